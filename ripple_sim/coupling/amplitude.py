@@ -155,7 +155,9 @@ class AmplitudeCheck:
     def waves_changed(self, geom: int, waves: WaveSolver) -> None:
         """Go on with the new waves of a geom."""
         if geom in self._watched:
-            self._watched[geom].go_on_with(waves)
+            self._watched[geom].look()  # a last time at the old ones
+            self._watched[geom].waves = waves
+            waves.crests()
 
     def flush(self) -> None:
         """Look at the heights a last time, and warn of all that has been seen: the waves are about to end."""
@@ -224,12 +226,6 @@ class _Watch:
         if self.excess > 1:
             self._looks += 1
         return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED)
-
-    def go_on_with(self, waves: WaveSolver) -> None:
-        """Take new waves on the same surface in place of the old ones, which are looked at a last time."""
-        self.look()
-        self.waves = waves
-        waves.crests()
 
     def _measure(self, crests: NDArray[np.float32], height: NDArray[np.float32]) -> float:
         if self._scales is None:

@@ -83,7 +83,8 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         raise SceneError(f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}")
     found = _find(spec, geom)
     if found.meshname and route == "auto":
-        route = "sdf" if is_closed(spec, found) else "flex"
+        model = _compiled(spec, found)
+        route = "sdf" if target_mesh(model, model.geom(found.name).id).closed else "flex"
     # what can fail comes first: then nothing has been changed
     core = flex_core(spec, found) if found.meshname and route == "flex" else None
     parts = convex_parts_of(spec, found) if found.meshname and route == "convex" else None
@@ -96,20 +97,14 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     if not (found.contype or found.conaffinity):
         found.contype = found.conaffinity = 1
     if found.meshname and route == "sdf":
-        spec.option.sdf_initpoints = _initpoints(spec, found)
+        others = (each for each in spec.geoms if each.name != found.name and (each.contype or each.conaffinity))
+        choose, count = (max, _MESH_INITPOINTS) if any(each.meshname for each in others) else (min, SDF_INITPOINTS)
+        spec.option.sdf_initpoints = choose(spec.option.sdf_initpoints, count)
     if core is not None:
         add_flex_collider(spec, found, core)
     if parts is not None:
         add_convex_collider(spec, found, parts)
     return found
-
-
-def _initpoints(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> int:
-    """Starting points for a geom of type sdf among the others of its specification."""
-    others = (each for each in spec.geoms if each.name != geom.name and (each.contype or each.conaffinity))
-    if any(each.meshname for each in others):
-        return max(spec.option.sdf_initpoints, _MESH_INITPOINTS)
-    return min(spec.option.sdf_initpoints, SDF_INITPOINTS)
 
 
 def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
@@ -197,12 +192,6 @@ def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
     return dataclasses.replace(mesh, V=model.geom_pos[index] + mesh.V @ rotation.reshape(3, 3).T)
 
 
-def is_closed(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
-    """Whether a geom's mesh has no rim; raises SceneError if the specification does not compile."""
-    model = _compiled(spec, geom)
-    return target_mesh(model, model.geom(geom.name).id).closed
-
-
 def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
     trial = spec.copy()
     # a signed distance would take long, and a flat mesh has no convex hull
@@ -241,7 +230,7 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
         spec.add_mesh(name=name, uservert=V.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
         geom.parent.add_geom(
             name=name,
-            type=mujoco.mjtGeom.mjGEOM_MESH,
+            type=_GEOM.mjGEOM_MESH,
             meshname=name,
             mass=0.0,
             group=_HIDDEN,
@@ -322,8 +311,7 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore)
         elem=F.ravel().astype(np.int32),
         radius=0.0,
         margin=geom.margin + thickness,
-        # MuJoCo's own viewer does not show this group
-        group=3,
+        group=_HIDDEN,
         **{name: getattr(geom, name) for name in _SETTINGS},
         **{name: np.array(getattr(geom, name)) for name in _LISTS},
     )
@@ -383,11 +371,8 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     outward = (1 + _ROUNDING) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
     length = np.maximum(np.linalg.norm(outward, axis=1), np.finfo(np.float64).tiny)
     outward /= length[:, None]
-    moved = np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * _thickness(V, F, -outward, 1e-3 * depth))
+    # to the other side, infinite where there is none
+    start = 1e-3 * depth
+    thickness: NDArray[Any] = start + RayScene(V, F).cast(V - start * outward, -outward)[1]
+    moved = np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * thickness)
     return V - moved[:, None] * outward
-
-
-def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:
-    """Distance from each vertex inwards to the other side of a mesh [m], [n]; infinite where there is none."""
-    distance: NDArray[Any] = RayScene(V, F).cast(V + start * inward, inward)[1]
-    return start + distance

@@ -105,14 +105,10 @@ def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None
         return _gap_warning(coupled, geom, atlas)
     if coupled.has_flex[geom]:
         return _flex_warning(coupled, geom)
-    if _collides_as_hull(coupled.model, geom):
+    collides = coupled.model.geom_contype[geom] or coupled.model.geom_conaffinity[geom]
+    if collides and coupled.model.geom_type[geom] == _GEOM.mjGEOM_MESH:
         return _hull_warning(coupled.names[geom], atlas)
     return _distance_warning(coupled, geom)
-
-
-def _collides_as_hull(model: mujoco.MjModel, geom: int) -> bool:
-    collides = model.geom_contype[geom] or model.geom_conaffinity[geom]
-    return bool(collides) and int(model.geom_type[geom]) == int(_GEOM.mjGEOM_MESH)
 
 
 def _touch_warning(coupled: CoupledModel, geom: int) -> str:

@@ -46,6 +46,11 @@ class Contacts(NamedTuple):
         """Some of the contacts."""
         return Contacts(self.others[which], self.points[which], self.forces[which], self.normals[which])
 
+    def by_other(self) -> list[Contacts]:
+        """The contacts with each geom."""
+        starts = first_rows(self.others).tolist()
+        return [self.rows(slice(a, b)) for a, b in zip(starts, [*starts[1:], None], strict=True)]
+
     @classmethod
     def together(cls, parts: Sequence[Contacts]) -> Contacts:
         """Several on one target, sorted by what touches it."""
@@ -251,12 +256,7 @@ def adhesion(model: mujoco.MjModel, data: mujoco.MjData) -> Floats | None:
 
 
 class ColliderIds:
-    """Collider ids of the two sides of every contact, see `CoupledModel`.
-
-    Parameters
-    ----------
-    coupled : CoupledModel
-    """
+    """Collider ids of the two sides of every contact, see `CoupledModel`."""
 
     def __init__(self, coupled: CoupledModel) -> None:
         self._model = model = coupled.model

@@ -37,10 +37,6 @@ class BodyEnergy:
     MuJoCo's semi-implicit steps leave velocities half a step behind positions. The potential is taken half a step back:
     under uniform gravity the sum is then constant to round-off, while that of `mujoco.mj_energyPos` and `mj_energyVel`
     differs on the way up from that on the way down. With the integrator RK4 both are of the same time already.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -75,10 +71,6 @@ class VelocityChange:
 
     MuJoCo's integrators are implicit in joint damping, and some in the gyroscopic terms of what spins: velocities then
     change by another mass matrix than accelerations tell, and forces that are taken back would leave a rest behind.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:

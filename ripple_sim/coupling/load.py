@@ -67,10 +67,6 @@ class SleepingContacts:
 
     A sleeping body's contacts stay where they were, with their mean force over the steps before it fell asleep, until
     one of the two wakes.
-
-    Parameters
-    ----------
-    coupled : CoupledModel
     """
 
     def __init__(self, coupled: CoupledModel) -> None:
@@ -80,12 +76,14 @@ class SleepingContacts:
 
     def add(self, data: mujoco.MjData, contacts: Mapping[int, Contacts]) -> dict[int, Contacts]:
         """Contacts of each target, by geom id, with those of sleeping bodies."""
-        present = {(target, int(pair.others[0])): pair for target, each in contacts.items() for pair in _by_other(each)}
+        present = {(target, int(pair.others[0])): pair for target, each in contacts.items() for pair in each.by_other()}
         found = dict(contacts)
         for key, (pair, sums) in list(self._pairs.items()):
             if key in present:
                 continue
-            if self._sleeps(data, *key):
+            # neither is awake: each sleeps or is static; vertices between bodies never sleep
+            bodies = self._coupled.bodies[list(key)]
+            if (bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all():
                 mean = pair._replace(forces=pair.forces * (sum(sums) / len(sums) / pair.forces.sum()))
                 found[key[0]] = Contacts.together([*([found[key[0]]] if key[0] in found else []), mean])
             else:
@@ -97,17 +95,6 @@ class SleepingContacts:
             sums.append(float(pair.forces.sum()))
             self._pairs[key] = pair, sums
         return found
-
-    def _sleeps(self, data: mujoco.MjData, target: int, other: int) -> bool:
-        """Whether neither of a pair is awake: each sleeps or is static. Vertices between bodies never sleep."""
-        bodies = self._coupled.bodies[[target, other]]
-        return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
-
-
-def _by_other(contacts: Contacts) -> list[Contacts]:
-    """The contacts with each geom."""
-    starts = first_rows(contacts.others).tolist()
-    return [contacts.rows(slice(a, b)) for a, b in zip(starts, [*starts[1:], None], strict=True)]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -214,8 +201,12 @@ class StepContacts(NamedTuple):
             weighted = np.add.reduceat(forces[:, None] * places, first)
             forces, others, inner = np.add.reduceat(forces, first), others[first], inner[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
-        elif (apart := self._touch_apart()).any():
-            whose, middles, forces = self._corners()
+        # what is wedged touches in several places, and not in their middle
+        elif (apart := ((places - self.on_texels.middles) ** 2).sum(axis=1) > self.on_texels.place_radii**2).any():
+            ends = np.append(self.starts[1:], len(self.contacts.forces))
+            points = (self.contacts.points - self.position) @ self.rotation
+            rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
+            whose, middles, forces = corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
             kept = np.concatenate([(~apart).nonzero()[0], apart[whose].nonzero()[0] + len(apart)])
             whose = np.concatenate([np.arange(len(apart)), whose])[kept]
             forces = np.concatenate([self.forces, forces])[kept]
@@ -226,18 +217,6 @@ class StepContacts(NamedTuple):
         for other, point, force, texel, behind in rows:
             row = texel // n
             yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
-
-    def _touch_apart(self) -> Bools:
-        """Whether each collider touches in several places, and not in their middle: as what is wedged does."""
-        away = self.places - self.on_texels.middles
-        return np.asarray((away**2).sum(axis=1) > self.on_texels.place_radii**2)
-
-    def _corners(self) -> tuple[Ints, Floats, Floats]:
-        """Places where each collider touches: its row, points in the target's frame [m], and forces [N]."""
-        ends = np.append(self.starts[1:], len(self.contacts.forces))
-        points = (self.contacts.points - self.position) @ self.rotation
-        rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
-        return corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""
@@ -307,7 +286,10 @@ class TargetLoad:
         forces = np.add.reduceat(contacts.forces, starts)
         middles = np.add.reduceat(contacts.forces[:, None] * points, starts) / forces[:, None]
         places, at = nearest_places(surface, middles)
-        inner = self._from_inside(contacts, starts, rotation, at)
+        inner = np.zeros(len(starts), dtype=np.bool_)
+        if self._is_open:
+            pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
+            inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
         loads = load_points(
             points, contacts.forces, starts, self._radii[geoms], self._convex[geoms],
             lambda probes: nearest_places(surface, probes)[0],
@@ -329,13 +311,6 @@ class TargetLoad:
     def untouched(self, elapsed: float) -> Load:
         """Load over a time [s] in which no geom touches."""
         return self._filter(NO_FORCES, elapsed)
-
-    def _from_inside(self, contacts: Contacts, starts: Ints, rotation: Floats, texels: Ints) -> Bools:
-        """Whether each geom touches an open surface from inside, [p]; `texels` are those at their middles."""
-        if not self._is_open:
-            return np.zeros(len(starts), dtype=np.bool_)
-        pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
-        return np.asarray((pushes * self._atlas.texels.grid.normals[texels]).sum(axis=1) < 0)
 
 
 def time_constant(coupled: CoupledModel, target: int) -> float:
@@ -395,7 +370,12 @@ class ContactLoads:
         self._timestep = self._coupled.model.opt.timestep
         contacts = self._contacts.read(data)
         if self._coupled.model.opt.enableflags & SLEEP:
-            contacts = self._with_sleeping(data, contacts)
+            if self._sleeping is None:
+                # bodies that sleep already never touched before our eyes
+                self._sleeping, resting = SleepingContacts(self._coupled), at_rest(self._coupled.model, data)
+                if resting is not None:
+                    self._sleeping.add(data, self._contacts.read(resting))
+            contacts = self._sleeping.add(data, contacts)
         for geom, target in self._targets.items():
             if geom in contacts:
                 target.follow(self._waves[geom].atlas)
@@ -405,14 +385,6 @@ class ContactLoads:
             else:
                 loads[geom] = target.untouched(elapsed)
         return loads
-
-    def _with_sleeping(self, data: mujoco.MjData, contacts: Mapping[int, Contacts]) -> dict[int, Contacts]:
-        if self._sleeping is None:
-            # bodies that sleep already never touched before our eyes
-            self._sleeping, resting = SleepingContacts(self._coupled), at_rest(self._coupled.model, data)
-            if resting is not None:
-                self._sleeping.add(data, self._contacts.read(resting))
-        return self._sleeping.add(data, contacts)
 
     @property
     def impulses(self) -> list[Impulse]:

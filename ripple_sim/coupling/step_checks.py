@@ -162,10 +162,6 @@ class SolverBalance:
     inertia of the whole model. Among very heavy bodies light ones may then be far from where their contact forces would
     take them: M a is not the sum of all forces. What is missing, over the contact forces, is the share by which the
     impulses given to a target are wrong. A warning is given once for each target.
-
-    Parameters
-    ----------
-    coupled : CoupledModel
     """
 
     def __init__(self, coupled: CoupledModel) -> None:

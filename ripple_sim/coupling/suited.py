@@ -106,8 +106,8 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     if not material.unset:
         return material
     burden = _burden(coupled, geom, extent)
-    speed = _speed(coupled.model, extent) if "speed" in material.unset else _greatest(material.speed)
-    density = _density(coupled.model, geom, extent)
+    speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
+    density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
     if "stiffness" in material.unset:
         stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
     else:
@@ -146,7 +146,7 @@ def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, mat
         "speed": speed,
         "damping": damping_for(_DECAY),
         "stiffness": min(narrow_stiffness(extent.size, speed), _stiffest(model)),
-        "density": float(np.clip((mass if mass > 0 else _DENSITY * extent.volume) / extent.area, 1e-12, 1e12)),
+        "density": float(np.clip(_density(mass, extent), 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
@@ -203,8 +203,7 @@ def _stiffest(model: mujoco.MjModel) -> float:
     return float(min((_STIFFEST / model.opt.timestep) ** 2, 1e12))
 
 
-def _density(model: mujoco.MjModel, geom: int, extent: Extent) -> float:
-    mass = float(model.body_mass[model.geom_bodyid[geom]])
+def _density(mass: float, extent: Extent) -> float:
     return (mass if mass > 0 else _DENSITY * extent.volume) / extent.area
 
 
@@ -257,10 +256,6 @@ def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
     other = int(reduced.argmax())
     radii = coupled.footprint_radii
     return float(reduced[other]), float(min(radii[geom], radii[other]))
-
-
-def _greatest(coefficient: object) -> float:
-    return float(np.max(np.asarray(coefficient, dtype=np.float64)))
 
 
 LEAST, USUAL, MOST = 32, 96, 256

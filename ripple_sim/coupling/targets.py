@@ -23,7 +23,7 @@ from .target_mesh import target_atlas
 
 
 class Target:
-    """A geom that ripples.
+    """A geom that ripples: its waves, and what they are made of.
 
     Parameters
     ----------
@@ -39,6 +39,8 @@ class Target:
     Attributes
     ----------
     geom : int
+    held : float64 [C, n, n] or None
+        Shares of the texels that are held still.
     waves : WaveSolver
         A new one after each change, in the state of the old one.
     """
@@ -46,44 +48,10 @@ class Target:
     def __init__(
         self, model: mujoco.MjModel, geom: int, atlas: Atlas, material: Material, options: Mapping[str, Any]
     ) -> None:
-        self.geom = geom
-        self._model, self._material, self._options = model, material, dict(options)
-        self._held: NDArray[np.float64] | None = None
+        self.geom, self.material = geom, material
+        self._model, self._options = model, dict(options)
+        self.held: NDArray[np.float64] | None = None
         self.waves = WaveSolver(atlas, material, **options)
-
-    def change_material(self, **coefficients: Any) -> None:
-        """Change coefficients of the material, by their names in `Material`.
-
-        Raises
-        ------
-        SolverError
-            For an unknown or invalid coefficient; the old ones stay.
-        """
-        names = [field.name for field in dataclasses.fields(Material)]
-        for name in coefficients:
-            if name not in names:
-                raise SolverError(f"a material has no coefficient {name!r}; valid are {', '.join(names)}")
-        self._rebuild(dataclasses.replace(self._material, **coefficients), self._held, self._options)
-
-    def change_operator(self, operator: str) -> None:
-        """Change the wave operator, by its name in `WaveSolver`."""
-        self._rebuild(self._material, self._held, {**self._options, "operator": operator})
-
-    def make_rigid(self, point: ArrayLike, radius: float) -> None:
-        """Hold a disc still, of a radius [m] round a point [m] in the body's frame; waves bounce off its rim."""
-        disc = np.zeros(self.waves.atlas.areas.shape)
-        disc.reshape(-1)[footprint(self.waves.atlas, self.to_geom(point), radius).texels] = 1.0
-        self.hold(disc)
-
-    def hold(self, region: ArrayLike) -> None:
-        """Hold a region still, bool or shares from 0 to 1, [C, n, n], beside those held already; see `hold`."""
-        try:
-            held = np.asarray(region, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise SolverError(f"region is {region!r}; valid are numbers from 0 to 1, one for each texel") from error
-        if self._held is not None and held.shape == self._held.shape:
-            held = np.maximum(held, self._held)
-        self._rebuild(self._material, held, self._options)
 
     def to_geom(self, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of the geom's body to that of the geom; what is soft is in the world."""
@@ -94,16 +62,14 @@ class Target:
         places = check_points(point) - self._model.geom_pos[self.geom]
         return (places @ rotation.reshape(3, 3)).reshape(np.shape(point))
 
-    def _rebuild(self, material: Material, held: NDArray[np.float64] | None, options: dict[str, Any]) -> None:
+    def rebuild(self, material: Material, held: NDArray[np.float64] | None, **options: Any) -> None:
         """Make a new solver in the old one's state; if that fails, nothing has changed."""
-        old, held_material = self.waves, material
-        if held is not None:
-            held_material = hold(old.rest, material, held)
-        new = WaveSolver(old.rest, held_material, **options)
+        old, options = self.waves, {**self._options, **options}
+        new = WaveSolver(old.rest, material if held is None else hold(old.rest, material, held), **options)
         if old.vertices is not None:
             new.move(old.vertices)
         new.state = old.state
-        self.waves, self._material, self._held, self._options = new, material, held, options
+        self.waves, self.material, self.held, self._options = new, material, held, options
 
 
 class Targets:
@@ -174,7 +140,12 @@ class Targets:
         SolverError
             For an unknown or invalid coefficient.
         """
-        self._target(name).change_material(**coefficients)
+        target = self._target(name)
+        names = [field.name for field in dataclasses.fields(Material)]
+        for each in coefficients:
+            if each not in names:
+                raise SolverError(f"a material has no coefficient {each!r}; valid are {', '.join(names)}")
+        target.rebuild(dataclasses.replace(target.material, **coefficients), target.held)
         self._waves_changed(name)
 
     def poke(self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0) -> Footprint:
@@ -218,8 +189,10 @@ class Targets:
         radius : float
             Along the surface [m].
         """
-        self._target(name).make_rigid(point, radius)
-        self._waves_changed(name)
+        target = self._target(name)
+        disc = np.zeros(target.waves.atlas.areas.shape)
+        disc.reshape(-1)[footprint(target.waves.atlas, target.to_geom(point), radius).texels] = 1.0
+        self.hold(name, disc)
 
     def hold(self, name: GeomKey, region: ArrayLike) -> None:
         """Hold a region of a geom's surface still, as `make_rigid` does with a disc.
@@ -236,7 +209,14 @@ class Targets:
         SolverError
             If the region has another shape, or numbers that are not from 0 to 1.
         """
-        self._target(name).hold(region)
+        target = self._target(name)
+        try:
+            held = np.asarray(region, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise SolverError(f"region is {region!r}; valid are numbers from 0 to 1, one for each texel") from error
+        if target.held is not None and held.shape == target.held.shape:
+            held = np.maximum(held, target.held)
+        target.rebuild(target.material, held)
         self._waves_changed(name)
 
     def change_operator(self, operator: str) -> None:
@@ -248,7 +228,7 @@ class Targets:
             For an unknown operator.
         """
         for name, target in self._targets.items():
-            target.change_operator(operator)
+            target.rebuild(target.material, target.held, operator=operator)
             self._waves_changed(name)
 
     def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
@@ -271,5 +251,4 @@ class Targets:
 
     def _waves_changed(self, name: GeomKey) -> None:
         """Hand a target's new waves to everybody."""
-        target = self._target(name)
-        self._waves[target.geom] = target.waves
+        self._waves[self._target(name).geom] = self[name]

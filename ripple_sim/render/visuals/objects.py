@@ -106,10 +106,6 @@ class ObjectTable:
 class Assets:
     """What all visuals of a model share on the GPU: its textures, each uploaded at its first use, and a table.
 
-    Parameters
-    ----------
-    model : mujoco.MjModel
-
     Attributes
     ----------
     objects : ObjectTable
