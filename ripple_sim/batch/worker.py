@@ -24,10 +24,9 @@ from ripple_sim.solver.files import atomic_write
 from ripple_sim.video.render_video import render_video
 from ripple_sim.video.settings import frame_count, settled
 
-from .finished import FACTS, TIMES, FinishedScene, facts_hash
+from .finished import FACTS, TIMES, FinishedScene, FrameRecord, facts_hash
 from .folder import BatchFolder, clear, load_plan
 from .plan import Plan, StoreEntry, options_of, video_name
-from .records import FrameRecord
 from .variation import Variation
 
 _SIZE = 160  # its longer edge [pixels]
