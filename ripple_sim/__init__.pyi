@@ -4,10 +4,9 @@ from .batch.run import RunOptions as RunOptions, run_batch as run_batch
 from .coupling.colliders import make_collidable as make_collidable
 from .coupling.ripples import Impulse as Impulse, Ripples as Ripples
 from .errors import RippleWarning as RippleWarning
-from .export.exporter import Exporter as Exporter
+from .export.exporter import Exporter as Exporter, export_scene as export_scene
 from .export.options import ExportOptions as ExportOptions
 from .export.renderer import RippleRenderer as RippleRenderer
-from .export.scene import export_scene as export_scene
 from .figures.atlas_plot import plot_atlas as plot_atlas
 from .render import Camera as Camera
 from .scene.drop import drop_scene as drop_scene

@@ -8,6 +8,7 @@ import fcntl
 import hashlib
 import io
 import shutil
+import zipfile
 from collections.abc import Container, Iterator
 from pathlib import Path
 from tarfile import TarInfo
@@ -25,8 +26,11 @@ from ripple_sim.export.tables import COLUMNS
 from ripple_sim.solver.files import atomic_write
 
 from .folder import BatchFolder, member_name, members, times_of, write_tar
-from .records import HEIGHTS, IMPULSES, POSITIONS, read_heights
 
+# An array `height_TARGET` a target, [frames, C, n, n] float32, in metres, a frame a chunk.
+HEIGHTS = "heights.zarr.zip"
+
+IMPULSES, POSITIONS = "impulses.csv", "qpos.npy"
 FACTS, TIMES = "scene.json", "times.json"
 
 
@@ -99,8 +103,14 @@ class FinishedScene:
 
     def heights(self) -> dict[str, NDArray[np.float32]]:
         """The height of each target at every frame [m], [frames, C, n, n]."""
+        import zarr
+        from zarr.buffer import cpu
+
         with self._reported():
-            return read_heights(self.read(HEIGHTS))
+            with zipfile.ZipFile(io.BytesIO(self.read(HEIGHTS))) as file:
+                stored = {name: cpu.Buffer.from_bytes(file.read(name)) for name in file.namelist()}
+            group = zarr.open_group(zarr.storage.MemoryStore(stored), mode="r", zarr_format=2)
+            return {str(array.attrs["target"]): array[...] for name, array in group.arrays() if name != "time"}
 
     def impulses(self) -> NDArray:
         """The impulses, a structured array: frame, time, geom, other, x, y, z, impulse, chart, row, column, inner."""

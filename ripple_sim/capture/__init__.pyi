@@ -1,11 +1,12 @@
 from .frame_source import (
     FrameSource as FrameSource,
     Sensor as Sensor,
+    Sighting as Sighting,
     focal_distance as focal_distance,
+    passes_of as passes_of,
     surface_of as surface_of,
     viewpoint as viewpoint,
 )
-from .passes import Sighting as Sighting, passes_of as passes_of
 from .snapshot import (
     ShutterTimes as ShutterTimes,
     Snapshot as Snapshot,

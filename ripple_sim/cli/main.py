@@ -22,9 +22,8 @@ import tyro.conf
 import tyro.extras
 from tyro.conf import Positional, arg
 
-from .batch import BatchCommand
 from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
-from .reports import AtlasCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
+from .reports import AtlasCommand, BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2

@@ -84,8 +84,8 @@ class ExportCommand(ExportOptions):
         check_options(options)  # before anything that takes time
         check_export(self.output, options.overwrite)
 
+        from ripple_sim.export.exporter import export_scene
         from ripple_sim.export.place import frame_count
-        from ripple_sim.export.scene import export_scene
         from ripple_sim.scene.scene import through_camera
 
         scene = find_scene(self.scene, seed=self.seed)

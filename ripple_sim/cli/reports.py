@@ -1,26 +1,32 @@
-"""Commands that print a report: `atlas`, `bench`, `cache`, `info` and `materials`.
+"""Commands that print a report, `atlas`, `bench`, `cache`, `info` and `materials`, and `batch`, which ends with one.
 
-That of an atlas tells of the mesh, what was done to it, the quality of the atlas, and the time of each stage.
+That of an atlas tells of the mesh, what was done to it, the quality of the atlas, and the time of each stage. A batch
+shows how far it is by a bar on a terminal, and by a line a minute in a log.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json as json_format
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, TextColumn
 from tyro.conf import Positional, arg
 
-from .arguments import Count, LayoutName, UpAxis
+from .arguments import Count, Gigabytes, LayoutName, Limit, Shard, UpAxis
 
 if TYPE_CHECKING:
+    from ripple_sim.batch.plan import Plan
+    from ripple_sim.batch.run import Progress
     from ripple_sim.solver import Atlas
 
 
@@ -282,3 +288,121 @@ class MaterialsCommand:
             print(f"{'':{width}}  {row['law']}: {parameters}")
             print(f"{'':{width}}  holds: {row['valid']}")
             print(f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BatchCommand:
+    """Make many scenes by one plan, each varied by its own seed."""
+
+    plan: Annotated[Positional[Path], arg(metavar="PLAN|DIR")]
+    """The plan (TOML), or the folder of a batch to go on with."""
+    output: Annotated[Path | None, arg(aliases=["-o"], metavar="DIR", help_behavior_hint="(needed with a plan)")] = None
+    """Folder of the batch. Run again, it makes what is not there yet."""
+    workers: Limit = None
+    """Processes that make scenes; by default one for every two cores, at least two."""
+    shard: Shard = None
+    """Make a part of the scenes only, for several machines."""
+    dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="(optional)")] = None
+    """Address of a Dask scheduler whose workers make the scenes (needs Dask); they share the folder."""
+    limit: Limit = None
+    """Make at most so many scenes in this run."""
+    keep_free: Gigabytes = 1.0
+    """Stop when the disk has no more room than this."""
+    status: bool = False
+    """Tell how far the batch is, and make nothing."""
+    retry_failed: bool = False
+    """Try the scenes again that were put aside."""
+    dry_run: bool = False
+    """Make one scene for a trial, and tell the first scenes' values, the time and the room that all will take."""
+
+    def run(self) -> None:
+        """Do what is asked for."""
+        from ripple_sim.batch.report import parquet
+
+        plan, folder = self._plan_and_folder()
+        parquet()  # before anything that takes time
+        if self.status:
+            from ripple_sim.batch.report import status_text
+
+            print(status_text(folder))
+        elif self.dry_run:
+            from ripple_sim.batch.report import trial_text
+
+            print(trial_text(plan, folder, self.workers))
+        else:
+            self._make(plan, folder)
+
+    def _plan_and_folder(self) -> tuple[Plan | None, Path]:
+        from ripple_sim.errors import BatchError
+
+        if self.plan.is_dir():
+            if self.output is not None:
+                raise BatchError(f"{self.plan} is the folder of a batch: leave -o out, or name a plan")
+            return None, self.plan
+        from ripple_sim.batch.plan import read_plan
+
+        plan = read_plan(self.plan)
+        if self.output is None and not self.dry_run:
+            raise BatchError("a plan needs a folder for its scenes: add -o DIR")
+        return plan, self.output or self.plan.with_suffix("")
+
+    def _make(self, plan: Plan | None, folder: Path) -> None:
+        from ripple_sim.batch.report import status_text
+        from ripple_sim.batch.run import RunOptions, run_batch
+
+        options = RunOptions(
+            workers=self.workers,
+            shard=self.shard or (1, 1),
+            limit=self.limit,
+            dask=self.dask,
+            retry_failed=self.retry_failed,
+            keep_free=self.keep_free * 1e9,
+        )
+        with batch_progress() as progress:
+            run_batch(plan, folder, options, progress=progress)
+        print(status_text(folder))
+
+
+_BETWEEN = 60.0  # lines in a log [s]
+
+
+def progress_text(progress: Progress) -> str:
+    """Frames, rate, time left, failures, room taken and left on the disk, in a line."""
+    left = progress.scenes - progress.finished - progress.aside
+    parts = [f"{progress.frames} frames"]
+    if progress.made and progress.seconds:
+        rate = progress.made / progress.seconds
+        parts += [f"{3600 * rate:.0f} scenes/h", f"{duration_text(left / rate)} left"]
+    if progress.failures or progress.aside:
+        parts.append(f"{progress.failures} failed, {progress.aside} put aside")
+    return ", ".join([*parts, f"{progress.bytes / 1e9:.2f} GB written", f"{progress.free / 1e9:.1f} GB free"])
+
+
+def duration_text(seconds: float) -> str:
+    """A time in seconds, minutes and hours."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+
+
+@contextlib.contextmanager
+def batch_progress() -> Iterator[Callable[[Progress], None]]:
+    """Yield a function that shows a batch's progress on stderr."""
+    if not sys.stderr.isatty():
+        told = time.monotonic()
+
+        def log(progress: Progress) -> None:
+            nonlocal told
+            if time.monotonic() - told >= _BETWEEN:
+                told = time.monotonic()
+                done = progress.finished + progress.aside
+                print(f"{done} of {progress.scenes} scenes, {progress_text(progress)}", file=sys.stderr, flush=True)
+
+        yield log
+        return
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("scenes, {task.description}"))
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task("", total=None)
+        yield lambda now: bars.update(
+            task, total=now.scenes, completed=now.finished + now.aside, description=progress_text(now)
+        )

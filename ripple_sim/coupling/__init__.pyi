@@ -13,7 +13,6 @@ from .contacts import (
     places_facing as places_facing,
 )
 from .energy import Energy as Energy, VelocityChange as VelocityChange
-from .flex_contacts import FlexContacts as FlexContacts
 from .geoms import (
     TARGET_TYPES as TARGET_TYPES,
     ByGeom as ByGeom,
@@ -32,6 +31,7 @@ from .geoms import (
 from .load import ContactLoads as ContactLoads, StepContacts as StepContacts, TargetLoad as TargetLoad
 from .model import (
     CoupledModel as CoupledModel,
+    FlexContacts as FlexContacts,
     find_flex_colliders as find_flex_colliders,
     flex_thickness as flex_thickness,
 )

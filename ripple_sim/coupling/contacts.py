@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
-from .flex_contacts import FlexContacts
-from .model import CoupledModel
+from .model import CoupledModel, FlexContacts
 from .step_checks import SolverBalance
 from .target_mesh import target_mesh
 

@@ -1,14 +1,23 @@
-"""The energy of bodies and waves together, as their schemes conserve it, and MuJoCo's own scheme for new forces."""
+"""The energy of bodies and waves together, and the contact problem, solved again so that this energy does not rise.
+
+Surfaces give way in the problem: each row of MuJoCo's constraint solver gets the gap, the velocity and the mobility of
+the surfaces that it presses on. A pair pays in what its contacts take from the motion of body and surface, and gets
+back no more than that. Forces that would take more are lessened (a passivity observer and controller: Hannaford and
+Ryu, 2002). What new forces change in velocities is told as MuJoCo's own scheme has it.
+"""
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from ripple_sim.solver.kernel import Floats
+
+from .contacts import adhesion, is_pyramidal
 
 
 class Energy(NamedTuple):
@@ -63,7 +72,7 @@ class BodyEnergy:
 
 _INTEGRATORS = mujoco.mjtIntegrator
 # Rounds in which the velocity at the beginning of a step is found from that at its end.
-_ROUNDS = 3
+_START_ROUNDS = 3
 
 
 class VelocityChange:
@@ -113,9 +122,259 @@ class VelocityChange:
 
         start = data.qvel if pending else self._latest if self._latest is not None else data.qvel - dt * qacc
         old = end(start, qacc, force)
-        for _ in range(0 if pending else _ROUNDS):
+        for _ in range(0 if pending else _START_ROUNDS):
             if np.array_equal(old, data.qvel):
                 break
             start = start + data.qvel - old
             old = end(start, qacc, force)
         return end(start, data.qacc, data.qfrc_constraint) - old
+
+
+# MuJoCo keeps impedances this far from 0 and 1, and takes narrower ranges for none.
+_LEAST_IMPEDANCE, _NARROW = 1e-4, 1e-15
+# Rounds in which contacts that share a footprint find their forces, and the share of a force that may be left.
+_ROUNDS, _LEFT = 8, 1e-4
+# Rounds in which pairs that cannot afford their forces get a share of them, after the first a little less than they can
+# afford, and in the last one the least.
+_ATTEMPTS, _LESS, _LEAST_SHARE = 6, 0.95, 1e-9
+# A difference of work that round-off makes, as a share of it.
+_ROUND_OFF = 1e-6
+# Acceleration that the rows of an open contact aim at: any is greater, so that they do not push.
+_OPEN = -1e10
+
+# Of a target, and of what touches it.
+Key = tuple[int, int]
+
+
+class Pair(NamedTuple):
+    """A target and what touches it: what the contact problem has to know of the surface there.
+
+    Attributes
+    ----------
+    key : tuple of int
+        Target and other.
+    height : float
+        Of the surface [m].
+    held : float
+        Force of the last step [N].
+    start, free, mobility : float
+        Velocity of the surface at the beginning of the step, and at its end under the force of the last step [m/s]; and
+        what a unit force adds to it, over the step [1/kg].
+    mean, mean_mobility : float
+        The last two for the mean velocity over the step.
+    """
+
+    key: Key
+    height: float
+    held: float
+    start: float
+    free: float
+    mobility: float
+    mean: float
+    mean_mobility: float
+
+    @property
+    def purse(self) -> Key:
+        """Who pays: the same for the two pairs of two targets that touch each other."""
+        return min(self.key), max(self.key)
+
+
+class _Contact(NamedTuple):
+    """A contact: which of MuJoCo's, its rows that carry the normal force, all its rows, and its pairs, one a target."""
+
+    which: int
+    rows: slice
+    whole: slice
+    pairs: Sequence[Pair]
+
+
+class ContactProblem:
+    """MuJoCo's rows with gaps and velocities counted from surfaces that move as under the last force.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    data : mujoco.MjData
+        With the contacts of the step; gets the forces that are found.
+    pairs_at : mapping
+        MuJoCo's index of each contact to the pairs that it belongs to.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, pairs_at: Mapping[int, Sequence[Pair]]) -> None:
+        self._model, self._data, self._dt = model, data, model.opt.timestep
+        contact, pulls = data.contact, adhesion(model, data)
+        self._pulls = np.zeros(data.ncon) if pulls is None else pulls
+        self._pairs = {pair.key: pair for mine in pairs_at.values() for pair in mine}
+        self._contacts, rows_of = [], dict.fromkeys(self._pairs, 0)
+        for i, mine in pairs_at.items():
+            first, dim = int(contact.efc_address[i]), int(contact.dim[i])
+            count = 2 * (dim - 1) if is_pyramidal(model) and dim > 1 else 1
+            rows = slice(first, first + count)
+            self._contacts.append(_Contact(i, rows, rows if count > 1 else slice(first, first + dim), mine))
+            for pair in mine:
+                rows_of[pair.key] += count
+        # as they are without mobility, and what each row would add if all rows of its pairs bore alike [1/kg]
+        self._R, self._aref, self._mobility = data.efc_R.copy(), data.efc_aref.copy(), np.zeros(data.nefc)
+        # acceleration without contacts [m/s^2]
+        self._smooth = self._along(data.qacc_smooth)
+        for i, rows, whole, mine in self._contacts:
+            first = rows.start
+            gap = data.efc_pos[first] - data.efc_margin[first] - sum(pair.height for pair in mine)
+            stiffness, damping = data.efc_KBIP[first, :2]
+            part = impedance(contact.solimp[i], gap)
+            self._R[whole] *= data.efc_diagA[first] * (1 - part) / part / self._R[first]
+            self._mobility[rows] = sum(pair.mobility * rows_of[pair.key] for pair in mine)
+            if gap >= 0:
+                self._aref[rows] = _OPEN
+                continue
+            free = sum((pair.free - pair.start) / self._dt + pair.mobility * pair.held for pair in mine)
+            slip = data.efc_vel[rows] - sum(pair.start for pair in mine)
+            self._aref[rows] = free - damping * slip - stiffness * part * gap
+
+    def solve(self, paid: Mapping[Key, float]) -> dict[Key, float]:
+        """Force on each target in a pair [N], such as every pair can afford with what it has paid in [J]."""
+        data = self._data
+        soft, force = np.zeros(data.nefc), np.zeros(data.nefc)
+        for attempt in range(_ATTEMPTS):
+            self._set_compliance(self._R + self._mobility + soft)
+            force = self._shared(force)
+            shares = self._affordable(force, paid)
+            if not shares:
+                break
+            gained, total = self._along(data.qacc) - self._smooth, self._total(force)
+            for contact in self._contacts:
+                share = shares.get(contact.pairs[0].purse)
+                if share is None:
+                    continue
+                # with this much added to R, and all else as it is, a row bears that share of its force
+                share = max(share * (_LESS if attempt else 1), _LEAST_SHARE)
+                share = share if attempt < _ATTEMPTS - 2 else _LEAST_SHARE
+                rows = contact.rows
+                less = (1 - share) / share
+                yields = sum(pair.mobility * total[pair.key] for pair in contact.pairs)
+                lost = np.maximum(gained[rows] + yields, 0) / np.where(force[rows] > 0, force[rows], np.inf)
+                soft[rows] += less * (self._R[rows] + soft[rows] + lost)
+        return self._total(force)
+
+    def works(self) -> list[tuple[Pair, float, float]]:
+        """Of each pair the work that its contacts do on bodies [J], and the force on the surface [N]."""
+        force, work = self._data.efc_force, dict[Key, float]()
+        means = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
+        for contact, normal in zip(self._contacts, self._normal(force), strict=True):
+            along, whole = normal * self._dt * float(means[contact.rows].mean()), contact.whole
+            aside = self._dt * float(force[whole] @ means[whole]) - along
+            _add(work, contact.pairs[0].key, along + max(aside, 0.0))
+        total = self._total(force)
+        return [(pair, work.get(key, 0.0), total[key]) for key, pair in self._pairs.items()]
+
+    def _normal(self, force: Floats) -> list[float]:
+        """Normal force of each contact on its bodies, without what adhesion takes of it [N]."""
+        return [float(force[each.rows].sum() - self._pulls[each.which]) for each in self._contacts]
+
+    def _total(self, force: Floats) -> dict[Key, float]:
+        """Force on each target in a pair [N]."""
+        total: dict[Key, float] = {}
+        for contact, normal in zip(self._contacts, self._normal(force), strict=True):
+            for pair in contact.pairs:
+                _add(total, pair.key, normal)
+        return total
+
+    def _along(self, vector: Floats) -> Floats:
+        """Rows of the constraint Jacobian times a vector over the degrees of freedom."""
+        product = np.zeros(self._data.nefc)
+        mujoco.mj_mulJacVec(self._model, self._data, product, vector)
+        return product
+
+    def _set_compliance(self, R: Floats) -> None:
+        data, contact = self._data, self._data.contact
+        data.efc_R[:], data.efc_D[:] = R, 1 / R
+        if data.nisland:
+            # the solver takes `aref` from all rows, but these from the rows of islands
+            data.iefc_R[:], data.iefc_D[:] = data.efc_R[data.map_iefc2efc], data.efc_D[data.map_iefc2efc]
+        for i, rows, whole, _ in self._contacts:
+            if rows != whole:
+                # an elliptic cone: friction stays what it is
+                contact.mu[i] = contact.friction[i, 0] * np.sqrt(R[rows.start + 1] / R[rows.start])
+
+    def _shared(self, force: Floats) -> Floats:
+        """Forces of all rows, found from a guess by turns.
+
+        The rows of a pair move the surface together: each by the sum of their forces F, while MuJoCo's R is one number
+        a row. With n rows R has n times the mobility m, and the difference, m F - n m f, is that of the last round.
+        """
+        data = self._data
+        for _ in range(_ROUNDS):
+            total, aref = self._total(force), self._aref + self._mobility * force
+            for contact in self._contacts:
+                aref[contact.rows] -= sum(pair.mobility * total[pair.key] for pair in contact.pairs)
+            data.efc_aref[:] = aref
+            mujoco.mj_fwdConstraint(self._model, data)
+            last, force = force, data.efc_force.copy()
+            found, least = self._total(force), 0.0
+            left = 0.0
+            for contact in self._contacts:
+                for pair in contact.pairs:
+                    change = found[pair.key] - total[pair.key]
+                    rows = self._mobility[contact.rows] * (force[contact.rows] - last[contact.rows])
+                    left = max(left, float(np.abs(rows - pair.mobility * change).max()))
+                    least = max(least, pair.mobility * abs(found[pair.key]))
+            if left <= _LEFT * least:
+                break
+        return force
+
+    def _affordable(self, force: Floats, paid: Mapping[Key, float]) -> dict[Key, float]:
+        """Shares of their forces that pairs can afford, of those that cannot afford all.
+
+        The work of a share s of a force is linear s + square s^2: at first against what moves apart without it, and
+        then against what it has set in motion itself.
+        """
+        data, dt = self._data, self._dt
+        total, linear, square = self._total(force), dict[Key, float](), dict[Key, float]()
+        for pair in self._pairs.values():
+            given, added = total[pair.key], pair.mean_mobility * dt
+            _add(linear, pair.purse, -given * dt * (pair.mean + added * pair.held))
+            _add(square, pair.purse, given * dt * added * given)
+        gained = self._along(data.qacc) - self._smooth
+        for contact, normal in zip(self._contacts, self._normal(force), strict=True):
+            rows, whole, purse = contact.rows, contact.whole, contact.pairs[0].purse
+            at_first, later = data.efc_vel + dt / 2 * self._smooth, dt / 2 * gained
+            works = [normal * dt * float(each[rows].mean()) for each in (at_first, later)]
+            aside = [
+                dt * float(force[whole] @ each[whole]) - work
+                for each, work in zip((at_first, later), works, strict=True)
+            ]
+            if sum(aside) > 0:
+                # friction that drives must be paid for too
+                works = [work + more for work, more in zip(works, aside, strict=True)]
+            _add(linear, purse, works[0])
+            _add(square, purse, works[1])
+        return {
+            purse: share
+            for purse in linear
+            if (share := affordable_share(linear[purse], square[purse], paid.get(purse, 0.0))) < 1
+        }
+
+
+def affordable_share(linear: float, square: float, paid: float) -> float:
+    """The greatest share s up to 1 whose work, linear s + square s^2, is paid for [J]."""
+    if square <= 0 or linear + square <= paid + _ROUND_OFF * abs(linear):
+        return 1.0
+    return max(float(np.sqrt(max(linear**2 + 4 * square * paid, 0.0)) - linear) / (2 * square), 0.0)
+
+
+def _add(sums: dict[Key, float], key: Key, value: float) -> None:
+    sums[key] = sums.get(key, 0.0) + value
+
+
+def impedance(solimp: Iterable[float], gap: float) -> float:
+    """MuJoCo's impedance d of a contact, from its `solimp` [5] and gap [m]; see "solver parameters" in its manual."""
+    begin, end, width, middle, power = (float(each) for each in solimp)
+    begin, end, middle = (min(max(each, _LEAST_IMPEDANCE), 1 - _LEAST_IMPEDANCE) for each in (begin, end, middle))
+    if begin == end or width <= _NARROW:
+        return (begin + end) / 2
+    along, power = min(abs(gap) / width, 1.0), max(power, 1.0)
+    if along <= middle:
+        rise = along**power / middle ** (power - 1)
+    else:
+        rise = 1 - (1 - along) ** power / (1 - middle) ** (power - 1)
+    return begin + rise * (end - begin)

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
-from .contact_rows import ContactProblem, Key, Pair, affordable_share
 from .contacts import ColliderIds, pair_rows, places_facing, points_outside
-from .energy import VelocityChange
+from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
 from .load import Touch
 from .model import CoupledModel
 

@@ -26,10 +26,9 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.errors import ExportError, VideoError
-from ripple_sim.export.exporter import Exporter
+from ripple_sim.export.exporter import Exporter, scene_source
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.export.place import ending_of
-from ripple_sim.export.scene import scene_source
 from ripple_sim.export.source import Source
 from ripple_sim.export.visuals import mean_color
 from ripple_sim.render.passes.shadows import find_floor

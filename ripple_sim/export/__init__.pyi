@@ -1,4 +1,4 @@
-from .exporter import Exporter as Exporter
+from .exporter import Exporter as Exporter, export_scene as export_scene, scene_source as scene_source
 from .moving_mesh import MovingMesh as MovingMesh
 from .options import ExportOptions as ExportOptions
 from .page import (
@@ -14,7 +14,6 @@ from .place import (
     frame_count as frame_count,
 )
 from .renderer import RippleRenderer as RippleRenderer
-from .scene import export_scene as export_scene, scene_source as scene_source
 from .source import Source as Source
 from .tables import COLUMNS as COLUMNS, HEADER as HEADER, rows as rows
 from .usd import UsdWriter as UsdWriter

@@ -20,8 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.passes import Sighting, passes_of
+from ripple_sim.capture.frame_source import FrameSource, Sighting, passes_of
 from ripple_sim.capture.snapshot import Snapshot, snapshots
 from ripple_sim.coupling.geoms import geom_name
 from ripple_sim.coupling.stepping import adopt_warnings

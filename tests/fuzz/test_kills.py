@@ -28,7 +28,7 @@ JOBS = {
 }
 # a process is forked from one that has imported all, so that most moments lie in the work
 CONTEXT = multiprocessing.get_context("forkserver")
-LOADED = ["ripple_sim.cli.main", "ripple_sim.video.render_video", "ripple_sim.export.scene", "ripple_sim.batch.run"]
+LOADED = ["ripple_sim.cli.main", "ripple_sim.video.render_video", "ripple_sim.export.exporter", "ripple_sim.batch.run"]
 
 
 def ended(home: Path, words: str) -> None:
