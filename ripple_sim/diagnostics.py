@@ -50,7 +50,12 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[s
     if software is None:
         # a missing library explains the rest
         return list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
-    found = [*_device_problems(devices), *_nvidia_problems(devices)]
+    found = list(_device_problems(devices))
+    if (devices / "nvidia0").exists() and not any("nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]):
+        found.append(
+            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software: "
+            f"{_install_nvidia()}"
+        )
     if found or _render_nodes(devices) or any(devices.glob("nvidia[0-9]*")):
         return found
     return [
@@ -95,20 +100,15 @@ def _vendor_problems() -> Iterator[str]:
 def _device_problems(devices: Path) -> Iterator[str]:
     for node in _render_nodes(devices):
         if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
-            group = _group_of(node)
+            number = node.stat().st_gid
+            try:
+                group = grp.getgrgid(number).gr_name
+            except KeyError:
+                group = str(number)
             yield (
                 f"this user has no access to the GPU's render node {node}: "
                 f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add {group})"
             )
-
-
-def _nvidia_problems(devices: Path) -> Iterator[str]:
-    """An NVIDIA driver in the kernel without its EGL library beside it."""
-    if (devices / "nvidia0").exists() and not any("nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]):
-        yield (
-            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software: "
-            f"{_install_nvidia()}"
-        )
 
 
 def _install_nvidia() -> str:
@@ -137,14 +137,6 @@ def _library_of(file: Path) -> str | None:
 
 def _render_nodes(devices: Path) -> list[Path]:
     return sorted((devices / "dri").glob("renderD*"))
-
-
-def _group_of(path: Path) -> str:
-    number = path.stat().st_gid
-    try:
-        return grp.getgrgid(number).gr_name
-    except KeyError:
-        return str(number)
 
 
 PACKAGES = (

@@ -96,11 +96,8 @@ class Simulation:
             self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
             if not (entry.limit and entry.warn):
                 self.ripples.allow_any_height(entry.geom)
-        self._heights = {
-            entry.geom: entry.height.heights(self.ripples, entry.geom)
-            for entry in scene.targets
-            if entry.height is not None
-        }
+        shaped = {entry.geom: entry.height for entry in scene.targets if entry.height is not None}
+        self._heights = {geom: height.heights(self.ripples, geom) for geom, height in shaped.items()}
         self._raise_surfaces()
         self._materials = {name: self.ripples[name].material for name in self.ripples}
         self._script = Script(self.model, scene.events, list(self.ripples))
@@ -118,16 +115,8 @@ class Simulation:
         on_step: Callable[[Simulation], None] | None = None,
     ) -> Self:
         """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
-        return cls(
-            scene,
-            fps=options.rate,
-            resolution=options.resolution,
-            layout=options.layout,
-            rim=options.rim,
-            backend=options.backend,
-            operator=operator,
-            on_step=on_step,
-        )
+        given = {name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")}
+        return cls(scene, fps=options.rate, operator=operator, on_step=on_step, **given)
 
     @property
     def backend(self) -> str:

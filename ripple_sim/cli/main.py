@@ -96,9 +96,11 @@ def _fail(message: object, status: int, ending: BaseException | None = None) -> 
 
 
 def _say(message: str) -> None:
-    """Print a line on standard error."""
+    """Print a message on standard error, without line ends and long words, such as a name of thousands of letters."""
+    text = " ".join(re.sub(r"(\S{120})\S{80,}", r"\1...", message).split())
+    text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
     try:
-        print(f"ripple-sim: {_one_line(message)}", file=sys.stderr, flush=True)
+        print(f"ripple-sim: {text}", file=sys.stderr, flush=True)
     except OSError:  # standard error is full, or a closed pipe: nothing more goes there, not even at exit
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
 
@@ -112,12 +114,6 @@ def _open_standard_streams() -> None:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free, this one
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open("w" if number else "r"))  # noqa: SIM115
-
-
-def _one_line(message: str) -> str:
-    """A message without line ends and long words, such as a name of thousands of letters."""
-    text = " ".join(re.sub(r"(\S{120})\S{80,}", r"\1...", message).split())
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 def _parse(argv: list[str]) -> Any:

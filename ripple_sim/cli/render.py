@@ -85,15 +85,15 @@ class ExportCommand(ExportOptions):
         check_export(self.output, options.overwrite)
 
         from ripple_sim.export.exporter import export_scene
-        from ripple_sim.export.place import frame_count
         from ripple_sim.scene.scene import through_camera
+        from ripple_sim.video.settings import frame_count
 
         scene = find_scene(self.scene, seed=self.seed)
         for note in scene.notes:
             print(f"{Path(self.scene).name}: {note}", file=sys.stderr)
         if self.camera is not None:
             scene = through_camera(scene, self.camera)
-        with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
+        with frame_progress(f"export to {self.output}", frame_count(options, scene.duration)) as progress:
             summary = export_scene(scene, self.output, options, progress=progress)
         print(
             f"{summary.output}: {summary.frames} frames\n"

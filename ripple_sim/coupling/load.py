@@ -205,8 +205,8 @@ class StepContacts(NamedTuple):
         elif (apart := ((places - self.on_texels.middles) ** 2).sum(axis=1) > self.on_texels.place_radii**2).any():
             ends = np.append(self.starts[1:], len(self.contacts.forces))
             points = (self.contacts.points - self.position) @ self.rotation
-            rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
-            whose, middles, forces = corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
+            row = np.repeat(np.arange(len(self.starts)), ends - self.starts)
+            whose, middles, forces = corners(row, points, self.contacts.forces, 2 * self.on_texels.place_radii)
             kept = np.concatenate([(~apart).nonzero()[0], apart[whose].nonzero()[0] + len(apart)])
             whose = np.concatenate([np.arange(len(apart)), whose])[kept]
             forces = np.concatenate([self.forces, forces])[kept]
@@ -215,8 +215,8 @@ class StepContacts(NamedTuple):
         points = self.position + places @ self.rotation.T
         rows = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
         for other, point, force, texel, behind in rows:
-            row = texel // n
-            yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
+            chart = texel // n**2
+            yield Impulse(geom, names[other], point, force * timestep, (chart, texel // n % n, texel % n), behind)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""

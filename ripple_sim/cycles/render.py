@@ -235,7 +235,15 @@ def render_cycles(
         tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder,
     ):
         stage = Path(folder) / "stage.usdc"
-        settings = _export(scene, stage, options, frames)
+        simulation = Simulation.of(scene, options)
+        exported_as = ExportOptions(fps=options.fps or 1, slow_motion=options.slow_motion, size=options.size)
+        source = scene_source(scene, simulation, exported_as)
+        settings = blender_settings(source, simulation.data)
+        with Exporter.of(source, stage) as exporter:
+            for number in range(frames):
+                if number:
+                    simulation.advance_frame()
+                exporter.write(simulation.data, simulation.impulses)
         exported = time.perf_counter()
         told = {**settings, "stage": str(stage), "frames": frames, "samples": samples}
         for frame in frames_of_cycles(python, told, Path(folder)):
@@ -264,18 +272,3 @@ def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) ->
     except ExportError as error:
         raise VideoError(f"the renderer cycles reads USD: {error}") from error
     return python_with_bpy()
-
-
-def _export(scene: Scene, stage: Path, options: VideoOptions, frames: int) -> dict:
-    """Write the run, and return what Blender is told beside it."""
-    simulation = Simulation.of(scene, options)
-    exported = ExportOptions(fps=options.fps or 1, slow_motion=options.slow_motion, size=options.size)
-    source = scene_source(scene, simulation, exported)
-    with Exporter.of(source, stage) as exporter:
-        for number in range(frames):
-            if number:
-                simulation.advance_frame()
-            else:
-                settings = blender_settings(source, simulation.data)
-            exporter.write(simulation.data, simulation.impulses)
-    return settings

@@ -181,7 +181,10 @@ def check_output(
         if transparent and form not in _WITH_OPACITY:
             raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
         _check_size(form, width, height)
-        _check_fps(form, fps)
+        highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
+        if not isinstance(fps, int) or not 1 <= fps <= highest:
+            what = "a GIF's frame rate" if form == ".gif" else "frame rate"
+            raise VideoError(f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second")
         _check_place(path, form, overwrite)
     except OSError as error:
         kind = VideoError if error.errno in NO_NAME else EncodingError
@@ -212,13 +215,6 @@ def _check_size(form: str, width: int, height: int) -> None:
             f"frame size is {width}x{height}; {form} needs an even width and height, "
             f"such as {width + width % 2}x{height + height % 2}"
         )
-
-
-def _check_fps(form: str, fps: int) -> None:
-    highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
-    if not isinstance(fps, int) or not 1 <= fps <= highest:
-        what = "a GIF's frame rate" if form == ".gif" else "frame rate"
-        raise VideoError(f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second")
 
 
 def check_replaceable(path: Path, overwrite: bool) -> None:

@@ -22,10 +22,10 @@ from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import CameraEntry, check_camera
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
-from ripple_sim.video.settings import origin
+from ripple_sim.video.settings import frame_count, origin
 
 from .options import WRITE_OPTIONS, ExportOptions, WriteOptions
-from .place import Unfinished, check_export, check_options, check_write_options, frame_count
+from .place import Unfinished, check_export, check_options, check_write_options
 from .source import Chunking, Source
 
 
@@ -294,7 +294,7 @@ def export_scene(
     adopt_warnings()
     check_options(options)
     check_export(Path(output), options.overwrite, chunked=options.chunk is not None)
-    frames = frame_count(options, scene)
+    frames = frame_count(options, scene.duration)
     simulation = Simulation.of(scene, options, on_step=on_step)
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)
@@ -344,9 +344,5 @@ def _settings(scene: Scene, options: ExportOptions, frames: int) -> dict[str, st
         "the tessellation": options.tessellation,
         "the number of triangles": options.triangles,
         "the size": "{}x{}".format(*options.size),
-        "the resolution": options.resolution or "the scene's",
-        "the layout": options.layout or "the scene's",
-        "the rims": options.rim or "the scene's",
-        "the wave solver": options.backend,
-        **origin(scene),
+        **origin(scene, options),
     }

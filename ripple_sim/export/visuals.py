@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ripple_sim.render.contract import MappingKind
 from ripple_sim.render.surfaces.surface import painted
 from ripple_sim.render.tone_mapping import srgb_to_linear
+from ripple_sim.render.visuals.corners import normalized
 from ripple_sim.render.visuals.geoms import visuals_of
 from ripple_sim.render.visuals.shapes import Shape, sizes
 from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
@@ -117,9 +118,7 @@ def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
     name = mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), index) or f"{kind}_{index}"
     position, quaternion = (np.array(getattr(model, f"{kind}_{what}")[index]) for what in ("pos", "quat"))
     body = int(getattr(model, f"{kind}_bodyid")[index])
-    size = np.linalg.norm(mesh.normals, axis=1, keepdims=True)
-    normals = mesh.normals / np.where(size > 0, size, 1.0)
+    normals = normalized(mesh.normals)
     if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
-        normals = normals / visual.half_sizes
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normalized(normals / visual.half_sizes)
     return Solid(visual, name, body, position, quaternion, points, normals, mesh.faces, uv)

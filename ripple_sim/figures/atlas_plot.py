@@ -266,18 +266,15 @@ def show(figure: Figure, place: tuple[float, float, float, float], image: NDArra
 
 def save_plot(figure: Figure, path: str | Path) -> None:
     """Write a figure with the mark of files that were made here; raise `AtlasError` if that fails."""
+    ending = Path(path).suffix.lower()
+    told: dict[str, Any] = {"Software" if ending == ".png" else "Creator": MARK}
+    mark: dict[str, Any] = {"metadata": told | ({"Date": None} if ending == ".svg" else {})}
+    if ending == ".jpg":
+        mark = {"pil_kwargs": {"comment": MARK.encode()}}
     try:
-        figure.savefig(path, dpi=_DPI, **_marked(Path(path).suffix.lower()))
+        figure.savefig(path, dpi=_DPI, **mark)
     except OSError as error:
         raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
-
-
-def _marked(ending: str) -> dict[str, Any]:
-    """How each format is told to hold the mark of files that were made here."""
-    if ending == ".jpg":
-        return {"pil_kwargs": {"comment": MARK.encode()}}
-    name = "Software" if ending == ".png" else "Creator"
-    return {"metadata": {name: MARK, **({"Date": None} if ending == ".svg" else {})}}
 
 
 # Finer than an even spread is blue, coarser is red; the ends stand for a factor of 2.

@@ -68,8 +68,8 @@ class Sprite:
         opacity: float = 1.0,
     ) -> None:
         """Fill an upright rectangle."""
-        across, down = _overlap(left, right, self.width), _overlap(top, bottom, self.height)
-        self.fill(down[:, None] * across, color, opacity)
+        across, down = overlap(left, right, self.width), overlap(top, bottom, self.height)
+        self.fill(down * across.T, color, opacity)
 
     def polygon(self, corners: list[tuple[float, float]], color: NDArray | Color, opacity: float = 1.0) -> None:
         """Fill a polygon."""
@@ -132,11 +132,10 @@ def _font(size: int) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(folder / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf", size)
 
 
-def _overlap(low: float, high: float, count: int) -> NDArray[np.float32]:
-    """Share of each of `count` pixels in a row that lies between two places."""
-    edge = np.arange(count + 1)
-    inside = np.clip(edge, low, high)
-    return np.diff(inside).astype(np.float32)
+def overlap(low: ArrayLike, high: ArrayLike, count: int) -> NDArray[np.float32]:
+    """Share of each of `count` pixels in a row, [count, k], that lies between two places, [k] or one."""
+    edge = np.arange(count + 1)[:, None]
+    return np.diff(np.clip(edge, low, high), axis=0).astype(np.float32)
 
 
 HEAD_LENGTH, HEAD_WIDTH, DOT, RIM = 6.0, 2.2, 1.5, 0.7  # in thicknesses of the shaft

@@ -66,16 +66,10 @@ def lab_to_srgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _arm(hue_near: float, hue_end: float) -> NDArray[np.float64]:
     """CIELAB colours from zero to an end, [k, 3], through the control points."""
-    place = np.linspace(0, 1, 1025)
-    lightness, chroma = (_smooth(place, column) for column in _ARM.T)
+    place, knots = np.linspace(0, 1, 1025), np.linspace(0, 1, len(_ARM))
+    lightness, chroma = (np.polyval(np.polyfit(knots, column, len(knots) - 1), place) for column in _ARM.T)
     hue = np.radians(hue_near + (hue_end - hue_near) * place)
     return np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=1)
-
-
-def _smooth(place: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Polynomial through control points at equal distances."""
-    knots = np.linspace(0, 1, len(points))
-    return np.asarray(np.polyval(np.polyfit(knots, points, len(points) - 1), place), dtype=np.float64)
 
 
 def _evenly(lab: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -299,11 +293,10 @@ class Notebook:
         return limit.follow(max(magnitudes, default=0.0), self._dt), limit.goal
 
     def _heatmaps(self, simulation: Simulation) -> dict[str, NDArray[np.float32]]:
-        ripples = simulation.ripples
-        shown = self._request.heatmap or ""
+        ripples, shown = simulation.ripples, self._request.heatmap or ""
         return {
-            name: with_filled_halo(waves.atlas.texels.topology, getattr(waves, shown))
-            for name, waves in ((name, ripples[name]) for name in ripples)
+            name: with_filled_halo(ripples[name].atlas.texels.topology, getattr(ripples[name], shown))
+            for name in ripples
         }
 
     def _least_limit(self) -> float:

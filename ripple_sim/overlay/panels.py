@@ -21,7 +21,7 @@ from ripple_sim.coupling.energy import Energy
 from ripple_sim.render.camera import Pose
 from ripple_sim.scene.scene import HEATMAPS, Request
 
-from .marks import FAINT, HEAD_WIDTH, INK, RIM, Color, Mark, Sprite, draw_arrow, text_width
+from .marks import FAINT, HEAD_WIDTH, INK, RIM, Color, Mark, Sprite, draw_arrow, overlap, text_width
 from .notes import Notes, colors, number, readable, round_up
 
 
@@ -280,11 +280,8 @@ class EnergyPlot:
         sprite = self._axes[1].copy()
         for color, (times, values) in zip(COLORS, curves, strict=False):
             self._draw_curve(sprite, times, values, limit, color)
-        if ledger is not None and self._has_ledger:
-            self._draw_ledger(sprite, ledger)
-        return sprite
-
-    def _draw_ledger(self, sprite: Sprite, ledger: Energy) -> None:
+        if ledger is None or not self._has_ledger:
+            return sprite
         size, inks = round(0.85 * self._em), {"bodies": INK, "waves": COLORS[0], "total": INK}
         for column, (name, ink) in enumerate(inks.items()):
             value = getattr(ledger, name)
@@ -293,6 +290,7 @@ class EnergyPlot:
             sprite.text(x, 2.75 * self._em, name, size, FAINT if ink == INK else ink)
             x += text_width(name, size) + 0.4 * self._em
             sprite.text(x, 2.75 * self._em, f"{number(float(f'{factor * value:.3g}'))} {unit}", size, ink)
+        return sprite
 
     def _draw_axes(self, limit: float, goal: float) -> Sprite:
         em, small = self._em, round(0.85 * self._em)
@@ -335,8 +333,8 @@ class EnergyPlot:
         thick = self._em / 9
         slope = np.hypot(1.0, np.diff(rows))
         low, high = np.minimum(rows[1:], rows[:-1]), np.maximum(rows[1:], rows[:-1])
-        line = _columns_between(low - thick / 2 * slope**0.5, high + thick / 2 * slope**0.5, self._height)
-        under = _columns_between((low + high) / 2, np.full(len(low), float(self._bottom)), self._height)
+        line = overlap(low - thick / 2 * slope**0.5, high + thick / 2 * slope**0.5, self._height)
+        under = overlap((low + high) / 2, np.full(len(low), float(self._bottom)), self._height)
         coverage = np.zeros((2, self._height, self._width), np.float32)
         coverage[:, :, edges[:-1]] = under, line
         if len(self._names) < 2:
@@ -350,12 +348,6 @@ class EnergyPlot:
     def _row(self, value: ArrayLike, limit: float) -> NDArray[np.float64]:
         share = np.asarray(value, dtype=np.float64) / (limit or 1.0)
         return self._bottom - (self._bottom - self._top) * np.clip(share, 0, 1)
-
-
-def _columns_between(low: NDArray[np.float64], high: NDArray[np.float64], height: int) -> NDArray[np.float32]:
-    """Share of each pixel [height, k] that lies between two rows, column by column."""
-    edge = np.arange(height + 1)[:, None]
-    return np.diff(np.clip(edge, low, high), axis=0).astype(np.float32)
 
 
 class Painter:

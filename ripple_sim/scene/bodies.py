@@ -171,22 +171,18 @@ def randomize(spec: mujoco.MjSpec, entry: RandomEntry) -> dict[str, np.ndarray]:
         size, mass = np.exp(rng.uniform(*np.log([entry.size, entry.mass]).T))
         kind = rng.choice(entry.shapes) if entry.shapes else None
         for geom in body.geoms:
-            _vary(geom, float(size), float(mass), kind)
+            if geom.meshname:
+                continue
+            if kind is not None:
+                radius = float(np.max(geom.size))
+                geom.type, proportions = BODY_SHAPES[kind]
+                geom.size = radius * np.array(proportions)
+            geom.size = geom.size * float(size)
+            if np.isfinite(geom.mass):
+                geom.mass = geom.mass * float(mass)
+            else:
+                geom.density = geom.density * float(mass)
     return shifts
-
-
-def _vary(geom: mujoco.MjsGeom, size: float, mass: float, kind: str | None) -> None:
-    if geom.meshname:
-        return
-    if kind is not None:
-        radius = float(np.max(geom.size))
-        geom.type, proportions = BODY_SHAPES[kind]
-        geom.size = radius * np.array(proportions)
-    geom.size = geom.size * size
-    if np.isfinite(geom.mass):
-        geom.mass = geom.mass * mass
-    else:
-        geom.density = geom.density * mass
 
 
 def _check(entry: RandomEntry) -> None:

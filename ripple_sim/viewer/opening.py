@@ -116,12 +116,17 @@ def poke_strength(material: Material, size: float) -> tuple[float, float]:
     4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
     """
     radius = _POKE * size
+    mass, square = swinging(material, radius)
+    # nothing pulls a surface without stiffness back: it then gets a second
+    return radius, _DEPTH * size * mass * max(square**0.5, 1.0)
+
+
+def swinging(material: Material, radius: float) -> tuple[float, float]:
+    """Mass [kg] of what swings under a footprint of a radius [m], and the square of its frequency omega [1/s^2]."""
     speed, stiffness, density = (
         float(np.max(value)) for value in (material.speed, material.stiffness, material.density)
     )
-    omega = np.hypot(2 * speed / radius, np.sqrt(stiffness))
-    # nothing pulls a surface without stiffness back: it then gets a second
-    return radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0)
+    return density * np.pi * radius**2 / 4, (2 * speed / radius) ** 2 + stiffness
 
 
 def open_scene(

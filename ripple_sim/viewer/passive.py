@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from types import TracebackType
@@ -16,9 +17,9 @@ from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.coupling.soft import first_flex, first_skin, is_soft, target_pose
 from ripple_sim.errors import DisplayError, SceneError
 from ripple_sim.render.visuals.corners import normalized, smooth_normals
-from ripple_sim.solver.waves.wave_solver import WaveSolver
+from ripple_sim.solver import WaveSolver
 
-from .opening import display_problem
+from .opening import display_problem, swinging
 
 # Of all targets together: MuJoCo takes them one by one, a thousand in 2 ms.
 _TRIANGLES = 5000
@@ -167,8 +168,9 @@ class RippleViewer:
             local, drag = (point - position) @ rotation, (pull.refselpos - point) @ rotation
             texel = np.linalg.norm(waves.atlas.positions.reshape(-1, 3) - local, axis=1).argmin()
             inwards = -float(drag @ waves.atlas.normals.reshape(-1, 3)[texel])
-            radius, stiffness = _finger(waves)
-            waves.add_impulse(local, stiffness * inwards * elapsed, radius)
+            # the force of a finger that presses the surface in by so much
+            radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
+            waves.add_impulse(local, math.prod(swinging(waves.material, radius)) * inwards * elapsed, radius)
 
     def __enter__(self) -> Self:
         return self
@@ -177,17 +179,6 @@ class RippleViewer:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _finger(waves: WaveSolver) -> tuple[float, float]:
-    """Radius of a finger [m], and the force on it that presses the surface in by a metre [N/m]."""
-    material = waves.material
-    radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
-    speed, stiffness, density = (
-        float(np.max(value)) for value in (material.speed, material.stiffness, material.density)
-    )
-    # as `poke_strength`: a mass of pi r^2 sigma / 4 that swings at omega^2 = (2 c / r)^2 + k
-    return radius, np.pi * density * (speed**2 + stiffness * radius**2 / 4)
 
 
 def _look(model: mujoco.MjModel, target: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
