@@ -85,8 +85,8 @@ class ExportCommand(ExportOptions):
         check_export(self.output, options.overwrite)
 
         from ripple_sim.export.exporter import export_scene
-        from ripple_sim.export.place import frame_count
         from ripple_sim.scene.scene import through_camera
+        from ripple_sim.video.settings import frame_count
 
         scene = find_scene(self.scene, seed=self.seed)
         for note in scene.notes:

@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import importlib.metadata
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import igl
 import mujoco
@@ -383,11 +383,6 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     outward = (1 + _ROUNDING) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
     length = np.maximum(np.linalg.norm(outward, axis=1), np.finfo(np.float64).tiny)
     outward /= length[:, None]
-    moved = np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * _thickness(V, F, -outward, 1e-3 * depth))
-    return V - moved[:, None] * outward
-
-
-def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:
-    """Distance from each vertex inwards to the other side of a mesh [m], [n]; infinite where there is none."""
-    distance: NDArray[Any] = RayScene(V, F).cast(V + start * inward, inward)[1]
-    return start + distance
+    # to the other side of the mesh, infinite where there is none
+    thickness = 1e-3 * depth + RayScene(V, F).cast(V - 1e-3 * depth * outward, -outward)[1]
+    return V - np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * thickness)[:, None] * outward

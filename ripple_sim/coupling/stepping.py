@@ -165,7 +165,9 @@ def followed(data: mujoco.MjData, after_step: Callable[[], None]) -> Iterator[No
     """
     with _lock:
         if not _followers:
-            _replace()
+            for name in _FINISH_A_STEP:
+                _mujoco_functions[name] = getattr(mujoco, name)
+                setattr(mujoco, name, _following(_mujoco_functions[name]))
         _followers.setdefault(id(data), []).append(after_step)
     try:
         yield
@@ -175,18 +177,8 @@ def followed(data: mujoco.MjData, after_step: Callable[[], None]) -> Iterator[No
             if not _followers[id(data)]:
                 del _followers[id(data)]
             if not _followers:
-                _restore()
-
-
-def _replace() -> None:
-    for name in _FINISH_A_STEP:
-        _mujoco_functions[name] = getattr(mujoco, name)
-        setattr(mujoco, name, _following(_mujoco_functions[name]))
-
-
-def _restore() -> None:
-    for name in _FINISH_A_STEP:
-        setattr(mujoco, name, _mujoco_functions.pop(name))
+                for name, function in _mujoco_functions.items():
+                    setattr(mujoco, name, function)
 
 
 def _following(function: Callable[..., None]) -> Callable[..., None]:
@@ -296,7 +288,9 @@ class SolvedForces:
         completed as `mj_step2` will do with the controls as they are. Forces that are solved already, as after
         `mj_forward`, come out the same. Where forces are lost, the copy has them as they were, if they can be found.
         """
-        lost, model = _lost(data), self._model
+        model = self._model
+        # no row of the constraint solver, but contacts that should have rows
+        lost = bool(not data.nefc and data.ncon and (data.contact.exclude == _HAS_ROWS).any())
         self._has_moved_on = self._has_moved_on or self._moved_on(data)
         if not lost and not (self._has_moved_on and data.nefc):
             return data, None
@@ -329,11 +323,6 @@ class SolvedForces:
         poses.qpos, poses.mocap_pos, poses.mocap_quat = data.qpos, data.mocap_pos, data.mocap_quat
         mujoco.mj_kinematics(self._model, poses)
         return np.array_equal(poses.xpos, data.xpos) and np.array_equal(poses.xquat, data.xquat)
-
-
-def _lost(data: mujoco.MjData) -> bool:
-    """Whether there is no row of the constraint solver, but contacts that should have rows."""
-    return bool(not data.nefc and data.ncon and (data.contact.exclude == _HAS_ROWS).any())
 
 
 def _restore_forces(model: mujoco.MjModel, data: mujoco.MjData) -> bool:

@@ -11,7 +11,6 @@ from .place import (
     check_export as check_export,
     check_options as check_options,
     ending_of as ending_of,
-    frame_count as frame_count,
 )
 from .renderer import RippleRenderer as RippleRenderer
 from .source import Source as Source

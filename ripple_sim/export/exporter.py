@@ -22,10 +22,10 @@ from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import CameraEntry, check_camera
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
-from ripple_sim.video.settings import origin
+from ripple_sim.video.settings import frame_count, origin
 
 from .options import WRITE_OPTIONS, ExportOptions, WriteOptions
-from .place import Unfinished, check_export, check_options, check_write_options, frame_count
+from .place import Unfinished, check_export, check_options, check_write_options
 from .source import Chunking, Source
 
 
@@ -221,14 +221,11 @@ def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> Cam
     SceneError
         If the model has not what it names.
     """
-    free = model.vis.global_
-    entry = (
-        camera
-        if isinstance(camera, CameraEntry)
-        else CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
-    )
-    check_camera(model, entry)
-    return entry
+    if not isinstance(camera, CameraEntry):
+        free = model.vis.global_
+        camera = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
+    check_camera(model, camera)
+    return camera
 
 
 _HEIGHT = 420  # [pixels]
@@ -299,10 +296,8 @@ def export_scene(
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)
     if options.chunk is not None:
-        settings = _settings(scene, options, frames)
-        source = dataclasses.replace(
-            source, chunking=Chunking(options.chunk, Path(output), settings, resume=options.resume)
-        )
+        chunking = Chunking(options.chunk, Path(output), _settings(scene, options, frames), resume=options.resume)
+        source = dataclasses.replace(source, chunking=chunking)
     with Exporter.of(source, output, options.overwrite) as exporter:
         for number in range(frames):
             start = time.perf_counter()
@@ -318,10 +313,9 @@ def export_scene(
 
 def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -> Source:
     """What is recorded of a scene."""
-    ripples = simulation.ripples
     return Source(
         model=simulation.model,
-        ripples=ripples,
+        ripples=simulation.ripples,
         fps=options.fps,
         slow_motion=options.slow_motion,
         camera=scene.camera,
@@ -344,9 +338,5 @@ def _settings(scene: Scene, options: ExportOptions, frames: int) -> dict[str, st
         "the tessellation": options.tessellation,
         "the number of triangles": options.triangles,
         "the size": "{}x{}".format(*options.size),
-        "the resolution": options.resolution or "the scene's",
-        "the layout": options.layout or "the scene's",
-        "the rims": options.rim or "the scene's",
-        "the wave solver": options.backend,
-        **origin(scene),
+        **origin(scene, options),
     }

@@ -16,7 +16,6 @@ from pathlib import Path
 from ripple_sim.encode.output import check_size
 from ripple_sim.encode.replace import MARK, made_here, move
 from ripple_sim.errors import EncodingError, ExportError
-from ripple_sim.scene.scene import Scene, check_duration
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import NO_NAME, final_path
 
@@ -214,16 +213,3 @@ def check_write_options(options: WriteOptions) -> None:
         raise ExportError(f"a chunk shall have {shown(chunk)} frames; valid is a whole number from 1")
     if tessellation not in TESSELLATIONS:
         raise ExportError(f"tessellation is {shown(tessellation)}; valid are {' and '.join(map(repr, TESSELLATIONS))}")
-
-
-def frame_count(options: ExportOptions, scene: Scene) -> int:
-    """Frames of a scene's export.
-
-    Raises
-    ------
-    SceneError
-        If the duration or the slow motion is out of range.
-    """
-    duration = scene.duration if options.duration is None else options.duration
-    check_duration(duration, options.slow_motion)
-    return max(1, round(duration * options.fps * options.slow_motion))

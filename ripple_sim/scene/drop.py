@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.coupling.colliders import make_collidable
+from ripple_sim.coupling.suited import Extent
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Material, Mesh, load_mesh
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import read_image
-from ripple_sim.solver.texels.thickness import half_thickness_at
 
 from .bodies import BODY_SHAPES, TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
 from .events import Events
@@ -250,21 +250,10 @@ def drop_scene(
 
 def _material(mesh: Mesh) -> MaterialEntry:
     """Waves slow and high enough to watch under typical bodies, and lower on a thin target."""
-    amplitude = min(_AMPLITUDE * _usual_radius(mesh), _DEEPEST)
+    extent = Extent.of(mesh)
+    amplitude = min(_AMPLITUDE * extent.radius / extent.size, _DEEPEST)
     suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, amplitude=amplitude, crossing=1.5, decay=3.0)
     return MaterialEntry(**{name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))})
-
-
-def _usual_radius(mesh: Mesh) -> float:
-    """Median of the half thickness over the surface, as a share of the longest extent."""
-    corners = mesh.V[mesh.F]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(normals, axis=1)
-    normals = normals / np.maximum(doubled, np.finfo(float).tiny)[:, None]
-    radius = half_thickness_at(mesh, corners.mean(axis=1), normals)
-    order = np.argsort(radius)
-    reached = np.cumsum(doubled[order])
-    return float(radius[order[np.searchsorted(reached, reached[-1] / 2)]] / np.ptp(mesh.V, axis=0).max())
 
 
 def _camera(height: float) -> CameraEntry:

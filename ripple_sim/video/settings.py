@@ -11,7 +11,7 @@ import functools
 import hashlib
 from importlib.metadata import version
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import msgspec
 import mujoco
@@ -30,10 +30,16 @@ from .options import Backend, VideoOptions
 _PACKAGES = ("ripple-sim", "numpy", "numba", "moderngl", "av", "pillow")
 
 
-def origin(scene: Scene) -> dict[str, str]:
-    """Fingerprint of a scene and versions of the packages, by name."""
-    told = {f"the version of {package}": number for package, number in versions().items()}
-    return {"the scene's fingerprint": scene_digest(scene), **told}
+def origin(scene: Scene, options: Any) -> dict[str, str | int]:
+    """What the options of a video or an export change of a scene's waves, its fingerprint, and versions of packages."""
+    return {
+        "the resolution": options.resolution or "the scene's",
+        "the layout": options.layout or "the scene's",
+        "the rims": options.rim or "the scene's",
+        "the wave solver": options.backend,
+        "the scene's fingerprint": scene_digest(scene),
+        **{f"the version of {package}": number for package, number in versions().items()},
+    }
 
 
 @functools.cache
@@ -110,11 +116,7 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         "the frame format": options.frame_format,
         "the overlays": ",".join(options.overlay or ()),
         "the operators": ",".join(compared_operators(options.compare)),
-        "the resolution": options.resolution or "the scene's",
-        "the layout": options.layout or "the scene's",
-        "the rims": options.rim or "the scene's",
-        "the wave solver": options.backend,
-        **origin(scene),
+        **origin(scene, options),
         "the OpenGL driver": f"{gl.renderer}, {gl.version}",
         **({"the passes": f"{','.join(options.passes)} in {options.pass_format}"} if options.passes else {}),
         **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
@@ -145,14 +147,14 @@ def check_options(options: VideoOptions, output: Path) -> None:
             raise VideoError("passes cannot be written with --compare; leave one of the two out")
 
 
-def frame_count(options: VideoOptions) -> int:
-    """Frames of a video with settled options.
+def frame_count(options: Any, scene: Scene | None = None) -> int:
+    """Frames of a video with settled options, or of an export of a scene.
 
     Raises
     ------
     SceneError
         If the duration or the slow motion is out of range.
     """
-    duration = 0.0 if options.duration is None else options.duration
-    check_duration(duration, options.slow_motion)
-    return max(1, round(duration * (options.fps or 0) * options.slow_motion))
+    duration = options.duration if scene is None or options.duration is not None else scene.duration
+    check_duration(duration or 0.0, options.slow_motion)
+    return max(1, round((duration or 0.0) * (options.fps or 0) * options.slow_motion))
