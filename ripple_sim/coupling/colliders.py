@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import importlib.metadata
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import igl
 import mujoco
@@ -371,8 +371,6 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     outward = (1 + _ROUNDING) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
     length = np.maximum(np.linalg.norm(outward, axis=1), np.finfo(np.float64).tiny)
     outward /= length[:, None]
-    # to the other side, infinite where there is none
-    start = 1e-3 * depth
-    thickness: NDArray[Any] = start + RayScene(V, F).cast(V - start * outward, -outward)[1]
-    moved = np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * thickness)
-    return V - moved[:, None] * outward
+    # to the other side of the mesh, infinite where there is none
+    thickness = 1e-3 * depth + RayScene(V, F).cast(V - 1e-3 * depth * outward, -outward)[1]
+    return V - np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * thickness)[:, None] * outward

@@ -14,7 +14,7 @@ from ripple_sim.solver import Atlas
 
 from .geoms import TARGET_TYPES
 from .model import CoupledModel, flex_thickness
-from .target_mesh import primitive_triangles
+from .target_mesh import mesh_arrays, primitive_triangles
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 # Points of the rippling surface at which its distance is taken.
@@ -66,9 +66,7 @@ def _solid(coupled: CoupledModel, geom: int) -> tuple[NDArray[np.float64], NDArr
     model, kind = coupled.model, TARGET_TYPES[int(coupled.model.geom_type[geom])]
     if kind not in ("mesh", "sdf"):
         return primitive_triangles(kind, model.geom_size[geom])
-    mesh = model.geom_dataid[geom]
-    V = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(np.float64)
-    F = model.mesh_face[model.mesh_faceadr[mesh] :][: model.mesh_facenum[mesh]].astype(np.int64)
+    V, F, _ = mesh_arrays(model, int(model.geom_dataid[geom]))
     if kind == "mesh" and not coupled.has_flex[geom]:
         hull = trimesh.convex.convex_hull(V)
         V, F = np.array(hull.vertices), np.array(hull.faces)
@@ -105,8 +103,8 @@ def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None
         return _gap_warning(coupled, geom, atlas)
     if coupled.has_flex[geom]:
         return _flex_warning(coupled, geom)
-    collides = coupled.model.geom_contype[geom] or coupled.model.geom_conaffinity[geom]
-    if collides and coupled.model.geom_type[geom] == _GEOM.mjGEOM_MESH:
+    model = coupled.model
+    if model.geom_type[geom] == _GEOM.mjGEOM_MESH and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
         return _hull_warning(coupled.names[geom], atlas)
     return _distance_warning(coupled, geom)
 

@@ -42,7 +42,7 @@ from .stepping import (
     missed_warning,
     physics_errors,
 )
-from .targets import Targets
+from .targets import Target, Targets
 from .two_way import TwoWay
 
 __all__ = ["Impulse", "Ripples"]
@@ -274,9 +274,8 @@ class Ripples(Targets):
             self._two_way.settle()
         self._check_amplitude()
 
-    def _waves_changed(self, name: GeomKey) -> None:
-        super()._waves_changed(name)
-        target = self._target(name)
+    def _waves_changed(self, target: Target) -> None:
+        super()._waves_changed(target)
         self._loads.waves_changed(target.geom)
         self._check_amplitude.waves_changed(target.geom, target.waves)
         if target.geom in self._high_pass:

@@ -177,8 +177,8 @@ def followed(data: mujoco.MjData, after_step: Callable[[], None]) -> Iterator[No
             if not _followers[id(data)]:
                 del _followers[id(data)]
             if not _followers:
-                for name in _FINISH_A_STEP:
-                    setattr(mujoco, name, _mujoco_functions.pop(name))
+                for name, function in _mujoco_functions.items():
+                    setattr(mujoco, name, function)
 
 
 def _following(function: Callable[..., None]) -> Callable[..., None]:
@@ -285,7 +285,7 @@ class SolvedForces:
         `mj_forward`, come out the same. Where forces are lost, the copy has them as they were, if they can be found.
         """
         model = self._model
-        # there is no row of the constraint solver, but contacts that should have rows
+        # no row of the constraint solver, but contacts that should have rows
         lost = bool(not data.nefc and data.ncon and (data.contact.exclude == _HAS_ROWS).any())
         self._has_moved_on = self._has_moved_on or self._moved_on(data)
         if not lost and not (self._has_moved_on and data.nefc):

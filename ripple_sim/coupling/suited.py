@@ -107,7 +107,7 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
         return material
     burden = _burden(coupled, geom, extent)
     speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
+    density = _density(coupled.model, geom, extent)
     if "stiffness" in material.unset:
         stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
     else:
@@ -287,8 +287,7 @@ def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material
 def _substeps(material: Material, spacing: float, timestep: float) -> float:
     """Substeps of a physics step at a spacing of the texels [m]."""
     speed, bending, viscosity, stiffness = (
-        float(np.max(np.asarray(getattr(material, name), dtype=np.float64)))
-        for name in ("speed", "bending", "viscosity", "stiffness")
+        float(np.max(getattr(material, name))) for name in ("speed", "bending", "viscosity", "stiffness")
     )
     eigenvalue = (2 / (_STABLE * spacing)) ** 2
     wave = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness

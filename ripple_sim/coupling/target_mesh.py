@@ -126,22 +126,20 @@ def _surface(model: mujoco.MjModel, geom: int) -> tuple[NDArray, NDArray, NDArra
         return *height_field_triangles(model, int(model.geom_dataid[geom])), None, name
     if kind not in ("mesh", "sdf"):
         return *primitive_triangles(kind, model.geom_size[geom]), None, name
-    mesh = model.geom_dataid[geom]
-    first_vertex, first_triangle = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    V = model.mesh_vert[first_vertex : first_vertex + model.mesh_vertnum[mesh]]
-    F = model.mesh_face[first_triangle : first_triangle + model.mesh_facenum[mesh]]
-    return V, F, _texture_coordinates(model, mesh), name
+    V, F, uv = mesh_arrays(model, int(model.geom_dataid[geom]))
+    return V, F, None if uv is None else np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1), name
 
 
-def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64] | None:
-    """A mesh's own texture coordinates at the corners of its triangles, [triangle_count, 3, 2], or None.
+def mesh_arrays(
+    model: mujoco.MjModel, mesh: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]:
+    """Vertices [m], [n, 3], and triangles, [m, 3], of a mesh asset, and its own texture coordinates, if it has any.
 
-    MuJoCo counts v from the upper edge of the image.
+    These are those of the triangles' corners, [m, 3, 2]; v is counted from the upper edge of the image.
     """
-    first, first_triangle = model.mesh_texcoordadr[mesh], model.mesh_faceadr[mesh]
-    if first < 0:
-        return None
-    pairs = model.mesh_texcoord[first : first + model.mesh_texcoordnum[mesh]]
-    corners = model.mesh_facetexcoord[first_triangle : first_triangle + model.mesh_facenum[mesh]]
-    uv = pairs[corners].astype(np.float64)
-    return np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1)
+    faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
+    V = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(np.float64)
+    first, uv = model.mesh_texcoordadr[mesh], None
+    if first >= 0:
+        uv = model.mesh_texcoord[first + model.mesh_facetexcoord[faces]].astype(np.float64)
+    return V, model.mesh_face[faces].astype(np.int64), uv

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver
+from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.assembly import hold
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
@@ -22,54 +22,39 @@ from .suited import suited_targets
 from .target_mesh import target_atlas
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Target:
     """A geom that ripples: its waves, and what they are made of.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
-    geom : int
-        Geom id.
-    atlas : Atlas
-        Of its surface, in the frame of the geom.
-    material : Material
-    options : mapping
-        Keyword arguments of `WaveSolver`.
 
     Attributes
     ----------
     geom : int
-    held : float64 [C, n, n] or None
-        Shares of the texels that are held still.
+        Geom id.
+    material : Material
+    options : mapping
+        Keyword arguments of `WaveSolver`.
     waves : WaveSolver
-        A new one after each change, in the state of the old one.
+    held : float64 [C, n, n], optional
+        Shares of the texels that are held still.
     """
 
-    def __init__(
-        self, model: mujoco.MjModel, geom: int, atlas: Atlas, material: Material, options: Mapping[str, Any]
-    ) -> None:
-        self.geom, self.material = geom, material
-        self._model, self._options = model, dict(options)
-        self.held: NDArray[np.float64] | None = None
-        self.waves = WaveSolver(atlas, material, **options)
+    geom: int
+    material: Material
+    options: Mapping[str, Any]
+    waves: WaveSolver
+    held: NDArray[np.float64] | None = None
 
-    def to_geom(self, point: ArrayLike) -> NDArray[np.float64]:
-        """Carry a point [m] from the frame of the geom's body to that of the geom; what is soft is in the world."""
-        if is_soft(self._model, self.geom):
-            return np.array(point, dtype=np.float64)
-        rotation = np.zeros(9)
-        mujoco.mju_quat2Mat(rotation, self._model.geom_quat[self.geom])
-        places = check_points(point) - self._model.geom_pos[self.geom]
-        return (places @ rotation.reshape(3, 3)).reshape(np.shape(point))
-
-    def rebuild(self, material: Material, held: NDArray[np.float64] | None, **options: Any) -> None:
-        """Make a new solver in the old one's state; if that fails, nothing has changed."""
-        old, options = self.waves, {**self._options, **options}
-        new = WaveSolver(old.rest, material if held is None else hold(old.rest, material, held), **options)
+    def rebuilt(self, **changes: Any) -> Target:
+        """The same with a new solver in the state of the old one, after a change of its material, options or `held`."""
+        changed = dataclasses.replace(self, **changes)
+        old, material = self.waves, changed.material
+        if changed.held is not None:
+            material = hold(old.rest, material, changed.held)
+        new = WaveSolver(old.rest, material, **changed.options)
         if old.vertices is not None:
             new.move(old.vertices)
         new.state = old.state
-        self.waves, self.material, self.held, self._options = new, material, held, options
+        return dataclasses.replace(changed, waves=new)
 
 
 class Targets:
@@ -102,16 +87,11 @@ class Targets:
         layouts, rims = for_each(model, named, "layout", layout), for_each(model, named, "rim", rim)
         named, texels = suited_targets(model, named, given)
         self.model = model
-        self._targets = {
-            name: Target(
-                model,
-                (geom := find_target(model, name)),
-                target_atlas(model, geom, texels[name], layouts[name]),
-                material,
-                {**options, "rim": rims[name]},
-            )
-            for name, material in named.items()
-        }
+        self._targets = {}
+        for name, material in named.items():
+            geom, own = find_target(model, name), {**options, "rim": rims[name]}
+            atlas = target_atlas(model, geom, texels[name], layouts[name])
+            self._targets[name] = Target(geom, material, own, WaveSolver(atlas, material, **own))
         # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here
         self._waves = {target.geom: target.waves for target in self._targets.values()}
 
@@ -140,13 +120,11 @@ class Targets:
         SolverError
             For an unknown or invalid coefficient.
         """
-        target = self._target(name)
         names = [field.name for field in dataclasses.fields(Material)]
-        for each in coefficients:
-            if each not in names:
-                raise SolverError(f"a material has no coefficient {each!r}; valid are {', '.join(names)}")
-        target.rebuild(dataclasses.replace(target.material, **coefficients), target.held)
-        self._waves_changed(name)
+        for given in coefficients:
+            if given not in names:
+                raise SolverError(f"a material has no coefficient {given!r}; valid are {', '.join(names)}")
+        self._change(name, material=dataclasses.replace(self._target(name).material, **coefficients))
 
     def poke(self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0) -> Footprint:
         """Give a geom's surface an impulse at once, as `[[poke]]` in a scene file does.
@@ -174,8 +152,7 @@ class Targets:
         SolverError
             If the impulse, the point or the radius is not finite, or the radius negative.
         """
-        target = self._target(name)
-        return target.waves.add_impulse(target.to_geom(point), impulse, radius)
+        return self._target(name).waves.add_impulse(self.to_geom(name, point), impulse, radius)
 
     def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
         """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.
@@ -189,9 +166,9 @@ class Targets:
         radius : float
             Along the surface [m].
         """
-        target = self._target(name)
-        disc = np.zeros(target.waves.atlas.areas.shape)
-        disc.reshape(-1)[footprint(target.waves.atlas, target.to_geom(point), radius).texels] = 1.0
+        atlas = self._target(name).waves.atlas
+        disc = np.zeros(atlas.areas.shape)
+        disc.reshape(-1)[footprint(atlas, self.to_geom(name, point), radius).texels] = 1.0
         self.hold(name, disc)
 
     def hold(self, name: GeomKey, region: ArrayLike) -> None:
@@ -209,15 +186,14 @@ class Targets:
         SolverError
             If the region has another shape, or numbers that are not from 0 to 1.
         """
-        target = self._target(name)
+        before = self._target(name).held
         try:
             held = np.asarray(region, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise SolverError(f"region is {region!r}; valid are numbers from 0 to 1, one for each texel") from error
-        if target.held is not None and held.shape == target.held.shape:
-            held = np.maximum(held, target.held)
-        target.rebuild(target.material, held)
-        self._waves_changed(name)
+        if before is not None and held.shape == before.shape:
+            held = np.maximum(held, before)
+        self._change(name, held=held)
 
     def change_operator(self, operator: str) -> None:
         """Change the wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
@@ -227,9 +203,8 @@ class Targets:
         SolverError
             For an unknown operator.
         """
-        for name, target in self._targets.items():
-            target.rebuild(target.material, target.held, operator=operator)
-            self._waves_changed(name)
+        for name, target in list(self._targets.items()):
+            self._change(name, options={**target.options, "operator": operator})
 
     def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes.
@@ -237,7 +212,13 @@ class Targets:
         The points of `poke` and `make_rigid` are in the body's frame; those of an atlas, and of the waves of one geom,
         `ripples[name]`, in the geom's.
         """
-        return self._target(name).to_geom(point)
+        geom = self._target(name).geom
+        if is_soft(self.model, geom):  # it is in the world
+            return np.array(point, dtype=np.float64)
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, self.model.geom_quat[geom])
+        places = check_points(point) - self.model.geom_pos[geom]
+        return (places @ rotation.reshape(3, 3)).reshape(np.shape(point))
 
     def _target(self, name: GeomKey) -> Target:
         target = self._targets.get(name) if isinstance(name, str) else None
@@ -249,6 +230,12 @@ class Targets:
             )
         return target
 
-    def _waves_changed(self, name: GeomKey) -> None:
+    def _change(self, name: GeomKey, **changes: Any) -> None:
+        """Change a target's material, options or what is held, see `Target`; if that fails, nothing has changed."""
+        target = self._target(name).rebuilt(**changes)
+        self._targets[target_name(self.model, target.geom)] = target
+        self._waves_changed(target)
+
+    def _waves_changed(self, target: Target) -> None:
         """Hand a target's new waves to everybody."""
-        self._waves[self._target(name).geom] = self[name]
+        self._waves[target.geom] = target.waves

@@ -221,14 +221,11 @@ def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> Cam
     SceneError
         If the model has not what it names.
     """
-    free = model.vis.global_
-    entry = (
-        camera
-        if isinstance(camera, CameraEntry)
-        else CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
-    )
-    check_camera(model, entry)
-    return entry
+    if not isinstance(camera, CameraEntry):
+        free = model.vis.global_
+        camera = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
+    check_camera(model, camera)
+    return camera
 
 
 _HEIGHT = 420  # [pixels]
@@ -299,10 +296,8 @@ def export_scene(
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)
     if options.chunk is not None:
-        settings = _settings(scene, options, frames)
-        source = dataclasses.replace(
-            source, chunking=Chunking(options.chunk, Path(output), settings, resume=options.resume)
-        )
+        chunking = Chunking(options.chunk, Path(output), _settings(scene, options, frames), resume=options.resume)
+        source = dataclasses.replace(source, chunking=chunking)
     with Exporter.of(source, output, options.overwrite) as exporter:
         for number in range(frames):
             start = time.perf_counter()
@@ -318,10 +313,9 @@ def export_scene(
 
 def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -> Source:
     """What is recorded of a scene."""
-    ripples = simulation.ripples
     return Source(
         model=simulation.model,
-        ripples=ripples,
+        ripples=simulation.ripples,
         fps=options.fps,
         slow_motion=options.slow_motion,
         camera=scene.camera,

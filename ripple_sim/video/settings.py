@@ -31,7 +31,7 @@ _PACKAGES = ("ripple-sim", "numpy", "numba", "moderngl", "av", "pillow")
 
 
 def origin(scene: Scene, options: Any) -> dict[str, str | int]:
-    """What the waves of a video or an export depend on, by name: options, a scene's fingerprint, and versions."""
+    """What the options of a video or an export change of a scene's waves, its fingerprint, and versions of packages."""
     return {
         "the resolution": options.resolution or "the scene's",
         "the layout": options.layout or "the scene's",
@@ -147,14 +147,14 @@ def check_options(options: VideoOptions, output: Path) -> None:
             raise VideoError("passes cannot be written with --compare; leave one of the two out")
 
 
-def frame_count(options: Any, usual: float = 0.0) -> int:
-    """Frames of a video with settled options, or of an export, whose usual duration [s] is the scene's.
+def frame_count(options: Any, scene: Scene | None = None) -> int:
+    """Frames of a video with settled options, or of an export of a scene.
 
     Raises
     ------
     SceneError
         If the duration or the slow motion is out of range.
     """
-    duration = usual if options.duration is None else options.duration
-    check_duration(duration, options.slow_motion)
-    return max(1, round(duration * (options.fps or 0) * options.slow_motion))
+    duration = options.duration if scene is None or options.duration is not None else scene.duration
+    check_duration(duration or 0.0, options.slow_motion)
+    return max(1, round((duration or 0.0) * (options.fps or 0) * options.slow_motion))

@@ -107,6 +107,7 @@ _BALL, _POKE, _DEPTH = 0.06, 0.06, 0.025
 # Time of flight of a thrown ball [s], and the distance it covers, in sizes of the surface.
 FLIGHT = 0.5
 _THROW = 3.0
+SWINGING = ("speed", "stiffness", "density")  # coefficients by which what is pressed in swings back
 
 
 def poke_strength(material: Material, size: float) -> tuple[float, float]:
@@ -116,17 +117,10 @@ def poke_strength(material: Material, size: float) -> tuple[float, float]:
     4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
     """
     radius = _POKE * size
-    mass, square = swinging(material, radius)
+    speed, stiffness, density = (float(np.max(getattr(material, name))) for name in SWINGING)
+    omega = np.hypot(2 * speed / radius, np.sqrt(stiffness))
     # nothing pulls a surface without stiffness back: it then gets a second
-    return radius, _DEPTH * size * mass * max(square**0.5, 1.0)
-
-
-def swinging(material: Material, radius: float) -> tuple[float, float]:
-    """Mass [kg] of what swings under a footprint of a radius [m], and the square of its frequency omega [1/s^2]."""
-    speed, stiffness, density = (
-        float(np.max(value)) for value in (material.speed, material.stiffness, material.density)
-    )
-    return density * np.pi * radius**2 / 4, (2 * speed / radius) ** 2 + stiffness
+    return radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0)
 
 
 def open_scene(
@@ -154,14 +148,11 @@ def open_scene(
     MeshError
         If a mesh cannot be read or does not suit the layout.
     """
-    load: Callable[..., Scene] = (
-        functools.partial(load_scene, target)
-        if is_scene(target)
-        else functools.partial(drop_scene, target, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap)
-    )
+    load: Callable[..., Scene] = functools.partial(load_scene, target)
+    if not is_scene(target):
+        load = functools.partial(drop_scene, target, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap)
     scene = load()
-    size = surface_size(scene)
-    first = scene.targets[0]
+    size, first = surface_size(scene), scene.targets[0]
     materials, _ = suited_targets(scene.model, {first.geom: first.material.material()}, {first.geom: 1})
     _, impulse = poke_strength(materials[first.geom], size)
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
@@ -179,11 +170,8 @@ def surface_size(scene: Scene) -> float:
     """Longest extent of the smallest rippling surface [m]."""
     model, extents = scene.model, []
     for target in (find_target(model, entry.geom) for entry in scene.targets):
-        extent = (
-            np.ptp(SoftSurface(model, target).mesh.V, axis=0)
-            if is_soft(model, target)
-            else 2 * model.geom_aabb[target, 3:]
-        )
+        soft = is_soft(model, target)
+        extent = np.ptp(SoftSurface(model, target).mesh.V, axis=0) if soft else 2 * model.geom_aabb[target, 3:]
         extents.append(float(extent.max()))
     return min(extents)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Self
 
 import mujoco
@@ -19,7 +18,7 @@ from ripple_sim.errors import DisplayError, SceneError
 from ripple_sim.render.visuals.corners import normalized, smooth_normals
 from ripple_sim.solver import WaveSolver
 
-from .opening import display_problem, swinging
+from .opening import SWINGING, display_problem
 
 # Of all targets together: MuJoCo takes them one by one, a thousand in 2 ms.
 _TRIANGLES = 5000
@@ -79,8 +78,7 @@ def launch_passive(
             f"the viewer shows ripples of the model that it is given, not {ripples!r}: Ripples(model, ...)"
         )
     data = own_data(model, data)
-    problem = display_problem()
-    if problem is not None:
+    if problem := display_problem():
         raise DisplayError(f"no window can be opened: {problem}; RippleRenderer renders frames without one")
     import mujoco.viewer  # opens GLFW
 
@@ -175,10 +173,16 @@ class RippleViewer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
+
+
+def _finger(waves: WaveSolver) -> tuple[float, float]:
+    """Radius of a finger [m], and the force on it that presses the surface in by a metre [N/m]."""
+    radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
+    speed, stiffness, density = (float(np.max(getattr(waves.material, name))) for name in SWINGING)
+    # as `poke_strength`: a mass of pi r^2 sigma / 4 that swings at omega^2 = (2 c / r)^2 + k
+    return radius, np.pi * density * (speed**2 + stiffness * radius**2 / 4)
 
 
 def _look(model: mujoco.MjModel, target: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

@@ -56,7 +56,6 @@ def add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, r
 HEIGHT = "height [mm]"
 _PER_METRE = 1000.0
 
-_GEOM = mujoco.mjtGeom
 _COLORMAP = "coolwarm"
 _STEPS = (1.0, 2.0, 5.0)  # times a power of ten end the colours, so that these do not change with every frame
 _SEGMENTS = 8  # of a geom, per right angle
@@ -80,14 +79,17 @@ class BodyActors:
                 position, rotation = target_pose(session.simulation.data, geom)
                 self._actors[geom] = add_floor(plotter, (middle - position) @ rotation, reach, rgba)
             elif (mesh := geom_mesh(model, geom)) is not None:
-                self._actors[geom] = _add(plotter, mesh, rgba)
+                look = {"color": rgba[:3].tolist(), "opacity": float(rgba[3])}
+                self._actors[geom] = plotter.add_mesh(
+                    mesh, interpolation="Phong", reset_camera=False, **look, **_SHADING
+                )
         self.update()
 
     @property
     def solid(self) -> list[int]:
         """Visible geoms except planes."""
         kinds = self._session.simulation.model.geom_type
-        return [geom for geom in self._actors if kinds[geom] != _GEOM.mjGEOM_PLANE]
+        return [geom for geom in self._actors if kinds[geom] != _PLANE]
 
     def update(self) -> None:
         """Take the poses from the session."""
@@ -144,20 +146,12 @@ _SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "
 def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
     """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
     visual = geom_visual(model, geom)
-    found = shape_of(model, visual)
-    if found is None:
+    if (found := shape_of(model, visual)) is None:
         return None
-    _, make = found
-    shape = make(_SEGMENTS)
+    shape = found[1](_SEGMENTS)
     mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, visual)), shape.faces)
     mesh.point_data.active_normals = shape.normals
     return mesh
-
-
-def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float64]) -> pv.Actor:
-    return plotter.add_mesh(
-        mesh, color=rgba[:3].tolist(), opacity=float(rgba[3]), interpolation="Phong", reset_camera=False, **_SHADING
-    )
 
 
 def _place(actor: pv.Actor, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
@@ -183,12 +177,8 @@ class Shadows:
         shade = np.zeros((disc.n_points, 4), np.uint8)
         shade[:, 3] = np.rint(255 * dark * dark * (3 - 2 * dark))
         disc.point_data["shade"] = shade
-        self._actors = {
-            geom: plotter.add_mesh(
-                disc, scalars="shade", rgb=True, lighting=False, reset_camera=False, show_scalar_bar=False
-            )
-            for geom in geoms
-        }
+        flat = {"rgb": True, "lighting": False, "reset_camera": False, "show_scalar_bar": False}
+        self._actors = {geom: plotter.add_mesh(disc, scalars="shade", **flat) for geom in geoms}
         self.update()
 
     def update(self) -> None:

@@ -183,9 +183,8 @@ class Window:
 
     def pixels(self) -> NDArray[np.uint8]:
         """The latest frame, uint8 [height, width, 3]."""
-        window, pixels = self.plotter.render_window, vtkUnsignedCharArray()
-        width, height = window.GetSize()
-        window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
+        pixels, (width, height) = vtkUnsignedCharArray(), self.size()
+        self.plotter.render_window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
         return vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
 
     def size(self) -> tuple[int, int]:
@@ -333,13 +332,8 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
         start, processor, drawing = time.perf_counter(), time.process_time(), window.seconds_drawing
         for _ in range(updates):
             window.tick()
-        trials.append(
-            (
-                time.perf_counter() - start,
-                window.seconds_drawing - drawing,
-                time.process_time() - processor,
-            )
-        )
+        seconds, processor = time.perf_counter() - start, time.process_time() - processor
+        trials.append((seconds, window.seconds_drawing - drawing, processor))
     renderer = window.gl_renderer
     window.close()
     seconds, drawing, processor = min(trials)
@@ -358,8 +352,7 @@ def check_display() -> None:
     DisplayError
         With what is missing, and the alternatives.
     """
-    problem = display_problem()
-    if problem is not None:
+    if problem := display_problem():
         raise DisplayError(
             f"no window can be opened: {problem}; add --web to use a browser instead, or render a video with "
             "`ripple-sim render` or `ripple-sim drop`"

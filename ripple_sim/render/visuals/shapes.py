@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.target_mesh import height_field_triangles, mesh_arrays
 from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V
 
 from .corners import normalized, split_corners
@@ -138,41 +139,26 @@ def _arrow(*profile: tuple[float, float]) -> Callable[[int], Shape]:
 
 def mesh_asset(model: Any, mesh: int, hull: bool = False) -> Shape:
     """Mesh of a MuJoCo model in its geom's frame, or its convex hull."""
-    first, first_face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    faces = slice(first_face, first_face + model.mesh_facenum[mesh])
-    V = np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
-    F = np.asarray(model.mesh_face[faces], dtype=np.int64)
+    V, F, uv = mesh_arrays(model, mesh)
     if hull and model.mesh_graphadr[mesh] >= 0:
         graph = model.mesh_graph[model.mesh_graphadr[mesh] :]
         vertices, triangles = int(graph[0]), int(graph[1])
         end = 2 + 3 * vertices + 6 * triangles
         return creased(V, graph[end - 3 * triangles : end].reshape(-1, 3).astype(np.int64))
-    start = model.mesh_texcoordadr[mesh]
-    if start < 0:
-        return creased(V, F)
-    uv = np.asarray(model.mesh_texcoord[start : start + model.mesh_texcoordnum[mesh]], dtype=np.float64)
-    return creased(V, F, uv[model.mesh_facetexcoord[faces]])
+    return creased(V, F, uv)
 
 
 def height_field(model: Any, hfield: int) -> Shape:
     """Height field of a MuJoCo model with its walls, in its geom's frame."""
-    rows, columns = int(model.hfield_nrow[hfield]), int(model.hfield_ncol[hfield])
-    half_x, half_y, top, bottom = (float(x) for x in model.hfield_size[hfield])
-    start = model.hfield_adr[hfield]
-    height = top * np.asarray(model.hfield_data[start : start + rows * columns], dtype=np.float64).reshape(
-        rows, columns
-    )
-    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
-    ground = np.stack([x, y, height], axis=2).reshape(-1, 3)
-    index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
-    F = [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    ground, F = height_field_triangles(model, hfield)
+    index = np.arange(len(ground)).reshape(model.hfield_nrow[hfield], model.hfield_ncol[hfield])
     # round the rim, counter-clockwise from above
     rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
     foot = len(ground) + np.arange(len(rim))
     after, foot_after = np.roll(rim, -1), np.roll(foot, -1)
-    F += [np.stack([rim, foot, foot_after], axis=1), np.stack([rim, foot_after, after], axis=1)]
-    return creased(np.concatenate([ground, ground[rim] * [1, 1, 0] - [0, 0, bottom]]), np.concatenate(F))
+    walls = np.stack([rim, foot, foot_after], axis=1), np.stack([rim, foot_after, after], axis=1)
+    feet = ground[rim] * [1, 1, 0] - [0, 0, model.hfield_size[hfield, 3]]
+    return creased(np.concatenate([ground, feet]), np.concatenate([F, *walls]))
 
 
 def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
