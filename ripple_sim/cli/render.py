@@ -93,7 +93,7 @@ class ExportCommand(ExportOptions):
             print(f"{Path(self.scene).name}: {note}", file=sys.stderr)
         if self.camera is not None:
             scene = through_camera(scene, self.camera)
-        with frame_progress(f"export to {self.output}", frame_count(options, scene.duration)) as progress:
+        with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
             summary = export_scene(scene, self.output, options, progress=progress)
         print(
             f"{summary.output}: {summary.frames} frames\n"

@@ -107,7 +107,7 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
         return material
     burden = _burden(coupled, geom, extent)
     speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    density = _density(coupled.model, geom, extent)
+    density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
     if "stiffness" in material.unset:
         stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
     else:

@@ -291,7 +291,7 @@ def export_scene(
     adopt_warnings()
     check_options(options)
     check_export(Path(output), options.overwrite, chunked=options.chunk is not None)
-    frames = frame_count(options, scene.duration)
+    frames = frame_count(options, scene)
     simulation = Simulation.of(scene, options, on_step=on_step)
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)

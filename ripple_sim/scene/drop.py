@@ -263,13 +263,6 @@ def _material(mesh: Mesh) -> MaterialEntry:
     return MaterialEntry(**{name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))})
 
 
-def _camera(height: float) -> CameraEntry:
-    """Camera that circles a target of a height [m]."""
-    return CameraEntry(
-        lookat=(0.0, 0.0, 0.95 * (height / 2)), distance=3.6, azimuth=125.0, elevation=-17.0, fovy=28.0, orbit=5.0
-    )
-
-
 def _flat_along(mesh: Mesh) -> str | None:
     """Axis along which a mesh has no extent, if it is one that can point up."""
     extents = np.ptp(mesh.V, axis=0)

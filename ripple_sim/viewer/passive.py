@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable
 from typing import Any, Self
@@ -166,9 +165,8 @@ class RippleViewer:
             local, drag = (point - position) @ rotation, (pull.refselpos - point) @ rotation
             texel = np.linalg.norm(waves.atlas.positions.reshape(-1, 3) - local, axis=1).argmin()
             inwards = -float(drag @ waves.atlas.normals.reshape(-1, 3)[texel])
-            # the force of a finger that presses the surface in by so much
-            radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
-            waves.add_impulse(local, math.prod(swinging(waves.material, radius)) * inwards * elapsed, radius)
+            radius, stiffness = _finger(waves)
+            waves.add_impulse(local, stiffness * inwards * elapsed, radius)
 
     def __enter__(self) -> Self:
         return self
