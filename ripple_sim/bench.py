@@ -345,13 +345,12 @@ def as_text(report: Mapping[str, Any]) -> str:
         for n, row in report["cpu"].items()
     ]
     meshes = [
-        [
+        (
             name,
-            f"{row['triangles']:,}",
-            f"{row['texels']:,}",
+            *(f"{row[k]:,}" for k in ("triangles", "texels")),
             f"{row['atlas [s]']:.2f}",
             f"{1e3 * row['substep [s]']:.3f}",
-        ]
+        )
         for name, row in report["meshes"].items()
     ]
     coupling = [
@@ -385,10 +384,8 @@ def as_text(report: Mapping[str, Any]) -> str:
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Align columns: the first to the left, the others to the right."""
     widths = [max(len(line[i]) for line in [head, *rows]) for i in range(len(head))]
-    lines = [
-        "  ".join(
-            cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(line, widths, strict=True))
-        )
+    lines = (
+        [line[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(line[1:], widths[1:], strict=True))]
         for line in [head, *rows]
-    ]
-    return "\n".join(line.rstrip() for line in lines)
+    )
+    return "\n".join("  ".join(line).rstrip() for line in lines)

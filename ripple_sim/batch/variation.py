@@ -230,9 +230,13 @@ class Variation:
         if Path(self.source).suffix in ("", ".toml"):
             scene = load_scene(self.source, edit=edit, change=change)
         else:
-            bodies = self._bodies()
+            meshes = self.plan.meshes or MeshesEntry([], bodies=0)
+            bodies = meshes.bodies
+            if isinstance(bodies, Distribution):
+                bodies = bodies.draw(self.stream("bodies"))
+                if not isinstance(bodies, int):
+                    raise SceneError(f"plan: the number of bodies is {bodies!r}; draw it from integers")
             values["bodies"] = bodies
-            meshes = self.plan.meshes or MeshesEntry([])
             scene = drop_scene(
                 self.source,
                 bodies=bodies,
@@ -247,15 +251,6 @@ class Variation:
             change(table)
             scene = scene_of(scene.name, scene.model, parse_scene(table, scene.name), scene.notes)
         return scene, dict(sorted(values.items()))
-
-    def _bodies(self) -> int:
-        bodies = self.plan.meshes.bodies if self.plan.meshes else 0
-        if not isinstance(bodies, Distribution):
-            return bodies
-        drawn = bodies.draw(self.stream("bodies"))
-        if not isinstance(drawn, int):
-            raise SceneError(f"plan: the number of bodies is {drawn!r}; draw it from integers")
-        return drawn
 
 
 def _table(scene: Scene) -> dict[str, Any]:

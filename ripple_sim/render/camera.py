@@ -206,9 +206,9 @@ def perspective(
 
 def orthographic(half_width: float, depth: float) -> NDArray[np.float64]:
     """Eye to clip coordinates of a square box from 0 to `depth` [m] in front of the eye, shape [4, 4]."""
-    return np.diag([1 / half_width, 1 / half_width, -2 / depth, 1.0]) + np.array(
-        [[0.0] * 4, [0.0] * 4, [0.0, 0.0, 0.0, -1.0], [0.0] * 4]
-    )
+    matrix = np.diag([1 / half_width, 1 / half_width, -2 / depth, 1.0])
+    matrix[2, 3] = -1.0
+    return matrix
 
 
 def within(balls: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> NDArray[np.float64]:

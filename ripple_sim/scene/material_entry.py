@@ -149,12 +149,8 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
 
     def located(self, folder: Path) -> MaterialEntry:
         """The same with the images' paths made relative to a folder."""
-        return msgspec.structs.replace(
-            self,
-            **{
-                name: msgspec.structs.replace(entry, map=str(folder / entry.map)) for name, entry in self.maps().items()
-            },
-        )
+        replace, maps = msgspec.structs.replace, self.maps()
+        return replace(self, **{name: replace(each, map=str(folder / each.map)) for name, each in maps.items()})
 
 
 class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
