@@ -118,16 +118,8 @@ class Simulation:
         on_step: Callable[[Simulation], None] | None = None,
     ) -> Self:
         """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
-        return cls(
-            scene,
-            fps=options.rate,
-            resolution=options.resolution,
-            layout=options.layout,
-            rim=options.rim,
-            backend=options.backend,
-            operator=operator,
-            on_step=on_step,
-        )
+        chosen = {name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")}
+        return cls(scene, fps=options.rate, operator=operator, on_step=on_step, **chosen)
 
     @property
     def backend(self) -> str:

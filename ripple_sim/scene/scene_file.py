@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -216,18 +217,10 @@ def _check_values(value: Any, place: str, origin: str) -> None:
     elif isinstance(value, list):
         for inner in value:
             _check_values(inner, place, origin)
-    elif isinstance(value, str) and ("\0" in value or not _is_unicode(value)):
+    elif isinstance(value, str) and re.search("[\0\ud800-\udfff]", value):  # the latter are halves of pairs
         raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are names without a NUL")
     elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
         raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
-
-
-def _is_unicode(text: str) -> bool:
-    try:
-        text.encode()
-    except UnicodeEncodeError:  # half of a pair of surrogates
-        return False
-    return True
 
 
 _TABLES: dict[str, type[msgspec.Struct]] = {
