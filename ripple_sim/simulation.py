@@ -115,8 +115,8 @@ class Simulation:
         on_step: Callable[[Simulation], None] | None = None,
     ) -> Self:
         """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
-        given = {name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")}
-        return cls(scene, fps=options.rate, operator=operator, on_step=on_step, **given)
+        chosen = {name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")}
+        return cls(scene, fps=options.rate, operator=operator, on_step=on_step, **chosen)
 
     @property
     def backend(self) -> str:

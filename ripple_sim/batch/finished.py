@@ -182,7 +182,8 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
 
     Killed at any time and called again, it loses and doubles nothing: folders go when the tar file is there.
     """
-    with _locked(batch.work / f"tar-{first:06d}"):
+    with (batch.work / f"tar-{first:06d}").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # one process at a time
         loose = [number for number in range(first, end) if batch.scene(number).is_dir()]
         if not loose:
             return
@@ -202,11 +203,3 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
             shutil.rmtree(hidden, ignore_errors=True)  # of a process that was killed
             batch.scene(number).rename(hidden)
             shutil.rmtree(hidden)
-
-
-@contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """One process at a time."""
-    with path.open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

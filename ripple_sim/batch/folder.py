@@ -23,6 +23,7 @@ from typing import Any
 
 import msgspec
 
+from ripple_sim.encode.replace import sync
 from ripple_sim.errors import BatchError, SceneError
 from ripple_sim.scene.loading import load_scene
 from ripple_sim.solver.errors import shown
@@ -160,11 +161,7 @@ class BatchFolder:
     def finish(self, number: int, work: Path) -> None:
         """Put a scene that was made in `work` in its place, whole and on the disk."""
         for path in (*work.rglob("*"), work):
-            handle = os.open(path, os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+            sync(path)
         work.rename(self.scene(number))
 
     def failures(self) -> dict[int, Failure]:

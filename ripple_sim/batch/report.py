@@ -10,7 +10,7 @@ import json
 import shutil
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.kernel import compile_times
 
 from .executors import usual_workers
-from .finished import FinishedScene, finished_scenes
+from .finished import finished_scenes
 from .folder import BatchFolder, keep_plan, load_stored, stored
 from .plan import Plan
 from .variation import Variation
@@ -155,9 +155,6 @@ class Batch(Sequence):
     def __getitem__(self, place: Any) -> Any:
         """The scene at a place among those that are there; its number is another if some are missing."""
         return self._scenes[place]
-
-    def __iter__(self) -> Iterator[FinishedScene]:
-        return iter(self._scenes)
 
     def table(self) -> Any:
         """The Parquet index as a table of pyarrow; where pandas is installed, its `to_pandas` makes a data frame."""

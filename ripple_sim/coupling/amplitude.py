@@ -73,13 +73,6 @@ def scales_of(atlas: Atlas) -> Scales:
     return Scales(per_limit, per_row, per_column, share, thinnest, float(calm))
 
 
-def highest(crests: NDArray[np.float32], scales: Scales) -> tuple[float, int]:
-    """The greatest crest over what is allowed there, and its texel; crests are sizes of heights, see `crests`."""
-    share = (crests * scales.per_limit).reshape(-1)
-    texel = int(share.argmax())
-    return float(share[texel]), texel
-
-
 @kernel
 def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
     """Share of the surface that is steeper than 1, seen on every fourth row."""
@@ -155,8 +148,9 @@ class AmplitudeCheck:
     def waves_changed(self, geom: int, waves: WaveSolver) -> None:
         """Go on with the new waves of a geom."""
         if geom in self._watched:
-            self._watched[geom].look()  # a last time at the old ones
-            self._watched[geom].waves = waves
+            watch = self._watched[geom]
+            watch.look()  # at the old ones, a last time
+            watch.waves = waves
             waves.crests()
 
     def flush(self) -> None:
@@ -232,7 +226,10 @@ class _Watch:
             self._scales = scales_of(self.waves.rest)
             self._calm = self._scales.calm
         scales = self._scales
-        high, texel = highest(crests, scales)
+        # the greatest crest over what is allowed there
+        share = (crests * scales.per_limit).reshape(-1)
+        texel = int(share.argmax())
+        high = float(share[texel])
         steep_share = steep_area(height, scales.per_row, scales.per_column, scales.share)
         excess, what = high, ""
         if steep_share > _STEEP_AREA:

@@ -332,7 +332,8 @@ class TwoWay:
             held = {key: self._forces.get(key, 0.0) for key in places}
             waves, trial, rest = self._with_trials(target)
             trial.state = waves.state
-            trial.step(dt, load=Load.together([_times(place.load, held[key]) for key, place in places.items()]))
+            loads = [Load(place.load.texels, held[key] * place.load.forces) for key, place in places.items()]
+            trial.step(dt, load=Load.together(loads))
             mobilities = self._mobilities_of(places, rest, dt)
             now, before, after = self._heights[target], self._before.get(target, self._heights[target]), trial.height
             velocity, end = waves.velocity, trial.velocity
@@ -407,7 +408,3 @@ class TwoWay:
         self._move(data, force * dt * response[0], dt, pending=pending)
         self._work.append((pair, force * dt * ((start + end) / 2 + force * dt * light / 2), force))
         return force
-
-
-def _times(load: Load, factor: float) -> Load:
-    return Load(load.texels, factor * load.forces)

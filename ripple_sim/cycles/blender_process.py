@@ -88,9 +88,11 @@ def set_world(scene, settings):
     nodes.clear()
     rays, seen = nodes.new("ShaderNodeLightPath"), sky_colors(nodes, links, settings)
     boxes, axes = soft_boxes(nodes, links, settings["boxes"])
-    diffuse = vectors(nodes, links, "ADD", settings["sky"], scaled(nodes, links, boxes, settings["boxes_diffuse"]))
-    glossy = scaled(nodes, links, boxes, settings["boxes_reflected"])
-    glossy = vectors(nodes, links, "ADD", glossy, scaled(nodes, links, seen, 0.75))
+    diffuse = vectors(
+        nodes, links, "ADD", settings["sky"], vectors(nodes, links, "SCALE", boxes, settings["boxes_diffuse"])
+    )
+    glossy = vectors(nodes, links, "SCALE", boxes, settings["boxes_reflected"])
+    glossy = vectors(nodes, links, "ADD", glossy, vectors(nodes, links, "SCALE", seen, 0.75))
     color = mixed(nodes, links, rays.outputs["Is Glossy Ray"], diffuse, glossy)
     for kind in ("Is Camera Ray", "Is Transmission Ray"):
         color = mixed(nodes, links, rays.outputs[kind], color, seen)
@@ -111,7 +113,7 @@ def soft_boxes(nodes, links, boxes):
             limit = maths(nodes, links, "MULTIPLY", shares[0], half)
             near = maths(nodes, links, "LESS_THAN", maths(nodes, links, "ABSOLUTE", share, 0.0), limit)
             inside = maths(nodes, links, "MULTIPLY", inside, near)
-        total = vectors(nodes, links, "ADD", total, scaled(nodes, links, box["radiance"], inside))
+        total = vectors(nodes, links, "ADD", total, vectors(nodes, links, "SCALE", box["radiance"], inside))
         axes.append([share.node for share in shares])
     return total, axes
 
@@ -144,21 +146,12 @@ def mixed(nodes, links, share, first, second):
 
 
 def vectors(nodes, links, operation, first, second):
-    """Vector or number of an operation on two vectors, given as lists or as sockets."""
+    """Vector or number of an operation on two vectors, or to scale a vector, given as they are or as sockets."""
     node = nodes.new("ShaderNodeVectorMath")
     node.operation = operation
     set_input(links, node.inputs[0], first)
-    set_input(links, node.inputs[1], second)
+    set_input(links, node.inputs["Scale" if operation == "SCALE" else 1], second)
     return node.outputs["Value" if operation == "DOT_PRODUCT" else "Vector"]
-
-
-def scaled(nodes, links, color, factor):
-    """Brighten or darken a colour."""
-    node = nodes.new("ShaderNodeVectorMath")
-    node.operation = "SCALE"
-    set_input(links, node.inputs[0], color)
-    set_input(links, node.inputs["Scale"], factor)
-    return node.outputs[0]
 
 
 def maths(nodes, links, operation, first, second):

@@ -29,7 +29,7 @@ from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.files import final_path
 
 from .clip import GIF, Clip, Stream
-from .replace import MARK, made_here, mark_gif
+from .replace import MARK, check_folder, made_here, mark_gif
 
 # ITU-R BT.709: x and y of red, green, blue and white
 _CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
@@ -230,14 +230,11 @@ def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: boo
     if form == "exr":
         check_exr()
     folder = passes_folder(video)
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise VideoError(f"cannot write passes to {folder}: it is not a folder; name another output")
-    for each in folder.iterdir() if folder.is_dir() else ():
-        named = each.is_file() and not each.is_symlink() and _NAME.fullmatch(each.name.lstrip("."))
-        if not named or not (overwrite or made_here(each)):
-            raise VideoError(
-                f"cannot write passes to {folder}: it holds other files ({each.name}); name another output"
-            )
+
+    def own(file: Path) -> bool:
+        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (overwrite or made_here(file))
+
+    check_folder(VideoError, "passes", folder, own)
     owner = _owner(folder)
     if owner not in (None, final_path(video).name) and not overwrite:
         raise VideoError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 
 from PIL.PngImagePlugin import PngInfo
@@ -42,11 +43,25 @@ def mark_gif(path: Path) -> None:
         file.write(b"\x21\xfe" + bytes([len(text)]) + text + b"\x00\x3b")
 
 
-def move(source: Path, target: Path) -> None:
-    """Rename a finished file or folder once it has reached the disk."""
-    handle = os.open(source, os.O_RDONLY)
+def check_folder(kind: type[Exception], what: str, folder: Path, own: Callable[[Path], object]) -> None:
+    """Raise an error of a kind if a folder, to which `what` is to be written, holds anything but files of our own."""
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise kind(f"cannot write {what} to {folder}: it is not a folder; name another output")
+    for each in folder.iterdir() if folder.is_dir() else ():
+        if not (each.is_file() and not each.is_symlink() and own(each)):
+            raise kind(f"cannot write {what} to {folder}: it holds other files ({each.name}); name another output")
+
+
+def sync(path: Path) -> None:
+    """Wait until a file or folder has reached the disk."""
+    handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def move(source: Path, target: Path) -> None:
+    """Rename a finished file or folder once it has reached the disk."""
+    sync(source)
     source.replace(target)

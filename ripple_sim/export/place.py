@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ripple_sim.encode.output import check_size
-from ripple_sim.encode.replace import MARK, made_here, move
+from ripple_sim.encode.replace import MARK, check_folder, made_here, move
 from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import NO_NAME, final_path
@@ -65,16 +65,12 @@ def check_companion(folder: Path, recognised: Recognised, overwrite: bool) -> No
     ExportError
         If it holds anything but those that were made here.
     """
-    what = folder.suffix.removeprefix(".")
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise ExportError(f"cannot write {what} to {folder}: it is not a folder; name another output")
-    for each in folder.iterdir() if folder.is_dir() else ():
-        plain = each.is_file() and not each.is_symlink()
-        image = plain and each.suffix == ".png" and (overwrite or made_here(each))
-        if not image and not (plain and each.suffix == ".usdc" and (overwrite or recognised(each))):
-            raise ExportError(
-                f"cannot write {what} to {folder}: it holds other files ({each.name}); name another output"
-            )
+    made = {".png": made_here, ".usdc": recognised}
+
+    def own(file: Path) -> bool:
+        return file.suffix in made and (overwrite or made[file.suffix](file))
+
+    check_folder(ExportError, folder.suffix.removeprefix("."), folder, own)
 
 
 def _check_replaceable(path: Path, recognised: Recognised, overwrite: bool) -> None:

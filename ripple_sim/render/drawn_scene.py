@@ -126,17 +126,20 @@ class SurfaceMesh:
         self._solid = resources.vertex_array(self._program, content, self._indices, skip_errors=True)
         # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
         whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse))
-        passing = look.transparency * rgb  # linear colour of the light that passes through it
+        solid, passing = (
+            int(not self._open),
+            look.transparency * rgb,
+        )  # linear colour of the light that passes through it
         self._depth, self._albedo, self._transmission = (
-            resources.vertex_array(self._caster(**shown), [moved], triangles)
-            for shown, triangles in (({}, whole), ({"ALBEDO_MAP": 1}, coarse), ({"TRANSMISSION_MAP": 1}, self._indices))
+            resources.vertex_array(
+                resources.program("passes/casters", MOVED=1, ALBEDO_MAP=albedo, TRANSMISSION_MAP=passed, SOLID=solid),
+                [moved],
+                triangles,
+            )
+            for albedo, passed, triangles in ((0, 0, whole), (1, 0, coarse), (0, 1, self._indices))
         )
         self._albedo.program["color"] = tuple(rgb - passing)
         self._transmission.program["transmission"] = tuple(passing)
-
-    def _caster(self, **shown: int) -> moderngl.Program:
-        options = {"MOVED": 1, "ALBEDO_MAP": 0, "TRANSMISSION_MAP": 0, "SOLID": int(not self._open), **shown}
-        return self._resources.program("passes/casters", **options)
 
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
         """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.

@@ -217,7 +217,7 @@ def _check_values(value: Any, place: str, origin: str) -> None:
     elif isinstance(value, list):
         for inner in value:
             _check_values(inner, place, origin)
-    elif isinstance(value, str) and re.search("[\0\ud800-\udfff]", value):  # halves of a pair of surrogates, too
+    elif isinstance(value, str) and re.search("[\0\ud800-\udfff]", value):  # the latter are halves of pairs
         raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are names without a NUL")
     elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
         raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")

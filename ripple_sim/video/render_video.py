@@ -317,23 +317,6 @@ class Summary:
     encode_seconds: float
     wall_seconds: float
 
-    @classmethod
-    def of(cls, film: Film, writer: FrameWriter, gl: GLContext, **measured: Any) -> Summary:
-        """Summary of a film that has been written; given is what neither the film nor its writer knows."""
-        simulations = film.simulations
-        return cls(
-            output=writer.path,
-            frames=writer.frames,
-            renderer=gl.renderer,
-            backend=simulations[0].backend,
-            substeps_per_frame=sum(each.substeps_taken for each in simulations) / max(writer.frames - 1, 1),
-            physics_seconds=sum(each.physics_seconds for each in simulations),
-            wave_seconds=sum(each.wave_seconds for each in simulations),
-            render_seconds=film.seconds,
-            encode_seconds=writer.encode_seconds,
-            **measured,
-        )
-
 
 # Shots that wait to be rendered. One would do if all frames took the same time.
 _WAITING = 2
@@ -400,13 +383,19 @@ def render_video(
         if options.passes:
             film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)
-    return Summary.of(
-        film,
-        writer,
-        gl,
+    return Summary(
+        output=writer.path,
+        frames=writer.frames,
         resumed_at=resumed_at,
+        renderer=gl.renderer,
+        backend=simulations[0].backend,
+        substeps_per_frame=sum(each.substeps_taken for each in simulations) / max(writer.frames - 1, 1),
         compile_seconds=sum(compile_times().values()) - compiled,
         setup_seconds=ready - work_start,
+        physics_seconds=sum(each.physics_seconds for each in simulations),
+        wave_seconds=sum(each.wave_seconds for each in simulations),
+        render_seconds=film.seconds,
+        encode_seconds=writer.encode_seconds,
         wall_seconds=time.perf_counter() - start,
     )
 

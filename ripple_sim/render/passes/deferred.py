@@ -258,21 +258,16 @@ class DeferredShading:
             self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
         self._background.draw(ctx, self.frame)
         self.frame.depth_mask = False
-        self._shade_solids(ctx, scissor_of(boxes))
+        if (scissor := scissor_of(boxes)) is not None:
+            # a software driver also takes its time over pixels that the depth test leaves out
+            self.frame.scissor = scissor
+            ctx.enable(moderngl.BLEND)
+            ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+            ctx.depth_func = ">="  # solids in some or all of the samples
+            self._solids.run(self.frame, LEVELS["MIXED"])
+            self.frame.scissor = (0, 0, *self.frame.size)
         self.frame.depth_mask = True
         ctx.depth_func = "<="
-
-    def _shade_solids(self, ctx: moderngl.Context, scissor: tuple[int, int, int, int] | None) -> None:
-        """Shade pixels with solids, over the background."""
-        if scissor is None:
-            return
-        # a software driver also takes its time over pixels that the depth test leaves out
-        self.frame.scissor = scissor
-        ctx.enable(moderngl.BLEND)
-        ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        ctx.depth_func = ">="  # solids in some or all of the samples
-        self._solids.run(self.frame, LEVELS["MIXED"])
-        self.frame.scissor = (0, 0, *self.frame.size)
 
 
 class TransparentLayers:

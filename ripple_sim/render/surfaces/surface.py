@@ -87,7 +87,9 @@ def split_at_charts(
     part, place = np.nonzero(~whole)
     cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
     cut[:, normal] /= np.maximum(np.linalg.norm(cut[:, normal], axis=1, keepdims=True), 1e-12)
-    cut = _snapped(cut, attributes)
+    # without the round-off by which two triangles differ in a point that they share
+    step = np.ldexp(1.0, np.frexp(np.abs(attributes).max(axis=0))[1] - _BITS)
+    cut = np.round(cut / step) * step
     _, point = np.unique(np.hstack([cut[:, position], cut[:, normal]]), axis=0, return_inverse=True)
     _, distinct = np.unique(cut, axis=0, return_inverse=True)
     source, alike = np.where(whole, vertex, 0), np.where(whole, vertex, 0)
@@ -102,13 +104,6 @@ def split_at_charts(
         np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row],
         key.ravel()[where] % charts.shape[0],
     )
-
-
-def _snapped(cut: NDArray[np.float64], attributes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Attributes of cut points without the round-off by which two triangles differ in a point that they share."""
-    exponent = np.frexp(np.abs(attributes).max(axis=0))[1]
-    step = np.ldexp(1.0, exponent - _BITS)
-    return np.round(cut / step) * step
 
 
 def shared_places(uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray) -> NDArray[np.float64]:

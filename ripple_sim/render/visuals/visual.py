@@ -299,9 +299,8 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
 
 def look_of(model: Any, visual: Visual) -> Look:
     """Look of a visual's material; roughness is derived from MuJoCo's shininess where the material gives none."""
-    red, green, blue = (float(x) for x in visual.color)
-    rgb = red, green, blue
-    material = visual.material
+    red, green, blue = visual.color.tolist()
+    rgb, material = (red, green, blue), visual.material
     if material < 0:
         return Look(color=rgb, roughness=0.42, coat=0.2)
     roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
