@@ -87,7 +87,9 @@ class Session:
     def __init__(self, scene: Scene, *, fps: int = 30, resolution: int | None = None) -> None:
         adopt_warnings()
         self.fps = fps
-        self.simulation = Simulation(scene, fps=fps, resolution=resolution, backend="cpu", on_step=self._before_step)
+        self.simulation = Simulation(
+            scene, fps=fps, resolution=resolution, backend="cpu", on_step=lambda now: self._balls.hold(now.data)
+        )
         self._balls = Balls(self.simulation.model)
         self._material: dict[str, float] = {}
         ripples, limited = self.simulation.ripples, self.simulation.limited
@@ -224,9 +226,6 @@ class Session:
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Position [m] and rotation matrix of a geom in the world."""
         return target_pose(self.simulation.data, self.simulation.ripples.geom_ids[name])
-
-    def _before_step(self, simulation: Simulation) -> None:
-        self._balls.hold(simulation.data)
 
     def _change_material(self, **coefficients: Any) -> None:
         for name in self.simulation.ripples:

@@ -71,7 +71,9 @@ def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[n
 
 def _weighted(V: NDArray, F: NDArray) -> NDArray[np.float64]:
     """Normals of the triangles, weighted with their angles at the corners [3 m, 3]."""
-    return (_corner_angles(V, F)[:, :, None] * triangle_normals(V, F)[:, None, :]).reshape(-1, 3)
+    sides = normalized(V[np.roll(F, -1, axis=1)] - V[F])
+    angles = np.arccos(np.clip(np.einsum("fkj,fkj->fk", sides, -np.roll(sides, 1, axis=1)), -1.0, 1.0))
+    return (angles[:, :, None] * triangle_normals(V, F)[:, None, :]).reshape(-1, 3)
 
 
 def _sums(weighted: NDArray[np.float64], group: NDArray, count: int) -> NDArray[np.float64]:
@@ -82,11 +84,6 @@ def _sums(weighted: NDArray[np.float64], group: NDArray, count: int) -> NDArray[
 def triangle_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:
     """Unit normals of triangles, shape [m, 3]; zero where a triangle has no area."""
     return normalized(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
-
-
-def _corner_angles(V: NDArray, F: NDArray) -> NDArray[np.float64]:
-    sides = normalized(V[np.roll(F, -1, axis=1)] - V[F])
-    return np.arccos(np.clip(np.einsum("fkj,fkj->fk", sides, -np.roll(sides, 1, axis=1)), -1.0, 1.0))
 
 
 def normalized(vectors: NDArray) -> NDArray[np.float64]:
