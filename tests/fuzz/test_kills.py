@@ -47,6 +47,7 @@ def ended(home: Path, words: str) -> None:
 
 def finish(home: Path, words: str, kill: int = 0, after: float = 300) -> int:
     """Run a command, to its end or until it is killed after some seconds; return its status."""
+    (home / "out").mkdir(exist_ok=True)
     process = CONTEXT.Process(target=ended, args=(home, words))
     process.start()
     process.join(after)
