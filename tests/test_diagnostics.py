@@ -183,7 +183,7 @@ def test_mujocos_version_is_that_which_runs_also_where_its_package_is_mujoco_cor
 
     monkeypatch.setattr(importlib.metadata, "version", without_mujoco)
     monkeypatch.setattr(settings, "version", without_mujoco)
-    assert diagnostics.collect().versions["mujoco"] == mujoco.__version__
+    assert diagnostics.collect()["versions"]["mujoco"] == mujoco.__version__
     assert settings.versions.__wrapped__()["mujoco"] == mujoco.__version__
 
 

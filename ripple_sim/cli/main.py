@@ -12,6 +12,7 @@ import dataclasses
 import io
 import os
 import re
+import resource
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -30,6 +31,19 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 _LONGEST = 800  # of a message [characters]
 
+# Address space [GB] that a small job takes, with its libraries, software OpenGL and kernels: with less, these end the
+# process, or blame something else.
+_ADDRESS_SPACE = {
+    InfoCommand: 1.3,
+    AtlasCommand: 1.2,
+    BenchCommand: 2.4,
+    RenderCommand: 2.4,
+    DropCommand: 2.4,
+    ViewCommand: 2.4,
+    BatchCommand: 2.4,
+    ExportCommand: 3.0,
+}
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the arguments `argv` (by default the process's own) and return its exit status."""
@@ -46,6 +60,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(command: Any) -> int:
     """Run a command and return the exit status."""
+    need, most = _ADDRESS_SPACE.get(type(command), 0), resource.getrlimit(resource.RLIMIT_AS)[0]
+    if resource.RLIM_INFINITY != most < 1e9 * need:
+        text = f"this needs {need} GB of address space, but the limit (ulimit -v) is {most / 1e9:.2f} GB; allow more"
+        return _fail(text, FAILED)
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
 
     from ripple_sim.errors import DisplayError, EncodingError

@@ -26,7 +26,7 @@ class Energy(NamedTuple):
     Attributes
     ----------
     bodies : float
-        Kinetic and potential energy, of gravity and of springs; see `BodyEnergy`.
+        Kinetic and potential energy, of gravity and of springs; see `body_energy`.
     waves : float
         Of all targets, see `WaveSolver.energy`.
     """
@@ -40,34 +40,29 @@ class Energy(NamedTuple):
         return self.bodies + self.waves
 
 
-class BodyEnergy:
-    """Kinetic and potential energy of MuJoCo's bodies, at one time.
+def body_energy(data: mujoco.MjData, scratch: mujoco.MjData) -> float:
+    """Kinetic and potential energy of MuJoCo's bodies [J], at one time; `scratch` is data of the same model.
 
     MuJoCo's semi-implicit steps leave velocities half a step behind positions. The potential is taken half a step back:
     under uniform gravity the sum is then constant to round-off, while that of `mujoco.mj_energyPos` and `mj_energyVel`
     differs on the way up from that on the way down. With the integrator RK4 both are of the same time already.
     """
+    model = scratch.model
 
-    def __init__(self, model: mujoco.MjModel) -> None:
-        self._model, self._scratch = model, mujoco.MjData(model)
+    def update() -> None:
+        for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_flex, mujoco.mj_tendon):
+            compute(model, scratch)
 
-    def __call__(self, data: mujoco.MjData) -> float:
-        """Energy [J]; `data` stays as it is."""
-        model, scratch = self._model, self._scratch
-        for name in ("qpos", "qvel", "mocap_pos", "mocap_quat"):
-            getattr(scratch, name)[:] = getattr(data, name)
-        self._update()
-        mujoco.mj_makeM(model, scratch)
-        mujoco.mj_energyVel(model, scratch)
-        if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
-            mujoco.mj_integratePos(model, scratch.qpos, scratch.qvel, -model.opt.timestep / 2)
-            self._update()
-        mujoco.mj_energyPos(model, scratch)
-        return float(scratch.energy.sum())
-
-    def _update(self) -> None:
-        for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_flex, mujoco.mj_tendon):
-            update(self._model, self._scratch)
+    for name in ("qpos", "qvel", "mocap_pos", "mocap_quat"):
+        getattr(scratch, name)[:] = getattr(data, name)
+    update()
+    mujoco.mj_makeM(model, scratch)
+    mujoco.mj_energyVel(model, scratch)
+    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+        mujoco.mj_integratePos(model, scratch.qpos, scratch.qvel, -model.opt.timestep / 2)
+        update()
+    mujoco.mj_energyPos(model, scratch)
+    return float(scratch.energy.sum())
 
 
 _INTEGRATORS = mujoco.mjtIntegrator

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import warnings
 from collections.abc import Iterator, Sequence
-from typing import TypedDict, Unpack
 
 import mujoco
 import numpy as np
@@ -17,7 +16,7 @@ from ripple_sim.solver.errors import checked, whole
 
 from .amplitude import AmplitudeCheck
 from .collision_warnings import collision_warnings
-from .energy import BodyEnergy, Energy
+from .energy import Energy, body_energy
 from .geoms import (
     ByGeom,
     GeomKey,
@@ -46,14 +45,6 @@ from .targets import Target, Targets
 from .two_way import TwoWay
 
 __all__ = ["Impulse", "Ripples"]
-
-
-class WaveOptions(TypedDict, total=False):
-    """Keyword arguments that `Ripples` hands on to `WaveSolver`."""
-
-    backend: str
-    operator: str
-    conserve_volume: bool
 
 
 class Ripples(Targets):
@@ -95,8 +86,8 @@ class Ripples(Targets):
         Whether a flex keeps to itself the coarse motion that contacts give it, for all targets or by name: its waves
         then get what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in the flex
         and in its waves, which take theirs from nothing.
-    **wave_options
-        As for `WaveSolver`: `backend` (str, "auto"), `operator` (str, "fem") and `conserve_volume` (bool, True).
+    backend, operator, conserve_volume : str, str, bool
+        As for `WaveSolver`.
 
     Raises
     ------
@@ -117,9 +108,12 @@ class Ripples(Targets):
         two_way: bool = False,
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
         high_pass: bool | ByGeom[bool] = False,
-        **wave_options: Unpack[WaveOptions],
+        backend: str = "auto",
+        operator: str = "fem",
+        conserve_volume: bool = True,
     ) -> None:
-        super().__init__(own_model(model), materials, resolution, layout, rim, wave_options)
+        options = {"backend": backend, "operator": operator, "conserve_volume": conserve_volume}
+        super().__init__(own_model(model), materials, resolution, layout, rim, options)
         adopt_warnings()
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
@@ -143,7 +137,7 @@ class Ripples(Targets):
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._two_way = TwoWay(coupled, self._waves) if two_way else None
-        self._body_energy = BodyEnergy(self.model)
+        self._scratch = mujoco.MjData(self.model)
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
 
@@ -227,7 +221,7 @@ class Ripples(Targets):
         SceneError
             If `data` belongs to another model.
         """
-        bodies = self._body_energy(own_data(self.model, data))
+        bodies = body_energy(own_data(self.model, data), self._scratch)
         return Energy(bodies, sum(waves.energy() for waves in self._waves.values()))
 
     def vertices(self, name: GeomKey, data: mujoco.MjData) -> NDArray[np.float64] | None:

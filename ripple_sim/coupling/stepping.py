@@ -208,26 +208,24 @@ def adopt_warnings() -> None:
     Of itself it writes them to standard error and to MUJOCO_LOG.TXT in the current folder. A handler that the user has
     given to `mujoco.set_mju_user_warning` stays.
     """
-    handler = mujoco.get_mju_user_warning()
-    if handler is None or isinstance(handler, _Warner):
-        mujoco.set_mju_user_warning(_Warner())
+    if mujoco.get_mju_user_warning() in (None, _tell):
+        _said.clear()
+        mujoco.set_mju_user_warning(_tell)
 
 
-class _Warner:
+_said: set[str] = set()
+
+
+def _tell(message: str) -> None:
     """What MuJoCo calls with its warnings."""
-
-    def __init__(self) -> None:
-        self._said: set[str] = set()
-
-    def __call__(self, message: str) -> None:
-        text = re.sub(r" *Time = [0-9.]+", "", " ".join(message.split()))
-        kind = re.sub(r"[0-9]+", "", text)
-        # an unstable simulation ends in an error, or begins anew with a warning
-        if kind in self._said or "simulation is unstable" in text:
-            return
-        self._said.add(kind)
-        with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
-            warnings.warn(f"MuJoCo: {text}", RippleWarning, stacklevel=2)
+    text = re.sub(r" *Time = [0-9.]+", "", " ".join(message.split()))
+    kind = re.sub(r"[0-9]+", "", text)
+    # an unstable simulation ends in an error, or begins anew with a warning
+    if kind in _said or "simulation is unstable" in text:
+        return
+    _said.add(kind)
+    with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
+        warnings.warn(f"MuJoCo: {text}", RippleWarning, stacklevel=2)
 
 
 @contextlib.contextmanager

@@ -44,7 +44,14 @@ from .resources import (
     write_page as write_page,
 )
 from .surfaces.surface import Surface as Surface
-from .targets import FrameFormat as FrameFormat, FramePass as FramePass, GBuffer as GBuffer, Readback as Readback
+from .targets import (
+    FrameFormat as FrameFormat,
+    FramePass as FramePass,
+    GBuffer as GBuffer,
+    Readback as Readback,
+    SurfaceBuffers as SurfaceBuffers,
+    SurfaceImage as SurfaceImage,
+)
 from .tone_mapping import linear_to_srgb as linear_to_srgb, srgb_to_linear as srgb_to_linear, tone_mapped as tone_mapped
 from .visuals.lights import LIGHTING as LIGHTING
 from .visuals.visual import LOOKS as LOOKS

@@ -18,7 +18,6 @@ from ripple_sim.coupling.model import find_flex_colliders
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
 from ripple_sim.render.passes.shadows import Floor, FloorOcclusion, ShadowMaps, TransmissionMaps, find_floor
-from ripple_sim.render.passes.surface_buffers import SurfaceBuffers, SurfaceImage
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.visuals.geoms import shaped
 from ripple_sim.render.visuals.lights import SceneLight
@@ -31,7 +30,7 @@ from ripple_sim.solver.gl import GLContext
 from .camera import Pose, Viewpoint, boxes_of, enclosing, within
 from .drawn_scene import DrawnScene
 from .resources import AnyHeightMap, FrameUniforms, Resources
-from .targets import FrameFormat, Readback
+from .targets import FrameFormat, Readback, SurfaceBuffers, SurfaceImage
 
 _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow

@@ -117,7 +117,7 @@ def build_atlas(
     cube = layout == "cube" or (layout == "auto" and _fits_cube(mesh))
     start = time.perf_counter()
     path = _cache_path(mesh, method if cube else f"patches {resolution}", sphere if cube else None) if cache else None
-    stored = None if path is None else _read_cache(path, mesh)
+    stored = None if path is None else _read_cache(path, mesh, cube)
     # charts of the patch layout have a resolution of their own, and a file for each of the atlas's
     if stored is not None and (not cube or stored.resolution == resolution):
         stored.timings["cache"] = time.perf_counter() - start
@@ -129,7 +129,9 @@ def build_atlas(
         atlas = patch_atlas(mesh, resolution)
     if path is not None:
         # a folder that cannot be written costs the next call its time, nothing else
-        with contextlib.suppress(AtlasError):
+        with contextlib.suppress(AtlasError, OSError):
+            if path.is_symlink():  # whatever it leads to is not ours
+                path.unlink()
             atlas.save(path, overwrite=True)
             make_room(path)
     return atlas
@@ -170,13 +172,14 @@ def _cache_path(mesh: Mesh, kind: str, sphere: NDArray[np.float64] | None) -> Pa
     return cache_path(f"{FORMAT} {kind}", (mesh.V, mesh.F))
 
 
-def _read_cache(path: Path, mesh: Mesh) -> Atlas | None:
-    """The atlas of this very mesh, or None where the file is missing, does not verify, or is of another mesh."""
+def _read_cache(path: Path, mesh: Mesh, cube: bool) -> Atlas | None:
+    """The atlas of this very mesh in this layout, or None where the file is missing, does not verify, or is another."""
     try:
         stored = load_atlas(path)
     except AtlasError:
         return None
-    if not (np.array_equal(stored.mesh.V, mesh.V) and np.array_equal(stored.mesh.F, mesh.F)):
+    same = np.array_equal(stored.mesh.V, mesh.V) and np.array_equal(stored.mesh.F, mesh.F)
+    if not same or (stored.layout == "cube") != cube:
         return None
     mark_used(path)
     return dataclasses.replace(stored, mesh=mesh, timings={})

@@ -275,6 +275,8 @@ def evened_areas(areas: NDArray[np.float64], stencil: Stencil) -> NDArray[np.flo
     of the operator is k^2 h^2 / 12; the bound is as low as a share of that allows.
     """
     flat, pull, matrix = areas.ravel(), stencil.absolute_sums().ravel(), stiffness_matrix(stencil)
+    if not pull.any():  # a single texel
+        return areas
     rate, part = pull / flat, connected_components(matrix, directed=False)[1]
     best, low, high = flat, _FASTER * _bulk(rate, flat), float(rate.max())
     bound = max(low, _even(flat))  # beyond which texels are softened, if need be

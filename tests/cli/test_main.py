@@ -154,6 +154,18 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
     assert capsys.readouterr().err == f"ripple-sim: {line}\n"
 
 
+@pytest.mark.parametrize(
+    ("words", "need"), [("render duck -o x.mp4", 2.4), ("export duck -o x.usda", 3.0), ("atlas a.obj", 1.2)]
+)
+def test_little_address_space_is_told_at_once_with_what_is_needed(tmp_path, words, need):
+    """Later OpenBLAS, LLVM or Mesa run out of it, and end the process or blame something else."""
+    code = f"ulimit -v 800000; {sys.executable} -m ripple_sim {words}"
+    result = subprocess.run(["bash", "--norc", "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False)
+    limit = "the limit (ulimit -v) is 0.82 GB; allow more"
+    assert result.stderr == f"ripple-sim: this needs {need} GB of address space, but {limit}\n"
+    assert result.returncode == 1
+
+
 def test_an_unexpected_error_is_not_hidden(monkeypatch):
     def run(self):
         raise ZeroDivisionError

@@ -46,10 +46,10 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_damaged_atlases_in_the_cache_are_made_anew_and_damaged_files_refused(cache: Path, damages: list) -> None:
     whole = [load_atlas(file) for file in sorted(cache.iterdir())]
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(home / "cache"))
-        shutil.copytree(cache, home / "cache" / "ripple-sim")
-        damage(home / "cache", damages)
-        for file in (home / "cache").rglob("*.npz"):
+        patch.setenv("XDG_CACHE_HOME", str(home))
+        shutil.copytree(cache, home / "ripple-sim")
+        damage(home / "ripple-sim", damages)
+        for file in (home / "ripple-sim").glob("*.npz"):
             found = outcome(lambda file=file: load_atlas(file))
             assert isinstance(found, RippleError) or any(np.array_equal(found.areas, each.areas) for each in whole)
         assert {each.areas.tobytes() for each in atlases()} == {each.areas.tobytes() for each in whole}

@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import pytest
@@ -31,8 +32,8 @@ CONTEXT = multiprocessing.get_context("forkserver")
 LOADED = ["ripple_sim.cli.main", "ripple_sim.video.render_video", "ripple_sim.export.exporter", "ripple_sim.batch.run"]
 
 
-def ended(home: Path, words: str) -> None:
-    """What a process does: a command, whose workers are this very process."""
+def ended(home: Path, words: str, begun: Event) -> None:
+    """What a process does: a command, whose workers are this very process. It can be killed once it has `begun`."""
     from ripple_sim.batch import run
     from ripple_sim.cli.main import main
 
@@ -42,13 +43,17 @@ def ended(home: Path, words: str) -> None:
     os.dup2(os.open("said", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     run.LocalExecutor = Here  # type: ignore[misc,assignment]
+    begun.set()
     sys.exit(main(words.split()))
 
 
 def finish(home: Path, words: str, kill: int = 0, after: float = 300) -> int:
     """Run a command, to its end or until it is killed after some seconds; return its status."""
-    process = CONTEXT.Process(target=ended, args=(home, words))
+    (home / "out").mkdir(exist_ok=True)
+    begun = CONTEXT.Event()
+    process = CONTEXT.Process(target=ended, args=(home, words, begun))
     process.start()
+    assert begun.wait(60)
     process.join(after)
     if kill and process.is_alive():
         os.kill(process.pid or 0, kill)

@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim.overlay.notes import round_up
 from ripple_sim.viewer import BACKGROUND, add_floor, find_floor, is_endless
-from ripple_sim.viewer.stage import _round_up
+from ripple_sim.viewer.stage import _STEPS
 
 
 def state(body: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -57,5 +58,5 @@ def test_a_large_floor_fades_from_its_colour_to_the_background() -> None:
 
 @pytest.mark.parametrize(("value", "limit"), [(1.0, 1), (1.01, 2), (2.0, 2), (3e-4, 5e-4), (5.1e-3, 1e-2), (70, 100)])
 def test_a_limit_is_rounded_up_to_one_two_or_five(value: float, limit: float) -> None:
-    assert _round_up(value) == pytest.approx(limit)
-    assert _round_up(_round_up(value)) == pytest.approx(limit)
+    assert round_up(value, _STEPS) == pytest.approx(limit)
+    assert round_up(round_up(value, _STEPS), _STEPS) == pytest.approx(limit)

@@ -12,4 +12,3 @@ from .shadows import (
     TransmissionMaps as TransmissionMaps,
     find_floor as find_floor,
 )
-from .surface_buffers import SurfaceBuffers as SurfaceBuffers, SurfaceImage as SurfaceImage
