@@ -109,7 +109,11 @@ class BatchRun:
             with contextlib.suppress(queue.Empty):
                 number, future = self._done.get(timeout=_PATIENCE)
                 self._running.remove(number)
-                self._take(number, _outcome(number, future))
+                try:
+                    outcome = future.result()
+                except Exception as error:  # the worker died
+                    outcome = Outcome(number, "died", error=f"its worker died: {' '.join(str(error).split())}")
+                self._take(number, outcome)
             if not self.pending and not self._running and self._later and self.full is None:
                 time.sleep(_PATIENCE)
                 self.pending, self._later = deque(self._later), []
@@ -198,13 +202,6 @@ def in_shard(number: int, plan: Plan, shard: tuple[int, int]) -> bool:
     """Whether a scene belongs to a part of the batch; scenes of a tar file stay together."""
     together = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 1
     return number // together % shard[1] == shard[0] - 1
-
-
-def _outcome(number: int, future: Future) -> Outcome:
-    try:
-        return future.result()
-    except Exception as error:  # the worker died
-        return Outcome(number, "died", error=f"its worker died: {' '.join(str(error).split())}")
 
 
 _TRIED = 3  # scenes whose values are drawn before the batch begins

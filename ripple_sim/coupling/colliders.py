@@ -91,8 +91,7 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     if not found.meshname or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
     if found.meshname:
-        remove_flex_collider(spec, found)
-        remove_convex_collider(spec, found)
+        _remove_colliders(spec, found)
         found.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
     if not (found.contype or found.conaffinity):
         found.contype = found.conaffinity = 1
@@ -259,16 +258,6 @@ def convex_parts_of(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> list[NDArray[n
     return convex_parts(mesh)
 
 
-def remove_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
-    """Remove the convex colliders of a geom, if it has any, and let the geom collide by itself again."""
-    i = 0
-    while (part := spec.geom(part_name(geom.name, i))) is not None and part.parent.name == geom.parent.name:
-        geom.contype, geom.conaffinity = part.contype, part.conaffinity
-        spec.delete(part)
-        spec.delete(spec.mesh(part_name(geom.name, i)))
-        i += 1
-
-
 # Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
 _THICKNESSES = (0.05, 0.04, 0.03, 0.02)
 # Thickness of a sheet over its size, on either side.
@@ -318,12 +307,18 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore)
     geom.contype = geom.conaffinity = 0
 
 
-def remove_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
-    """Remove the flex collider of a geom, if it has one, and let the geom collide by itself again."""
+def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+    """Remove the flex and the convex colliders of a geom, if it has any, and let it collide by itself again."""
     flex = spec.flex(geom.name)
     if flex is not None and set(flex.vertbody) == {geom.parent.name}:
         geom.contype, geom.conaffinity = flex.contype, flex.conaffinity
         spec.delete(flex)
+    i = 0
+    while (part := spec.geom(part_name(geom.name, i))) is not None and part.parent.name == geom.parent.name:
+        geom.contype, geom.conaffinity = part.contype, part.conaffinity
+        spec.delete(part)
+        spec.delete(spec.mesh(part_name(geom.name, i)))
+        i += 1
 
 
 def flex_core(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> FlexCore:

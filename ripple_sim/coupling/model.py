@@ -134,15 +134,6 @@ def vertex_flexes(model: mujoco.MjModel) -> NDArray[np.int64]:
     return np.repeat(np.arange(model.nflex), model.flex_vertnum)
 
 
-def vertex_spacing(model: mujoco.MjModel) -> NDArray[np.float64]:
-    """Mean length of the edges of each vertex's flex [m], [nflexvert]."""
-    spacing = [
-        model.flexedge_length0[first : first + count].mean() if count else 0.0
-        for first, count in zip(model.flex_edgeadr, model.flex_edgenum, strict=True)
-    ]
-    return np.array(spacing)[vertex_flexes(model)]
-
-
 _GEOM = mujoco.mjtGeom
 _ENDLESS = (int(_GEOM.mjGEOM_PLANE), int(_GEOM.mjGEOM_HFIELD))
 _NOT_CONVEX = (int(_GEOM.mjGEOM_SDF), int(_GEOM.mjGEOM_HFIELD))
@@ -221,7 +212,9 @@ class CoupledModel:
         self.collider_extents, self.solref = extents.copy(), model.geom_solref.copy()
         for geom, flex in self.flex_colliders.items():
             self.collider_extents[geom], self.solref[geom] = flex_thickness(model, flex), model.flex_solref[flex]
-        spacing = vertex_spacing(model)
+        edges = zip(model.flex_edgeadr, model.flex_edgenum, strict=True)
+        lengths = [model.flexedge_length0[i : i + count].mean() if count else 0.0 for i, count in edges]
+        spacing = np.array(lengths)[vertex_flexes(model)]
         endless = np.full(softs, np.inf)
         self.extents = np.concatenate([extents, spacing, endless])
         self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing, endless])

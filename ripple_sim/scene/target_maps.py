@@ -28,17 +28,9 @@ from .events import Vector
 
 # name: function and how many arguments it takes
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
-    "abs": (np.abs, 1),
-    "sqrt": (np.sqrt, 1),
-    "exp": (np.exp, 1),
-    "log": (np.log, 1),
-    "sin": (np.sin, 1),
-    "cos": (np.cos, 1),
-    "tan": (np.tan, 1),
+    **{name: (getattr(np, name), 1) for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tan")},
     "atan2": (np.arctan2, 2),
-    "hypot": (np.hypot, 2),
-    "minimum": (np.minimum, 2),
-    "maximum": (np.maximum, 2),
+    **{name: (getattr(np, name), 2) for name in ("hypot", "minimum", "maximum")},
     "where": (np.where, 3),
 }
 _CONSTANTS = {"pi": np.pi}
