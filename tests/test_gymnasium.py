@@ -15,6 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import posed
 
 gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.envs.mujoco import MujocoEnv  # noqa: E402
@@ -97,8 +98,7 @@ def test_each_physics_step_counts(kind: type, path: Path) -> None:
         env.reset()
         mujoco.mj_resetData(model, data)
         given = 0.0
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", RippleWarning)
+        with warnings.catch_warnings(action="error", category=RippleWarning):
             for _ in range(40):
                 *_, info = env.step(np.zeros(1))
                 given += sum(impulse.impulse for impulse in info["impulses"])
@@ -161,16 +161,6 @@ def test_depths_are_those_of_a_depth_buffer() -> None:
 def test_modes_without_ripples_say_so(path: Path) -> None:
     with pytest.warns(RippleWarning, match="'human', which shows no ripples"):
         RippleWrapper(BallEnv(path, render_mode="human"), MATERIALS, **OPTIONS)
-
-
-def test_environments_in_parallel(path: Path) -> None:
-    envs = gymnasium.vector.SyncVectorEnv([lambda: RippleWrapper(BallEnv(path), MATERIALS, **OPTIONS)] * 2)
-    envs.reset(seed=1)
-    for _ in range(20):
-        *_, info = envs.step(np.zeros((2, 1)))
-    assert info["heights"]["block"].shape == (2, 6, N, N)
-    assert info["heights"]["block"][1].any()
-    envs.close()
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -265,9 +255,7 @@ def pose_of_mujoco(
     ],
 )
 def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
-    model = mujoco.MjModel.from_xml_string(VIEWED)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed(VIEWED)
     viewer = types.SimpleNamespace(camera_id=camera_id, default_cam_config=config or None, width=320, height=200)
     env = types.SimpleNamespace(model=model, data=data, mujoco_renderer=viewer)
     camera = environment_camera(env, model, np.median(data.geom_xpos, axis=0))

@@ -7,7 +7,6 @@ import importlib.util
 import json
 import os
 import re
-import subprocess
 import sys
 import types
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from programs import ended
 
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import load_mesh
@@ -112,10 +112,7 @@ def test_a_plot_is_written(name: str, options: dict[str, Any], folder: Path, imp
 @without_warnings
 @pytest.mark.parametrize(
     ("name", "arguments"),
-    [
-        *((name, "") for name in PICTURES.split()),
-        ("batch_impulses", "--scenes 2 --seconds 0.6 --workers 1"),
-    ],
+    [*((name, "") for name in PICTURES.split()), ("batch_impulses", "--scenes 2 --seconds 0.6 --workers 1")],
 )
 def test_an_example_makes_its_picture(name: str, arguments: str, folder: Path, imported, monkeypatch, capsys) -> None:
     monkeypatch.setattr(sys, "argv", [name, *arguments.split()])
@@ -127,8 +124,7 @@ def test_an_example_makes_its_picture(name: str, arguments: str, folder: Path, i
 
 @pytest.mark.usefixtures("opengl")
 def test_mujocos_renderer_ours_and_a_plotter_end_without_a_crash() -> None:
-    command = [sys.executable, EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    result = ended(EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista", timeout=300)
     assert "| mujoco, ours, pyvista | 0 | 0 |" in result.stdout
     assert result.returncode == 0, result.stderr
 

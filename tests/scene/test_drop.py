@@ -151,13 +151,6 @@ def test_the_picture_is_named_by_the_material_library(tmp_path):
     assert tuple(picture[-1, 0]) == BLUE
 
 
-def test_without_a_library_a_picture_beside_it_serves(tmp_path):
-    mesh = textured_obj(tmp_path / "p.obj")
-    assert mesh_image(mesh) is None
-    half_and_half(tmp_path / "p_texture.png")
-    assert mesh_image(mesh).shape == (16, 16, 3)
-
-
 def test_two_images_are_not_mixed_up(tmp_path):
     for name in ("a", "b"):
         half_and_half(tmp_path / f"{name}.png")
@@ -196,12 +189,6 @@ def test_a_dropped_on_mesh_wears_its_image(tmp_path, named):
     assert np.median(np.where(redder > 60, rows, np.nan)[redder > 60]) < np.median(
         np.where(redder < -60, rows, np.nan)[redder < -60]
     )
-
-
-def test_an_image_that_cannot_be_read_is_refused(tmp_path):
-    (tmp_path / "broken.png").write_bytes(b"no picture")
-    with pytest.raises(SceneError, match=r"broken\.png.*cannot be read"):
-        drop_scene(textured_obj(tmp_path / "p.obj"), texture=tmp_path / "broken.png")
 
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (3, 5, 3), dtype=np.uint8)

@@ -21,8 +21,7 @@ NAMES = "animal arm drum duck finger heavy jelly kick pair pretzel rolling skull
 @pytest.mark.parametrize("name", NAMES.split())
 def test_targets_are_hit_and_ripple_visibly(name: str) -> None:
     scene = load_scene(name)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         simulation = Simulation(scene, fps=30, resolution=32, backend="cpu")
         hit, highest, end = set(), dict.fromkeys(simulation.ripples, 0.0), min(scene.duration, 1.6)
         while simulation.data.time < end:
@@ -97,13 +96,6 @@ def test_every_toy_hits_the_duck_and_the_hits_are_spread_over_time(duck_rain):
     assert times[0] < 0.4
     assert 3.0 < times[-1] < 3.6
     assert np.diff(times).max() < 0.5
-
-
-def test_toys_arrive_at_two_to_five_metres_a_second(duck_rain):
-    *_, first, _ = duck_rain
-    speeds = np.array([speed for _, speed in first.values()])
-    assert speeds.min() > 2.0
-    assert speeds.max() < 5.0
 
 
 def test_no_toy_gets_into_the_duck_and_all_end_on_the_floor(duck_rain):

@@ -8,11 +8,10 @@ import importlib.util
 import os
 import re
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from programs import ended
 
 from ripple_sim.cli import main as cli
 from ripple_sim.errors import DisplayError
@@ -26,13 +25,7 @@ def check(display: str | None, *options: str) -> None:
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "CI")}
     if display is not None:
         environment["DISPLAY"] = display
-    result = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(CHECKS), *options],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    result = ended("-m", "pytest", "-q", "-p", "no:cacheprovider", CHECKS, *options, env=environment)
     assert result.returncode == 0, result.stdout + result.stderr
 
 
@@ -117,15 +110,6 @@ def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None
 )
 def test_wrong_arguments_are_bad_input(capsys: pytest.CaptureFixture[str], argv: list[str], named: str) -> None:
     assert re.search(named, complaint(capsys, 2, *argv))
-
-
-@pytest.mark.parametrize("mode", ["--web", "--benchmark"])
-def test_a_missing_scene_is_bad_input_and_named(capsys: pytest.CaptureFixture[str], mode: str) -> None:
-    if mode == "--web":
-        pytest.importorskip("trame_vtk")
-    line = complaint(capsys, 2, "no-such-scene", mode)
-    assert "no scene or mesh 'no-such-scene'" in line
-    assert "sphere" in line
 
 
 def test_an_invalid_mesh_is_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

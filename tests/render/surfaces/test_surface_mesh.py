@@ -36,15 +36,14 @@ def vertices_at(chart, uv, positions=None, directions=None, midpoints=0, page=PA
     return SurfaceVertices(none, attributes, edges, places, places, np.zeros((0, 4)), none)
 
 
-def displaced(resources, vertices, height_map, place=STILL, used=(), layers=1, layer=0, page=PAGE) -> np.ndarray:
+def displaced(resources, vertices, height_map, place=STILL, used=(), page=PAGE) -> np.ndarray:
     """World positions and visibility [n, 4] as the GPU leaves them, NaN where it leaves nothing."""
-    height_maps = HeightMapTextures(resources, [page] * layers)
+    height_maps = HeightMapTextures(resources, [page])
     Occluders(resources, NoGeoms, np.zeros(0, dtype=np.int64)).bind(NoGeoms, np.zeros(3))
     with resources.gl as ctx:
-        for each in range(layers):
-            height_maps.write(each, height_map if each == layer else np.full_like(height_map, 1e6))
+        height_maps.write(0, height_map)
         height_maps.bind()
-        displacement = Displacement(resources, vertices, layer)
+        displacement = Displacement(resources, vertices, 0)
         displacement.moved.write(np.full(4 * len(vertices.attributes), np.nan, np.float32).tobytes())
         displacement.run(ctx, *place, np.array(used, dtype=np.int32))
         return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1]
@@ -138,12 +137,3 @@ def test_of_the_midpoints_only_those_in_use_are_displaced(resources, used):
     np.testing.assert_array_equal(np.flatnonzero(done), [*range(64), *sorted(used)])
     every = displaced(resources, vertices_at(chart, uv), height_map)
     np.testing.assert_array_equal(moved[done], every[done])
-
-
-def test_each_target_reads_its_own_layer(resources):
-    chart, uv = random_places(50, 6)
-    height_map = random_height_map(6)
-    alone = displaced(resources, vertices_at(chart, uv), height_map)
-    for layer in range(3):
-        among = displaced(resources, vertices_at(chart, uv), height_map, layers=3, layer=layer)
-        np.testing.assert_array_equal(among, alone)

@@ -3,14 +3,10 @@
 What is refused, is so always with one line.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re
 import struct
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +15,7 @@ import trimesh
 from all_kinds import crumbs
 from known_meshes import known_mesh
 from mesh_text import CORNERS, QUADS, obj, off, ply, written
+from programs import ended
 from scipy.spatial import cKDTree
 from sound import assert_sound, assert_unchanged_when_read_again
 
@@ -261,18 +258,14 @@ def test_nothing_but_the_error_is_said(tmp_path: Path) -> None:
     code = (
         f"from ripple_sim.solver import load_mesh\ntry: load_mesh({str(path)!r})\nexcept Exception as e: print(type(e))"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stderr == ""
+    assert ended("-c", code, check=True).stderr == ""
 
 
 @pytest.mark.parametrize(
     ("name", "content"),
     [
         ("promise.stl", b"\x00" * 80 + struct.pack("<I", 2**32 - 1) + b"\x00" * 50),
-        (
-            "promise.ply",
-            ply(CORNERS, QUADS, "binary_little_endian").replace(b"vertex 8", b"vertex 900000000000"),
-        ),
+        ("promise.ply", ply(CORNERS, QUADS, "binary_little_endian").replace(b"vertex 8", b"vertex 900000000000")),
         ("rows.ply", ply(CORNERS, QUADS, "ascii").replace(b"vertex 8", b"vertex 900000000000")),
         ("faces.ply", ply(CORNERS, QUADS, "ascii").replace(b"face 6", b"face 900000000000")),
         ("promise.off", b"OFF\n900000000000 900000000000 0\n0 0 0\n"),
