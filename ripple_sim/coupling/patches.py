@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.texels.chart_map import nearest_places
-from ripple_sim.solver.texels.distance import distance_scratch
 from ripple_sim.solver.waves.footprint import weigh_each
 
 MAX_CORNERS = 8
@@ -280,9 +279,9 @@ class Footprints:
 
     def _make(self, points: Floats, radii: Floats) -> tuple[list[tuple[Ints, Floats]], Floats]:
         """New footprints, and how far they may be from their points [m]."""
-        grid, scratch = self._grid, distance_scratch(len(self._movable))
+        grid = self._grid
         places, centres = nearest_places(self._surface, points)
-        begins, texels, weights, _ = weigh_each(grid, centres, places, radii, scratch)
+        begins, texels, weights, _ = weigh_each(grid, centres, places, radii)
         shares = weights * self._movable_area[texels]
         under = [(texels[first:last], shares[first:last]) for first, last in itertools.pairwise(begins.tolist())]
         return under, _SAME_PLACE * np.sqrt(grid.areas[centres])

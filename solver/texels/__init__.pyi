@@ -35,10 +35,12 @@ from .chart_map import (
     uncut as uncut,
 )
 from .distance import (
+    cleaned as cleaned,
     depth_in_region as depth_in_region,
     distance_scratch as distance_scratch,
     distance_to as distance_to,
-    march_from_point as march_from_point,
+    march as march,
+    seeded as seeded,
     taken as taken,
 )
 from .maps import texture_map as texture_map, vertex_map as vertex_map
