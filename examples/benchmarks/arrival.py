@@ -31,7 +31,7 @@ from ripple_sim.bench import table
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Material, Mesh, RippleError, WaveSolver, build_atlas, load_mesh
 from ripple_sim.solver.operator import OPERATORS
-from ripple_sim.solver.texels import TexelMesh, cleaned, distance_scratch, march, sampling_matrix, seeded
+from ripple_sim.solver.texels import TexelMesh, clean, distance_scratch, march, sampling_matrix, seeded
 
 # A ripple below this share of the strongest signal is no crest.
 _LEAST = 0.2
@@ -191,11 +191,11 @@ def distance_from_point(
     """
     grid = texels.grid
     scratch = distance_scratch(len(grid.positions))
-    seeds = seeded(grid.halo, grid.positions, center, point, scratch)
+    seeds = seeded(grid.halo, grid.positions, center, point, scratch.distance, scratch.touched)
     touched, known = march(grid.halo, grid.positions, seeds, limit, scratch)
     reached = np.sort(scratch.order[:known])
     distance = scratch.distance[reached]
-    cleaned(scratch, touched)
+    clean(scratch.distance, scratch.place, scratch.touched, touched)
     return reached, distance
 
 

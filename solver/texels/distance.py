@@ -20,7 +20,7 @@ _TURNS = np.array([-1, 1, -2, 2])
 
 
 class Scratch(NamedTuple):
-    """What marching over T texels writes; `cleaned` leaves it as it was, so that it costs no more on a larger grid.
+    """What marching over T texels writes; `clean` leaves it as it was, so that it costs no more on a larger grid.
 
     Attributes
     ----------
@@ -107,10 +107,9 @@ def _comes_first(distance: Floats, a: int, b: int) -> bool:
 
 
 @kernel(no_cpython_wrapper=True)
-def _rise(scratch: Scratch, i: int, t: int) -> None:
+def _rise(front: Ints, place: Ints, distance: Floats, i: int, t: int) -> None:
     """Put a texel into the heap at place i, or nearer to the top."""
-    front, place = scratch.front, scratch.place
-    while i > 0 and _comes_first(scratch.distance, t, front[(i - 1) // 2]):
+    while i > 0 and _comes_first(distance, t, front[(i - 1) // 2]):
         front[i] = front[(i - 1) // 2]
         place[front[i]] = i
         i = (i - 1) // 2
@@ -118,15 +117,14 @@ def _rise(scratch: Scratch, i: int, t: int) -> None:
 
 
 @kernel(no_cpython_wrapper=True)
-def _sink(scratch: Scratch, count: int) -> None:
+def _sink(front: Ints, place: Ints, distance: Floats, count: int) -> None:
     """Take the first of `count` + 1 texels out of the heap."""
-    front, place = scratch.front, scratch.place
     t, i, child = front[count], 0, 1
     place[front[0]] = -1
     while child < count:
-        if child + 1 < count and _comes_first(scratch.distance, front[child + 1], front[child]):
+        if child + 1 < count and _comes_first(distance, front[child + 1], front[child]):
             child += 1
-        if not _comes_first(scratch.distance, front[child], t):
+        if not _comes_first(distance, front[child], t):
             break
         front[i] = front[child]
         place[front[i]] = i
@@ -139,44 +137,45 @@ def _sink(scratch: Scratch, count: int) -> None:
 def march(halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scratch) -> tuple[int, int]:
     """Fast marching with point-source updates over the triangles of both triangulations of every quad.
 
-    The first of those `touched` are the seeds, see `seeded`, whose distances are known. Returns how many texels have been touched,
-    and of how many within the limit the distance is now known.
+    The first of those `touched` are the seeds, whose distances are known; see `seeded`. Returns how many texels have
+    been touched, and of how many within the limit the distance is now known.
     """
     n, distance, touched = halo.shape[1] - 2, scratch.distance, scratch.touched
+    order, front, place = scratch.order, scratch.front, scratch.place
     around = np.empty(8, np.int64)
     count, known, waiting = seeds, 0, 0
     for i in range(seeds):
-        _rise(scratch, i, touched[i])
+        _rise(front, place, distance, i, touched[i])
         waiting += 1
-    while waiting > 0 and distance[scratch.front[0]] <= limit:
-        t = scratch.front[0]
+    while waiting > 0 and distance[front[0]] <= limit:
+        t = front[0]
         waiting -= 1
-        _sink(scratch, waiting)
-        scratch.order[known] = t
+        _sink(front, place, distance, waiting)
+        order[known] = t
         known += 1
         chart, row, column = t // (n * n), t // n % n, t % n
         for k in range(8):
             around[k] = halo[chart, row + _ROWS[k], column + _COLUMNS[k]]
         for k in range(8):
             a = around[k]
-            if a < 0 or (distance[a] < np.inf and scratch.place[a] < 0):  # none, or known
+            if a < 0 or (distance[a] < np.inf and place[a] < 0):  # none, or known
                 continue
             best = _beside(positions, distance, around, k, t)
             if best < distance[a]:
-                at = scratch.place[a]
+                at = place[a]
                 if at < 0:
                     touched[count] = a
                     count += 1
                     at = waiting
                     waiting += 1
                 distance[a] = best
-                _rise(scratch, at, a)
+                _rise(front, place, distance, at, a)
     return count, known
 
 
 @kernel
-def seeded(halo: Ints, positions: Floats, center: int, point: Floats, scratch: Scratch) -> int:
-    """Touch the nine texels round the one nearest to a point, at their straight distances from it; how many there are."""
+def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints) -> int:
+    """Touch the nine texels round the one nearest to a point, at their straight distances from it; return how many."""
     n = halo.shape[1] - 2
     chart, row, column = center // (n * n), center // n % n, center % n
     seeds = np.int64(0)  # whoever is called with a number's literal is compiled for that too
@@ -184,17 +183,17 @@ def seeded(halo: Ints, positions: Floats, center: int, point: Floats, scratch: S
         for j in range(3):
             t = halo[chart, row + i, column + j]
             # beyond a rim the halo shows the texel beside it once more
-            if t >= 0 and scratch.distance[t] == np.inf:
-                scratch.touched[seeds], scratch.distance[t] = t, distance_to(positions, t, point)
+            if t >= 0 and distance[t] == np.inf:
+                touched[seeds], distance[t] = t, distance_to(positions, t, point)
                 seeds += 1
     return seeds
 
 
 @kernel
-def cleaned(scratch: Scratch, count: int) -> None:
-    """Leave the scratch as if so many texels had not been touched."""
+def clean(distance: Floats, place: Ints, touched: Ints, count: int) -> None:
+    """Leave a scratch as if so many texels had not been touched."""
     for i in range(count):
-        scratch.distance[scratch.touched[i]], scratch.place[scratch.touched[i]] = np.inf, -1
+        distance[touched[i]], place[touched[i]] = np.inf, -1
 
 
 @kernel

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SolverError, is_finite, shown
 from ..kernel import Floats, Ints, kernel
 from ..texels.atlas import Atlas, check_points
-from ..texels.distance import Scratch, cleaned, distance_scratch, distance_to, march, seeded
+from ..texels.distance import Scratch, clean, distance_scratch, distance_to, march, seeded
 from ..texels.texel_mesh import TexelGrid
 from .finite import require_finite
 
@@ -28,9 +28,7 @@ _FLAT, _BENT = 1.05, 1.5
 _DOWN, _RIGHT = np.array([0, 1, 1, 2]), np.array([1, 0, 2, 1])
 
 
-def weigh_each(
-    grid: TexelGrid, centers: Ints, points: Floats, radii: Floats
-) -> tuple[Ints, Ints, Floats, Floats]:
+def weigh_each(grid: TexelGrid, centers: Ints, points: Floats, radii: Floats) -> tuple[Ints, Ints, Floats, Floats]:
     """Footprints round points [k, 3] whose nearest texels are `centers`.
 
     Returns
@@ -58,32 +56,33 @@ def _weigh(
     begins: Ints, used: Floats, texels: Ints, weights: Floats,
 ) -> int:  # fmt: skip
     """Fill in footprints from the first on; one after the last for which there was room."""
+    distance, touched = scratch.distance, scratch.touched
     for i in range(first, len(centers)):
         center, point = centers[i], points[i]
         radius = used[i] = max(radii[i], MIN_TEXELS * _spacing(grid, center))
-        count, end, total, near = _nearby(grid, center, point, radius, scratch), begins[i], 0.0, scratch.touched
+        count, end, total, near = _nearby(grid, center, point, radius, distance, touched), begins[i], 0.0, touched
         known, flat = count, count > 0
         if not flat:
-            count = seeded(grid.halo, grid.positions, center, point, scratch)
+            count = seeded(grid.halo, grid.positions, center, point, distance, touched)
             count, known = march(grid.halo, grid.positions, count, 1.1 * radius, scratch)
             near = scratch.order
         if end + known > len(texels):
-            cleaned(scratch, count)
+            clean(distance, scratch.place, touched, count)
             return i
         for k in range(known):
             t = near[k]
-            distance = scratch.distance[t]
+            away = distance[t]
             straight = 0.0 if flat else distance_to(grid.positions, t, point)
             if straight > 0:
-                bend = min(max((distance / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
+                bend = min(max((away / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
                 bend = bend * bend * (3 - 2 * bend)
-                distance = (1 - bend) * straight + bend * distance
-            weight = max(1 - (distance / radius) ** 2, 0.0) ** 3
+                away = (1 - bend) * straight + bend * away
+            weight = max(1 - (away / radius) ** 2, 0.0) ** 3
             if weight > 0:
                 texels[end], weights[end] = t, weight
                 total += weight * grid.areas[t]
                 end += 1
-        cleaned(scratch, count)
+        clean(distance, scratch.place, touched, count)
         for k in range(begins[i], end):
             weights[k] /= total
         begins[i + 1] = end
@@ -105,14 +104,13 @@ def _spacing(grid: TexelGrid, center: int) -> float:
 
 
 @kernel(no_cpython_wrapper=True)
-def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Scratch) -> int:
+def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints) -> int:
     """Touch connected texels within a straight distance of a point; how many, or 0, and none, if they do not lie flat.
 
     Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
     whose slope makes no way along it longer than 1.05 times the straight one.
     """
     halo, positions, normals = grid.halo, grid.positions, grid.normals
-    distance, texels = scratch.distance, scratch.touched
     n = halo.shape[1] - 2
     count, done = np.int64(1), 0
     texels[0], distance[center] = center, distance_to(positions, center, point)
@@ -125,7 +123,8 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch:
         for k in range(3):
             along += normals[t, k] * normals[center, k]
         if along * _FLAT < 1:
-            cleaned(scratch, count)
+            for i in range(count):
+                distance[texels[i]] = np.inf
             return 0
         chart, row, column = t // (n * n), t // n % n, t % n
         for i in range(3):
