@@ -34,7 +34,7 @@ import numpy as np
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from .cache import cache_folder
@@ -214,23 +214,3 @@ def fingerprint(module: str) -> str:
 def shared(function: Callable) -> Any:
     """Declare a function, written for numbers and arrays alike, that both kernels and plain Python call."""
     return register_jitable(function)
-
-
-def variant(declared: Any, first: type) -> Callable[[Callable], Callable]:
-    """Decorate the version of a `functools.singledispatch` function for a first argument of this NamedTuple.
-
-    Kernels and plain Python call the declared function, and get the version. So compiled code is open to kinds that it
-    does not know: whoever declares the function need not import them.
-    """
-
-    def register(version: Callable) -> Callable:
-        declared.register(first)(version)
-
-        @overload(declared)
-        @functools.wraps(version)
-        def choose(*arguments: Any) -> Callable | None:
-            return version if getattr(arguments[0], "instance_class", None) is first else None
-
-        return version
-
-    return register

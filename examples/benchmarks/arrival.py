@@ -31,7 +31,7 @@ from ripple_sim.bench import table
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Material, Mesh, RippleError, WaveSolver, build_atlas, load_mesh
 from ripple_sim.solver.operator import OPERATORS
-from ripple_sim.solver.texels import TexelMesh, distance_scratch, march_from_point, sampling_matrix
+from ripple_sim.solver.texels import TexelMesh, clean, distance_scratch, march, sampling_matrix, seeded
 
 # A ripple below this share of the strongest signal is no crest.
 _LEAST = 0.2
@@ -191,9 +191,12 @@ def distance_from_point(
     """
     grid = texels.grid
     scratch = distance_scratch(len(grid.positions))
-    reached, distance = march_from_point(grid.halo, grid.positions, center, point, limit, scratch)
-    order = np.argsort(reached)
-    return reached[order], distance[order]
+    seeds = seeded(grid.halo, grid.positions, center, point, scratch.distance, scratch.touched)
+    touched, known = march(grid.halo, grid.positions, seeds, limit, scratch)
+    reached = np.sort(scratch.order[:known])
+    distance = scratch.distance[reached]
+    clean(scratch.distance, scratch.place, scratch.touched, touched)
+    return reached, distance
 
 
 def arrival_times(

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Bools, Floats, Ints
-from ripple_sim.solver.texels.chart_map import nearest_places
 
 from .contacts import ContactReader, Contacts, first_rows
 from .model import CoupledModel
@@ -281,18 +280,18 @@ class TargetLoad:
         timestep, elapsed : float
             How long the contacts' forces were held, and over which time their impulse is given [s].
         """
-        starts, surface, (position, rotation) = first_rows(contacts.others), self._atlas.places, pose
+        starts, (position, rotation) = first_rows(contacts.others), pose
         geoms, points = contacts.others[starts], (contacts.points - position) @ rotation
         forces = np.add.reduceat(contacts.forces, starts)
         middles = np.add.reduceat(contacts.forces[:, None] * points, starts) / forces[:, None]
-        places, at = nearest_places(surface, middles)
+        places, at = self._atlas.nearest_places(middles)
         inner = np.zeros(len(starts), dtype=np.bool_)
         if self._is_open:
             pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
             inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
         loads = load_points(
             points, contacts.forces, starts, self._radii[geoms], self._convex[geoms],
-            lambda probes: nearest_places(surface, probes)[0],
+            lambda probes: self._atlas.nearest_places(probes)[0],
         )  # fmt: skip
         under = self._footprints.under(geoms[loads.patches], loads.points, loads.radii, self._filter.active)
         # what touches from inside pushes outwards

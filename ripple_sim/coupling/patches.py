@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
-from ripple_sim.solver.texels.chart_map import nearest_places
-from ripple_sim.solver.texels.distance import distance_scratch
 from ripple_sim.solver.waves.footprint import weigh_each
 
 MAX_CORNERS = 8
@@ -171,21 +169,33 @@ def corners(patches: Ints, points: Floats, forces: Floats, radii: Floats) -> tup
     return _joined(patches, points[strongest_first], forces[strongest_first], radii, MAX_CORNERS)
 
 
-@kernel
 def _joined(patches: Ints, points: Floats, forces: Floats, near: Floats, most: int) -> tuple[Ints, Floats, Floats]:
     """Points of each patch joined with the first one near them that is a seed: force-weighted, with summed forces.
 
     A point is a seed unless one of its patch that is a seed of its own comes before. `near` are the distances of the
     patches [m]. After so many seeds of a patch the rest joins the nearest of them.
     """
-    size, found, begin = len(patches), 0, 0
-    seeds, of, at, totals = np.empty(size, np.int64), np.empty(size, np.int64), np.empty((size, 3)), np.empty(size)
-    for i in range(size):
+    # made here: kernels that allocate take longer to compile
+    of, at, totals = np.empty_like(patches), np.empty_like(points), np.empty_like(forces)
+    found = _join(patches, points, forces, near, most, np.empty_like(patches), of, at, totals)
+    return of[:found], at[:found], totals[:found]
+
+
+@kernel
+def _join(
+    patches: Ints, points: Floats, forces: Floats, near: Floats, most: int,
+    seeds: Ints, of: Ints, at: Floats, totals: Floats,
+) -> int:  # fmt: skip
+    """Fill in the seeds, their patches, points and forces; how many there are."""
+    found, begin = 0, 0
+    for i in range(len(patches)):
         if found > 0 and of[found - 1] != patches[i]:
             begin = found
         joins, nearest, least = -1, -1, np.inf
         for row in range(begin, found):
-            distance2 = _distance2(points, i, points, seeds[row])
+            distance2 = 0.0
+            for k in range(3):
+                distance2 += (points[i, k] - points[seeds[row], k]) ** 2
             if distance2 < least:
                 nearest, least = row, distance2
             if joins < 0 and distance2 <= near[patches[i]] ** 2:
@@ -201,16 +211,7 @@ def _joined(patches: Ints, points: Floats, forces: Floats, near: Floats, most: i
             totals[joins] += forces[i]
             for k in range(3):
                 at[joins, k] += forces[i] / totals[joins] * (points[i, k] - at[joins, k])
-    return of[:found], at[:found], totals[:found]
-
-
-@kernel(no_cpython_wrapper=True)
-def _distance2(points: Floats, i: int, others: Floats, j: int) -> float:
-    """Square of the distance between two points of two lists."""
-    distance2 = 0.0
-    for k in range(3):
-        distance2 += (points[i, k] - others[j, k]) ** 2
-    return distance2
+    return found
 
 
 def _length(vectors: Floats) -> Floats:
@@ -248,7 +249,7 @@ class Footprints:
         self._points = self._points + self._grid.positions[first] - before[first]
 
     def _place_on(self, atlas: Atlas) -> None:
-        self._surface, self._grid = atlas.places, atlas.texels.grid
+        self._atlas, self._grid = atlas, atlas.texels.grid
         self._movable_area = self._grid.areas * self._movable
 
     def under(self, geoms: Ints, points: Floats, radii: Floats, active: Bools) -> list[tuple[Ints, Floats]]:
@@ -266,7 +267,8 @@ class Footprints:
             Geoms that touch, have lost touch only now, or have yet to give an impulse: their footprints are kept.
         """
         made = self._geoms, self._points, self._radii, self._tolerances
-        rows = _serving(geoms, points, radii, *made, active)
+        rows, touching = np.full(len(geoms) + len(self._geoms), -1), np.zeros(len(active), np.bool_)
+        rows = rows[: _serving(geoms, points, radii, *made, active, touching, rows)]
         new = (rows < 0).nonzero()[0]
         rows[new] = len(self._geoms) + np.arange(len(new))
         under, tolerances = self._make(points[new], radii[new]) if len(new) else ([], np.zeros(0))
@@ -280,9 +282,9 @@ class Footprints:
 
     def _make(self, points: Floats, radii: Floats) -> tuple[list[tuple[Ints, Floats]], Floats]:
         """New footprints, and how far they may be from their points [m]."""
-        grid, scratch = self._grid, distance_scratch(len(self._movable))
-        places, centres = nearest_places(self._surface, points)
-        begins, texels, weights, _ = weigh_each(grid, centres, places, radii, scratch)
+        grid = self._grid
+        places, centres = self._atlas.nearest_places(points)
+        begins, texels, weights, _ = weigh_each(grid, centres, places, radii)
         shares = weights * self._movable_area[texels]
         under = [(texels[first:last], shares[first:last]) for first, last in itertools.pairwise(begins.tolist())]
         return under, _SAME_PLACE * np.sqrt(grid.areas[centres])
@@ -290,9 +292,10 @@ class Footprints:
 
 @kernel
 def _serving(
-    geoms: Ints, points: Floats, radii: Floats, made: Ints, at: Floats, sizes: Floats, near: Floats, active: Bools
-) -> Ints:
-    """The first footprint that serves each load point, -1 where none does, and then those that are only kept.
+    geoms: Ints, points: Floats, radii: Floats, made: Ints, at: Floats, sizes: Floats, near: Floats, active: Bools,
+    touching: Bools, rows: Ints,
+) -> int:  # fmt: skip
+    """Fill in the first footprint that serves each load point, and then those that are only kept; how many there are.
 
     Parameters
     ----------
@@ -302,18 +305,23 @@ def _serving(
         Geoms, points, radii and tolerances of the footprints.
     active
         Geoms whose footprints are kept.
+    touching : bool [c]
+        Scratch, False.
+    rows : int64 [n + m]
+        -1, which stays where none serves.
     """
     count = len(geoms)
-    rows, touching = np.full(count + len(made), -1), np.zeros(len(active), np.bool_)
     for i in range(len(geoms)):
         touching[geoms[i]] = True
         for row in range(len(made)):
             if made[row] == geoms[i] and rows[i] < 0:
-                moved = np.sqrt(_distance2(at, row, points, i))
-                if max(moved, abs(sizes[row] - radii[i])) <= near[row]:
+                distance2 = 0.0
+                for k in range(3):
+                    distance2 += (at[row, k] - points[i, k]) ** 2
+                if np.sqrt(distance2) <= near[row] and abs(sizes[row] - radii[i]) <= near[row]:
                     rows[i] = row
     for row in range(len(made)):
         if active[made[row]] and not touching[made[row]]:
             rows[count] = row
             count += 1
-    return rows[:count]
+    return count

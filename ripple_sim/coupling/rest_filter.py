@@ -138,17 +138,20 @@ class RestFilter:
         """Load over a time [s] in which these forces act."""
         if self._is_over and not len(present.geoms):
             return Load.none()
-        self._texels, self._shares, forces, self._is_over = _filtered(
-            self._states, self._texels, self._shares, present, dt / self._unit, self._slots
-        )
-        return Load(self._texels, forces)
+        size = len(self._texels) + len(present.texels)
+        under, mean, forces = np.empty(size, np.int64), np.empty(size), np.empty(size)
+        before = self._states, self._texels, self._shares
+        end, self._is_over = _filter(*before, present, dt / self._unit, self._slots, under, mean, forces)
+        self._texels, self._shares = under[:end], mean[:end]
+        return Load(self._texels, forces[:end])
 
 
 @kernel
-def _filtered(
-    states: np.ndarray, texels: Ints, shares: Floats, present: TexelForces, dt: float, slots: Ints
-) -> tuple[Ints, Floats, Floats, bool]:
-    """Texels under the geoms, their new mean shares, the forces on them [N], and whether all geoms have left.
+def _filter(
+    states: np.ndarray, texels: Ints, shares: Floats, present: TexelForces, dt: float, slots: Ints,
+    under: Ints, mean: Floats, given: Floats,
+) -> tuple[int, bool]:  # fmt: skip
+    """Fill in the texels under the geoms; how many there are, and whether all geoms have left.
 
     Parameters
     ----------
@@ -161,11 +164,11 @@ def _filtered(
         Time step [s].
     slots : int64 [C n n]
         Scratch: -1 everywhere, before and after, so that a step costs no more on a larger grid.
+    under, mean, given
+        Texels under the geoms, their new mean shares, and the forces on them [N].
     """
-    size = len(texels) + len(present.texels)
-    under, mean, given = np.empty(size, np.int64), np.empty(size), np.empty(size)
     at, forces = present.texels, present.forces
-    end, row, over = 0, 0, True
+    end, row, over = np.int64(0), 0, True  # no literal, for which `_faded` would be compiled again
     for geom in range(len(states)):
         state, begin, force, first, last = states[geom], end, 0.0, 0, 0
         if row < len(present.geoms) and present.geoms[row] == geom:
@@ -181,8 +184,7 @@ def _filtered(
             total = side * _touch(state, abs(force), present.middles[row - 1], present.place_radii[row - 1], dt)
             weight = dt / (dt + state.memory) if state.first < state.last else 1.0
             if weight < 1:
-                old, before = texels[state.first : state.last], shares[state.first : state.last]
-                end = _faded(old, before, 1 - weight, under, mean, given, slots, end)
+                end = _faded(texels, shares, state.first, state.last, 1 - weight, under, mean, given, slots, end)
             for i in range(first, last):
                 slot = slots[at[i]]
                 if slot < 0:
@@ -191,7 +193,6 @@ def _filtered(
                     end += 1
                 mean[slot] += weight * (forces[i] / force)
                 given[slot] += forces[i] / force
-            slots[under[begin:end]] = -1
             state.active = True
             steady = side * min(state.mean_force, side * total)
         elif state.active:
@@ -204,21 +205,23 @@ def _filtered(
         over = over and not state.active
         state.first, state.last = begin, end
         for i in range(begin, end):
+            slots[under[i]] = -1
             given[i] = steady * mean[i] + (total - steady) * given[i]
-    return under[:end], mean[:end], given[:end], over
+    return end, over
 
 
 @kernel(no_cpython_wrapper=True)
 def _faded(
-    texels: Ints, shares: Floats, left: float, under: Ints, mean: Floats, given: Floats, slots: Ints, end: int
-) -> int:
+    texels: Ints, shares: Floats, first: int, last: int, left: float,
+    under: Ints, mean: Floats, given: Floats, slots: Ints, end: int,
+) -> int:  # fmt: skip
     """Enter the mean shares of a geom's texels from `end` on, so that what is left adds up; one after the last."""
     whole = 0.0
-    for i in range(len(texels)):
+    for i in range(first, last):
         if shares[i] > _LEAST_SHARE:
             whole += shares[i]
     fading = left / whole
-    for i in range(len(texels)):
+    for i in range(first, last):
         if shares[i] > _LEAST_SHARE:
             under[end], mean[end], given[end] = texels[i], fading * shares[i], 0.0
             slots[texels[i]] = end

@@ -235,7 +235,7 @@ class CPUBackend:
 
     def velocity(self) -> NDArray[np.float32]:
         """Copy of the velocity [m/s], [C, n, n]."""
-        self._drift(0.0)
+        self._add_shift()
         return self._fields.texels(self._v).copy()
 
     def crests(self) -> NDArray[np.float32]:
@@ -266,7 +266,7 @@ class CPUBackend:
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
         """Add velocities [m/s] to some texels (each named once), and one to all, as they respond.
 
-        The latter is only noted: the next drift, which touches every texel anyway, adds it.
+        The latter is only noted: the next step adds all at once.
         """
         self._v.reshape(-1)[self._fields.addresses[texels]] += velocities
         self._shift = everywhere if self._shift is None else self._shift + everywhere
@@ -281,10 +281,8 @@ class CPUBackend:
         k, balance = self._prepare(dt), self._balance
         acceleration = self._pressure(self._acceleration) if balance is None else balance.pressure
         kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
-        self._drift(dt / 2)
+        self._add_shift()
         features = self._features
-        if len(features.dent):
-            kernels.flow(self._h.reshape(-1), features.limit, features.dent)
         drags = self._plain and len(features.viscosity.rows) > 0
         kernels.advance(
             substeps,
@@ -329,15 +327,13 @@ class CPUBackend:
         height = self._h if self._dent is None else np.add(self._h, self._dent, out=self._h_next)
         np.maximum(crests, np.abs(height, out=self._h_next), out=crests)
 
-    def _drift(self, dt: float) -> None:
-        """The drift by which a step begins; the noted shift is in it."""
+    def _add_shift(self) -> None:
+        """Add the shift that was noted."""
         if self._shift is not None:
             shift = self._pressure(self._shift) * self._response
             velocities = self._v[:, 1:-1, 1 : self._fields.columns + 1]
             velocities += shift.reshape(velocities.shape) if shift.ndim else shift
             self._shift = None
-        if dt:
-            kernels.drift(self._h.reshape(-1), self._v.reshape(-1), np.float32(dt))
 
     def _pressure(self, amplitude: Amplitude) -> Coefficient:
         """An amplitude, one for all or one for each part, as the loops take it: a number, or a flat field."""

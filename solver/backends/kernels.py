@@ -221,26 +221,11 @@ def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.fl
         h_next[address] += dt * kicked
 
 
-@kernel(no_cpython_wrapper=True)
-def kick_texels(h: Floats32, v: Floats32, addresses: Ints, kicks: Floats32, dt: np.float32) -> None:
-    """Kick some texels [k] by velocities [k] [m/s], and drift them by that."""
-    for i in range(len(addresses)):
-        v[addresses[i]] += kicks[i]
-        h[addresses[i]] += dt * kicks[i]
-
-
 @kernel
 def fill(h: Floats32, halo: Ints) -> None:
     """Copy the texels beyond the charts' borders into the halo: addresses of its places and of the texels, [2, k]."""
     for i in range(halo.shape[1]):
         h[halo[0, i]] = h[halo[1, i]]
-
-
-@kernel
-def drift(h: Floats32, v: Floats32, dt: np.float32) -> None:
-    """Add dt v to h; what that leaves in the halo is filled again."""
-    for i in range(len(h)):
-        h[i] += dt * v[i]
 
 
 @kernel
@@ -266,11 +251,17 @@ def advance(
     viscosity: Weights | None,
     features: Features | None,
 ) -> None:
-    """Substeps of dt, from the first half drift to the last; the height ends in `h_next` where their number is odd.
+    """Substeps of dt, from the first half drift to the last, and velocities [k] that kick the texels at addresses [k].
+
+    The height ends in `h_next` where their number is odd.
 
     What is None is compiled away: `features` where a material has no more than viscosity, which then is `viscosity`.
     """
     half = dt / np.float32(2)
+    for i in range(len(h)):  # what that leaves in the halo is filled again
+        h[i] += half * v[i]
+    if features is not None and len(features.dent):
+        flow(h, features.limit, features.dent)
     for step in range(substeps):
         fill(h, halo)
         if viscosity is not None:
@@ -281,7 +272,9 @@ def advance(
         drifted = dt if step < substeps - 1 else half
         kick_drift(h, v, h_next, kick, drifted)
         h, h_next = h_next, h
-        kick_texels(h, v, addresses, kicks, drifted)
+        for i in range(len(addresses)):
+            v[addresses[i]] += kicks[i]
+            h[addresses[i]] += drifted * kicks[i]
         if features is not None and len(features.dent):
             flow(h, features.limit, features.dent)
 

@@ -56,53 +56,39 @@ def refitted(tree: TriangleTree, V: NDArray[np.float64], F: NDArray[np.int64]) -
 
 @kernel
 def closest_points(tree: TriangleTree, points: Floats) -> tuple[Ints, Floats]:
-    """Triangle nearest to each of some points [k, 3] [m], and the point nearest on it [m], [k, 3]."""
-    triangles, closest = np.empty(len(points), np.int64), np.empty((len(points), 3))
-    for i in range(len(points)):
-        triangles[i], closest[i, 0], closest[i, 1], closest[i, 2] = closest_point(
-            tree, points[i, 0], points[i, 1], points[i, 2]
-        )
-    return triangles, closest
-
-
-@kernel
-def closest_point(tree: TriangleTree, x: float, y: float, z: float) -> tuple[int, float, float, float]:
-    """Triangle nearest to a point [m], and the point nearest on it [m].
+    """Triangle nearest to each of some points [k, 3] [m], and the point nearest on it [m], [k, 3].
 
     The nearer child is looked at first, and what is farther than the nearest triangle so far is left out.
     """
-    boxes, count, leaves = tree.boxes, len(tree.triangles), len(tree.boxes) // 2
+    triangles, closest = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    boxes, corners, count, leaves = tree.boxes, tree.corners, len(tree.triangles), len(tree.boxes) // 2
     nodes, distances = np.empty(_DEPTH, np.int64), np.empty(_DEPTH)
-    nodes[0], distances[0], waiting = 1, 0.0, 1
-    least, row, nx, ny, nz = np.inf, 0, x, y, z
-    while waiting:
-        waiting -= 1
-        node = nodes[waiting]
-        if distances[waiting] >= least:
-            continue
-        while node < leaves:
-            near, far = 2 * node, 2 * node + 1
-            to_near, to_far = _distance2_to_box(boxes, near, x, y, z), _distance2_to_box(boxes, far, x, y, z)
-            if to_far < to_near:
-                near, far, to_near, to_far = far, near, to_far, to_near
-            if to_far < least:
-                nodes[waiting], distances[waiting] = far, to_far
-                waiting += 1
-            if to_near >= least:
-                break
-            node = near
-        if node < leaves:
-            continue
-        leaf = node - leaves
-        for i in range(count * leaf // leaves, count * (leaf + 1) // leaves):
-            cx, cy, cz = _closest_in_triangle(tree.corners[i], x, y, z)
-            distance2 = (cx - x) ** 2 + (cy - y) ** 2 + (cz - z) ** 2
-            if distance2 < least:
-                least, row, nx, ny, nz = distance2, i, cx, cy, cz
-    return tree.triangles[row], nx, ny, nz
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        nodes[0], distances[0], waiting, least = 1, 0.0, 1, np.inf
+        while waiting > 0:
+            waiting -= 1
+            node = nodes[waiting]
+            if distances[waiting] >= least:
+                continue
+            if node < leaves:
+                # the farther one waits below the nearer one
+                near, far = _distance2_to_box(boxes, 2 * node, x, y, z), _distance2_to_box(boxes, 2 * node + 1, x, y, z)
+                swap = 1 if far < near else 0
+                nodes[waiting], distances[waiting] = 2 * node + 1 - swap, max(near, far)
+                nodes[waiting + 1], distances[waiting + 1] = 2 * node + swap, min(near, far)
+                waiting += 2
+                continue
+            for row in range(count * (node - leaves) // leaves, count * (node - leaves + 1) // leaves):
+                cx, cy, cz = _closest_in_triangle(corners[row], x, y, z)
+                distance2 = (cx - x) ** 2 + (cy - y) ** 2 + (cz - z) ** 2
+                if distance2 < least:
+                    least, triangles[i] = distance2, tree.triangles[row]
+                    closest[i, 0], closest[i, 1], closest[i, 2] = cx, cy, cz
+    return triangles, closest
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _distance2_to_box(boxes: Floats, node: int, x: float, y: float, z: float) -> float:
     """Squared distance of a point from a box, 0 inside [m^2]."""
     dx = max(boxes[node, 0] - x, x - boxes[node, 3], 0.0)
@@ -111,7 +97,7 @@ def _distance2_to_box(boxes: Floats, node: int, x: float, y: float, z: float) ->
     return dx * dx + dy * dy + dz * dz
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _closest_in_triangle(corners: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     """The point of a triangle [3, 3] nearest to a point [m].
 

@@ -22,23 +22,21 @@ from .cells import (
 from .chart_map import (
     ChartMap as ChartMap,
     LinearChartMap as LinearChartMap,
-    MeshPlaces as MeshPlaces,
     Parts as Parts,
     PartsMesh as PartsMesh,
     barycentrics_at as barycentrics_at,
     barycentrics_in as barycentrics_in,
-    nearest_place as nearest_place,
-    nearest_places as nearest_places,
     parts_mesh as parts_mesh,
-    texel_on as texel_on,
     texture_coordinates as texture_coordinates,
     uncut as uncut,
 )
 from .distance import (
+    clean as clean,
     depth_in_region as depth_in_region,
     distance_scratch as distance_scratch,
     distance_to as distance_to,
-    march_from_point as march_from_point,
+    march as march,
+    seeded as seeded,
     taken as taken,
 )
 from .maps import texture_map as texture_map, vertex_map as vertex_map

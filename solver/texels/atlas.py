@@ -21,7 +21,7 @@ from ..errors import PATH, AtlasError, checked, shown
 from ..files import atomic_write, final_path
 from ..mesh.closest import TriangleTree, closest_points, triangle_tree
 from ..mesh.mesh import Mesh
-from .chart_map import ChartMap, MeshPlaces, TextureCoordinates, nearest_places, texture_coordinates
+from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
 from .texel_mesh import TexelMesh, texel_quality
 from .topology import sampling_matrix
 
@@ -217,7 +217,12 @@ class Atlas:
 
     def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest surface points [m], [k, 3], and the flat index of the texel nearest to each in the atlas, [k]."""
-        return nearest_places(self.places, check_points(points))
+        return self.nearest_places(check_points(points))
+
+    def nearest_places(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The same of points that need no check, [k, 3]."""
+        triangle, closest = closest_points(self.tree, points)
+        return closest, self.chart_map.texels_at(self.mesh, self.resolution, triangle, closest)
 
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
         """Flat index (chart N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
@@ -287,11 +292,6 @@ class Atlas:
     def __getstate__(self) -> dict[str, Any]:
         """What `copy` and `pickle` keep: the search tree is made again when it is needed."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-
-    @functools.cached_property
-    def places(self) -> Any:
-        """What compiled code asks for the nearest places of the surface; see `nearest_places`."""
-        return MeshPlaces(self.tree, self.chart_map.compiled(self.mesh, self.texels.topology))
 
     @functools.cached_property
     def tree(self) -> TriangleTree:

@@ -1,22 +1,19 @@
 """The way from a point of the mesh to its place on the charts, which each layout knows in its own manner.
 
-In Python a layout's `ChartMap` gives map coordinates; compiled code, which contacts ask at every step, has a version of
-`texel_on` for its arrays. The chart map here is linear in each triangle: corners lie at rows and columns of one chart.
+Each has a compiled loop for the texels of points, since contacts ask at every step. The chart map here is linear in
+each triangle: corners lie at rows and columns of one chart.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel import Floats, Ints, kernel, variant
-from ..mesh.closest import TriangleTree, closest_point
+from ..kernel import Floats, Ints, kernel
 from ..mesh.mesh import Mesh
-from .topology import TexelTopology
 
 
 def barycentrics_in(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -33,9 +30,8 @@ def barycentrics_in(corners: NDArray[np.float64], points: NDArray[np.float64]) -
 
 
 @kernel
-def barycentrics_at(corners: Floats, x: float, y: float, z: float) -> tuple[float, float]:
+def barycentrics_at(corners: Floats, point: Floats) -> tuple[float, float]:
     """The second and third barycentric coordinate of a point in a triangle [3, 3], as in `barycentrics_in`."""
-    point = (x, y, z)
     uu = uv = vv = pu = pv = 0.0
     for k in range(3):
         u, v, p = corners[1, k] - corners[0, k], corners[2, k] - corners[0, k], point[k] - corners[0, k]
@@ -71,8 +67,8 @@ class ChartMap(Protocol):
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Chart, row and column, each [k], of map coordinates; 0.0 is the centre of the first texel."""
 
-    def compiled(self, mesh: Mesh, topology: TexelTopology) -> Any:
-        """What compiled code asks for the texels of points, a NamedTuple of arrays; see `texel_on`."""
+    def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
+        """Flat indices [k] of the texels in which points [k, 3] [m] lie that are on triangles [k]."""
 
     def linear_parts(self, mesh: Mesh) -> Parts:
         """Parts of the mesh's triangles in which map coordinates are linear, and these at their corners [p, 3, d]."""
@@ -143,58 +139,6 @@ def texture_coordinates(chart_map: ChartMap, mesh: Mesh) -> TextureCoordinates:
     return TextureCoordinates(triangle[part], barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))
 
 
-class MeshPlaces(NamedTuple):
-    """What is asked for the nearest places of a mesh: its triangles, and the arrays of its chart map."""
-
-    tree: TriangleTree
-    charts: Any
-
-
-@kernel
-def nearest_places(surface: Any, points: Floats) -> tuple[Floats, Ints]:
-    """Closest surface points [m], [k, 3], and the flat index of the texel nearest to each in the atlas, [k].
-
-    Parameters
-    ----------
-    surface : NamedTuple
-        See `Atlas.places`.
-    points : float64 [k, 3]
-        [m].
-    """
-    closest, texels = np.empty((len(points), 3)), np.empty(len(points), np.int64)
-    for i in range(len(points)):
-        x, y, z, texels[i] = nearest_place(surface, points[i, 0], points[i, 1], points[i, 2])
-        closest[i, 0], closest[i, 1], closest[i, 2] = x, y, z
-    return closest, texels
-
-
-@functools.singledispatch
-def nearest_place(surface: Any, x: float, y: float, z: float) -> tuple[float, float, float, int]:
-    """Closest surface point [m] and the texel nearest to it; every kind of surface has a `variant` of this."""
-    raise NotImplementedError
-
-
-@functools.singledispatch
-def texel_on(charts: Any, triangle: int, x: float, y: float, z: float) -> int:
-    """Texel in which a point of a triangle lies [m]; every chart map has a `variant` of this."""
-    raise NotImplementedError
-
-
-@variant(nearest_place, MeshPlaces)
-def _nearest_on_mesh(surface: MeshPlaces, x: float, y: float, z: float) -> tuple[float, float, float, int]:
-    triangle, x, y, z = closest_point(surface.tree, x, y, z)
-    return x, y, z, texel_on(surface.charts, triangle, x, y, z)
-
-
-class LinearCharts(NamedTuple):
-    """Triangles in space [m], [m, 3, 3], and on the charts; see `LinearChartMap`."""
-
-    triangles: Floats
-    charts: Ints
-    corners: Floats
-    resolution: int
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinearChartMap:
     """Triangles laid out on charts; map coordinates are chart, row and column. See `ChartMap`.
@@ -230,9 +174,10 @@ class LinearChartMap:
         """Chart, row and column, each [k]."""
         return coordinates[:, 0].astype(np.int64), coordinates[:, 1], coordinates[:, 2]
 
-    def compiled(self, mesh: Mesh, topology: TexelTopology) -> LinearCharts:
-        """The triangles in space and on the charts."""
-        return LinearCharts(mesh.V[mesh.F], self.charts, np.ascontiguousarray(self.corners), topology.shape[1])
+    def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
+        """Flat indices [k] of the texels in which points [k, 3] [m] lie that are on triangles [k]."""
+        charts, corners = self.charts[triangles], np.ascontiguousarray(self.corners[triangles])
+        return _texels_on_charts(mesh.V[mesh.F[triangles]], charts, corners, resolution, points)
 
     def linear_parts(self, mesh: Mesh) -> Parts:
         """The triangles, with chart, row and column of their corners."""
@@ -256,15 +201,18 @@ class LinearChartMap:
         return {"charts": self.charts, "corners": self.corners}
 
 
-@variant(texel_on, LinearCharts)
-def _texel_on_linear_charts(charts: LinearCharts, triangle: int, x: float, y: float, z: float) -> int:
-    s, t = barycentrics_at(charts.triangles[triangle], x, y, z)
-    texel, n = charts.charts[triangle], charts.resolution
-    for k in range(2):
-        place = (1 - s - t) * charts.corners[triangle, 0, k]
-        place += s * charts.corners[triangle, 1, k] + t * charts.corners[triangle, 2, k]
-        texel = texel * n + min(max(int(np.rint(place)), 0), n - 1)
-    return texel
+@kernel
+def _texels_on_charts(triangles: Floats, charts: Ints, corners: Floats, n: int, points: Floats) -> Ints:
+    """Texels [k] of points [k, 3] on triangles [k, 3, 3] [m] that lie at corners [k, 3, 2] of charts [k]."""
+    texels = np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        s, t = barycentrics_at(triangles[i], points[i])
+        texel = charts[i]
+        for k in range(2):
+            place = (1 - s - t) * corners[i, 0, k] + (s * corners[i, 1, k] + t * corners[i, 2, k])
+            texel = texel * n + min(max(int(np.rint(place)), 0), n - 1)
+        texels[i] = texel
+    return texels
 
 
 _BITS = 34  # of coordinates in which copies of a point agree

@@ -150,19 +150,9 @@ class CrossingLinks(NamedTuple):
 
     def level(self, weights: Floats) -> None:
         """Give all copies of each link their mean, in a stencil's weights."""
-        _level(weights.reshape(-1), self.copies, self.begins)
-
-
-@kernel
-def _level(weights: Floats, copies: Ints, begins: Ints) -> None:
-    """Give the copies of each link their mean, in flat weights; those of link i are from begins[i] to begins[i + 1]."""
-    for link in range(len(begins) - 1):
-        first, last = begins[link], begins[link + 1]
-        total = 0.0
-        for i in range(first, last):
-            total += weights[copies[i]]
-        for i in range(first, last):
-            weights[copies[i]] = total / (last - first)
+        counts, flat = np.diff(self.begins), weights.reshape(-1)
+        link = np.repeat(np.arange(len(counts)), counts)
+        flat[self.copies] = (np.bincount(link, flat[self.copies], len(counts)) / counts)[link]
 
 
 @functools.lru_cache(maxsize=4)
@@ -275,8 +265,10 @@ class Stencil:
 
     def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
-        result = np.empty(self.topology.shape)
-        _gather(self.weights, self.topology.with_boundary(field), result)
+        n, h, result = self.topology.shape[1], self.topology.with_boundary(field), np.zeros(self.topology.shape)
+        for link, down, left, dr, dc in (*_SIDES, *_DIAGONALS):
+            weights = self.weights[:, link, 1 + down : n + 1 + down, 1 + left : n + 1 + left]
+            result += weights * (h[:, 1 + dr : n + 1 + dr, 1 + dc : n + 1 + dc] - h[:, 1:-1, 1:-1])
         if self.irregular is not None:
             gather_links(self.irregular, field.reshape(-1), result.reshape(-1))
         return result
@@ -313,20 +305,6 @@ class Stencil:
 # link, the place from which it starts relative to the texel, and its other end
 _SIDES = ((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0))
 _DIAGONALS = ((2, 0, 0, 1, 1), (2, -1, -1, -1, -1), (3, -1, 0, -1, 1), (3, 0, -1, 1, -1))
-
-
-@kernel
-def _gather(w: Floats, h: Floats, out: Floats) -> None:
-    """Sum of weight (h_j - h_i) over the stencil; h has a halo."""
-    n = out.shape[1]
-    for chart in range(len(out)):
-        for r in range(1, n + 1):
-            for c in range(1, n + 1):
-                total = 0.0
-                for links in (_SIDES, _DIAGONALS):
-                    for link, i, j, dr, dc in links:
-                        total += w[chart, link, r + i, c + j] * (h[chart, r + dr, c + dc] - h[chart, r, c])
-                out[chart, r - 1, c - 1] = total
 
 
 def stiffness_matrix(stencil: Stencil) -> csr_array:

@@ -182,7 +182,7 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     rim = np.zeros(halo.shape, dtype=bool)
     first = size * np.arange(charts)[:, None]
     halo[:, 1:-1, 1:-1] = np.arange(charts * size).reshape(charts, n, n)
-    border, beyond = _border_texels(n), _places_beyond(n)
+    border, beyond = _along_sides(np.arange(n), n), _along_sides(np.arange(1, n + 1), n + 2)
     for side in range(4):
         chart, other = glued[:, side].T
         is_rim = chart < 0
@@ -212,15 +212,9 @@ def _checked(glued: NDArray[np.int64]) -> NDArray[np.int64]:
     return table
 
 
-def _border_texels(n: int) -> NDArray[np.int64]:
-    """Index row n + column of the texels along each side of a chart, [4, n]."""
-    along, last = np.arange(n), n - 1
-    return np.stack([along, along * n + last, last * n + last - along, (last - along) * n])
-
-
-def _places_beyond(n: int) -> NDArray[np.int64]:
-    """Address of the places beyond each side in a chart with halo, [4, n]."""
-    along, width, last = np.arange(1, n + 1), n + 2, n + 1
+def _along_sides(along: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+    """Flat places along each side of a square of so many rows and columns, [4, n]."""
+    last = width - 1
     return np.stack([along, along * width + last, last * width + last - along, (last - along) * width])
 
 

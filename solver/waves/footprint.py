@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SolverError, is_finite, shown
 from ..kernel import Floats, Ints, kernel
 from ..texels.atlas import Atlas, check_points
-from ..texels.distance import distance_scratch, distance_to, march_from_point, taken
+from ..texels.distance import Scratch, clean, distance_scratch, distance_to, march, seeded
 from ..texels.texel_mesh import TexelGrid
 from .finite import require_finite
 
@@ -24,12 +24,12 @@ MIN_TEXELS = 2.0
 # only the way along the surface counts. In between the two are blended, so that no texel jumps in or out.
 _FLAT, _BENT = 1.05, 1.5
 
+# Rows and columns in a halo table of the four texels beside one
+_DOWN, _RIGHT = np.array([0, 1, 1, 2]), np.array([1, 0, 2, 1])
 
-@kernel
-def weigh_each(
-    grid: TexelGrid, centers: Ints, points: Floats, radii: Floats, scratch: Floats
-) -> tuple[Ints, Ints, Floats, Floats]:
-    """Footprints round points [k, 3] whose nearest texels are `centers`; `scratch` is `distance_scratch`.
+
+def weigh_each(grid: TexelGrid, centers: Ints, points: Floats, radii: Floats) -> tuple[Ints, Ints, Floats, Floats]:
+    """Footprints round points [k, 3] whose nearest texels are `centers`.
 
     Returns
     -------
@@ -40,31 +40,53 @@ def weigh_each(
     radii : float64 [k]
         Those used [m].
     """
-    begins, used, room = np.zeros(len(centers) + 1, np.int64), np.empty(len(centers)), 1024
-    texels, weights = np.empty(room, np.int64), np.empty(room)
-    for i in range(len(centers)):
-        radius = used[i] = max(radii[i], MIN_TEXELS * _spacing(grid, centers[i]))
-        near, distance, flat = _nearby(grid, centers[i], points[i], radius, scratch)
+    begins, used, done = np.zeros(len(centers) + 1, np.int64), np.empty(len(centers)), 0
+    texels, weights = np.empty(4096, np.int64), np.empty(4096)
+    scratch = distance_scratch(len(grid.areas))
+    while done < len(centers):
+        done = _weigh(grid, centers, points, radii, scratch, done, begins, used, texels, weights)
+        if done < len(centers):  # there was no room for the next
+            texels, weights = np.resize(texels, 4 * len(texels)), np.resize(weights, 4 * len(weights))
+    return begins, texels[: begins[-1]], weights[: begins[-1]], used
+
+
+@kernel
+def _weigh(
+    grid: TexelGrid, centers: Ints, points: Floats, radii: Floats, scratch: Scratch, first: int,
+    begins: Ints, used: Floats, texels: Ints, weights: Floats,
+) -> int:  # fmt: skip
+    """Fill in footprints from the first on; one after the last for which there was room."""
+    distance, touched = scratch.distance, scratch.touched
+    for i in range(first, len(centers)):
+        center, point = centers[i], points[i]
+        radius = used[i] = max(radii[i], MIN_TEXELS * _spacing(grid, center))
+        count, end, total, near = _nearby(grid, center, point, radius, distance, touched), begins[i], 0.0, touched
+        known, flat = count, count > 0
         if not flat:
-            near, distance = _blended(grid, centers[i], points[i], radius, scratch)
-        first = end = begins[i]
-        if first + len(near) > room:
-            room = 2 * (first + len(near))
-            more_texels, more_weights = np.empty(room, np.int64), np.empty(room)
-            for k in range(first):
-                more_texels[k], more_weights[k] = texels[k], weights[k]
-            texels, weights = more_texels, more_weights
-        total = 0.0
-        for k in range(len(near)):
-            weight = max(1 - (distance[k] / radius) ** 2, 0.0) ** 3
+            count = seeded(grid.halo, grid.positions, center, point, distance, touched)
+            count, known = march(grid.halo, grid.positions, count, 1.1 * radius, scratch)
+            near = scratch.order
+        if end + known > len(texels):
+            clean(distance, scratch.place, touched, count)
+            return i
+        for k in range(known):
+            t = near[k]
+            away = distance[t]
+            straight = 0.0 if flat else distance_to(grid.positions, t, point)
+            if straight > 0:
+                bend = min(max((away / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
+                bend = bend * bend * (3 - 2 * bend)
+                away = (1 - bend) * straight + bend * away
+            weight = max(1 - (away / radius) ** 2, 0.0) ** 3
             if weight > 0:
-                texels[end], weights[end] = near[k], weight
-                total += weight * grid.areas[near[k]]
+                texels[end], weights[end] = t, weight
+                total += weight * grid.areas[t]
                 end += 1
-        for k in range(first, end):
+        clean(distance, scratch.place, touched, count)
+        for k in range(begins[i], end):
             weights[k] /= total
         begins[i + 1] = end
-    return begins, texels[: begins[-1]], weights[: begins[-1]], used
+    return len(centers)
 
 
 @kernel(no_cpython_wrapper=True)
@@ -74,65 +96,45 @@ def _spacing(grid: TexelGrid, center: int) -> float:
     n = halo.shape[1] - 2
     chart, row, column = center // (n * n), center // n % n, center % n
     greatest = 0.0
-    for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
-        t = halo[chart, row + down, column + right]
+    for k in range(4):
+        t = halo[chart, row + _DOWN[k], column + _RIGHT[k]]
         if t >= 0:
             greatest = max(greatest, distance_to(positions, t, positions[center]))
     return greatest
 
 
 @kernel(no_cpython_wrapper=True)
-def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, bool]:
-    """Connected texels within a straight distance of a point, their distances, and whether they lie flat.
+def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints) -> int:
+    """Touch connected texels within a straight distance of a point; how many, or 0, and none, if they do not lie flat.
 
     Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
     whose slope makes no way along it longer than 1.05 times the straight one.
     """
     halo, positions, normals = grid.halo, grid.positions, grid.normals
     n = halo.shape[1] - 2
-    room = 256
-    texels = np.empty(room, np.int64)
-    count, done, flat = 1, 0, True
-    texels[0] = center
-    scratch[center] = distance_to(positions, center, point)
-    while done < count and flat:
+    count, done = np.int64(1), 0
+    texels[0], distance[center] = center, distance_to(positions, center, point)
+    while done < count:
         t = texels[done]
         done += 1
-        if scratch[t] > radius:
+        if distance[t] > radius:
             continue
         along = 0.0
         for k in range(3):
             along += normals[t, k] * normals[center, k]
-        flat = along * _FLAT >= 1
-        if count + 8 > room:
-            room *= 2
-            longer = np.empty(room, np.int64)
+        if along * _FLAT < 1:
             for i in range(count):
-                longer[i] = texels[i]
-            texels = longer
+                distance[texels[i]] = np.inf
+            return 0
         chart, row, column = t // (n * n), t // n % n, t % n
         for i in range(3):
             for j in range(3):
                 a = halo[chart, row + i, column + j]
-                if a >= 0 and scratch[a] == np.inf:
-                    scratch[a] = distance_to(positions, a, point)
+                if a >= 0 and distance[a] == np.inf:
+                    distance[a] = distance_to(positions, a, point)
                     texels[count] = a
                     count += 1
-    texels = texels[:count]
-    return texels, taken(scratch, texels, texels), flat
-
-
-@kernel(no_cpython_wrapper=True)
-def _blended(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats]:
-    """Texels within a little more than the radius along the surface, and the distances that count."""
-    texels, distance = march_from_point(grid.halo, grid.positions, center, point, 1.1 * radius, scratch)
-    for i in range(len(texels)):
-        straight = distance_to(grid.positions, texels[i], point)
-        if straight > 0:
-            bend = min(max((distance[i] / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
-            bend = bend * bend * (3 - 2 * bend)
-            distance[i] = (1 - bend) * straight + bend * distance[i]
-    return texels, distance
+    return count
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -191,8 +193,7 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
 
 def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
     """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
-    grid, scratch = atlas.texels.grid, distance_scratch(atlas.areas.size)
-    _, texels, weights, radii = weigh_each(grid, np.array([center]), point[None], np.array([radius]), scratch)
+    _, texels, weights, radii = weigh_each(atlas.texels.grid, np.array([center]), point[None], np.array([radius]))
     return Footprint(texels, weights, center, point, float(radii[0]))
 
 

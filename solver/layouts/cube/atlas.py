@@ -9,9 +9,7 @@ accuracy are tested.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
-from typing import NamedTuple
 
 import igl
 import numpy as np
@@ -19,14 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from ...errors import POSITIVE, AtlasError, checked
-from ...kernel import Floats, Ints, kernel, variant
+from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...mesh.rays import RayScene
-from ...mesh.vectors import combine, cross, dot, row
+from ...mesh.vectors import cross, dot
 from ...texels.atlas import Atlas, check_points
-from ...texels.chart_map import Parts, nearest_place, nearest_places, texel_on, uncut
+from ...texels.chart_map import Parts, barycentrics_at, uncut
+from ...texels.texel_atlas import triangles_of
 from ...texels.texel_mesh import TexelMesh
-from ...texels.topology import TexelTopology, stretch_summary
+from ...texels.topology import stretch_summary
 from ..sphere_map import certify, stretch
 from .convention import (
     CHART_U,
@@ -43,63 +42,30 @@ from .convention import (
 
 
 @kernel
-def sphere_directions(V: Floats, F: Ints, sphere: Floats, triangles: Ints, points: Floats) -> Floats:
-    """Unit vectors, [k, 3], of points that lie on triangles: where linear interpolation of the sphere map puts them."""
+def sphere_directions(corners: Floats, sphere: Floats, points: Floats) -> Floats:
+    """Unit vectors [k, 3] of points in triangles, whose corners [k, 3, 3] are given in space and on the sphere map.
+
+    There linear interpolation of the sphere map puts them.
+    """
     found = np.empty((len(points), 3))
     for i in range(len(points)):
-        found[i, 0], found[i, 1], found[i, 2] = _direction(V, F, sphere, triangles[i], points[i])
+        s, t = barycentrics_at(corners[i], points[i])
+        square = 0.0
+        for k in range(3):
+            found[i, k] = (1 - s - t) * sphere[i, 0, k] + s * sphere[i, 1, k] + t * sphere[i, 2, k]
+            square += found[i, k] ** 2
+        for k in range(3):
+            found[i, k] /= np.sqrt(square)
     return found
 
 
-class SphereCharts(NamedTuple):
-    """A mesh and its sphere map on the six charts; see `CubeChartMap`."""
-
-    V: Floats
-    F: Ints
-    sphere: Floats
-    resolution: int
-
-
-class Ball(NamedTuple):
-    """A sphere round the origin [m], whose sphere map is itself."""
-
-    radius: float
-    resolution: int
-
-
-@variant(texel_on, SphereCharts)
-def _texel_on_sphere_map(charts: SphereCharts, triangle: int, x: float, y: float, z: float) -> int:
-    u, v, w = _direction(charts.V, charts.F, charts.sphere, triangle, (x, y, z))
-    return texel_at(u, v, w, charts.resolution)
-
-
-@variant(nearest_place, Ball)
-def _nearest_on_ball(surface: Ball, x: float, y: float, z: float) -> tuple[float, float, float, int]:
-    length = np.sqrt(x * x + y * y + z * z)
-    if length > 0:
-        x, y, z = x / length, y / length, z / length
-    else:
-        x, y, z = 0.0, 0.0, 1.0  # all are as near
-    texel = texel_at(x, y, z, surface.resolution)
-    return surface.radius * x, surface.radius * y, surface.radius * z, texel
-
-
 @kernel
-def _direction(V: Floats, F: Ints, sphere: Floats, triangle: int, point: Floats) -> tuple[float, float, float]:
-    """Unit vector of a point [3] that lies on a triangle."""
-    a, b, c = F[triangle, 0], F[triangle, 1], F[triangle, 2]
-    uu = uv = vv = pu = pv = 0.0
-    for k in range(3):
-        u, v, p = V[b, k] - V[a, k], V[c, k] - V[a, k], point[k] - V[a, k]
-        uu, uv, vv, pu, pv = uu + u * u, uv + u * v, vv + v * v, pu + p * u, pv + p * v
-    area = uu * vv - uv * uv
-    # a triangle without area has no barycentrics: its corners are as good as any point of it
-    s = min(max((vv * pu - uv * pv) / area, 0.0), 1.0) if area > 0 else 1 / 3
-    t = min(max((uu * pv - uv * pu) / area, 0.0), 1.0 - s) if area > 0 else 1 / 3
-    first = combine(1 - s - t, row(sphere, a), s, row(sphere, b))
-    x, y, z = combine(1.0, first, t, row(sphere, c))
-    length = np.sqrt(x * x + y * y + z * z)
-    return x / length, y / length, z / length
+def texels_towards(directions: Floats, n: int) -> Ints:
+    """Flat indices of the texels in which directions [k, 3] lie."""
+    texels = np.empty(len(directions), np.int64)
+    for i in range(len(directions)):
+        texels[i] = texel_at(directions[i, 0], directions[i, 1], directions[i, 2], n)
+    return texels
 
 
 @kernel
@@ -229,7 +195,8 @@ class CubeChartMap:
 
     def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Directions [k, 3] of points [k, 3] [m] that lie on triangles [k], unit vectors."""
-        return sphere_directions(mesh.V, mesh.F, self.sphere, triangles, points)
+        corners = mesh.F[triangles]
+        return sphere_directions(mesh.V[corners], self.sphere[corners], points)
 
     def chart_points(
         self, coordinates: NDArray[np.float64], resolution: int
@@ -237,9 +204,9 @@ class CubeChartMap:
         """Chart, row and column of directions, each [k]."""
         return cube_chart_points(coordinates, resolution)
 
-    def compiled(self, mesh: Mesh, topology: TexelTopology) -> SphereCharts:
-        """Mesh and sphere map."""
-        return SphereCharts(mesh.V, mesh.F, self.sphere, topology.shape[1])
+    def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
+        """Flat indices [k] of the texels in which points [k, 3] [m] lie that are on triangles [k]."""
+        return texels_towards(self.coordinates(mesh, triangles, points), resolution)
 
     def linear_parts(self, mesh: Mesh) -> Parts:
         """The triangles, with the directions of their corners."""
@@ -322,12 +289,13 @@ class SphereAtlas(Atlas):
     def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest points on the sphere [m], [k, 3], and the flat index of the texel in which each lies, [k]."""
         closest, directions = self.project(points)
-        return closest, nearest_places(self.places, directions)[1]
+        return closest, texels_towards(directions, self.resolution)
 
-    @functools.cached_property
-    def places(self) -> Ball:
-        """The sphere itself."""
-        return Ball(self.radius, self.resolution)
+    def nearest_places(self, points: Floats) -> tuple[Floats, Ints]:
+        """The same of finite points; of the centre, to which all are as near, the one towards z."""
+        length = np.linalg.norm(points, axis=1, keepdims=True)
+        directions = np.where(length > 0, points / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+        return self.radius * directions, texels_towards(directions, self.resolution)
 
 
 @checked(AtlasError, radius=POSITIVE)
@@ -368,12 +336,4 @@ def _texel_triangulation(
     corner_cells = cells[~whole]
     corners = np.array([cell[cell >= 0] for cell in corner_cells]).reshape(-1, 3)
     F = np.concatenate([cells[whole][:, [0, 1, 2]], cells[whole][:, [0, 2, 3]], corners])
-    triangles = np.empty(6 * n * n, dtype=np.int64)
-    barycentrics = np.zeros((6 * n * n, 3))
-    place = np.empty(6 * n * n, dtype=np.int64)
-    triangles[F[::-1].ravel()] = np.repeat(np.arange(len(F))[::-1], 3)
-    for k in range(3):
-        here = F[triangles, k] == np.arange(6 * n * n)
-        place[here] = k
-    barycentrics[np.arange(6 * n * n), place] = 1.0
-    return F, triangles.reshape(6, n, n), barycentrics.reshape(6, n, n, 3)
+    return F, *triangles_of(F, np.arange(6 * n * n).reshape(6, n, n))

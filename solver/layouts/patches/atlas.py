@@ -5,15 +5,14 @@ from __future__ import annotations
 import dataclasses
 import functools
 import time
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel import Floats, Ints, kernel, variant
+from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.atlas import Atlas
-from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, texel_on, uncut
+from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, uncut
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, glue, stretch_summary
 from ..energy import COLUMN, FIXED
@@ -33,15 +32,6 @@ def map_quality(mesh: Mesh, pieces: Pieces) -> dict[str, float]:
     even = flat * mesh.area / (int(pieces.chart.max()) + 1)
     stretch = np.sqrt(real / np.maximum(even, np.finfo(np.float64).tiny))
     return {"flipped": int((flat <= 0).sum()), **stretch_summary(stretch, real)}
-
-
-class PatchCharts(NamedTuple):
-    """Triangles in space [m], [m, 3, 3], the first piece of each, one behind the last, and the pieces."""
-
-    triangles: Floats
-    first: Ints
-    pieces: Pieces
-    resolution: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,9 +65,9 @@ class PatchChartMap:
         chart, column, row = coordinates.T
         return chart.astype(np.int64), row * resolution - 0.5, column * resolution - 0.5
 
-    def compiled(self, mesh: Mesh, topology: TexelTopology) -> PatchCharts:
-        """The triangles in space, and their pieces."""
-        return PatchCharts(mesh.V[mesh.F], self._first, self.pieces, topology.shape[1])
+    def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
+        """Flat indices [k] of the texels in which points [k, 3] [m] lie that are on triangles [k]."""
+        return _texels_on_pieces(mesh.V[mesh.F[triangles]], self._first, self.pieces, resolution, triangles, points)
 
     def linear_parts(self, mesh: Mesh) -> Parts:
         """The pieces."""
@@ -131,17 +121,20 @@ def _piece_at(first: Ints, corners: Floats, triangle: int, x: float, y: float) -
     return piece, at_s, at_t
 
 
-@variant(texel_on, PatchCharts)
-def _texel_on_patches(charts: PatchCharts, triangle: int, x: float, y: float, z: float) -> int:
-    pieces, n = charts.pieces, charts.resolution
-    s, t = barycentrics_at(charts.triangles[triangle], x, y, z)
-    piece, s, t = _piece_at(charts.first, pieces.barycentrics, triangle, 1 - s - t, s)
-    texel = pieces.chart[piece]
-    for k in (1, 0):
-        place = (1 - s - t) * pieces.places[piece, 0, k]
-        place += s * pieces.places[piece, 1, k] + t * pieces.places[piece, 2, k]
-        texel = texel * n + min(max(int(np.rint(place * n - 0.5)), 0), n - 1)
-    return texel
+@kernel
+def _texels_on_pieces(corners: Floats, first: Ints, pieces: Pieces, n: int, triangles: Ints, points: Floats) -> Ints:
+    """Texels [k] of points [k, 3] on triangles [k], whose corners [k, 3, 3] are given [m]."""
+    texels = np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        s, t = barycentrics_at(corners[i], points[i])
+        piece, s, t = _piece_at(first, pieces.barycentrics, triangles[i], 1 - s - t, s)
+        texel = pieces.chart[piece]
+        for k in (1, 0):
+            place = (1 - s - t) * pieces.places[piece, 0, k]
+            place += s * pieces.places[piece, 1, k] + t * pieces.places[piece, 2, k]
+            texel = texel * n + min(max(int(np.rint(place * n - 0.5)), 0), n - 1)
+        texels[i] = texel
+    return texels
 
 
 def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> NDArray[np.float64] | None:

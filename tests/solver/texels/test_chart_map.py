@@ -10,11 +10,9 @@ from hand_made import polygon, square, two_squares
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas, texel_atlas
 from ripple_sim.solver.layouts.cube import CubeChartMap, cube_topology
-from ripple_sim.solver.mesh import triangle_tree
+from ripple_sim.solver.mesh import closest_points, triangle_tree
 from ripple_sim.solver.texels import (
     LinearChartMap,
-    MeshPlaces,
-    nearest_places,
     sampling_matrix,
     texture_coordinates,
     with_filled_halo,
@@ -103,9 +101,8 @@ def test_a_triangle_without_area_gives_the_middle_of_its_place(corners: list) ->
 
 def test_the_border_belongs_to_the_last_texels() -> None:
     # on the plane of the first triangle, whose corners are at the corners of chart 2; the second is on chart 0
-    charts = MAP.compiled(MESH, two_squares(4).topology)
     points = [V[0], V[1], V[2], V[:3].mean(axis=0), 2 * V[2] - V[0]]
-    _, texels = nearest_places(MeshPlaces(triangle_tree(V, MESH.F), charts), np.array(points))
+    texels = MAP.texels_at(MESH, 4, *closest_points(triangle_tree(V, MESH.F), np.array(points)))
     assert texels.tolist() == [2 * 16, 2 * 16 + 3, 2 * 16 + 15, 2 * 16 + 4 + 2, 2 * 16 + 15]
 
 
@@ -137,7 +134,7 @@ def test_places_are_those_of_points_carried_to_the_charts(layout: str) -> None:
     atlas, rng = ATLASES[layout](), np.random.default_rng(0)
     n, size = atlas.resolution, np.ptp(atlas.mesh.V, axis=0).max()
     points = atlas.mesh.V[rng.integers(len(atlas.mesh.V), size=400)] + 0.02 * size * rng.standard_normal((400, 3))
-    closest, texels = nearest_places(atlas.places, points)
+    closest, texels = atlas.nearest_places(points)
     np.testing.assert_allclose(closest, atlas.project(points)[0], atol=1e-12)
     chart, row, column = atlas.locate(points)
     places = np.clip([row, column], 0, n - 1)

@@ -150,5 +150,5 @@ def test_rays_in_degenerate_directions_agree_too(what: str) -> None:
 
 def test_a_triangle_without_area_gives_its_middle() -> None:
     V = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
-    [found] = sphere_directions(V, np.array([[0, 1, 2]]), np.eye(3), np.array([0]), V[:1])
+    [found] = sphere_directions(V[None], np.eye(3)[None], V[:1])
     np.testing.assert_allclose(found, np.full(3, 3**-0.5))
