@@ -7,6 +7,7 @@ are fine enough for what touches it and coarse enough for the time step.
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.operator.presets import (
     BOUNCE,
@@ -295,6 +297,24 @@ def _substeps(material: Material, spacing: float, timestep: float) -> float:
     return timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
 
 
+# A surface so many times as heavy as its body hardly moves under what is light.
+_HEAVY = 300.0
+
+
+def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> None:
+    """Warn of a target that is made so heavy for a heavy body that other hits will not be seen."""
+    times = _greatest(material.density) / _density(coupled.model, geom, extent)
+    if times > _HEAVY:
+        mass = max(_resting(coupled, geom), heaviest(coupled, geom)[0])
+        warnings.warn(
+            f"the surface of geom {coupled.names[geom]!r} is to bear {mass:.2g} kg, and gets {times:,.0f} times the"
+            " mass of its body: hits of light bodies will not be seen; "
+            f"Material.suited(size={extent.size:.2g}, hit=(kg, m/s)) suits it to a hit",
+            RippleWarning,
+            stacklevel=7,
+        )
+
+
 _SOFT = 64  # resolution of flexes and skins
 
 
@@ -322,6 +342,8 @@ def suited_targets(
     for name in left:
         extent = Extent.of(target_mesh(model, geoms[name]))
         suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
+        if "density" in materials[name].unset:
+            _tell_heavy(coupled, geoms[name], extent, suited[name])
         if name not in texels:
             texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
     return suited, texels

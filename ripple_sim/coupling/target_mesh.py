@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ripple_sim.scenes.sphere_maps import shipped_sphere_map
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 from ripple_sim.solver.cache import Kept, content_key
+from ripple_sim.solver.errors import AtlasError
+from ripple_sim.solver.mesh.clean import counted
 
 from .geoms import TARGET_TYPES, geom_name
 from .soft import SoftSurface, is_soft
@@ -97,6 +99,8 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
     ------
     MeshError
         If the geom's mesh does not suit the layout.
+    AtlasError
+        If no charts can be laid on it, as where it is a heap of thin loose pieces.
     """
     if is_soft(model, geom):
         return build_atlas(SoftSurface(model, geom).mesh, resolution, layout=layout)
@@ -108,7 +112,13 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
 
     def build() -> Atlas:
         mesh = Mesh.from_arrays(V, F, uv, name)
-        return build_atlas(mesh, resolution, layout=layout, sphere=shipped_sphere_map(mesh))
+        try:
+            return build_atlas(mesh, resolution, layout=layout, sphere=shipped_sphere_map(mesh))
+        except AtlasError as error:
+            raise AtlasError(
+                f"{name}, in {counted(mesh.component_count, 'part')}, gets no charts: {error}; let the geom that "
+                "collides for it ripple, or give it a mesh that is wrapped: load_mesh(file, wrap=True)"
+            ) from error
 
     return _atlases.get(key, build)
 

@@ -211,7 +211,7 @@ def test_geoms_that_a_flex_meets_badly_are_named() -> None:
     add_ball(spec, "pebble", [0, 0, 4], type=mujoco.mjtGeom.mjGEOM_SDF, meshname="shape")
     add_ball(spec, "crate", [0, 0, 5], type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
     with pytest.warns(RippleWarning) as caught:
-        Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
+        Ripples(spec.compile(), {"target": Material(density=10.0)}, resolution=8, backend="cpu")
     [message] = [str(warning.message) for warning in caught]
     assert "'target' collides through a flex" in message
     assert "boxes ('crate') aside" in message
@@ -220,7 +220,7 @@ def test_geoms_that_a_flex_meets_badly_are_named() -> None:
     for geom in ("crate", "pebble", "arm", "excluded"):
         spec.geom(geom).contype = spec.geom(geom).conaffinity = 0
     with warnings.catch_warnings(action="error"):
-        Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
+        Ripples(spec.compile(), {"target": Material(density=10.0)}, resolution=8, backend="cpu")
 
 
 LINK = '<body name="link">{}</body>' + BALL.format("0 0 2")

@@ -146,6 +146,17 @@ def test_what_is_given_stays_and_a_density_says_that_all_is_given() -> None:
         assert in_box(whole) is whole
 
 
+def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so() -> None:
+    """As torsos of robots are, whose limbs may touch them: they bear the whole robot."""
+    link = BOX.format(mass=3e4).replace('"target"', '"target" mass="1"').replace("<geom", "<body><freejoint/><geom", 1)
+    model = mujoco.MjModel.from_xml_string(link.replace('0.25"/>', '0.25"/></body>', 1))
+    with pytest.warns(RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit"):
+        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Ripples(model, {"target": Material.suited(1.0, (1.0, 2.0))}, resolution=8, backend="cpu")
+
+
 def test_a_heavier_body_is_met_by_a_stiffer_surface_and_no_body_by_the_least_stiffness() -> None:
     light, middle, heavy = (in_box(Material(), mass, timestep=1e-4).stiffness for mass in (1e-6, 20.0, 1000.0))
     assert light == pytest.approx((16 * 4.43 / 1.0) ** 2, rel=0.01)

@@ -13,6 +13,7 @@ from hits import Run
 from mujoco_models import add_ball, model_of
 
 from ripple_sim.coupling import height_field_triangles, primitive_triangles, target_atlas
+from ripple_sim.solver import AtlasError
 
 
 def test_equal_geoms_share_one_atlas_whatever_their_names() -> None:
@@ -23,6 +24,18 @@ def test_equal_geoms_share_one_atlas_whatever_their_names() -> None:
     assert first is second
     assert third is fourth
     assert target_atlas(model, model.geom("target 0").id, 16) is not first
+
+
+def test_a_mesh_that_gets_no_charts_is_named_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As heaps of a thousand loose slivers, which covers of robots may be."""
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AtlasError("3 triangles of the surface are too thin to be laid out flat")
+
+    monkeypatch.setattr("ripple_sim.coupling.target_mesh.build_atlas", refuse)
+    model = model_of('<body name="cover"><geom type="box" size="0.11 0.22 0.33"/></body>')
+    with pytest.raises(AtlasError, match=r"geom 'cover/0', in 1 part, gets no charts: 3 triangles.*wrap=True"):
+        target_atlas(model, 0, 8)
 
 
 def land(rows: int, columns: int) -> mujoco.MjSpec:

@@ -225,3 +225,47 @@ def test_geoms_that_are_added_to_the_scene_are_seen(egg):
     assert (added[changed][:, 2] > added[changed][:, 0] + 30).mean() > 0.8
     renderer.update_scene(data, "side")
     assert np.array_equal(renderer.render(), plain)
+
+
+# a link as models of robots have it: parts of several materials that are seen, and over them what collides
+LINK = """<mujoco><option timestep="0.002"/><compiler inertiafromgeom="true"/>
+  <default><geom density="800"/>
+    <default class="visual"><geom type="mesh" contype="0" conaffinity="0" group="1" mass="0"/></default>
+    <default class="collision"><geom type="box" group="0" rgba="0 1 0 1"/></default></default>
+  <asset><material name="white" rgba="1 1 1 1"/><material name="black" rgba=".05 .05 .05 1"/>
+    <mesh name="shell" vertex="0 0 0  .4 0 0  0 .3 0  .4 .3 0  0 0 .2  .4 0 .2  0 .3 .2  .4 .3 .2"/>
+    <mesh name="cap" vertex="0 0 0  .1 0 0  0 .1 0  .1 .1 0  0 0 .1  .1 0 .1  0 .1 .1  .1 .1 .1"/></asset>
+  <worldbody><body name="link" pos="0 0 .5"><joint axis="0 1 0" damping="9" stiffness="99"/>
+    <geom class="visual" mesh="shell" material="white" pos=".2 0 0"/>
+    <geom class="visual" mesh="cap" material="black" pos=".6 0 .05"/>
+    <geom class="collision" name="box" size=".2 .15 .102" pos=".4 .15 .1"/></body>
+    <body pos=".4 .15 .9"><freejoint/><geom name="ball" size=".05"/></body></worldbody>
+  <keyframe><key name="home" qpos="0 .4 .15 .8 1 0 0 0"/></keyframe></mujoco>"""
+
+
+def test_a_robots_link_in_parts_ripples_under_what_collides_for_it_and_is_seen_where_that_is_hidden():
+    model = mujoco.MjModel.from_xml_string(LINK)
+    data, hit = mujoco.MjData(model), Material.suited(size=0.4, hit=(0.4, 2.0))
+    ripples = Ripples(model, {"link/0": hit}, resolution=24, backend="cpu")
+    option = mujoco.MjvOption()
+    given = []
+    with RippleRenderer(model, ripples, 60, 80) as renderer:
+        renderer.enable_segmentation_rendering()
+        for _ in range(2):  # episodes, from a keyframe
+            mujoco.mj_resetDataKeyframe(model, data, 0)
+            ripples.step(data)
+            assert not ripples["link/0"].height.any()
+            ripples.mj_step(data, 150)
+            given.append(sum(each.impulse for each in ripples.last_impulses))
+            assert {each.other for each in ripples.last_impulses} == {"ball"}
+        seen = []
+        for group in (1, 0):
+            option.geomgroup[0] = group
+            renderer.update_scene(data, Camera((0.4, 0.15, 0.6), 1.2, 120.0, -40.0), option)
+            seen.append(set(renderer.render()[..., 0].ravel().tolist()))
+    assert given[0] == pytest.approx(given[1])
+    assert given[0] > 0.3
+    assert np.abs(ripples["link/0"].height).max() > 3e-4
+    assert 2 in seen[0]
+    assert {0, 1} <= seen[1]
+    assert 2 not in seen[1]
