@@ -180,12 +180,7 @@ def run(folder: Path, words: str, redirections: str = "", **environment: str | N
 
 @pytest.mark.parametrize(
     ("words", "redirections", "status"),
-    [
-        ("fly", ">&- 2>&-", 2),
-        ("fly", "2>/dev/full", 2),
-        ("completion bash", ">&-", 0),
-        ("--help", "| head -c 0", 0),
-    ],
+    [("fly", ">&- 2>&-", 2), ("fly", "2>/dev/full", 2), ("completion bash", ">&-", 0), ("--help", "| head -c 0", 0)],
 )
 def test_closed_and_full_streams(tmp_path: Path, words: str, redirections: str, status: int) -> None:
     result = run(tmp_path, words, redirections)

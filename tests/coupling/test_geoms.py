@@ -143,10 +143,7 @@ def test_a_pair_collides_whatever_its_masks_say() -> None:
         ({"shell": ["pad"]}, "names geom 'pad' on body 'finger', which moves by itself; valid are .* body 'link'"),
         ({"shell": ["cap"]}, "names geom 'cap', which ripples itself"),
         ({"shell": ["hull2"]}, "no geom 'hull2'; its geoms are"),
-        (
-            {"blade": ["guard"]},
-            "geom 'blade', which does not ripple; the rippling geoms are 'shell', 'cap'",
-        ),
+        ({"blade": ["guard"]}, "geom 'blade', which does not ripple; the rippling geoms are 'shell', 'cap'"),
         ({"shell": "hull0"}, "contacts of geom 'shell' is 'hull0'; valid is a list"),
         ({"shell": 3}, "contacts of geom 'shell' is 3; valid is a list"),
         ({"shell": ["hull0"], 4: []}, "contacts has two entries for geom 'shell'"),

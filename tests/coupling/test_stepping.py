@@ -139,19 +139,6 @@ def test_it_stands_through_steps_and_copies(integrator: str) -> None:
     assert goes_on(clock, model, copy.copy(data))
 
 
-def test_every_kind_of_reset_wipes_it_out(in_tmp_path: None) -> None:
-    model, data, clock = made()
-    mujoco.mj_resetData(model, data)
-    assert not goes_on(clock, model, data)
-    assert goes_on(clock, model, data)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    assert not goes_on(clock, model, data)
-    data.qvel[0] = 1e12  # MuJoCo resets itself
-    mujoco.mj_step(model, data)
-    assert not goes_on(clock, model, data)
-    assert not goes_on(clock, model, mujoco.MjData(model))
-
-
 def test_several_who_look_see_the_same_resets() -> None:
     model, data, first = made()
     second = StepClock()
@@ -188,22 +175,6 @@ def test_data_after_a_step_is_taken_as_it_is(solver: str, integrator: str, nosli
         data.mocap_pos[0, 2] = 0.1 + 0.05 * np.sin(0.1 * step)
         mujoco.mj_step(model, data)
         assert solved.of(data) == (data, None)
-
-
-def test_forces_of_the_next_step_are_solved_for() -> None:
-    model = mujoco.MjModel.from_xml_string(TUMBLING.format("Newton", "Euler", 0, "disable"))
-    data, solved, found_unsolved = mujoco.MjData(model), SolvedForces(model), 0
-    mujoco.mj_step1(model, data)
-    for _ in range(200):
-        mujoco.mj_step2(model, data)
-        mujoco.mj_step1(model, data)
-        ahead, unsolved = solved.of(data)
-        found_unsolved += unsolved is not None
-        forces = ahead.efc_force.copy()
-        mujoco.mj_step2(model, data)
-        np.testing.assert_allclose(forces, data.efc_force, rtol=1e-6, atol=1e-6)
-        mujoco.mj_step1(model, data)
-    assert found_unsolved > 20
 
 
 def test_forces_that_are_solved_come_out_the_same() -> None:

@@ -97,13 +97,7 @@ def test_a_broken_clip_is_an_error_and_no_shorter_video(tmp_path: Path, codec: C
 
 
 @pytest.mark.parametrize(
-    ("frames", "counts"),
-    [
-        (striped(1), [1]),
-        (striped(5), [5]),
-        (striped(7), [4, 3]),
-        (striped(5), [2, 2, 1]),
-    ],
+    ("frames", "counts"), [(striped(1), [1]), (striped(5), [5]), (striped(7), [4, 3]), (striped(5), [2, 2, 1])]
 )
 def test_few_colours_of_a_gif_come_back_exactly_however_its_frames_are_cut_into_clips(
     tmp_path: Path, frames: np.ndarray, counts: list[int]

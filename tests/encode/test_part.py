@@ -18,11 +18,7 @@ import pytest
 from PIL import Image
 from unfinished_videos import contents
 
-from ripple_sim.encode import (
-    FRAMES_IN_CLIP,
-    FrameWriter,
-    open_writer,
-)
+from ripple_sim.encode import FRAMES_IN_CLIP, FrameWriter, open_writer
 from ripple_sim.errors import VideoError
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]

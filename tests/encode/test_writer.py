@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from ripple_sim.encode import (
-    FORMATS,
-    Format,
-    FrameWriter,
-    Segments,
-    Stream,
-    open_writer,
-)
+from ripple_sim.encode import FORMATS, Format, FrameWriter, Segments, Stream, open_writer
 from ripple_sim.errors import EncodingError, VideoError
 
 WIDTH, HEIGHT, FPS = 96, 64, 25

@@ -112,10 +112,7 @@ def test_a_plot_is_written(name: str, options: dict[str, Any], folder: Path, imp
 @without_warnings
 @pytest.mark.parametrize(
     ("name", "arguments"),
-    [
-        *((name, "") for name in PICTURES.split()),
-        ("batch_impulses", "--scenes 2 --seconds 0.6 --workers 1"),
-    ],
+    [*((name, "") for name in PICTURES.split()), ("batch_impulses", "--scenes 2 --seconds 0.6 --workers 1")],
 )
 def test_an_example_makes_its_picture(name: str, arguments: str, folder: Path, imported, monkeypatch, capsys) -> None:
     monkeypatch.setattr(sys, "argv", [name, *arguments.split()])

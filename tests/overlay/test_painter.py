@@ -7,16 +7,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.coupling import Energy
-from ripple_sim.overlay import (
-    EnergyPlot,
-    Layout,
-    Notes,
-    Painter,
-    Sprite,
-    draw_arrow,
-    marks as patch_module,
-    number,
-)
+from ripple_sim.overlay import EnergyPlot, Layout, Notes, Painter, Sprite, draw_arrow, marks as patch_module, number
 from ripple_sim.scene import parse_request
 
 

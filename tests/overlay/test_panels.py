@@ -249,9 +249,7 @@ def ray(pose: Pose, size: tuple[int, int], pixel: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("size", [(640, 480), (480, 640), (33, 17)])
-def test_points_on_the_ray_through_a_pixel_come_back_to_it_and_those_behind_to_none(
-    size: tuple[int, int],
-) -> None:
+def test_points_on_the_ray_through_a_pixel_come_back_to_it_and_those_behind_to_none(size: tuple[int, int]) -> None:
     pose = CAMERA.pose()
     for pixel in np.random.default_rng(0).uniform(0, size, (20, 2)):
         points = pose.position + np.array([[0.1], [3.0], [400.0]]) * ray(pose, size, pixel)

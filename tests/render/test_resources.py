@@ -14,15 +14,7 @@ from drawn import BALL, FLOOR
 from shader_functions import evaluated
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render import (
-    Camera,
-    Pose,
-    Renderer,
-    fitted,
-    srgb_cube,
-    srgb_texture,
-    srgb_to_linear,
-)
+from ripple_sim.render import Camera, Pose, Renderer, fitted, srgb_cube, srgb_texture, srgb_to_linear
 
 
 def test_renderers_leave_nothing_behind(gl):

@@ -151,13 +151,6 @@ def test_the_picture_is_named_by_the_material_library(tmp_path):
     assert tuple(picture[-1, 0]) == BLUE
 
 
-def test_without_a_library_a_picture_beside_it_serves(tmp_path):
-    mesh = textured_obj(tmp_path / "p.obj")
-    assert mesh_image(mesh) is None
-    half_and_half(tmp_path / "p_texture.png")
-    assert mesh_image(mesh).shape == (16, 16, 3)
-
-
 def test_two_images_are_not_mixed_up(tmp_path):
     for name in ("a", "b"):
         half_and_half(tmp_path / f"{name}.png")

@@ -31,7 +31,7 @@ from ripple_sim.solver import (
     load_mesh,
     sphere_atlas,
 )
-from ripple_sim.solver.files import OF_THE_NAME, atomic_write, final_path, read_image, require_memory, rooms
+from ripple_sim.solver.files import atomic_write, read_image, require_memory, rooms
 from ripple_sim.solver.texels import texture_map
 
 
@@ -166,18 +166,6 @@ def test_an_old_file_stays_as_it_was_where_writing_fails(tmp_path: Path, error: 
     assert names(tmp_path) == ["a.bin"]
 
 
-def test_the_file_behind_a_symbolic_link_is_written_and_the_link_stays(tmp_path: Path) -> None:
-    target, link = tmp_path / "there" / "a.bin", tmp_path / "link.bin"
-    target.parent.mkdir()
-    target.write_bytes(b"old")
-    link.symlink_to(target)
-    with atomic_write(link) as unfinished:
-        unfinished.write_bytes(b"new")
-    assert link.is_symlink()
-    assert target.read_bytes() == b"new"
-    assert names(target.parent) == ["a.bin"]
-
-
 @pytest.mark.parametrize("kind", ["folder", "pipe"])
 def test_what_is_not_a_regular_file_is_refused_and_left_alone(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "taken"
@@ -192,24 +180,6 @@ def test_nothing_written_is_an_error_and_no_empty_file(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), atomic_write(tmp_path / "a.bin"):
         pass
     assert names(tmp_path) == []
-
-
-@pytest.mark.parametrize("kind", ["circle", "long"])
-def test_a_name_that_cannot_be_written_is_refused_before_anything_is(tmp_path: Path, kind: str) -> None:
-    path = tmp_path / (250 * "a" if kind == "long" else "circle")
-    if kind == "circle":
-        path.symlink_to("other")
-        (tmp_path / "other").symlink_to("circle")
-    with pytest.raises(OSError, match=r"too long|symbolic links") as refusal:
-        final_path(path)
-    assert refusal.value.errno in OF_THE_NAME
-    with pytest.raises(OSError, match=r"too long|symbolic links"), atomic_write(path):
-        pytest.fail("nothing may be written")
-
-
-def test_a_link_to_what_is_not_there_yet_is_followed(tmp_path: Path) -> None:
-    (tmp_path / "link").symlink_to("folder/new")
-    assert final_path(tmp_path / "link") == tmp_path.resolve() / "folder" / "new"
 
 
 def png(width: int, height: int) -> bytes:

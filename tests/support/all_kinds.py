@@ -1,7 +1,5 @@
 """Surfaces of every kind: with handles, holes and twists, in many parts, and of hardly any triangles."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
 import trimesh

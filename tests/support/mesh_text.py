@@ -1,7 +1,5 @@
 """Mesh files written by hand: polygons as OBJ, OFF and PLY."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What bodies and surfaces exchange, by MuJoCo's own account and by that of the bodies' velocities."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import mujoco

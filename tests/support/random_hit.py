@@ -1,7 +1,5 @@
 """A random model at the moment before its geoms meet, and what drives them."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 

@@ -1,7 +1,5 @@
 """Random MuJoCo models: shapes, mounts, contact parameters, solvers, masses and scales of all kinds, by a seed."""
 
-from __future__ import annotations
-
 import functools
 
 import mujoco

@@ -9,12 +9,7 @@ GRAVITY = 9.81
 
 
 def run(
-    two_way: bool,
-    speed: float = 2.0,
-    target: str = "",
-    mass: float = 0.2,
-    gap: float = -1e-4,
-    gravity: float = GRAVITY,
+    two_way: bool, speed: float = 2.0, target: str = "", mass: float = 0.2, gap: float = -1e-4, gravity: float = GRAVITY
 ):
     """Let a ring run to a ball on a block, or above it: heights, and over time both momenta and the speed under it."""
     model = mujoco.MjModel.from_xml_string(

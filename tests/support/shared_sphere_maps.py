@@ -1,7 +1,5 @@
 """Sphere maps of meshes that differ in size alone, made once: most of the time that small models' atlases take."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from unittest.mock import patch

@@ -1,7 +1,5 @@
 """What every mesh must be, whatever it was made of."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ripple_sim.solver import Mesh

@@ -1,7 +1,5 @@
 """How high and how steep waves are, beside the object that carries them, by a way of its own."""
 
-from __future__ import annotations
-
 import functools
 
 import igl

@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import RippleError, SceneError
-from ripple_sim.scene import (
-    MAX_DURATION,
-    MAX_SLOW_MOTION,
-    CameraEntry,
-    MapEntry,
-    MaterialEntry,
-    RippleEntry,
-    Scene,
-)
+from ripple_sim.scene import MAX_DURATION, MAX_SLOW_MOTION, CameraEntry, MapEntry, MaterialEntry, RippleEntry, Scene
 from ripple_sim.video import VideoOptions, check_options, frame_count, scene_digest, settled
 
 MJCF = '<mujoco><worldbody><geom name="egg" size="{}"/></worldbody></mujoco>'

@@ -125,10 +125,7 @@ async def test_a_message_longer_than_the_pages_own_ends_the_connection() -> None
 
 @in_a_loop
 async def test_the_page_cannot_be_framed_by_another_and_gives_its_address_to_none() -> None:
-    async with (
-        served("framing") as (port, client, _),
-        client.get(f"http://127.0.0.1:{port}/index.html") as response,
-    ):
+    async with served("framing") as (port, client, _), client.get(f"http://127.0.0.1:{port}/index.html") as response:
         assert response.status == 200
         assert response.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
         assert response.headers["Referrer-Policy"] == "no-referrer"

@@ -8,14 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples
 from ripple_sim.render.surfaces import MovingOcclusion, MovingVertices
-from ripple_sim.render.visuals import (
-    bake,
-    bounding_radius,
-    cast,
-    frames_about,
-    shapes,
-    smooth_normals,
-)
+from ripple_sim.render.visuals import bake, bounding_radius, cast, frames_about, shapes, smooth_normals
 from ripple_sim.solver import HeightMap, sphere_atlas
 from ripple_sim.solver.waves import MovedGradients
 

@@ -138,12 +138,3 @@ def test_of_the_midpoints_only_those_in_use_are_displaced(resources, used):
     np.testing.assert_array_equal(np.flatnonzero(done), [*range(64), *sorted(used)])
     every = displaced(resources, vertices_at(chart, uv), height_map)
     np.testing.assert_array_equal(moved[done], every[done])
-
-
-def test_each_target_reads_its_own_layer(resources):
-    chart, uv = random_places(50, 6)
-    height_map = random_height_map(6)
-    alone = displaced(resources, vertices_at(chart, uv), height_map)
-    for layer in range(3):
-        among = displaced(resources, vertices_at(chart, uv), height_map, layers=3, layer=layer)
-        np.testing.assert_array_equal(among, alone)

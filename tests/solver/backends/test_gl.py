@@ -8,7 +8,7 @@ import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, WaveSolver, build_atlas, sphere_atlas, texel_atlas
-from ripple_sim.solver.backends import Dispatch, FieldLayout, TexelList, link_buffers
+from ripple_sim.solver.backends import Dispatch, FieldLayout, TexelList
 from ripple_sim.solver.gl import GLContext, shared_context
 
 pytestmark = pytest.mark.usefixtures("opengl")
@@ -22,29 +22,6 @@ def texels(request: pytest.FixtureRequest) -> TexelMesh:
 
 def field(texels: TexelMesh, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).standard_normal(texels.shape).astype(np.float32)
-
-
-@pytest.mark.parametrize("defines", [{}, {"FACTOR": 1}, {"SUBTRACT": 1}, {"SUBTRACT": 1, "ADD": 1}], ids=str)
-def test_the_stencil_is_applied_to_every_texel_once(texels: TexelMesh, defines: dict[str, int]) -> None:
-    gl = shared_context()
-    layout = FieldLayout(gl, texels.topology)
-    dispatch = Dispatch(gl, layout)
-    x, factor, before = (field(texels, seed) for seed in range(3))
-    stencil = texels.stencil(np.ones(texels.shape))
-    with gl:
-        buffer, result = layout.upload(x), layout.upload(before)
-        dispatch.fill_halo(buffer)
-        dispatch.bind(buffer, result, None, layout.upload_stencil(stencil), layout.upload(factor))
-        dispatch.run_texels(dispatch.texel_shader("apply", **defines))
-        irregular = dispatch.shader("irregular", KICK=0)
-        scale = (factor if "FACTOR" in defines else 1) * (-1 if "SUBTRACT" in defines else 1) * np.ones(texels.shape)
-        count, *links = link_buffers(gl, layout, stencil.irregular, scale)
-        if count:
-            dispatch.bind(buffer, result, None, *links)
-            dispatch.run_list(irregular, count)
-    assert count == (0 if stencil.irregular is None else len(stencil.irregular.texels))
-    expected = scale * stencil(x.astype(float)) + (before if "ADD" in defines else 0)
-    np.testing.assert_allclose(layout.read(result), expected, atol=2e-5 * max(1, np.abs(expected).max()))
 
 
 @pytest.mark.parametrize("count", [1, 63, 64, 65, 200])

@@ -3,8 +3,6 @@
 Hard shapes (spikes, chains of blobs, thin plates, needles): never a fold, never a lost texel.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 Surfaces with handles, holes, twists and parts, damage of every kind; and what must not matter does not.
 """
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

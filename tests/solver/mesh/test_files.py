@@ -3,8 +3,6 @@
 What is refused, is so always with one line.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -269,10 +267,7 @@ def test_nothing_but_the_error_is_said(tmp_path: Path) -> None:
     ("name", "content"),
     [
         ("promise.stl", b"\x00" * 80 + struct.pack("<I", 2**32 - 1) + b"\x00" * 50),
-        (
-            "promise.ply",
-            ply(CORNERS, QUADS, "binary_little_endian").replace(b"vertex 8", b"vertex 900000000000"),
-        ),
+        ("promise.ply", ply(CORNERS, QUADS, "binary_little_endian").replace(b"vertex 8", b"vertex 900000000000")),
         ("rows.ply", ply(CORNERS, QUADS, "ascii").replace(b"vertex 8", b"vertex 900000000000")),
         ("faces.ply", ply(CORNERS, QUADS, "ascii").replace(b"face 6", b"face 900000000000")),
         ("promise.off", b"OFF\n900000000000 900000000000 0\n0 0 0\n"),

@@ -3,8 +3,6 @@
 Where sheets touch, bodies stay bodies, floors stay floors, and what stands on them comes off.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from all_kinds import BALL, cube, torus

@@ -3,8 +3,6 @@
 Polygons are cut into triangles without folds.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

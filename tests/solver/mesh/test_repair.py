@@ -1,7 +1,5 @@
 """Repair on request, by pymeshfix."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """A closed surface round whatever is given, at the distance that was asked for."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
 import pytest

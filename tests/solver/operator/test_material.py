@@ -34,10 +34,7 @@ BENDING = 2e5 * 0.05**3 / 12 / (1 - 0.25**2) / (800.0 * 0.05)
 DISPERSION = {
     "membrane": (Material.membrane(tension=18.0, density=2.0), lambda k2: 18.0 / 2.0 * k2),
     "plate": (Material.plate(**PLATE), lambda k2: BENDING * k2**2),
-    "both on springs": (
-        Material(speed=0.7, bending=0.02, stiffness=3.0),
-        lambda k2: 0.7**2 * k2 + 0.02 * k2**2 + 3.0,
-    ),
+    "both on springs": (Material(speed=0.7, bending=0.02, stiffness=3.0), lambda k2: 0.7**2 * k2 + 0.02 * k2**2 + 3.0),
 }
 
 

@@ -3,8 +3,6 @@
 Atlases of texel meshes without a triangle mesh, and the page that holds their charts.
 """
 
-from __future__ import annotations
-
 import copy
 import itertools
 import pickle

@@ -26,17 +26,6 @@ def arrays() -> dict[str, np.ndarray]:
     }
 
 
-def test_arrays_come_back_as_they_were(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
-    path = tmp_path / "new folder" / "an.atlas"
-    write_atlas_file(path, arrays)
-    found = read_atlas_file(path)
-    assert found.keys() == arrays.keys() | {"format"}
-    for name, array in arrays.items():
-        assert found[name].dtype == array.dtype, name
-        np.testing.assert_array_equal(found[name], array)
-    assert list(path.parent.iterdir()) == [path]
-
-
 def written(path: Path, arrays: dict[str, np.ndarray]) -> Path:
     with path.open("wb") as file:
         write_arrays(file, arrays)

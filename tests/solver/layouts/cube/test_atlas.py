@@ -4,8 +4,6 @@ Figures of merit of a sphere map, where they are known. Rays through the texels 
 by every ray against every triangle; on an octahedron the answer is known in closed form.
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

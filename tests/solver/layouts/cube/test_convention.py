@@ -8,9 +8,8 @@ Texture coordinates into the atlas: every triangle in one chart's [0, 1], sampli
 import numpy as np
 import pytest
 import trimesh
-from cube_symmetry import cube_rotations, permute_texels
 
-from ripple_sim.solver import Atlas, AtlasError, Mesh, build_atlas, sphere_atlas
+from ripple_sim.solver import Atlas, AtlasError, Mesh, build_atlas
 from ripple_sim.solver.layouts import atlas_from_sphere_map
 from ripple_sim.solver.layouts.cube import (
     CHART_NORMALS,
@@ -21,7 +20,7 @@ from ripple_sim.solver.layouts.cube import (
     solid_angles,
     texel_directions,
 )
-from ripple_sim.solver.texels import TexelMesh, with_filled_halo
+from ripple_sim.solver.texels import TexelMesh
 
 
 @pytest.mark.parametrize("n", [4, 7, 16])
@@ -89,23 +88,12 @@ def test_limbs_that_fall_between_the_texels_are_not_covered(animal: Atlas) -> No
     assert animal.quality()["coverage"] == pytest.approx(1, abs=3e-3)
 
 
-def test_areas_of_the_sphere_have_the_symmetries_of_the_cube() -> None:
-    areas = sphere_atlas(2.0, 12).areas
-    for rotation in cube_rotations():
-        np.testing.assert_allclose(permute_texels(areas, rotation), areas, rtol=1e-12)
-
-
 def ball(subdivisions: int, resolution: int) -> Atlas:
     """A turned icosphere, so that its triangles cross the cube's edges anyhow, mapped onto itself."""
     solid = trimesh.creation.icosphere(subdivisions=subdivisions)
     turned = solid.vertices @ trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])[:3, :3].T
     mesh = Mesh.from_arrays(turned, solid.faces)
     return atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), resolution)
-
-
-def smooth(directions: np.ndarray) -> np.ndarray:
-    x, y, z = np.moveaxis(directions, -1, 0)
-    return np.sin(2 * x + y) + x * y * z + 0.5 * z**2
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -116,19 +104,6 @@ def direction_at(chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
     """The direction that a place in a chart stands for, by the definition of the equiangular cube map."""
     a, b = np.tan(np.pi / 4 * (2 * uv - 1)).T
     return unit(CHART_NORMALS[chart] + a[:, None] * CHART_U[chart] + b[:, None] * CHART_V[chart])
-
-
-def sample(field: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Bilinear interpolation in six layers with halo, as a GPU does it."""
-    n = field.shape[1]
-    with_halo = with_filled_halo(cube_topology(n), field)
-    column, row = (uv * n + 0.5).T
-    j, i = np.floor(column).astype(int).clip(0, n), np.floor(row).astype(int).clip(0, n)
-    s, t = column - j, row - i
-    return (
-        (1 - t) * ((1 - s) * with_halo[chart, i, j] + s * with_halo[chart, i, j + 1])
-        + t * ((1 - s) * with_halo[chart, i + 1, j] + s * with_halo[chart, i + 1, j + 1])
-    )  # fmt: skip
 
 
 def interior_points(atlas: Atlas, seed: int):
@@ -189,21 +164,6 @@ def test_interpolated_coordinates_converge_at_second_order() -> None:
         errors.append(np.sqrt((distance**2).mean()))
     assert errors[0] / errors[1] == pytest.approx(4, abs=0.4)
     assert errors[1] / errors[2] == pytest.approx(4, abs=0.4)
-
-
-def test_sampling_a_texture_with_halo_agrees_with_the_field_itself() -> None:
-    atlas = ball(5, 64)
-    chart, uv, directions = interior_points(atlas, 1)
-    texture = smooth(texel_directions(64))
-    error = np.abs(sample(texture, chart, uv) - smooth(directions))
-    texel = np.pi / 2 / 64
-    near_edge = np.abs(2 * uv - 1).max(axis=1) > 1 - 1 / 64
-    # bilinear interpolation is of second order; along cube edges the grid lines kink, which leaves a share of a texel
-    assert error[~near_edge].max() < 2 * texel**2
-    assert error.max() < texel
-    corners = atlas.texture_coordinates()
-    at_vertices = sample(texture, np.repeat(corners.chart, 3), corners.uv.reshape(-1, 2))
-    assert np.abs(at_vertices - smooth(unit(corners.carry(atlas.sphere[atlas.mesh.F]))).ravel()).max() < texel
 
 
 def test_triangles_as_large_as_a_quarter_of_the_sphere_are_cut() -> None:

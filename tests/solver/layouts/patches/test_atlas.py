@@ -14,17 +14,7 @@ from hand_made import eigenvalues
 from known_meshes import known_mesh
 from surfaces import disk, grid, joined, moved, sphere, square, torus
 
-from ripple_sim.solver import (
-    Atlas,
-    AtlasError,
-    Material,
-    Mesh,
-    TexelMesh,
-    WaveSolver,
-    build_atlas,
-    glue,
-    load_mesh,
-)
+from ripple_sim.solver import Atlas, AtlasError, Material, Mesh, TexelMesh, WaveSolver, build_atlas, glue, load_mesh
 from ripple_sim.solver.layouts.patches import atlas_from_patch_map, centres, layout, patch_map
 from ripple_sim.solver.texels import folded_texels
 

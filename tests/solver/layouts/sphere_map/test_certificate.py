@@ -11,12 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ripple_sim.solver import Mesh, WaveSolver, build_atlas
 from ripple_sim.solver.layouts import atlas_from_sphere_map
-from ripple_sim.solver.layouts.sphere_map import (
-    certificate,
-    certify,
-    progressive_sphere_map,
-    stretch,
-)
+from ripple_sim.solver.layouts.sphere_map import certificate, certify, progressive_sphere_map, stretch
 
 
 def test_certificate_catches_a_planted_fold():

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from genus_zero import SHAPES, crumpled, icosphere
 
-from ripple_sim.solver.layouts.sphere_map import (
-    corner_table,
-    decimate,
-    undo_collapse,
-    vertex_quadrics,
-)
+from ripple_sim.solver.layouts.sphere_map import corner_table, decimate, undo_collapse, vertex_quadrics
 
 
 def decimated(V, F):

@@ -7,15 +7,7 @@ relaxing a level brings it from any fold-free map to the minimum of its energy.
 import numpy as np
 import pytest
 import trimesh
-from genus_zero import (
-    SHAPES,
-    crumpled,
-    icosphere,
-    jack,
-    solid,
-    stretch_quantiles,
-    thin_limb,
-)
+from genus_zero import SHAPES, crumpled, icosphere, jack, solid, stretch_quantiles, thin_limb
 from hypothesis import HealthCheck, given, settings, strategies as st
 from known_meshes import known_mesh
 from levels import whole_level
