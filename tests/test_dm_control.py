@@ -44,8 +44,7 @@ def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.M
     ripples = couple(physics, MATERIALS, **OPTIONS)
     model = mujoco.MjModel.from_xml_string(MODEL)
     data, plain = mujoco.MjData(model), Ripples(model, MATERIALS, **OPTIONS)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RippleWarning)
+    with warnings.catch_warnings(action="error", category=RippleWarning):
         for _ in range(2):
             given = 0.0
             for _ in range(20):

@@ -97,8 +97,7 @@ def test_each_physics_step_counts(kind: type, path: Path) -> None:
         env.reset()
         mujoco.mj_resetData(model, data)
         given = 0.0
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", RippleWarning)
+        with warnings.catch_warnings(action="error", category=RippleWarning):
             for _ in range(40):
                 *_, info = env.step(np.zeros(1))
                 given += sum(impulse.impulse for impulse in info["impulses"])

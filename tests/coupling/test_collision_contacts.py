@@ -193,8 +193,7 @@ def test_no_warning_without_a_gap_or_without_collisions() -> None:
     ghost.geom("target").contype = ghost.geom("target").conaffinity = 0
     true = mesh_spec(limbed(0.05), route=None)
     make_collidable(true, "target")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         for spec in (convex, ghost, true):
             Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
 
@@ -220,8 +219,7 @@ def test_geoms_that_a_flex_meets_badly_are_named() -> None:
     assert "excluded ('arm', 'excluded')" in message
     for geom in ("crate", "pebble", "arm", "excluded"):
         spec.geom(geom).contype = spec.geom(geom).conaffinity = 0
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
 
 
@@ -265,8 +263,7 @@ def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: str | Non
         '<hfield name="flat" nrow="2" ncol="2" size="1 1 0.1 0.1"/>',
     )
     contacts = {"shell": ["core"]} if "plane" in core or "hfield" in core else None
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         Ripples(model, {"shell": Material()}, contacts=contacts, resolution=16, backend="cpu")
     messages = [str(each.message) for each in caught]
     assert len(messages) == (gap is not None)

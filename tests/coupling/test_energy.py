@@ -48,8 +48,7 @@ def test_energy_of_bodies_and_waves_never_rises(seed: int) -> None:
     material = Material() if seed % 3 == 0 else Material(1.0, 0.0, stiffness, density=float(10 ** rng.uniform(0, 4)))
     data = mujoco.MjData(model)
     data.qvel[-4] = -1.0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RippleWarning)  # of waves that are too high
+    with warnings.catch_warnings(action="ignore", category=RippleWarning):  # of waves that are too high
         ripples = coupled(model, material)
         paid, largest = mass * (GRAVITY * fall + 0.5), ripples.energy(data).total
         touched = False

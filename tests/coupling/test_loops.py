@@ -62,8 +62,7 @@ def wrapped(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> Non
 def test_every_loop_makes_the_waves_of_the_plain_one(loop: Loop, two_way: bool) -> None:
     expected = bounce(two_way=two_way)
     found = bounce(two_way=two_way)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RippleWarning)
+    with warnings.catch_warnings(action="error", category=RippleWarning):
         for _ in range(40):
             plain(*expected)
             loop(*found)
@@ -141,8 +140,7 @@ def test_forces_that_are_not_solved_yet_are_solved_for() -> None:
 def test_forces_lost_to_a_new_collision_are_found_again(two_way: bool, integrator: str) -> None:
     """`mj_collision` takes the rows of the constraint solver away."""
     waves, places = [], []
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RippleWarning)
+    with warnings.catch_warnings(action="error", category=RippleWarning):
         for collide in (False, True):
             ripples, model, data = bounce(two_way=two_way)
             model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")

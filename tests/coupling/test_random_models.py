@@ -37,8 +37,7 @@ class Hit:
         steps = min(scene.steps, int(AT_ONCE / random.timestep))
         again = steps // 2 if random.restarted else None
         self.balance = MomentumBalance(scene.model, random.targets)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", RippleWarning)
+        with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
             ripples = self.ripples = Ripples(
                 scene.model, materials, resolution=RESOLUTION, backend="cpu", conserve_volume=False
             )

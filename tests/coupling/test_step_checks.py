@@ -31,8 +31,7 @@ def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str
     )
     data, wrench, missing, pressed = mujoco.MjData(model), np.zeros(6), 0.0, 0.0
     data.qvel[8] = -1.0
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RippleWarning)
+    with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
         ripples = Ripples(model, {"target": Material(density=1.0)}, resolution=8, backend="cpu")
         for _ in range(150):
             before = data.qvel[6:9].copy()
@@ -116,8 +115,7 @@ def shoot(speed: float, solref: str, timestep: float, worldbody: str = PLATE) ->
     data = mujoco.MjData(model)
     check = TunnellingCheck(CoupledModel(model), [0])
     data.qvel[2] = -speed
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         for _ in range(int(1.2 / speed / timestep) + 200):
             mujoco.mj_step(model, data)
             check(data)
@@ -155,8 +153,7 @@ def test_moving_target_counts_with_its_own_speed() -> None:
     data = mujoco.MjData(model)
     data.qvel[:6] = data.qvel[6:] = [0, 0, -30, 0, 0, 0]
     mujoco.mj_forward(model, data)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         TunnellingCheck(CoupledModel(model), [0])(data)  # both fly along together
     data.qvel[2], data.qvel[8] = 15, -15
     mujoco.mj_forward(model, data)
@@ -177,8 +174,7 @@ def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
     for speed in np.geomspace(1, 30, 8):
         data, check, wrench = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0]), np.zeros(6)
         data.qvel[2], forces, push = -speed, 0.0, 0.0
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             while data.time < 0.2 / speed + 0.06:
                 mujoco.mj_step(model, data)
                 check(data)
@@ -209,8 +205,7 @@ def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: s
     for speed in np.geomspace(0.5, 60, 9):
         data, check = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
         data.qvel[2] = -speed
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             while data.time < 0.03 / speed + 0.06:
                 mujoco.mj_step(model, data)
                 check(data)
@@ -237,8 +232,7 @@ def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: p
     with pytest.warns(RippleWarning, match="at 60 m/s"):
         TunnellingCheck(CoupledModel(model), [0])(data)
     model.opt.enableflags |= 1 << 20
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         TunnellingCheck(CoupledModel(model), [0])(data)
 
 

@@ -79,8 +79,7 @@ def crowd(memory: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 def test_a_warning_is_given_once_though_it_tells_another_time() -> None:
     adopt_warnings()
     model, data = crowd("300K")
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as said:
         for _ in range(3):
             mujoco.mj_step(model, data)
     assert sum("Too many contacts" in str(each.message) for each in said) == 1

@@ -37,8 +37,7 @@ def highest(model: mujoco.MjModel, material: Material, seconds: float, **options
     """Greatest height [m]; any warning is an error."""
     ripples, data = Ripples(model, {"target": material}, backend="cpu", **options), mujoco.MjData(model)
     top = 0.0
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         for _ in range(round(seconds / model.opt.timestep)):
             ripples.mj_step(data)
             top = max(top, float(np.abs(ripples["target"].height).max()))
@@ -232,8 +231,7 @@ def warned(xml: str, material: Material, seconds: float = 0.5, backend: str = "c
     data = mujoco.MjData(model)
     data.qvel[2] = -4.5
     ripples = Ripples(model, {"target": material}, resolution=32, backend=backend)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         for _ in range(round(seconds / 0.002)):
             ripples.mj_step(data)
     assert all(issubclass(each.category, RippleWarning) for each in caught)
@@ -280,8 +278,7 @@ def test_what_is_named_for_a_foot_holds_under_other_steps_too(material: Material
 
     def messages(material: Material, seed: int) -> list[str]:
         data, rng = mujoco.MjData(model), np.random.default_rng(seed)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             ripples = Ripples(model, {"ffoot": material}, resolution=16, backend="cpu")
             for _ in range(30):
                 data.ctrl[:] = rng.uniform(-1, 1, model.nu)
@@ -304,8 +301,7 @@ def test_what_is_named_is_whole_where_the_model_chose_the_material() -> None:
         assert getattr(heavier, name) == pytest.approx(getattr(chosen, name), rel=1e-3)
     data, ripples = still_ripples(heavier)
     ripples.poke("target", [0, 0, 0.5], 200.0, 0.1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         run(data, ripples, 80)
 
 
@@ -356,8 +352,7 @@ def test_a_target_may_have_any_height_if_that_is_wanted() -> None:
     data, ripples = still_ripples()
     ripples.allow_any_height("target")
     ripples["target"].height = 0.4
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         run(data, ripples, 80)
 
 

@@ -208,8 +208,7 @@ def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
             "not drawn: labels; all else of the scene is",
             "the scene's flags have no effect: mjRND_SHADOW",
         }
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with warnings.catch_warnings(action="error"):
             seen()
 
 

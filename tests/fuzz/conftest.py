@@ -10,8 +10,7 @@ import pytest
 @pytest.fixture(autouse=True)
 def _left_as_found() -> Iterator[None]:
     kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         yield
     for number, handler in kept.items():
         signal.signal(number, handler)

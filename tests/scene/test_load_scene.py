@@ -221,10 +221,9 @@ def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(
     path = ball_scene(tmp_path, f'<option magnetic="nan 0 0"/>{BALL}')
     with pytest.warns(RippleWarning, match="MuJoCo: XML contains a 'NaN'"):
         load_scene(path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # an error of ours is told alone
-        with pytest.raises(SceneError, match="timestep"):
-            load_scene(ball_scene(tmp_path, f'<option timestep="nan"/>{BALL}'))
+    # an error of ours is told alone
+    with warnings.catch_warnings(action="error"), pytest.raises(SceneError, match="timestep"):
+        load_scene(ball_scene(tmp_path, f'<option timestep="nan"/>{BALL}'))
     assert sorted(each.name for each in tmp_path.iterdir()) == ["model.xml", "scene.toml"]
     assert capfd.readouterr() == ("", "")
 

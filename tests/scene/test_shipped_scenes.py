@@ -21,8 +21,7 @@ NAMES = "animal arm drum duck finger heavy jelly kick pair pretzel rolling skull
 @pytest.mark.parametrize("name", NAMES.split())
 def test_targets_are_hit_and_ripple_visibly(name: str) -> None:
     scene = load_scene(name)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         simulation = Simulation(scene, fps=30, resolution=32, backend="cpu")
         hit, highest, end = set(), dict.fromkeys(simulation.ripples, 0.0), min(scene.duration, 1.6)
         while simulation.data.time < end:

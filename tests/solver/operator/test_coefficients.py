@@ -106,8 +106,7 @@ def test_a_layer_whose_waves_the_atlas_has_no_room_for_is_warned_of(thickness: f
 
 
 def test_a_layer_that_suits_the_atlas_is_not_warned_of() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         WaveSolver(sphere_atlas(1.0, 16), Material.layer(MODULUS, thickness=0.4), backend="cpu")
 
 
