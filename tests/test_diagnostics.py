@@ -7,13 +7,12 @@ import grp
 import importlib.metadata
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
 import pytest
+from programs import ended
 
 from ripple_sim import diagnostics
 from ripple_sim.cli import main as cli
@@ -29,14 +28,7 @@ pytestmark = pytest.mark.usefixtures("opengl")  # what is to be taken away must 
 
 def info(**environment: str) -> dict:
     """Report of a process with other environment variables."""
-    result = subprocess.run(
-        [sys.executable, "-m", "ripple_sim", "info", "--json"],
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return json.loads(result.stdout)
+    return json.loads(ended("-m", "ripple_sim", "info", "--json", env={**os.environ, **environment}, check=True).stdout)
 
 
 @pytest.fixture

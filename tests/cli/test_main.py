@@ -6,11 +6,11 @@ Strange words are refused at once, in one line that is no longer than a line sho
 import os
 import re
 import signal
-import subprocess
 import sys
 import warnings
 
 import pytest
+from programs import ended
 
 from ripple_sim import bench
 from ripple_sim.cli import main as cli, reports
@@ -49,13 +49,8 @@ def test_a_usage_error_names_the_argument_and_the_help(refusal, argv, named):
 
 
 def test_a_usage_error_reads_the_same_in_every_locale():
-    result = subprocess.run(
-        [sys.executable, "-m", "ripple_sim", "render", "duck", "-o", "x.mp4", "--backend", "vulkan"],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONIOENCODING": "ascii", "FORCE_COLOR": "1"},
-        check=False,
-    )
+    words = ["render", "duck", "-o", "x.mp4", "--backend", "vulkan"]
+    result = ended("-m", "ripple_sim", *words, env={**os.environ, "PYTHONIOENCODING": "ascii", "FORCE_COLOR": "1"})
     assert result.returncode == 2
     assert result.stderr == (
         "ripple-sim: invalid choice 'vulkan' for argument '--backend'. Expected one of ('auto', 'gl', 'cpu'); "
@@ -195,9 +190,7 @@ def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_
         f"{where}\n"
         "sys.exit(cli.main(['info']))\n"
     )
-    result = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False
-    )
+    result = ended("-c", code, cwd=tmp_path, timeout=300)
     assert (result.returncode, result.stderr) == (status, f"ripple-sim: {word}\n")
 
 
@@ -220,8 +213,7 @@ def test_help_loads_nothing_heavy():
         "heavy = {'vtkmodules', 'pyvista', 'trame', 'numba', 'mujoco', 'moderngl', 'av', 'scipy'}\n"
         "print(sorted(heavy & set(sys.modules)))\n"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.splitlines()[-1] == "[]"
+    assert ended("-c", code, check=True).stdout.splitlines()[-1] == "[]"
 
 
 LONG = "a" * 5000

@@ -1,11 +1,10 @@
 """What is installed is the source tree: pyproject.toml names packages one by one, and one is soon forgotten."""
 
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+from programs import ended
 
 ROOT = Path(__file__).parents[2]
 SUFFIXES = {".py", ".glsl", ".toml", ".xml", ".obj", ".png", ".npy", ".typed"}
@@ -19,11 +18,7 @@ def wheel(tmp_path_factory) -> set[str]:
     source.mkdir()
     for name in ("ripple_sim", "solver", "scenes", "pyproject.toml", "README.md", "LICENSE"):
         (source / name).symlink_to(ROOT / name)
-    subprocess.run(
-        [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", folder, source],
-        check=True,
-        capture_output=True,
-    )
+    ended("-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", folder, source, check=True)
     with zipfile.ZipFile(next(folder.glob("*.whl"))) as archive:
         return set(archive.namelist())
 

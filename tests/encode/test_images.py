@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import subprocess
 import sys
 from fractions import Fraction
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from programs import ended
 from sphere_height_maps import cube_charts
 from unfinished_videos import contents, egg_scene, interrupting_at
 
@@ -111,10 +111,8 @@ def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(tmp_path: Path) -> 
         "except EncodingError as error:\n"
         "    print(error)\n"
     )
-    result = subprocess.run(
-        [sys.executable, "-c", program, tmp_path / "frames"], capture_output=True, text=True, check=True
-    )
-    assert result.stdout == f"cannot write the video {tmp_path / 'frames'}: File too large\n"
+    said = ended("-c", program, tmp_path / "frames", check=True).stdout
+    assert said == f"cannot write the video {tmp_path / 'frames'}: File too large\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -16,6 +16,7 @@ import av
 import numpy as np
 import pytest
 from PIL import Image
+from programs import ended
 from unfinished_videos import contents
 
 from ripple_sim.encode import FRAMES_IN_CLIP, FrameWriter, open_writer
@@ -176,9 +177,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
         "except EncodingError as error:\n"
         "    print(error)\n"
     )
-    result = subprocess.run(
-        [sys.executable, "-c", program, tmp_path / f"clip{ending}"], capture_output=True, text=True, check=True
-    )
+    result = ended("-c", program, tmp_path / f"clip{ending}", check=True)
     assert result.stdout.startswith(f"cannot write the video {tmp_path / f'clip{ending}'}: ")
     assert "File too large" in result.stdout
     assert result.stdout.count("\n") == 1

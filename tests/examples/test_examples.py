@@ -7,7 +7,6 @@ import importlib.util
 import json
 import os
 import re
-import subprocess
 import sys
 import types
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from programs import ended
 
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import load_mesh
@@ -124,8 +124,7 @@ def test_an_example_makes_its_picture(name: str, arguments: str, folder: Path, i
 
 @pytest.mark.usefixtures("opengl")
 def test_mujocos_renderer_ours_and_a_plotter_end_without_a_crash() -> None:
-    command = [sys.executable, EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    result = ended(EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista", timeout=300)
     assert "| mujoco, ours, pyvista | 0 | 0 |" in result.stdout
     assert result.returncode == 0, result.stderr
 

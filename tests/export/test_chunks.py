@@ -1,16 +1,14 @@
 """Runs divided over files, which a root layer joins, and which continue after a kill."""
 
 import dataclasses
-import os
 import resource
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from programs import ended
 from unfinished_videos import interrupting_at
 
 from ripple_sim import ExportOptions, RippleError, export_scene
@@ -81,7 +79,7 @@ def kill(done, frames):
         os.kill(os.getpid(), signal.SIGKILL)
 export_scene(load_scene({str(scene_file)!r}), Path({str(again)!r}), {OPTIONS!r}, progress=kill)
 """
-    killed = subprocess.run([sys.executable, "-c", code], env=os.environ, check=False, capture_output=True, text=True)
+    killed = ended("-c", code)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
     kept = sorted((again.with_name("run.usdc.part") / "frames").glob("frames_*"))
     assert [each.name for each in kept] == ["frames_00000-00003.usdc", "frames_00004-00007.usdc"]

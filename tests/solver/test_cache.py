@@ -4,14 +4,13 @@ Under stress: several processes at once, a full disk. What is kept in memory: th
 """
 
 import os
-import subprocess
-import sys
 import weakref
 from pathlib import Path
 
 import numpy as np
 import pytest
 from genus_zero import icosphere
+from programs import ended
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh, RippleError, build_atlas
@@ -146,14 +145,7 @@ sys.exit(not np.array_equal(build_atlas(mesh, 8).positions, expected))
 def run(program: str, cache: Path) -> list[str]:
     """Run a program with a cache of its own; return what it leaves there."""
     environment = {"XDG_CACHE_HOME": str(cache), "PATH": "", "NUMBA_NUM_THREADS": "1"}
-    result = subprocess.run(
-        [sys.executable, "-c", _BEGIN + program],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
+    result = ended("-c", _BEGIN + program, env=environment, timeout=600)
     assert (result.returncode, result.stderr) == (0, "")
     return [each.name for each in cache.rglob("*") if each.is_file()]
 

@@ -7,7 +7,6 @@ debugger, kernels are plain Python with the same results.
 import importlib
 import io
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -18,6 +17,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from programs import ended
 
 from ripple_sim.solver.kernel import compile_times, compiling, fingerprint, kernel, work_clock
 
@@ -178,7 +178,7 @@ def test_without_compilation_waves_are_the_same() -> None:
     exec(WAVES, compiled)
     save = "file = io.BytesIO(); np.savez(file, **results); sys.stdout.buffer.write(file.getvalue())"
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run([sys.executable, "-c", WAVES + save], env=environment, capture_output=True, check=True)
+    done = ended("-c", WAVES + save, env=environment, text=False, check=True)
     plain = np.load(io.BytesIO(done.stdout))
     assert set(plain) == set(compiled["results"])
     assert plain["square, every, dent"].any()

@@ -6,8 +6,6 @@ A stage that runs ahead: the same items in the same order, no more of them than 
 import dataclasses
 import json
 import re
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -17,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from programs import ended
 from unfinished_videos import MJCF, contents, interrupting_at
 
 from ripple_sim import ExportOptions
@@ -90,12 +89,7 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
         "module.render_video = lambda *args, **others: render(*args, **{**others, 'progress': lose})\n"
         "sys.exit(cli.main(['render', *sys.argv[1:], '--size', '64x48', '--fps', '30', '--backend', 'cpu']))\n"
     )
-    result = subprocess.run(
-        [sys.executable, "-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    result = ended("-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames")
     assert result.returncode == 1
     lines = [line for line in result.stderr.splitlines() if "nanobind" not in line and not line.startswith(" - ")]
     assert len(lines) == 1, result.stderr

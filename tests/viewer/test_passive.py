@@ -1,12 +1,11 @@
 """MuJoCo's viewer with ripples, on a virtual screen."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import mujoco
 import pytest
+from programs import ended
 
 from ripple_sim import Material, Ripples, launch_passive
 from ripple_sim.errors import DisplayError
@@ -14,13 +13,8 @@ from ripple_sim.errors import DisplayError
 
 def test_on_a_screen(screen: str) -> None:
     checks = Path(__file__).with_name("passive_checks.py")
-    result = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(checks)],
-        env={**os.environ, "DISPLAY": screen},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
+    result = ended(
+        "-m", "pytest", "-q", "-p", "no:cacheprovider", str(checks), env={**os.environ, "DISPLAY": screen}, timeout=600
     )
     assert result.returncode == 0, result.stdout + result.stderr
 

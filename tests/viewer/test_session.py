@@ -1,12 +1,11 @@
 """The viewer without a window: scenes opened, runs that pause and begin anew, rays, pokes and balls that are thrown."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from programs import ended
 
 from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene import Scene, load_scene
@@ -135,7 +134,7 @@ def test_a_session_needs_no_vtk() -> None:
         "session = Session(open_scene('sphere'), resolution=8)\nsession.advance()\n"
         "print(sorted({name.split('.')[0] for name in sys.modules} & {'vtkmodules', 'pyvista', 'trame'}))"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    result = ended("-c", code, check=True)
     assert result.stdout.splitlines()[-1] == "[]"
 
 

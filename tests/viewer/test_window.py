@@ -8,11 +8,10 @@ import importlib.util
 import os
 import re
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from programs import ended
 
 from ripple_sim.cli import main as cli
 from ripple_sim.errors import DisplayError
@@ -26,13 +25,7 @@ def check(display: str | None, *options: str) -> None:
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "CI")}
     if display is not None:
         environment["DISPLAY"] = display
-    result = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(CHECKS), *options],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    result = ended("-m", "pytest", "-q", "-p", "no:cacheprovider", CHECKS, *options, env=environment)
     assert result.returncode == 0, result.stdout + result.stderr
 
 

@@ -1,12 +1,11 @@
 """How the textures of MuJoCo's materials lie on its geoms, as in mujoco.Renderer since 3.12."""
 
 import os
-import subprocess
-import sys
 
 import mujoco
 import numpy as np
 import pytest
+from programs import ended
 from scipy.ndimage import maximum_filter, minimum_filter
 from sphere_height_maps import cube_charts
 from textured import textured_model
@@ -120,8 +119,7 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
     paths = [str(tmp_path / f"{i}.mjb") for i in range(len(models))]
     for model, path in zip(models, paths, strict=True):
         mujoco.mj_saveModel(model, path, None)
-    command = [sys.executable, "-c", THEIRS, str(tmp_path / "theirs.npy"), *paths]
-    done = subprocess.run(command, env={**os.environ, "MUJOCO_GL": "egl"}, capture_output=True, text=True, check=False)
+    done = ended("-c", THEIRS, tmp_path / "theirs.npy", *paths, env={**os.environ, "MUJOCO_GL": "egl"})
     if done.returncode:
         pytest.skip(f"MuJoCo's renderer does not run here: {done.stderr[-200:]}")
     for model, theirs, variant in zip(models, np.load(tmp_path / "theirs.npy"), variants, strict=True):

@@ -5,7 +5,6 @@ includes and defines put in.
 """
 
 import os
-import subprocess
 import sys
 import textwrap
 import threading
@@ -15,6 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from programs import ended
 
 from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import create_context, current_context, is_software, load_shader, shared_context
@@ -52,8 +52,7 @@ def test_what_moderngl_raises_becomes_one_error(gl_backend: str) -> None:
 
 def printed(script: str) -> str:
     """What a process of its own prints."""
-    program = [sys.executable, "-c", textwrap.dedent(script)]
-    return subprocess.run(program, capture_output=True, text=True, timeout=300, check=True).stdout
+    return ended("-c", textwrap.dedent(script), timeout=300, check=True).stdout
 
 
 def test_lost_context_is_reported(opengl: None) -> None:

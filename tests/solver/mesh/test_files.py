@@ -7,8 +7,6 @@ import json
 import os
 import re
 import struct
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +15,7 @@ import trimesh
 from all_kinds import crumbs
 from known_meshes import known_mesh
 from mesh_text import CORNERS, QUADS, obj, off, ply, written
+from programs import ended
 from scipy.spatial import cKDTree
 from sound import assert_sound, assert_unchanged_when_read_again
 
@@ -259,8 +258,7 @@ def test_nothing_but_the_error_is_said(tmp_path: Path) -> None:
     code = (
         f"from ripple_sim.solver import load_mesh\ntry: load_mesh({str(path)!r})\nexcept Exception as e: print(type(e))"
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stderr == ""
+    assert ended("-c", code, check=True).stderr == ""
 
 
 @pytest.mark.parametrize(
