@@ -66,11 +66,3 @@ def test_links_to_a_fixed_rim_count_half_in_gershgorins_bound() -> None:
     stencil = square(6).with_fixed_rim().stencil(np.ones((1, 6, 6)))
     rows = np.abs(stiffness_matrix(stencil).toarray()).sum(axis=1)
     np.testing.assert_allclose(2 * stencil.absolute_sums().ravel(), rows, atol=1e-12)
-
-
-@pytest.mark.parametrize("k", [1, 2, 4])
-def test_waves_along_the_grid_of_a_torus_have_the_eigenvalue_of_a_string_of_texels(k: int) -> None:
-    n = 8
-    column = np.indices((n, n))[1]
-    wave = np.cos(2 * np.pi * k * column / n).ravel()
-    np.testing.assert_allclose(flat_torus(n).stiffness() @ wave, (2 - 2 * np.cos(2 * np.pi * k / n)) * wave, atol=1e-12)
