@@ -17,10 +17,8 @@ from ripple_sim.solver import Atlas, Mesh, sphere_atlas
 from ripple_sim.solver.layouts.cube import (
     atlas_from_sphere_map,
     cast_rays,
-    cube_chart_points,
     sphere_directions,
     sphere_map_quality,
-    texel_at,
     texel_directions,
 )
 from ripple_sim.solver.texels import QUANTILES
@@ -148,22 +146,6 @@ def test_rays_in_degenerate_directions_agree_too(what: str) -> None:
     np.testing.assert_allclose(hit, other, atol=1e-9)
     np.testing.assert_allclose(np.cross(hit, directions), 0, atol=1e-9)
     assert (np.einsum("ij,ij->i", hit, directions) > 0).all()
-
-
-@pytest.mark.parametrize("n", [4, 7, 32])
-def test_texels_are_those_of_the_rounded_coordinates(n: int) -> None:
-    rng = np.random.default_rng(n)
-    directions = rng.standard_normal((4000, 3))
-    # edges and corners of the cube too, which belong to several charts
-    directions[:72] = np.concatenate(
-        [[1, 1, 0] @ cube_rotations(), [1, 1, 1] @ cube_rotations(), [1, 0, 0] @ cube_rotations()]
-    )
-    chart, row, column = cube_chart_points(directions, n)
-    row, column = (np.clip(np.rint(each).astype(int), 0, n - 1) for each in (row, column))
-    found = [texel_at(*direction, n) for direction in directions]
-    np.testing.assert_array_equal(found, (chart * n + row) * n + column)
-    found = [texel_at(*direction, n) for direction in texel_directions(n).reshape(-1, 3)]
-    np.testing.assert_array_equal(found, np.arange(6 * n * n))
 
 
 def test_a_triangle_without_area_gives_its_middle() -> None:
