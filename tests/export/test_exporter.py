@@ -9,7 +9,6 @@ import mujoco
 import pytest
 
 from ripple_sim import Exporter, RippleError, Ripples
-from ripple_sim.cli.main import main
 
 pytest.importorskip("pxr")
 
@@ -83,10 +82,3 @@ def test_a_file_without_frames_is_refused(ripples: Ripples, tmp_path: Path) -> N
     with pytest.raises(RippleError, match="at least one"), Exporter(ripples.model, ripples, tmp_path / "run.usdc"):
         pass
     assert not list(tmp_path.iterdir())
-
-
-def test_the_command_line_refuses_before_it_simulates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "duck", "-o", str(tmp_path / "run.fbx")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert main(["export", "nothing", "-o", str(tmp_path / "run.usdc")]) == 2
-    assert "no scene or mesh" in capsys.readouterr().err
