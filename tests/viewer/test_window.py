@@ -112,15 +112,6 @@ def test_wrong_arguments_are_bad_input(capsys: pytest.CaptureFixture[str], argv:
     assert re.search(named, complaint(capsys, 2, *argv))
 
 
-@pytest.mark.parametrize("mode", ["--web", "--benchmark"])
-def test_a_missing_scene_is_bad_input_and_named(capsys: pytest.CaptureFixture[str], mode: str) -> None:
-    if mode == "--web":
-        pytest.importorskip("trame_vtk")
-    line = complaint(capsys, 2, "no-such-scene", mode)
-    assert "no scene or mesh 'no-such-scene'" in line
-    assert "sphere" in line
-
-
 def test_an_invalid_mesh_is_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
     assert "flat.obj" in complaint(capsys, 2, str(tmp_path / "flat.obj"), "--benchmark")
