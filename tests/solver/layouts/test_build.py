@@ -11,7 +11,6 @@ from genus_zero import icosphere
 from hypothesis import HealthCheck, given, settings, strategies as st
 from surfaces import disk
 
-from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import (
     Atlas,
     AtlasError,
@@ -77,34 +76,6 @@ def test_a_sphere_map_of_something_else_is_refused(change, ball_mesh: Mesh) -> N
     known = ball_mesh.V / np.linalg.norm(ball_mesh.V, axis=1, keepdims=True)
     with pytest.raises(SphereMapError, match="no fold-free sphere map of the mesh"):
         build_atlas(ball_mesh, 8, cache=False, sphere=change(known))
-
-
-def with_degenerate_triangles(V: np.ndarray, F: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Split edges at a point on one of them, so that the triangles beyond get a corner on their own side: no area."""
-    V, F = list(V), [list(f) for f in F]
-    rng = np.random.default_rng(4)
-    for k in rng.choice(len(F), count, replace=False):
-        a, b, c = F[k]
-        V.append((1 - 1e-3) * V[a] + 1e-3 * V[b])  # on the edge a-b: the triangle a, new, b has no area
-        new = len(V) - 1
-        F[k] = [new, b, c]
-        F += [[a, new, c], [a, b, new]]
-    return np.array(V), np.array(F)
-
-
-def test_triangles_without_area_and_slivers_get_an_atlas() -> None:
-    V, F = with_degenerate_triangles(*limbed(), count=40)
-    mesh = Mesh.from_arrays(V, F)
-    assert mesh.triangle_areas.min() > 0, "those without area are left out"
-    assert mesh.closed and mesh.genus.tolist() == [0]
-    atlas = build_atlas(mesh, 32, cache=False)
-    quality = atlas.quality()
-    assert quality["flipped"] == 0
-    assert quality["solid_angle"] == pytest.approx(4 * np.pi)
-    assert quality["coverage"] == pytest.approx(1, abs=0.05)
-    assert np.isfinite(atlas.positions).all()
-    assert np.isfinite(atlas.normals).all()
-    assert np.isfinite(np.concatenate(atlas.locate(mesh.V))).all()
 
 
 @pytest.mark.parametrize("layout", ["cube", "patches"])
