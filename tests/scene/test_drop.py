@@ -191,12 +191,6 @@ def test_a_dropped_on_mesh_wears_its_image(tmp_path, named):
     )
 
 
-def test_an_image_that_cannot_be_read_is_refused(tmp_path):
-    (tmp_path / "broken.png").write_bytes(b"no picture")
-    with pytest.raises(SceneError, match=r"broken\.png.*cannot be read"):
-        drop_scene(textured_obj(tmp_path / "p.obj"), texture=tmp_path / "broken.png")
-
-
 PIXELS = np.random.default_rng(0).integers(0, 256, (3, 5, 3), dtype=np.uint8)
 
 
