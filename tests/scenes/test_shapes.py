@@ -46,16 +46,6 @@ def test_duck_stands_on_the_floor_and_is_as_large_as_promised():
     assert np.all(np.ptp(on_the_floor[:, :2], axis=0) > [0.3, 0.15]), "it has no flat bottom to stand on"
 
 
-def test_written_mesh_reads_back_and_leaves_nothing_else(tmp_path):
-    V, F = shapes.peanut(cell=0.05)
-    path = tmp_path / "peanut.obj"
-    shapes.write_obj(path, V, F)
-    read_V, _, _, read_F, *_ = igl.readOBJ(str(path))
-    assert np.array_equal(read_F, F)
-    np.testing.assert_allclose(read_V, V, rtol=6e-5, atol=1e-9)
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_polygonised_ball_converges_to_the_ball_at_second_order():
     ball = shapes.sphere((0.1, -0.05, 0.02), 0.5)
     cells = np.array([0.16, 0.08, 0.04])
