@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from arrival import front_and_crest
 from cube_symmetry import cube_rotations, permute_texels
 
 from ripple_sim.solver import Atlas, Mesh, WaveSolver, build_atlas, sphere_atlas
@@ -63,18 +64,6 @@ def sample(atlas: Atlas, field: np.ndarray, points: np.ndarray) -> np.ndarray:
     return sampling_matrix(atlas.texels.topology, *atlas.locate(points)) @ field.ravel().astype(float)
 
 
-def first_crest(times: np.ndarray, signal: np.ndarray) -> np.ndarray:
-    """Time of the first extremum that reaches half of the strongest, by a parabola through three samples."""
-    arrivals = []
-    for trace in signal.T:
-        size = np.abs(trace)
-        crest = (size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:]) & (size[1:-1] > 0.5 * size.max())
-        i = np.flatnonzero(crest)[0] + 1
-        a, b, c = size[i - 1 : i + 2]
-        arrivals.append(times[i] + 0.5 * (a - c) / (a - 2 * b + c) * (times[1] - times[0]))
-    return np.array(arrivals)
-
-
 @pytest.mark.parametrize("point", [[0, 0, 1], [1, 1, 1], [0.3, 0.9, -0.4]])
 def test_first_crest_arrives_at_the_same_time_in_all_directions(point: list[float]) -> None:
     atlas = sphere_atlas(1.0, 96)
@@ -92,7 +81,7 @@ def test_first_crest_arrives_at_the_same_time_in_all_directions(point: list[floa
         waves.step(0.01)
         times.append(waves.time)
         signal.append(sample(atlas, waves.height, probes))
-    arrivals = first_crest(np.array(times), np.array(signal))
+    _, arrivals = front_and_crest(np.array(times), -np.array(signal))  # an impulse presses in
     assert np.ptp(arrivals) < 0.01 * arrivals.mean()
     # and that time is about distance / speed, less the head start of the footprint's rim
     assert distance - 0.3 < arrivals.mean() < distance + 0.15
