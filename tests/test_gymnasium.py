@@ -15,6 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import posed
 
 gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.envs.mujoco import MujocoEnv  # noqa: E402
@@ -264,9 +265,7 @@ def pose_of_mujoco(
     ],
 )
 def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
-    model = mujoco.MjModel.from_xml_string(VIEWED)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed(VIEWED)
     viewer = types.SimpleNamespace(camera_id=camera_id, default_cam_config=config or None, width=320, height=200)
     env = types.SimpleNamespace(model=model, data=data, mujoco_renderer=viewer)
     camera = environment_camera(env, model, np.median(data.geom_xpos, axis=0))

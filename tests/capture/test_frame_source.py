@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 import pytest
 from exposed_scene import DISTANCE, FOVY, FPS, HEIGHT, SPEED, WIDTH, linear
+from mujoco_models import posed
 from PIL import Image
 
 from ripple_sim.capture import FrameSource, Sensor, focal_distance, snapshots, viewpoint
@@ -178,10 +179,7 @@ MJCF = """<mujoco><worldbody>
 
 @pytest.fixture
 def world() -> tuple[mujoco.MjModel, mujoco.MjData]:
-    model = mujoco.MjModel.from_xml_string(MJCF)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
+    return posed(MJCF)
 
 
 def test_the_free_camera_looks_at_the_middle_of_the_model(world):

@@ -15,15 +15,7 @@ BOX = '<geom name="target" type="box" size="0.4 0.4 0.2"/>'
 SEEN = 'contype="0" conaffinity="0"'
 
 
-def draped(
-    target: str,
-    body: str = "",
-    flex: str = "",
-    contact: str = "",
-    kind: str = "2",
-    integrator: str = "Euler",
-    points: int = 11,
-):
+def draped(target: str, body: str = "", contact: str = "", kind: str = "2", integrator: str = "Euler"):
     """A cloth of 0.4 m, or a soft cube, over a target whose top is at 0.2 m."""
     count = "11 11 1" if kind == "2" else "4 4 4"
     # the discrete integrator of MuJoCo 4 refuses damped edges
@@ -33,7 +25,7 @@ def draped(
         f"""<mujoco><option timestep="{DT}" solver="CG" tolerance="1e-6" integrator="{integrator}"/>
         <asset>{mesh_asset("animal", *limbed(0.05))}</asset><worldbody><body name="link">{body}{target}</body>
         <flexcomp name="cloth" type="grid" count="{count}" spacing="0.04 0.04 0.04" pos="0.03 0 0.3" dim="{kind}"
-          mass="{MASS}" radius="0.005" {flex}>{edge}
+          mass="{MASS}" radius="0.005">{edge}
         <contact selfcollide="none" condim="1" solref="0.01 1" {contact}/></flexcomp>
         </worldbody></mujoco>"""
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import posed
 from programs import ended
 from sphere_height_maps import cube_charts
 from unfinished_videos import contents, egg_scene, interrupting_at
@@ -55,9 +56,7 @@ def read(path: Path) -> np.ndarray:
 
 
 def render(bodies: str = BODIES, asset: str = "", **options) -> np.ndarray:
-    model = mujoco.MjModel.from_xml_string(f"<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>")
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed(f"<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>")
     with Renderer(shared_context(), model, {}, size=(120, 90), **options) as renderer:
         return renderer.render(data, {}, FRONT)
 

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 import unrippled
+from mujoco_models import posed
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from ripple_sim import Camera, Material, RippleError, RippleRenderer, Ripples, RippleWarning
@@ -25,9 +26,7 @@ MODEL = """<mujoco><worldbody>
 
 @pytest.fixture(scope="module")
 def egg():
-    model = mujoco.MjModel.from_xml_string(MODEL)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed(MODEL)
     ripples = Ripples(model, {"egg": Material(speed=0.5)}, resolution=32, backend="cpu")
     return model, data, ripples, RippleRenderer(model, ripples, width=96, height=72)
 
@@ -179,9 +178,8 @@ SHOWN = """<mujoco><statistic meansize=".3"/><worldbody><geom name="egg" size=".
 
 
 def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
-    model = mujoco.MjModel.from_xml_string(SHOWN)
-    data, ripples = mujoco.MjData(model), Ripples(model, {"egg": Material()}, resolution=8)
-    mujoco.mj_forward(model, data)
+    model, data = posed(SHOWN)
+    ripples = Ripples(model, {"egg": Material()}, resolution=8)
     kinds, option = mujoco.mjtObj, mujoco.MjvOption()
     with RippleRenderer(model, ripples, 60, 80) as renderer:
 

@@ -5,7 +5,6 @@ import pytest
 from hand_made import polygon, square
 
 from ripple_sim.figures import AtlasPainter, View, chart_colors, cross, plot_atlas, squares, texel_stretch
-from ripple_sim.scene import usual_up
 from ripple_sim.solver import AtlasError, sphere_atlas, texel_atlas
 
 
@@ -73,8 +72,6 @@ def test_the_up_axis_points_up(up):
     assert np.linalg.det(axes) == pytest.approx(1)
     right, upwards, eye = axes[:, "xyz".index(up)]
     assert (right, upwards > 0.8, eye > 0.4) == (pytest.approx(0), True, True)
-    assert usual_up("part.STL") == "z"
-    assert usual_up("animal.obj") == "y"
 
 
 def test_a_full_disk_is_one_line(monkeypatch, tmp_path, animal):

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-from drawn import posed
+from mujoco_models import posed
 
 from ripple_sim.coupling import Energy, Impulse
 from ripple_sim.overlay import (

@@ -3,10 +3,9 @@
 And against a brute-force reference: geometry displaced in float64, very fine, drawn large and shrunk.
 """
 
-import mujoco
 import numpy as np
 import pytest
-from drawn import posed
+from mujoco_models import posed
 from scipy.ndimage import gaussian_filter
 from sphere_height_maps import constant_height_map, cube_charts, height_map_of, linear_height_map
 
@@ -96,11 +95,8 @@ def test_ripples_run_on_across_cube_edges_and_corners(gl, direction):
 
 def test_height_maps_of_different_resolutions_stay_apart(gl):
     """Targets that swell each by its own height cover what balls of these radii cover."""
-    model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><geom size='.5' pos='-.8 0 0'/><geom size='.5' pos='.8 0 0'/></worldbody></mujoco>"
-    )
-    data, ball = mujoco.MjData(model), shapes.ball(16)
-    mujoco.mj_forward(model, data)
+    balls = "<geom size='.5' pos='-.8 0 0'/><geom size='.5' pos='.8 0 0'/>"
+    (model, data), ball = posed(f"<mujoco><worldbody>{balls}</worldbody></mujoco>"), shapes.ball(16)
     resolutions, heights = (8, 20), (0.25, 0.1)
 
     def frame(radii: list[float], swell: tuple[float, float]) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Frames of small MuJoCo scenes."""
 
-import mujoco
+from mujoco_models import posed
 from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
@@ -14,14 +14,6 @@ FLOOR = '<geom type="plane" size="0 0 .1" rgba=".8 .8 .8 1"/>'
 BALL = '<geom type="sphere" size=".3" pos="0 0 .8" rgba=".8 .2 .2 1"/>'
 SUN = '<light directional="true" pos="0 0 3" dir="{} 0 -1" diffuse=".8 .8 .8" castshadow="{}"/>'
 SPOT = '<light pos="{} 0 2" dir="{} 0 -1" diffuse=".9 .9 .9" cutoff="60" exponent="1"/>'
-
-
-def posed(xml: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A model and its data at the beginning."""
-    model = mujoco.MjModel.from_xml_string(xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=SIZE, **options):

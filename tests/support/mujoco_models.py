@@ -31,6 +31,14 @@ def model_of(worldbody: str, asset: str = "", option: str = "") -> mujoco.MjMode
     )
 
 
+def posed(xml: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A model and its data at the beginning."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
 def mesh_spec(
     shape: tuple[np.ndarray, np.ndarray], joint: str | None = None, route: str | None = "flex", **geom: object
 ) -> mujoco.MjSpec:

@@ -7,6 +7,7 @@ import sys
 
 import mujoco
 import numpy as np
+from mujoco_models import posed
 
 flag = mujoco.mjtVisFlag
 SIZE = (96, 128)  # height, width
@@ -44,13 +45,10 @@ _TENDON = '<tendon><spatial width=".02"><site site="a"/><site site="b"/></spatia
 
 def state_of(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A model with a sphere called "target" beside the rest, in its first state."""
-    model = mujoco.MjModel.from_xml_string(f"""<mujoco>{_FINE}<asset><mesh name="rock" vertex="{_CORNERS}"/>
+    return posed(f"""<mujoco>{_FINE}<asset><mesh name="rock" vertex="{_CORNERS}"/>
         <hfield name="hills" nrow="8" ncol="8" size=".5 .5 .3 .1" elevation="{_BUMPS}"/></asset><worldbody>
         {_TARGET}{WORLDS[name]}<camera name="side" pos="1.2 -1.2 .9" xyaxes="1 1 0 -.3 .3 1" fovy="50"/>
         </worldbody>{_TENDON if "tendon" in name else ""}</mujoco>""")
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
 
 
 def drawn(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from bouncing_stone import MJCF, TOML
+from mujoco_models import posed
 from sphere_height_maps import cube_charts
 from unfinished_videos import interrupting_at
 
@@ -62,11 +63,7 @@ def last_frame(film: Film) -> np.ndarray:
 
 
 def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><geom name="target" type="sphere" size="1"/></worldbody></mujoco>'
-    )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed('<mujoco><worldbody><geom name="target" type="sphere" size="1"/></worldbody></mujoco>')
     ball = meshes.ball(16)
     surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell), "metal", heatmap_colors=color_table())
     renderer = Renderer(shared_context(), model, {0: surface}, size=(200, 200))

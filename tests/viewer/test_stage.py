@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import posed
 
 from ripple_sim.overlay.notes import round_up
 from ripple_sim.viewer import BACKGROUND, add_floor, find_floor, is_endless
@@ -12,10 +13,7 @@ from ripple_sim.viewer.stage import _STEPS
 
 
 def state(body: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
+    return posed(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
 
 
 def test_the_floor_is_the_highest_plane_that_faces_up() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import posed
+from mujoco_models import posed
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 

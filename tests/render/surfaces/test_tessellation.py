@@ -3,9 +3,9 @@
 No gap opens, only where waves are sharp are there more triangles, and on the GPU they are those of the host.
 """
 
-import mujoco
 import numpy as np
 import pytest
+from mujoco_models import posed
 from sphere_height_maps import N, constant_height_map, cube_charts, height_map_of
 
 from ripple_sim.render import Camera, Renderer, Surface
@@ -164,12 +164,11 @@ RESOLUTION, SIZE = 16, (120, 480)  # so high that there are edges to be split
 @pytest.fixture(scope="module")
 def scene(gl):
     """A renderer of a ball and its atlas, and what draws its height field: from the host's memory, or on the GPU."""
-    model = mujoco.MjModel.from_xml_string(
+    model, data = posed(
         '<mujoco><worldbody><geom type="plane" size="3 3 .1"/><geom type="sphere" size=".5" pos="0 0 .5"/>'
         '<geom type="sphere" size=".1" pos=".5 .4 .9"/></worldbody></mujoco>'
     )
-    data, ball, atlas = mujoco.MjData(model), shapes.ball(16), sphere_atlas(1.0, RESOLUTION)
-    mujoco.mj_forward(model, data)
+    ball, atlas = shapes.ball(16), sphere_atlas(1.0, RESOLUTION)
     height_map = HeightMap(atlas.texels)
     targets = {1: Surface(0.5 * ball.shell, ball.faces, cube_charts(ball.shell, RESOLUTION), "rubber")}
     with Renderer(gl, model, targets, size=SIZE) as renderer:

@@ -5,7 +5,7 @@ The table of objects as shaders read it.
 
 import numpy as np
 import pytest
-from drawn import posed
+from mujoco_models import posed
 from shader_functions import evaluated
 
 from ripple_sim.render.visuals import LOOKS, Assets, Look, ObjectTable, Occluders, find_look, instances_of, visuals_of
