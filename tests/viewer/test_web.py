@@ -97,6 +97,13 @@ def seconds(page: Page) -> float:
     return float(found[1]) if found else -1.0
 
 
+def stands(page: Page) -> bool:
+    """Whether the time that the page shows is the same for half a second."""
+    before = seconds(page)
+    time.sleep(0.5)
+    return seconds(page) == before
+
+
 def picture(page: Page) -> np.ndarray:
     box = page.locator("#picture").bounding_box()
     return np.asarray(Image.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB")).astype(int)
@@ -126,10 +133,9 @@ def test_the_run_waits_for_the_first_browser_and_the_page_has_the_scenes_name(br
 def test_pause_holds_the_time_and_reset_sets_it_back(page: Page) -> None:
     page.click("#pause")
     wait_for(lambda: "paused" in page.inner_text("#status"))
-    time.sleep(0.5)  # what was on its way arrives
+    wait_for(lambda: stands(page))  # once what was on its way has arrived
     held = seconds(page)
-    time.sleep(0.5)
-    assert seconds(page) == held
+    assert stands(page) and seconds(page) == held
     page.click("#step")
     wait_for(lambda: seconds(page) > held)
     page.click("#reset")
