@@ -214,30 +214,22 @@ class StepContacts(NamedTuple):
             weighted = np.add.reduceat(forces[:, None] * places, first)
             forces, others, inner = np.add.reduceat(forces, first), others[first], inner[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
-        elif (apart := self._touch_apart()).any():
-            whose, middles, forces = self._corners()
+        # what touches in several places, and not in their middle, as what is wedged does
+        elif (apart := ((places - self.on_texels.middles) ** 2).sum(axis=1) > self.on_texels.place_radii**2).any():
+            ends = np.append(self.starts[1:], len(self.contacts.forces))
+            points = (self.contacts.points - self.position) @ self.rotation
+            rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
+            whose, middles, forces = corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
             kept = np.concatenate([(~apart).nonzero()[0], apart[whose].nonzero()[0] + len(apart)])
             whose = np.concatenate([np.arange(len(apart)), whose])[kept]
             forces = np.concatenate([self.forces, forces])[kept]
             places, texels = atlas.nearest(np.concatenate([places, middles])[kept])
             others, inner = others[whose], inner[whose]
         points = self.position + places @ self.rotation.T
-        rows = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
-        for other, point, force, texel, behind in rows:
+        told = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
+        for other, point, force, texel, behind in told:
             row = texel // n
             yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
-
-    def _touch_apart(self) -> Bools:
-        """Whether each collider touches in several places, and not in their middle: as what is wedged does."""
-        away = self.places - self.on_texels.middles
-        return np.asarray((away**2).sum(axis=1) > self.on_texels.place_radii**2)
-
-    def _corners(self) -> tuple[Ints, Floats, Floats]:
-        """Places where each collider touches: its row, points in the target's frame [m], and forces [N]."""
-        ends = np.append(self.starts[1:], len(self.contacts.forces))
-        points = (self.contacts.points - self.position) @ self.rotation
-        rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
-        return corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""
@@ -307,7 +299,10 @@ class TargetLoad:
         forces = np.add.reduceat(contacts.forces, starts)
         middles = np.add.reduceat(contacts.forces[:, None] * points, starts) / forces[:, None]
         places, at = nearest_places(surface, middles)
-        inner = self._from_inside(contacts, starts, rotation, at)
+        inner = np.zeros(len(starts), dtype=np.bool_)
+        if self._is_open:  # which may be touched from inside
+            pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
+            inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
         loads = load_points(
             points, contacts.forces, starts, self._radii[geoms], self._convex[geoms],
             lambda probes: nearest_places(surface, probes)[0],
@@ -329,13 +324,6 @@ class TargetLoad:
     def untouched(self, elapsed: float) -> Load:
         """Load over a time [s] in which no geom touches."""
         return self._filter(NO_FORCES, elapsed)
-
-    def _from_inside(self, contacts: Contacts, starts: Ints, rotation: Floats, texels: Ints) -> Bools:
-        """Whether each geom touches an open surface from inside, [p]; `texels` are those at their middles."""
-        if not self._is_open:
-            return np.zeros(len(starts), dtype=np.bool_)
-        pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
-        return np.asarray((pushes * self._atlas.texels.grid.normals[texels]).sum(axis=1) < 0)
 
 
 def time_constant(coupled: CoupledModel, target: int) -> float:

@@ -228,7 +228,10 @@ class TwoWay:
             self._places[key] = self._place(key, touched, known.get(key))
         reached = list(self._reach.reached(solved, self._waves, self._places.keys()))
         for touch in reached:
-            self._places[touch.target, touch.other] = self._reached_place(touch)
+            atlas = self._waves[touch.target].atlas
+            load = touch.load.merged(atlas.areas.size)
+            place = _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(touch.target, load))
+            self._places[touch.target, touch.other] = place
         asleep = [key for key in known if key not in self._places and self._force_stays(solved, key)]
         self._places |= {key: known[key] for key in asleep}
         self._heights = {target: self._waves[target].height for target, _ in self._places}
@@ -309,11 +312,6 @@ class TwoWay:
         load = Load.together(loads).merged(areas.size)
         load = Load(load.texels, -load.forces) if inside else load
         return _Place(atlas, points, _SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
-
-    def _reached_place(self, touch: Touch) -> _Place:
-        atlas = self._waves[touch.target].atlas
-        load = touch.load.merged(atlas.areas.size)
-        return _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(touch.target, load))
 
     def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]

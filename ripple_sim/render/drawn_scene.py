@@ -318,9 +318,8 @@ class DrawnScene:
         RippleError
             If the geom is no target.
         """
-        for target in self.targets:
-            if target.geom == geom:
-                return target
+        if (found := next((target for target in self.targets if target.geom == geom), None)) is not None:
+            return found
         geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
