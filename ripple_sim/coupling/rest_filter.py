@@ -150,7 +150,7 @@ class RestFilter:
 def _filter(
     states: np.ndarray, texels: Ints, shares: Floats, present: TexelForces, dt: float, slots: Ints,
     under: Ints, mean: Floats, given: Floats,
-) -> tuple[int, bool]:  # fmt: skip
+) -> tuple[np.int64, bool]:  # fmt: skip
     """Fill in the texels under the geoms; how many there are, and whether all geoms have left.
 
     Parameters

@@ -303,7 +303,8 @@ _HEAVY = 300.0
 
 def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> None:
     """Warn of a target that is made so heavy for a heavy body that other hits will not be seen."""
-    times = _greatest(material.density) / _density(coupled.model, geom, extent)
+    body = float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]])
+    times = float(np.max(material.density)) / _density(body, extent)
     if times > _HEAVY:
         mass = max(_resting(coupled, geom), heaviest(coupled, geom)[0])
         warnings.warn(

@@ -1,6 +1,5 @@
 from .closest import (
     TriangleTree as TriangleTree,
-    closest_point as closest_point,
     closest_points as closest_points,
     refitted as refitted,
     triangle_tree as triangle_tree,

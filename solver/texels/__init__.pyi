@@ -37,7 +37,6 @@ from .distance import (
     distance_to as distance_to,
     march as march,
     seeded as seeded,
-    taken as taken,
 )
 from .maps import texture_map as texture_map, vertex_map as vertex_map
 from .moving import MovedPlaces as MovedPlaces, MovedStencil as MovedStencil, Ride as Ride, SurfaceRide as SurfaceRide

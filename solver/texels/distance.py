@@ -62,8 +62,8 @@ def _distance_scratch(size: int, thread: int) -> Scratch:
 
 
 def _new_scratch(size: int) -> Scratch:
-    lists = (np.empty(size, np.int64) for _ in range(3))
-    return Scratch(np.full(size, np.inf), *lists, np.full(size, -1))
+    touched, order, front = np.empty((3, size), np.int64)
+    return Scratch(np.full(size, np.inf), touched, order, front, np.full(size, -1))
 
 
 @kernel(no_cpython_wrapper=True)
@@ -174,7 +174,7 @@ def march(halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scra
 
 
 @kernel
-def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints) -> int:
+def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints) -> np.int64:
     """Touch the nine texels round the one nearest to a point, at their straight distances from it; return how many."""
     n = halo.shape[1] - 2
     chart, row, column = center // (n * n), center // n % n, center % n
