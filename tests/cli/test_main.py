@@ -6,6 +6,7 @@ Strange words are refused at once, in one line that is no longer than a line sho
 import os
 import re
 import signal
+import subprocess
 import sys
 import warnings
 
