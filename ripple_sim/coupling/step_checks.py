@@ -86,11 +86,13 @@ class TunnellingCheck:
         body = model.body(int(model.geom_bodyid[other])).name or names[other]
         needed = limit / speed - stopping_time
         # MuJoCo keeps a contact's time constant at two time steps or more
-        advice = (
-            f"use a time step of {needed:.2g} s or less"
-            if needed > 0
-            else f"use a time step of {limit / speed / (1 + 2 / np.e):.2g} s or less, and a solref of twice that"
-        )
+        shortest = limit / speed / (1 + 2 / np.e)
+        if needed > 0:
+            advice = f"use a time step of {needed:.2g} s or less"
+        elif shortest < timestep:
+            advice = f"use a time step of {shortest:.2g} s or less, and a solref of twice that"
+        else:
+            advice = f'use a solref of "{np.e * (limit / speed - timestep):.2g} 1" or less for both'
         return (
             f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through it, get stuck or "
             f"give a wrong impulse: with a time step of {timestep:.2g} s it sinks in by "

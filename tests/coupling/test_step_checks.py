@@ -136,12 +136,22 @@ def test_what_gets_through_was_warned_of_and_what_is_slow_was_not(solref: str) -
 
 
 def test_warning_names_body_speed_and_a_time_step_that_does() -> None:
+    back, [message] = shoot(20.0, "0.02 1", 0.002)
+    assert not back
+    assert "body 'ball' meets geom 'plate' at 20 m/s" in message
+    timestep = float(message.split("time step of ")[-1].split()[0])
+    assert timestep < 0.002
+    assert "a solref of twice that" in message
+    assert shoot(20.0, f"{2 * timestep} 1", timestep) == (True, [])
+
+
+def test_where_the_time_step_will_do_a_solref_is_named_and_no_longer_step() -> None:
     back, [message] = shoot(10.0, "0.02 1", 0.002)
     assert not back
-    assert "body 'ball' meets geom 'plate' at 10 m/s" in message
-    timestep = float(message.split("time step of ")[-1].split()[0])
-    assert "a solref of twice that" in message
-    assert shoot(10.0, f"{2 * timestep} 1", timestep) == (True, [])
+    advice = message.split("; ")[-1]
+    solref = advice.split('"')[1]
+    assert advice == f'use a solref of "{solref}" or less for both'
+    assert shoot(10.0, solref, 0.002) == (True, [])
 
 
 def test_moving_target_counts_with_its_own_speed() -> None:
