@@ -10,7 +10,7 @@ import json
 import shutil
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -122,14 +122,11 @@ def _columns(rows: list[dict[str, Any]]) -> dict[str, list[Any]]:
     """Lists of values by column; a column of values of several kinds holds their JSON."""
     names = dict.fromkeys(name for each in rows for name in each)
     columns = {name: [each.get(name) for each in rows] for name in ("number", *(n for n in names if n != "number"))}
-    return {
-        name: values if _alike(values) else [json.dumps(value) for value in values] for name, values in columns.items()
-    }
-
-
-def _alike(values: Iterable[Any]) -> bool:
-    kinds = {float if isinstance(value, int) and not isinstance(value, bool) else type(value) for value in values}
-    return len(kinds - {type(None)}) <= 1 and not kinds & {dict}
+    for name, values in columns.items():
+        kinds = {float if isinstance(value, int) and not isinstance(value, bool) else type(value) for value in values}
+        if len(kinds - {type(None)}) > 1 or dict in kinds:
+            columns[name] = [json.dumps(value) for value in values]
+    return columns
 
 
 class Batch(Sequence):

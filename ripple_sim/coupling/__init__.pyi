@@ -4,7 +4,6 @@ from .colliders import (
     inset as inset,
     make_collidable as make_collidable,
 )
-from .collision_warnings import GAP_TOLERANCE as GAP_TOLERANCE, hull_gap as hull_gap
 from .contacts import (
     ContactReader as ContactReader,
     Contacts as Contacts,
@@ -68,4 +67,5 @@ from .target_mesh import (
     primitive_triangles as primitive_triangles,
     target_atlas as target_atlas,
 )
+from .target_warnings import GAP_TOLERANCE as GAP_TOLERANCE, hull_gap as hull_gap
 from .two_way import support_point as support_point

@@ -24,9 +24,9 @@ from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.mesh.rays import RayScene
 from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 
-from .collision_warnings import GAP_TOLERANCE
 from .model import SPECULATIVE, part_name
 from .target_mesh import target_mesh
+from .target_warnings import GAP_TOLERANCE
 
 _GEOM = mujoco.mjtGeom
 ROUTES = ("auto", "sdf", "flex", "convex", "hull")

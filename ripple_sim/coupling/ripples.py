@@ -14,8 +14,6 @@ from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Material
 from ripple_sim.solver.errors import checked, whole
 
-from .amplitude import AmplitudeCheck
-from .collision_warnings import collision_warnings
 from .energy import Energy, body_energy
 from .geoms import (
     ByGeom,
@@ -41,6 +39,7 @@ from .stepping import (
     missed_warning,
     physics_errors,
 )
+from .target_warnings import AmplitudeCheck, collision_warnings
 from .targets import Target, Targets
 from .two_way import TwoWay
 

@@ -139,11 +139,6 @@ class SoftSurface:
         side = self.mesh.V[self.mesh.F] - self.mesh.V[np.roll(self.mesh.F, 1, axis=1)]
         return float(np.linalg.norm(side, axis=2).mean())
 
-    @property
-    def rgba(self) -> NDArray[np.float64]:
-        """Colour and opacity of the model."""
-        return np.array(self._model.skin_rgba[self._skin] if self._skin >= 0 else self._model.flex_rgba[self.flex])
-
     @functools.cached_property
     def _bones(self) -> slice:
         first = int(self._model.skin_boneadr[self._skin])

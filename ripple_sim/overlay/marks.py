@@ -71,9 +71,9 @@ class Sprite:
         across, down = overlap(left, right, self.width), overlap(top, bottom, self.height)
         self.fill(down * across.T, color, opacity)
 
-    def polygon(self, corners: list[tuple[float, float]], color: NDArray | Color, opacity: float = 1.0) -> None:
+    def polygon(self, corners: list[tuple[float, float]], color: NDArray | Color) -> None:
         """Fill a polygon."""
-        self.fill(self._drawn(lambda draw, k: draw.polygon([(k * x, k * y) for x, y in corners], 255)), color, opacity)
+        self.fill(self._drawn(lambda draw, k: draw.polygon([(k * x, k * y) for x, y in corners], 255)), color)
 
     def disc(self, x: float, y: float, radius: float, color: Color) -> None:
         """Fill a circle."""

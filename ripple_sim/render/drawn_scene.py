@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation, DeviceTessellation, Displacement
 from ripple_sim.render.surfaces.moving import MovingOcclusion, MovingVertices
-from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearance, load_image
+from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearance
 from ripple_sim.render.surfaces.vertices import BAKED, DIRECTION, NORMAL, POSITION, mapped_coordinates, surface_vertices
 from ripple_sim.render.visuals.geoms import Instances, instances_of
 from ripple_sim.render.visuals.objects import Assets, Occluders
@@ -97,10 +97,7 @@ class SurfaceMesh:
         self._mesh = surface.moving or (surface.V, surface.F)
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
-        self._unit, self._image = mapping.unit, None
-        if mapping.kind != MappingKind.NO_IMAGE:
-            modelled = mapping.texture >= 0
-            self._image = assets.texture(mapping.texture) if modelled else load_image(resources, surface)
+        self._unit, self._image = mapping.unit, None if mapping.texture < 0 else assets.texture(mapping.texture)
         self._heatmap = None
         if surface.heatmap_colors is not None:
             self._heatmap = HeatmapTexture(resources, page, surface.heatmap_colors)
@@ -321,9 +318,8 @@ class DrawnScene:
         RippleError
             If the geom is no target.
         """
-        for target in self.targets:
-            if target.geom == geom:
-                return target
+        if (found := next((target for target in self.targets if target.geom == geom), None)) is not None:
+            return found
         geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 

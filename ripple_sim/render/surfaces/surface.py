@@ -6,7 +6,6 @@ A heatmap shows one of the solver's fields on it in false colours.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import moderngl
@@ -14,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.contract import MappingKind, Unit
-from ripple_sim.render.resources import Resources, srgb_texture, write_page
+from ripple_sim.render.resources import Resources, write_page
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
 from ripple_sim.render.visuals.visual import MODEL_LOOK, Look, find_look, geom_visual, look_of
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.errors import RippleError
-from ripple_sim.solver.files import read_image
 from ripple_sim.solver.mesh.topology import undirected
 from ripple_sim.solver.texels.chart_map import ChartMap
 from ripple_sim.solver.texels.texel_atlas import ChartPage
@@ -184,8 +182,8 @@ class Surface:
         Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
     color : tuple, optional
         sRGB, 0 to 1. By default the texture or colour that the model gives the geom, or else the look's own.
-    uv, image : optional
-        Texture coordinates, shape [n, 2] or per corner [m, 3, 2], and the file of the texture.
+    uv : array, optional
+        Texture coordinates, shape [n, 2] or per corner [m, 3, 2].
     heatmap_colors : array of uint8, shape [k, 3], optional
         sRGB, from the least to the greatest value of a heatmap that replaces the look; see `Renderer.set_heatmap`.
     grid : int
@@ -200,7 +198,6 @@ class Surface:
     look: str = "rubber"
     color: tuple[float, float, float] | None = None
     uv: NDArray[np.float64] | None = None
-    image: Path | str | None = None
     heatmap_colors: NDArray[np.uint8] | None = None
     grid: int = 0
     moving: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
@@ -216,8 +213,6 @@ def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[n
     """Look, linear colour under the texture, and how the texture lies on the surface."""
     if surface.heatmap_colors is not None:
         return UNDER_HEATMAP, np.ones(3), TextureMapping()
-    if surface.image is not None and surface.uv is not None and surface.look != MODEL_LOOK:
-        return find_look(surface.look), np.ones(3), TextureMapping(MappingKind.FLAT_IMAGE, own=True)
     return painted(model, geom, surface.look, surface.color, surface.uv is not None)
 
 
@@ -243,9 +238,3 @@ def target_color(model: Any, geom: int, look: str, given: tuple[float, float, fl
         return np.array(given)
     plain = mapping_of(model, visual).kind == MappingKind.NO_IMAGE
     return visual.rgba[:3] if visual.colored and plain else np.array(find_look(look).color)
-
-
-def load_image(resources: Resources, surface: Surface) -> moderngl.Texture:
-    """Upload the texture of a surface, or raise `RippleError` if its file cannot be read."""
-    pixels = read_image(RippleError, str(surface.image), "texture image", lambda mode: "RGB")
-    return srgb_texture(resources, pixels)

@@ -1,0 +1,437 @@
+"""Warnings of targets that nothing can touch, that collide off the surface that ripples, or whose waves are too high.
+
+Waves too high or too steep for the object that carries them are reported once a target, with what would do: heights are
+compared with the local radius, slopes with 1.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+import igl
+import mujoco
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from ripple_sim.errors import RippleWarning
+from ripple_sim.solver import Atlas, Material, WaveSolver
+from ripple_sim.solver.kernel import Floats32
+from ripple_sim.solver.texels.thickness import half_thickness
+
+from .geoms import TARGET_TYPES
+from .model import CoupledModel, flex_thickness
+from .suited import Extent, bearing_density
+from .target_mesh import mesh_arrays, primitive_triangles
+
+_GEOM = mujoco.mjtGeom
+# Points of the rippling surface at which its distance is taken.
+_POINTS = 1500
+
+
+def hull_gap(atlas: Atlas) -> float:
+    """Greatest distance from the convex hull of a mesh to its surface [m], on points 1/24 of its size apart."""
+    hull = trimesh.Trimesh(atlas.mesh.V, atlas.mesh.F, process=False).convex_hull
+    points, _ = trimesh.remesh.subdivide_to_size(hull.vertices, hull.faces, max_edge=float(hull.extents.max()) / 24)
+    closest, _ = atlas.project(points)
+    return float(np.linalg.norm(points - closest, axis=1).max())
+
+
+def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Iterable[int]) -> float:
+    """How deep bodies sink into a target's surface before they meet the geoms that collide for it [m].
+
+    Or how far above the surface they are held, where that is more: over half of it, since a part of it may well lie
+    inside a geom that collides for the target's neighbour too.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    target : int
+        Geom id.
+    atlas : Atlas
+        Of the target.
+    geoms : iterable of int
+        Ids of geoms on its body or on bodies welded to it. Planes and height fields have no surface to be off from.
+    """
+    model, data = coupled.model, mujoco.MjData(coupled.model)
+    mujoco.mj_kinematics(model, data)
+    points = atlas.positions.reshape(-1, 3)
+    points = points[:: -(-len(points) // _POINTS)]
+    points = data.geom_xpos[target] + points @ data.geom_xmat[target].reshape(3, 3).T
+    solids = [geom for geom in geoms if TARGET_TYPES.get(int(model.geom_type[geom]), "hfield") != "hfield"]
+    if not solids:
+        return 0.0
+    outside = np.full(len(points), np.inf)
+    for geom in solids:
+        V, F = _solid(coupled, geom)
+        local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+        outside = np.minimum(outside, igl.signed_distance(local, V, F)[0])
+    return float(max(outside.max(), -np.median(outside)))
+
+
+def _solid(coupled: CoupledModel, geom: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices [m], [n, 3], and triangles of a geom as it collides, in its own frame."""
+    model, kind = coupled.model, TARGET_TYPES[int(coupled.model.geom_type[geom])]
+    if kind not in ("mesh", "sdf"):
+        return primitive_triangles(kind, model.geom_size[geom])
+    V, F, _ = mesh_arrays(model, int(model.geom_dataid[geom]))
+    if kind == "mesh" and not coupled.has_flex[geom]:
+        hull = trimesh.convex.convex_hull(V)
+        V, F = np.array(hull.vertices), np.array(hull.faces)
+    return V, F
+
+
+# A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air. The coarse
+# tolerance is for geoms that were made to collide in place of a finer one.
+GAP_TOLERANCE, COARSE_TOLERANCE = 0.02, 0.1
+
+
+def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
+    """What to warn of where nothing touches a target, it collides off its surface, or contacts tell no forces."""
+    message = _shape_warning(coupled, geom, atlas)
+    if message is not None:
+        yield message
+    passive = getattr(coupled.model, "flex_passive", np.zeros(coupled.model.nflex))  # not in MuJoCo's older versions
+    for flex in coupled.masks.soft_flexes(coupled.collision_geoms(geom)).tolist():
+        if passive[flex]:
+            name = coupled.names[coupled.model.ngeom + flex]
+            yield (
+                f"MuJoCo tells no forces of the passive contacts of flex {name!r}, under which geom "
+                f'{coupled.names[geom]!r} will not ripple; set passive="false" in the flex\'s <contact>'
+            )
+
+
+def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
+    colliders = coupled.collision_geoms(geom)
+    if coupled.masks.out_of_touch(geom, colliders):
+        return _touch_warning(coupled, geom)
+    if any(each != geom for each in colliders) or geom in coupled.convex_colliders:
+        return _gap_warning(coupled, geom, atlas)
+    if coupled.has_flex[geom]:
+        return _flex_warning(coupled, geom)
+    model = coupled.model
+    if model.geom_type[geom] == _GEOM.mjGEOM_MESH and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+        return _hull_warning(coupled.names[geom], atlas)
+    return _distance_warning(coupled, geom)
+
+
+def _touch_warning(coupled: CoupledModel, geom: int) -> str:
+    """Of a target that nothing can touch."""
+    model, name, colliders = coupled.model, coupled.names[geom], coupled.collision_geoms(geom)
+    if not colliders:
+        return (
+            f"nothing can touch geom {name!r}: it does not collide (contype and conaffinity are 0), nor does another "
+            f"geom of its body; name the geoms that collide for it, contacts={{{name!r}: [...]}}, or give it a contype"
+        )
+    masks = ", ".join(
+        f"{coupled.names[each]!r} has contype {model.geom_contype[each]} and conaffinity {model.geom_conaffinity[each]}"
+        for each in colliders
+    )
+    return f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not welded to its own"
+
+
+def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
+    """Of collision geoms that are visibly off the surface."""
+    name, solids = coupled.names[geom], coupled.collision_geoms(geom)
+    colliders = [part for each in solids for part in coupled.convex_colliders.get(each, [each])]
+    gap, size = collision_gap(coupled, geom, atlas, colliders), float(np.ptp(atlas.mesh.V, axis=0).max())
+    if gap <= COARSE_TOLERANCE * size:
+        return None
+    names = ", ".join(repr(coupled.names[each]) for each in colliders)
+    return (
+        f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface that "
+        f"ripples: contacts load it where it is nearest to them; name other geoms in contacts=, or call "
+        f"make_collidable(spec, {name!r})"
+    )
+
+
+def _hull_warning(name: str, atlas: Atlas) -> str | None:
+    """Of a convex hull that is visibly off the surface."""
+    gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
+    if gap <= GAP_TOLERANCE * size:
+        return None
+    return (
+        f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface "
+        f'that ripples; give it type="sdf" in the MJCF, or call make_collidable(spec, {name!r})'
+    )
+
+
+def _flex_warning(coupled: CoupledModel, geom: int) -> str | None:
+    """Of geoms that a flex collider meets badly, or not at all."""
+    model, name = coupled.model, coupled.names[geom]
+    body, weld = int(model.geom_bodyid[geom]), model.body_weldid[model.geom_bodyid]
+    meets = coupled.masks_match(geom) & (weld != weld[geom])
+    thickness = flex_thickness(model, coupled.flex_colliders[geom])
+    reasons = (
+        (
+            model.geom_type == _GEOM.mjGEOM_BOX,
+            "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped meshes",
+        ),
+        (
+            model.geom_type == _GEOM.mjGEOM_SDF,
+            f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out",
+        ),
+        (
+            np.isin(model.geom_bodyid, _kept_apart(model, body)),
+            "MuJoCo finds no contacts of a flex with bodies that are joined to its own or excluded ({})",
+        ),
+    )
+    found = [
+        why.format(", ".join(repr(coupled.names[other]) for other in np.flatnonzero(which & meets).tolist()))
+        for which, why in reasons
+        if (which & meets).any()
+    ]
+    if not found:
+        return None
+    return (
+        f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), or '
+        "choose contype and conaffinity so that they do not meet"
+    )
+
+
+def _distance_warning(coupled: CoupledModel, geom: int) -> str | None:
+    """Of what an SDF geom does not meet."""
+    model, name = coupled.model, coupled.names[geom]
+    hills = coupled.can_collide(geom) & (model.geom_type == int(_GEOM.mjGEOM_HFIELD))
+    if int(model.geom_type[geom]) != int(_GEOM.mjGEOM_SDF) or not hills.any():
+        return None
+    names = ", ".join(repr(coupled.names[other]) for other in np.flatnonzero(hills).tolist())
+    return (
+        f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): call "
+        f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so that they do not meet'
+    )
+
+
+def _kept_apart(model: mujoco.MjModel, body: int) -> list[int]:
+    """Bodies whose geoms MuJoCo lets pass through those of a body: joined to it, or excluded by name."""
+    weld = model.body_weldid
+    above = weld[model.body_parentid[weld]]
+    joined = (weld != weld[body]) & (weld != 0) & ((above == weld[body]) | (above[body] == weld)) & bool(weld[body])
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
+        joined[:] = False
+    pairs = [(int(signature) >> 16, int(signature) & 0xFFFF) for signature in model.exclude_signature]
+    excluded = {b for pair in pairs if body in pair for b in pair if b != body}
+    return sorted(excluded.union(np.flatnonzero(joined).tolist()))
+
+
+# The height allowed over the local radius.
+HIGH = 0.25
+
+# Of the surface, what is counted as the thinnest part is beyond this share.
+_THINNEST = 0.99
+
+_ROWS = 4
+
+
+class Scales(NamedTuple):
+    """What heights are compared with; fields are [C, n, n].
+
+    Attributes
+    ----------
+    per_limit
+        1 over the greatest height allowed [1/m].
+    per_row, per_column
+        1 over the distance to the next texel in the next row and column [1/m]; 0 beyond the chart.
+    share
+        Of the surface's area.
+    per_thinnest : float
+        1 over the greatest height allowed where the object is thinnest [1/m].
+    calm : float
+        Waves that are no higher are neither too high nor too steep anywhere [m].
+    """
+
+    per_limit: Floats32
+    per_row: Floats32
+    per_column: Floats32
+    share: Floats32
+    per_thinnest: float
+    calm: float
+
+
+def scales_of(atlas: Atlas) -> Scales:
+    """What the heights on an atlas are compared with."""
+    fields = np.zeros((4, *atlas.areas.shape))
+    fields[0] = 1 / (HIGH * half_thickness(atlas))
+    for axis in (1, 2):
+        spacing = np.linalg.norm(np.diff(atlas.positions, axis=axis), axis=-1)
+        inner = (slice(None),) * axis + (slice(None, -1),)
+        # needles, on which a slope means little
+        fields[axis][inner] = 1 / np.maximum(spacing, 0.5 * np.median(spacing))
+    fields[3] = atlas.areas / atlas.areas.sum()
+    thinnest = float(np.quantile(fields[0], _THINNEST))
+    # no slope can reach 1 where neighbours differ by twice this height at most
+    calm = min(1 / fields[0].max(), 1 / (8**0.5 * fields[1:3].max()))
+    per_limit, per_row, per_column, share = fields.astype(np.float32)
+    return Scales(per_limit, per_row, per_column, share, thinnest, float(calm))
+
+
+def steep_area(height: Floats32, scales: Scales) -> float:
+    """Share of the surface that is steeper than 1, seen on every fourth row."""
+    here, below, beside = np.s_[:, :-1:_ROWS, :-1], np.s_[:, 1::_ROWS, :-1], np.s_[:, :-1:_ROWS, 1:]
+    down = (height[below] - height[here]) * scales.per_row[here]
+    right = (height[beside] - height[here]) * scales.per_column[here]
+    share = scales.share[here].astype(np.float64)
+    return float(share[down**2 + right**2 > 1].sum() / share.sum())
+
+
+# Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard body is steep, but
+# small.
+_STEEP_AREA = 0.01
+
+# The crests of all steps, and the slopes of one, are looked at once in so many steps. They are read back from a GPU for
+# that, which lets it run dry.
+_EVERY = {"cpu": 16, "gl": 128}
+
+# A wave that is too high is followed for so many looks, or until it falls again, so that the advice is based on its
+# crest.
+_FOLLOWED = 4
+
+# The density that is advised is this much more than the least for what was seen, and for a wave of this share of its
+# height that has spread to where the object is thinnest.
+_MARGIN, _SPREAD = 2.0, 0.3
+
+# What a material is printed with; the others change no wave.
+_PRINTED = tuple(each for each in dataclasses.fields(Material) if isinstance(each.default, float | bool))
+
+
+class AmplitudeCheck:
+    """Compares the heights of all targets with their local radii (`half_thickness`), and their slopes with 1.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    waves : mapping of int to WaveSolver
+        By geom; see `waves_changed`.
+    """
+
+    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
+        self._coupled = coupled
+        self._watched = {geom: _Watch(each) for geom, each in waves.items()}
+        self._steps = 0
+
+    def __call__(self) -> None:
+        """Look at the heights, if it is time to. Call it after each step of the waves."""
+        for geom, watch in list(self._watched.items()):
+            if self._steps % _EVERY[watch.waves.backend] == 0 and watch.look():
+                self._warn(geom)
+        self._steps += 1
+
+    def ignore(self, geom: int) -> None:
+        """Give no warning of a geom."""
+        self._watched.pop(geom, None)
+
+    def waves_changed(self, geom: int, waves: WaveSolver) -> None:
+        """Go on with the new waves of a geom."""
+        if geom in self._watched:
+            watch = self._watched[geom]
+            watch.look()  # at the old ones, a last time
+            watch.waves = waves
+            waves.crests()
+
+    def flush(self) -> None:
+        """Look at the heights a last time, and warn of all that has been seen: the waves are about to end."""
+        for geom, watch in list(self._watched.items()):
+            watch.look()
+            if watch.excess > 1:
+                self._warn(geom)
+
+    def _warn(self, geom: int) -> None:
+        watch = self._watched.pop(geom)
+        warnings.warn(
+            f"the waves on geom {self._coupled.names[geom]!r} are {watch.what}; pictures show them limited. "
+            + self._advice(geom, watch.waves, _MARGIN * watch.needed),
+            RippleWarning,
+            stacklevel=5,
+        )
+
+    def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:
+        """A material that would do: the same with a density that is so many times as high, or higher."""
+        material = waves.material
+        given = {each.name: getattr(material, each.name) for each in _PRINTED}
+        if any(np.ndim(value) for value in given.values()):
+            target = repr(self._coupled.names[geom])
+            density = f"{_rounded_up(factor):g} * ripples[{target}].material.density"
+            return f"This would do: ripples.change_material({target}, density={density})"
+        # what was seen may be the first of many hits
+        bearing = bearing_density(self._coupled, geom, Extent.of(waves.rest.mesh), material)
+        given["density"] = _rounded_up(max(factor * given["density"], bearing))
+        pairs = [
+            (each.name, repr(float(f"{given[each.name]:.4g}")))
+            for each in _PRINTED
+            if given[each.name] != each.default or each.name == "density"
+        ]
+        python, toml = (", ".join(f"{name}{sign}{value}" for name, value in pairs) for sign in ("=", " = "))
+        return f"This would do: Material({python}), in a scene file material = {{{toml}}}"
+
+
+class _Watch:
+    """One target's waves.
+
+    Attributes
+    ----------
+    waves : WaveSolver
+    excess : float
+        The most, over what is allowed, of heights and slopes.
+    needed : float
+        By how much waves would have to be lower.
+    what : str
+        What was too large, how large, and where.
+    """
+
+    def __init__(self, waves: WaveSolver) -> None:
+        self.waves = waves
+        # lower waves are right anywhere, or too small to matter
+        self._calm = 1e-3 * float(np.ptp(waves.rest.mesh.V, axis=0).max())
+        self._scales: Scales | None = None
+        self.excess, self.needed, self.what = 0.0, 0.0, ""
+        self._looks = 0
+
+    def look(self) -> bool:
+        """Whether the waves are too high or too steep, and it is time to say so."""
+        excess = 0.0
+        crests = self.waves.crests()
+        if float(crests.max()) > self._calm:
+            excess = self._measure(crests, self.waves.height)
+        if self.excess > 1:
+            self._looks += 1
+        return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED)
+
+    def _measure(self, crests: NDArray[np.float32], height: NDArray[np.float32]) -> float:
+        if self._scales is None:
+            self._scales = scales_of(self.waves.rest)
+            self._calm = self._scales.calm
+        scales = self._scales
+        # the greatest crest over what is allowed there
+        over = (crests * scales.per_limit).reshape(-1)
+        texel = int(over.argmax())
+        high = float(over[texel])
+        steep_share = steep_area(height, scales)
+        excess, what = high, ""
+        if steep_share > _STEEP_AREA:
+            down = np.diff(height, axis=1, append=0) * scales.per_row
+            slope = np.hypot(down, np.diff(height, axis=2, append=0) * scales.per_column).ravel()
+            order = np.argsort(-slope)
+            # the slope that this share of the surface exceeds
+            steep = float(slope[order[np.searchsorted(np.cumsum(scales.share.ravel()[order]), _STEEP_AREA)]])
+            excess, what = max(excess, steep), f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
+        if excess > max(self.excess, 1.0):
+            if high == excess:
+                where = ", ".join(f"{x:.3g}" for x in self.waves.rest.positions.reshape(-1, 3)[texel])
+                radius = 1 / (HIGH * float(scales.per_limit.reshape(-1)[texel]))
+                here = float(crests.reshape(-1)[texel])
+                what = f"too high: {here:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
+            self.what = what
+        self.excess = max(self.excess, excess)
+        spread = _SPREAD * float(crests.max()) * scales.per_thinnest
+        self.needed = max(self.needed, excess, spread)
+        return excess
+
+
+def _rounded_up(value: float) -> float:
+    """To two digits."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / step - 1e-9) * step
