@@ -200,22 +200,22 @@ class StepContacts(NamedTuple):
             weighted = np.add.reduceat(forces[:, None] * places, first)
             forces, others, inner = np.add.reduceat(forces, first), others[first], inner[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
-        # what is wedged touches in several places, and not in their middle
+        # what touches in several places, and not in their middle, as what is wedged does
         elif (apart := ((places - self.on_texels.middles) ** 2).sum(axis=1) > self.on_texels.place_radii**2).any():
             ends = np.append(self.starts[1:], len(self.contacts.forces))
             points = (self.contacts.points - self.position) @ self.rotation
-            row = np.repeat(np.arange(len(self.starts)), ends - self.starts)
-            whose, middles, forces = corners(row, points, self.contacts.forces, 2 * self.on_texels.place_radii)
+            rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
+            whose, middles, forces = corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
             kept = np.concatenate([(~apart).nonzero()[0], apart[whose].nonzero()[0] + len(apart)])
             whose = np.concatenate([np.arange(len(apart)), whose])[kept]
             forces = np.concatenate([self.forces, forces])[kept]
             places, texels = atlas.nearest(np.concatenate([places, middles])[kept])
             others, inner = others[whose], inner[whose]
         points = self.position + places @ self.rotation.T
-        rows = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
-        for other, point, force, texel, behind in rows:
-            chart = texel // n**2
-            yield Impulse(geom, names[other], point, force * timestep, (chart, texel // n % n, texel % n), behind)
+        told = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
+        for other, point, force, texel, behind in told:
+            row = texel // n
+            yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""
@@ -286,7 +286,7 @@ class TargetLoad:
         middles = np.add.reduceat(contacts.forces[:, None] * points, starts) / forces[:, None]
         places, at = self._atlas.nearest_places(middles)
         inner = np.zeros(len(starts), dtype=np.bool_)
-        if self._is_open:
+        if self._is_open:  # which may be touched from inside
             pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
             inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
         loads = load_points(

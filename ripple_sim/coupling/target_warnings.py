@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Atlas, Material, WaveSolver
-from ripple_sim.solver.kernel import Floats32, kernel
+from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.texels.thickness import half_thickness
 
 from .geoms import TARGET_TYPES
@@ -269,21 +269,13 @@ def scales_of(atlas: Atlas) -> Scales:
     return Scales(per_limit, per_row, per_column, share, thinnest, float(calm))
 
 
-@kernel
-def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
+def steep_area(height: Floats32, scales: Scales) -> float:
     """Share of the surface that is steeper than 1, seen on every fourth row."""
-    charts, n, _ = height.shape
-    steep, all_seen = 0.0, 0.0
-    for f in range(charts):
-        for r in range(0, n - 1, _ROWS):
-            for c in range(n - 1):
-                h = height[f, r, c]
-                down = (height[f, r + 1, c] - h) * per_row[f, r, c]
-                right = (height[f, r, c + 1] - h) * per_column[f, r, c]
-                all_seen += share[f, r, c]
-                if down * down + right * right > 1:
-                    steep += share[f, r, c]
-    return steep / all_seen
+    here, below, beside = np.s_[:, :-1:_ROWS, :-1], np.s_[:, 1::_ROWS, :-1], np.s_[:, :-1:_ROWS, 1:]
+    down = (height[below] - height[here]) * scales.per_row[here]
+    right = (height[beside] - height[here]) * scales.per_column[here]
+    share = scales.share[here].astype(np.float64)
+    return float(share[down**2 + right**2 > 1].sum() / share.sum())
 
 
 # Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard body is steep, but
@@ -417,7 +409,7 @@ class _Watch:
         over = (crests * scales.per_limit).reshape(-1)
         texel = int(over.argmax())
         high = float(over[texel])
-        steep_share = steep_area(height, scales.per_row, scales.per_column, scales.share)
+        steep_share = steep_area(height, scales)
         excess, what = high, ""
         if steep_share > _STEEP_AREA:
             down = np.diff(height, axis=1, append=0) * scales.per_row

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.energy import Energy
+from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 from ripple_sim.render.tone_mapping import linear_to_srgb
 from ripple_sim.scene.scene import Request
@@ -271,7 +272,7 @@ class Notebook:
     def follow(self) -> Notes:
         """Take in the simulations' present frame. Call it for every frame, rendered or not."""
         request = self._request
-        heatmaps = [self._heatmaps(simulation) for simulation in self._simulations] if request.heatmap else []
+        heatmaps = [self._heatmaps(each.ripples, request.heatmap) for each in self._simulations if request.heatmap]
         marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []
         ledgers = [simulation.energy for simulation in self._simulations] if request.energy else []
         for history, ledger in zip(self._energies, ledgers, strict=False):
@@ -292,12 +293,9 @@ class Notebook:
     def _scale(self, limit: Limit, magnitudes: Sequence[float]) -> Scale:
         return limit.follow(max(magnitudes, default=0.0), self._dt), limit.goal
 
-    def _heatmaps(self, simulation: Simulation) -> dict[str, NDArray[np.float32]]:
-        ripples, shown = simulation.ripples, self._request.heatmap or ""
-        return {
-            name: with_filled_halo(ripples[name].atlas.texels.topology, getattr(ripples[name], shown))
-            for name in ripples
-        }
+    def _heatmaps(self, ripples: Ripples, shown: str) -> dict[str, NDArray[np.float32]]:
+        each = {name: ripples[name] for name in ripples}
+        return {name: with_filled_halo(on.atlas.texels.topology, getattr(on, shown)) for name, on in each.items()}
 
     def _least_limit(self) -> float:
         ripples = self._simulations[0].ripples

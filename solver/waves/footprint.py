@@ -104,7 +104,7 @@ def _spacing(grid: TexelGrid, center: int) -> float:
 
 
 @kernel(no_cpython_wrapper=True)
-def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints) -> np.int64:
+def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints) -> int:
     """Touch connected texels within a straight distance of a point; how many, or 0, and none, if they do not lie flat.
 
     Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
@@ -134,7 +134,7 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance
                     distance[a] = distance_to(positions, a, point)
                     texels[count] = a
                     count += 1
-    return count
+    return int(count)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
