@@ -88,7 +88,7 @@ def texel_atlas(texels: TexelMesh) -> Atlas:
         np.concatenate([corners[exists][:, [0, 1, 2]], corners[exists][:, [0, 2, 3]]]),
         n,
     )
-    triangles, barycentrics = _triangles_of(F, nodes[:, 1:-1, 1:-1])
+    triangles, barycentrics = triangles_of(F, nodes[:, 1:-1, 1:-1])
     return Atlas(Mesh(V, F), texels, linear, triangles, barycentrics)
 
 
@@ -146,7 +146,7 @@ def _shown(texels: TexelMesh, rows: list[int], columns: list[int]) -> NDArray[np
     return texels.positions.reshape(-1, 3)[texels.topology.halo[:, rows, columns]]
 
 
-def _triangles_of(F: NDArray[np.int64], vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def triangles_of(F: NDArray[np.int64], vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """For each of some vertices a triangle of which it is a corner, and the barycentrics [..., 3] of that corner."""
     triangle = np.empty(F.max() + 1, np.int64)
     triangle[F[::-1].ravel()] = np.repeat(np.arange(len(F))[::-1], 3)

@@ -25,6 +25,7 @@ from ...mesh.rays import RayScene
 from ...mesh.vectors import combine, cross, dot, row
 from ...texels.atlas import Atlas, check_points
 from ...texels.chart_map import Parts, nearest_place, nearest_places, texel_on, uncut
+from ...texels.texel_atlas import triangles_of
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, stretch_summary
 from ..sphere_map import certify, stretch
@@ -368,12 +369,4 @@ def _texel_triangulation(
     corner_cells = cells[~whole]
     corners = np.array([cell[cell >= 0] for cell in corner_cells]).reshape(-1, 3)
     F = np.concatenate([cells[whole][:, [0, 1, 2]], cells[whole][:, [0, 2, 3]], corners])
-    triangles = np.empty(6 * n * n, dtype=np.int64)
-    barycentrics = np.zeros((6 * n * n, 3))
-    place = np.empty(6 * n * n, dtype=np.int64)
-    triangles[F[::-1].ravel()] = np.repeat(np.arange(len(F))[::-1], 3)
-    for k in range(3):
-        here = F[triangles, k] == np.arange(6 * n * n)
-        place[here] = k
-    barycentrics[np.arange(6 * n * n), place] = 1.0
-    return F, triangles.reshape(6, n, n), barycentrics.reshape(6, n, n, 3)
+    return F, *triangles_of(F, halo[:, 1:-1, 1:-1])

@@ -9,7 +9,7 @@ from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, WaveSolver, build_atlas, sphere_atlas, texel_atlas
 from ripple_sim.solver.backends import Dispatch, FieldLayout, TexelList, link_buffers
-from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.gl import GLContext, bind_buffers, shared_context
 
 pytestmark = pytest.mark.usefixtures("opengl")
 MESHES = [square(1), square(66), flat_torus(17), polygon(3, 9), two_squares(3)]
@@ -34,13 +34,13 @@ def test_the_stencil_is_applied_to_every_texel_once(texels: TexelMesh, defines: 
     with gl:
         buffer, result = layout.upload(x), layout.upload(before)
         dispatch.fill_halo(buffer)
-        dispatch.bind(buffer, result, None, layout.upload_stencil(stencil), layout.upload(factor))
+        bind_buffers(buffer, result, None, layout.upload_stencil(stencil), layout.upload(factor))
         dispatch.run_texels(dispatch.texel_shader("apply", **defines))
         irregular = dispatch.shader("irregular", KICK=0)
         scale = (factor if "FACTOR" in defines else 1) * (-1 if "SUBTRACT" in defines else 1) * np.ones(texels.shape)
         count, *links = link_buffers(gl, layout, stencil.irregular, scale)
         if count:
-            dispatch.bind(buffer, result, None, *links)
+            bind_buffers(buffer, result, None, *links)
             dispatch.run_list(irregular, count)
     assert count == (0 if stencil.irregular is None else len(stencil.irregular.texels))
     expected = scale * stencil(x.astype(float)) + (before if "ADD" in defines else 0)
@@ -59,7 +59,7 @@ def test_a_list_is_run_to_its_last_entry_and_not_beyond(count: int) -> None:
         places = ctx.buffer(layout.texels.astype(np.int32).tobytes())
         shader = dispatch.shader("kick")
         shader["dt"] = 0.5
-        dispatch.bind(height, velocity, places, ctx.buffer(kicks.tobytes()))
+        bind_buffers(height, velocity, places, ctx.buffer(kicks.tobytes()))
         dispatch.run_list(shader, count)
     kicks[count:] = 0
     np.testing.assert_allclose(layout.read(velocity).ravel(), v.ravel() + kicks, rtol=1e-6)
