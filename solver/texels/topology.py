@@ -116,7 +116,7 @@ def close_corners(
     for chart in range(len(glued)):
         for corner in range(4):
             fan, closed = _fan(glued, chart, corner)
-            texels = np.array([_corner_texel(c, k, n) for c, k in fan])
+            texels = np.array([c * n * n + _CORNERS[k] @ (n, 1) * (n - 1) for c, k in fan])
             place = (chart, *_CORNERS[corner] * (n + 1))
             count = len(fan)
             if corners[chart, corner] < 0:
@@ -155,11 +155,6 @@ def _fan(glued: NDArray[np.int64], chart: int, corner: int) -> tuple[list[tuple[
         fan.insert(0, (other, (side + 1) % 4))
 
 
-def _corner_texel(chart: int, corner: int, n: int) -> int:
-    row, column = _CORNERS[corner] * (n - 1)
-    return int((chart * n + row) * n + column)
-
-
 def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     """Connect charts of n x n texels along their sides.
 
@@ -182,7 +177,7 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     rim = np.zeros(halo.shape, dtype=bool)
     first = size * np.arange(charts)[:, None]
     halo[:, 1:-1, 1:-1] = np.arange(charts * size).reshape(charts, n, n)
-    border, beyond = _border_texels(n), _places_beyond(n)
+    border, beyond = _along_sides(np.arange(n), n), _along_sides(np.arange(1, n + 1), n + 2)
     for side in range(4):
         chart, other = glued[:, side].T
         is_rim = chart < 0
@@ -212,15 +207,9 @@ def _checked(glued: NDArray[np.int64]) -> NDArray[np.int64]:
     return table
 
 
-def _border_texels(n: int) -> NDArray[np.int64]:
-    """Index row n + column of the texels along each side of a chart, [4, n]."""
-    along, last = np.arange(n), n - 1
-    return np.stack([along, along * n + last, last * n + last - along, (last - along) * n])
-
-
-def _places_beyond(n: int) -> NDArray[np.int64]:
-    """Address of the places beyond each side in a chart with halo, [4, n]."""
-    along, width, last = np.arange(1, n + 1), n + 2, n + 1
+def _along_sides(along: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+    """Index row `width` + column of the places so far along each side of a square, counter-clockwise, [4, k]."""
+    last = width - 1
     return np.stack([along, along * width + last, last * width + last - along, (last - along) * width])
 
 
