@@ -17,7 +17,7 @@ from ..operator.wave_operator import StepCoefficients, WaveOperator, number_or_f
 from ..texels.stencil import NO_LINKS, Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
-from .kernels import NO_BALANCE, NO_FEATURES, Amplitude, Balance, Coefficient, Kick, Links, Weights
+from .kernels import NO_BALANCE, NO_FEATURES, NO_WEIGHTS, Amplitude, Balance, Coefficient, Kick, Links, Weights
 
 # Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of them. On charts of
 # 12 columns, loops that begin anew for each take four times as long.
@@ -88,15 +88,11 @@ class RowLayout:
         chart, row = np.divmod(row, self.n + 2)
         return (chart * self.n + row - 1) * self.columns + column - 1
 
-    def weights(self, stencil: Stencil) -> Weights:
-        """A stencil laid out like a field, and its irregular links."""
+    def weights(self, stencil: Stencil, rows: NDArray[np.float32]) -> Weights:
+        """A stencil laid out like a field, and its irregular links; the rows of another one are written over."""
         count = self._charts
-        rows = aligned((count if self._alone else 1, 4, self.n + 1, self._pitch), 1)
-        return self.fill(rows, stencil)
-
-    def fill(self, rows: NDArray[np.float32], stencil: Stencil) -> Weights:
-        """The same in the rows of another one, written over."""
-        count = self._charts
+        if not rows.size:
+            rows = aligned((count if self._alone else 1, 4, self.n + 1, self._pitch), 1)
         if self._alone:
             rows[..., : self.n + 1] = stencil.weights
         else:
@@ -140,12 +136,6 @@ def aligned(shape: tuple[int, ...], column: int, shift: int = 0, dtype: DTypeLik
     return memory[start : start + size].reshape(shape)
 
 
-def laid_out(k: StepCoefficients, fields: RowLayout, *, varied: bool) -> StepCoefficients:
-    """Coefficients as the loops read them: beside the gain all fields, or none."""
-    each = (k.gain, k.decay, k.spring, k.span)
-    return StepCoefficients(*map(fields.coefficients, np.broadcast_arrays(*each) if varied else each))
-
-
 def part_runs(operator: WaveOperator, fields: RowLayout) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Runs of texels in coefficients that belong to one part: where each begins, [k + 1], and its part, [k]."""
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
@@ -183,27 +173,21 @@ class CPUBackend:
     name = "cpu"
 
     def __init__(self, operator: WaveOperator, *, keeps_volume: bool = False) -> None:
-        self._operator = operator
         self.keeps_volume = keeps_volume
         self._fields = fields = RowLayout(operator.topology)
-        self._stencil = fields.weights(operator.stencil)
         # the processor takes a store to one field and a load from another at the same place of a page for a conflict:
         # each field begins elsewhere in its page
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
         self._dent: NDArray[np.float32] | None = None
-        features = NO_FEATURES
-        if operator.viscosity_stencil is not None:
-            features = features._replace(viscosity=fields.weights(operator.viscosity_stencil))
-        if operator.laplace_stencil is not None and operator.rigidity is not None:
-            rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
-            laplace = fields.weights(operator.laplace_stencil)
-            features = features._replace(laplace=laplace, rigidity=rigidity, moment=fields.zeros().reshape(-1))
+        self._stencil, self._features = NO_WEIGHTS, NO_FEATURES
+        if operator.laplace_stencil is not None:
+            self._features = self._features._replace(moment=fields.zeros().reshape(-1))
         if operator.yield_height is not None:
             self._dent = fields.zeros()
             limit = np.full_like(self._dent, np.inf)
             fields.texels(limit)[:] = operator.yield_height
-            features = features._replace(limit=limit.reshape(-1), dent=self._dent.reshape(-1))
-        self._features = features
+            self._features = self._features._replace(limit=limit.reshape(-1), dent=self._dent.reshape(-1))
+        self.move(operator)
         self._response = fields.coefficients(number_or_field(operator.response))
         self._part_runs = None if operator.parts is None else part_runs(operator, fields)
         self._part_count = 1 if operator.parts is None else int(operator.parts.max()) + 1
@@ -302,13 +286,13 @@ class CPUBackend:
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
         self._operator, fields = operator, self._fields
-        self._stencil = fields.fill(self._stencil.rows, operator.stencil)
+        self._stencil = fields.weights(operator.stencil, self._stencil.rows)
         features = self._features
         if operator.viscosity_stencil is not None:
-            features = features._replace(viscosity=fields.fill(features.viscosity.rows, operator.viscosity_stencil))
+            features = features._replace(viscosity=fields.weights(operator.viscosity_stencil, features.viscosity.rows))
         if operator.laplace_stencil is not None and operator.rigidity is not None:
             rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
-            laplace = fields.fill(features.laplace.rows, operator.laplace_stencil)
+            laplace = fields.weights(operator.laplace_stencil, features.laplace.rows)
             features = features._replace(laplace=laplace, rigidity=rigidity)
         self._features = features
         if operator.density is not None:
@@ -353,7 +337,10 @@ class CPUBackend:
             k = step_coefficients(self._operator, dt)
             varied = any(np.ndim(each) for each in (k.decay, k.spring, k.span))
             varied = varied or self._part_runs is not None or self._balance is not None
-            self._coefficients = laid_out(k, self._fields, varied=varied)
+            # beside the gain all of them are fields, or none
+            each = (k.gain, k.decay, k.spring, k.span)
+            laid_out = map(self._fields.coefficients, np.broadcast_arrays(*each) if varied else each)
+            self._coefficients = StepCoefficients(*laid_out)
             features = self._features
             self._plain = not (varied or len(features.moment) or len(features.dent))
             # a field where forces are added up, or the number 0

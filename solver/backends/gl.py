@@ -9,11 +9,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext, shared_context
+from ..gl import GLContext, bind_buffers, shared_context
 from ..kernel import Ints
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
-from ..texels.cells import EVEN, LEAST_AREA, PER_HOURGLASS, PER_TINY, SHARE, TINY
+from ..texels import cells
 from ..texels.moving import MovedStencil, Ride
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.stiffness import LEAST_RATIO
@@ -22,15 +22,8 @@ from .gl_dispatch import Dispatch, Pressure, VolumeKeeper
 from .gl_fields import DeviceField, FieldLayout, TexelList, link_buffers
 from .kernels import Amplitude
 
-_LAW = {
-    "PER_HOURGLASS": float(PER_HOURGLASS),
-    "SHARE": float(SHARE),
-    "EVEN": float(EVEN),
-    "LEAST_AREA": float(LEAST_AREA),
-    "TINY": float(TINY),
-    "PER_TINY": float(PER_TINY),
-    "LEAST_RATIO": float(LEAST_RATIO),
-}
+# What the law of a quad asks for
+_LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "TINY", "PER_TINY")
 
 
 class DeviceStiffness:
@@ -42,11 +35,12 @@ class DeviceStiffness:
 
     def __init__(self, gl: GLContext, dispatch: Dispatch, stencil: MovedStencil, mass: NDArray[np.float64]) -> None:
         self._gl, self._dispatch, self._mass = gl, dispatch, mass
-        topology, cells, ride = stencil.topology, stencil.cells, stencil.places.ride.ride
+        topology, texels, ride = stencil.topology, stencil.cells, stencil.places.ride.ride
         self._width, self._count = topology.halo.shape[1], topology.halo.size
-        self._special: Ride = ride.of_each(cells.special_places)
+        at = texels.special_places  # nowhere off their triangles, see `StencilBuffer`
+        self._special = Ride(ride.corners[at], ride.weights[at], ride.offsets)
         self._around = np.zeros((3, self._count))
-        added, crossing, missing = cells.special_links, crossing_links(topology), missing_links(topology)
+        added, crossing, missing = texels.special_links, crossing_links(topology), missing_links(topology)
         self._added = _link_groups(gl, topology, added, np.arange(len(added) + 1))
         self._copies = _link_groups(gl, topology, crossing.copies, crossing.begins)
         self._missing = _link_groups(gl, topology, missing, np.arange(len(missing) + 1))
@@ -63,7 +57,8 @@ class DeviceStiffness:
         )
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
         self._shaders = {name: dispatch.shader(name) for name in names}
-        self._shaders["quads"] = dispatch.shader("quads", **_LAW)
+        law = {name: float(getattr(cells, name)) for name in _LAW}
+        self._shaders["quads"] = dispatch.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
 
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks | None:
         """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
@@ -80,7 +75,7 @@ class DeviceStiffness:
             for (groups, *links), factor in ((self._missing, 0.0), (self._copies, 1.0)):
                 self._run("close_links", groups, buffer, *links, factor=factor)
             self._run("add_links", self._added[0], buffer, self._added[1], self._values)
-            stencil.note_fastest(self._fastest(irregular, buffer))
+            stencil.known_fastest = self._fastest(irregular, buffer)
         return irregular
 
     def _fastest(self, irregular: IrregularLinks | None, buffer: moderngl.Buffer) -> float:
@@ -102,7 +97,7 @@ class DeviceStiffness:
         shader = self._shaders[name]
         for uniform, value in {"count": count, **uniforms}.items():
             shader[uniform] = value
-        self._dispatch.bind(*buffers)
+        bind_buffers(*buffers)
         self._dispatch.run_list(shader, count)
 
 
@@ -189,15 +184,15 @@ class ExtraForces:
         dispatch = self._dispatch
         if self._viscosity:
             dispatch.fill_halo(velocity)
-            dispatch.bind(velocity, self.field, None, self._viscosity.buffer)
+            bind_buffers(velocity, self.field, None, self._viscosity.buffer)
             dispatch.run_texels(self._apply_viscosity)
             self._apply_links(self._viscosity_links, velocity, self.field)
         if self._laplace:
-            dispatch.bind(height, self._moment, None, self._laplace.buffer, self._rigidity)
+            bind_buffers(height, self._moment, None, self._laplace.buffer, self._rigidity)
             dispatch.run_texels(self._apply_rigidity)
             self._apply_links(self._moment_links, height, self._moment)
             dispatch.fill_halo(self._moment)
-            dispatch.bind(self._moment, self.field, None, self._laplace.buffer)
+            bind_buffers(self._moment, self.field, None, self._laplace.buffer)
             dispatch.run_texels(self._subtract_laplace)
             self._apply_links(self._bending_links, self._moment, self.field)
 
@@ -217,7 +212,7 @@ class ExtraForces:
     ) -> None:
         count, *buffers = links
         if count:
-            self._dispatch.bind(field, result, None, *buffers)
+            bind_buffers(field, result, None, *buffers)
             self._dispatch.run_list(self._irregular, count)
 
 
@@ -334,7 +329,7 @@ class GLBackend:
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
                 operator = self._stencil.buffer, self._coefficients, self._extra.field
-                self._dispatch.bind(self._h, self._v, self._h_next, *operator, *pressure)
+                bind_buffers(self._h, self._v, self._h_next, *operator, *pressure)
                 self._dispatch.run_texels(kick_drift)
                 self._kick_irregular(drift)
                 self._h, self._h_next = self._h_next, self._h
@@ -373,21 +368,21 @@ class GLBackend:
             self._drift["dt"] = dt
             if self._given is None:
                 self._drift["shift"] = self._shift
-                self._dispatch.bind(self._h, self._v, self._response)
+                bind_buffers(self._h, self._v, self._response)
             else:
                 self._given.set(self._shift)
-                self._dispatch.bind(self._h, self._v, self._response, self._given.parts, self._given.amplitudes)
+                bind_buffers(self._h, self._v, self._response, self._given.parts, self._given.amplitudes)
             self._dispatch.run_texels(self._drift)
         self._shift = 0.0
 
     def _flow(self) -> None:
         if self._dent is not None and self._yield is not None:
-            self._dispatch.bind(self._h, self._dent, self._yield)
+            bind_buffers(self._h, self._dent, self._yield)
             self._dispatch.run_texels(self._yielding)
 
     def _raise_crests(self, crests: moderngl.Buffer) -> None:
         shader = self._dispatch.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
-        self._dispatch.bind(self._h, crests, self._dent)
+        bind_buffers(self._h, crests, self._dent)
         self._dispatch.run_texels(shader)
 
     def _kick_irregular(self, dt: float) -> None:
@@ -395,7 +390,7 @@ class GLBackend:
         count, *buffers = self._links
         if count:
             self._irregular_kick["dt"] = dt
-            self._dispatch.bind(self._h, self._v, self._h_next, *buffers)
+            bind_buffers(self._h, self._v, self._h_next, *buffers)
             self._dispatch.run_list(self._irregular_kick, count)
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
@@ -434,5 +429,5 @@ class GLBackend:
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:
             self._kick["dt"] = dt
-            self._dispatch.bind(self._h, self._v, kicks.places, kicks.values)
+            bind_buffers(self._h, self._v, kicks.places, kicks.values)
             self._dispatch.run_list(self._kick, kicks.count)

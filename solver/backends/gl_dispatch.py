@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext
+from ..gl import GLContext, bind_buffers
 from ..operator.volume import VolumeRate
 from ..operator.wave_operator import WaveOperator
 from .gl_fields import FieldLayout
@@ -39,20 +39,9 @@ class Dispatch:
         """A shader that runs over all texels, see charts.glsl."""
         return self.shader(name, N=self._fields.n, **defines)
 
-    def bind(self, *buffers: moderngl.Buffer | None) -> None:
-        """Bind buffers to 0, 1, 2 ..., in the order in which the shader declares them; None leaves out a binding."""
-        for binding, buffer in enumerate(buffers):
-            if buffer is not None:
-                buffer.bind_to_storage_buffer(binding)
-
     def run_texels(self, shader: moderngl.ComputeShader) -> None:
         """Run a shader over all texels."""
         self.run_list(shader, self._fields.count)
-
-    def run_groups(self, shader: moderngl.ComputeShader, count: int) -> None:
-        """Run so many groups of threads."""
-        shader.run(count)
-        self._gl.barrier()
 
     def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
         """Run a shader over a list of so many entries, of which it is told."""
@@ -64,7 +53,7 @@ class Dispatch:
         """Fill the halo of a field."""
         count = self._fields.halo_count
         if count:
-            self.bind(field, self._fields.halo_pairs)
+            bind_buffers(field, self._fields.halo_pairs)
             self.run_list(self._halo, count)
 
 
@@ -114,9 +103,10 @@ class VolumeKeeper(Pressure):
 
     def follow(self, height: moderngl.Buffer, velocity: moderngl.Buffer) -> None:
         """Set the amplitudes of the coming substep."""
-        self._dispatch.bind(height, velocity, self._addresses, self._factors, self._chunks, self._sums)
-        self._dispatch.run_groups(self._weigh, self._chunk_count)
-        self._dispatch.bind(self._loaded, self._sums, self._begins, self.amplitudes)
+        bind_buffers(height, velocity, self._addresses, self._factors, self._chunks, self._sums)
+        self._weigh.run(self._chunk_count)
+        self._gl.barrier()
+        bind_buffers(self._loaded, self._sums, self._begins, self.amplitudes)
         self._dispatch.run_list(self._balance, self._count)
 
 

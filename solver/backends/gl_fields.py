@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext
+from ..gl import GLContext, bind_buffers
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil
 from ..texels.topology import TexelTopology
 
@@ -36,8 +36,7 @@ class DeviceField:
             self._peak = ctx.buffer(bytes(4))
             program = gl.shared_compute_shader(_SHADERS, "backends/shaders/device_field", GROUP=_GROUP, **defines)
             program["count"], program["share"] = count, share
-            for binding, buffer in enumerate((self.buffer, self._peak, *sources)):
-                buffer.bind_to_storage_buffer(binding)
+            bind_buffers(self.buffer, self._peak, *sources)
             program.run(-(-count // _GROUP))
             ctx.memory_barrier()
             self._fence = gl.put_fence()

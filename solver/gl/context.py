@@ -156,46 +156,16 @@ def load_egl() -> ctypes.CDLL:
     raise GLError("the EGL library is gone since the context was created; see `ripple-sim info`")
 
 
+def bind_buffers(*buffers: moderngl.Buffer | None) -> None:
+    """Bind storage buffers to 0, 1, 2 ..., in the order in which a shader declares them; None leaves out a binding."""
+    for binding, buffer in enumerate(buffers):
+        if buffer is not None:
+            buffer.bind_to_storage_buffer(binding)
+
+
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
 _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
-
-
-class Fences:
-    """Creates fences in the current context, and waits for them without holding the interpreter's lock.
-
-    `address` gives that of an OpenGL function by its name.
-    """
-
-    def __init__(self, address: Callable[[bytes], int]) -> None:
-        pointer, number, wide = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint64
-        self._create = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
-        self._wait = ctypes.CFUNCTYPE(number, pointer, number, wide)(address(b"glClientWaitSync"))
-        self._delete = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
-
-    def put(self) -> int:
-        """Put a fence behind all commands so far, and return its handle."""
-        return self._create(_COMMANDS_COMPLETE, 0)
-
-    def reached(self, fence: int, patience: float) -> bool:
-        """Wait until the driver has finished all commands before the fence, for so long [s] at most.
-
-        A fence that was reached is deleted.
-
-        Raises
-        ------
-        GLError
-            If the driver reports a failure.
-        """
-        state = _FAILED
-        try:
-            state = self._wait(fence, _FLUSH, round(1e9 * patience))
-        finally:
-            if state != _TIMEOUT_EXPIRED:
-                self._delete(fence)
-        if state == _FAILED:
-            raise GLError("OpenGL cannot wait for its own commands; see `ripple-sim info`")
-        return state != _TIMEOUT_EXPIRED
 
 
 _MOST = 64  # idle at a time
@@ -275,7 +245,11 @@ class GLContext:
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self._depth = 0
-        self._fences = Fences(load_egl().eglGetProcAddress)
+        # fences, which moderngl lacks; ctypes lets go of the interpreter's lock while they are waited for
+        pointer, number, address = ctypes.c_void_p, ctypes.c_uint, load_egl().eglGetProcAddress
+        self._create_fence = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
+        self._client_wait = ctypes.CFUNCTYPE(number, pointer, number, ctypes.c_uint64)(address(b"glClientWaitSync"))
+        self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
         self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
         self._before: int | None = None
         self._pool = ProgramPool()
@@ -358,19 +332,31 @@ class GLContext:
     def put_fence(self) -> int:
         """Put a fence behind all commands so far, and return its handle; wait for each fence once."""
         with self:
-            return self._fences.put()
+            return self._create_fence(_COMMANDS_COMPLETE, 0)
 
     def wait_for(self, fence: int) -> None:
-        """Wait until the driver has reached a fence, as `wait` does for all commands.
+        """Wait until the driver has reached a fence, as `wait` does for all commands; the fence is then deleted.
 
         Outside of the context's `with` block other threads may enter meanwhile.
+
+        Raises
+        ------
+        GLError
+            If the driver reports a failure.
         """
-        reached = False
-        while not reached:
+        while True:
             with self:
-                reached = self._fences.reached(fence, _TURN)
-            if not reached:
-                time.sleep(_PAUSE)
+                state = _FAILED
+                try:
+                    state = self._client_wait(fence, _FLUSH, round(1e9 * _TURN))
+                finally:
+                    if state != _TIMEOUT_EXPIRED:
+                        self._delete_fence(fence)
+                if state == _FAILED:
+                    raise GLError("OpenGL cannot wait for its own commands; see `ripple-sim info`")
+            if state != _TIMEOUT_EXPIRED:
+                return
+            time.sleep(_PAUSE)
 
     def compute_shader(
         self, package: str, name: str, stage: str = "compute", **defines: object

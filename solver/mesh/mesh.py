@@ -24,7 +24,7 @@ from .clean import (
     without_slivers,
 )
 from .sheets import cut_apart
-from .topology import distinct, genera, labels, rims_of, sides_of
+from .topology import distinct, genera, labels, rims_of, sides_of, triangle_areas
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
 _STEPS = 300
@@ -180,8 +180,7 @@ class Mesh:
     @functools.cached_property
     def triangle_areas(self) -> NDArray[np.float64]:
         """Triangle areas [m^2], shape [triangle_count]."""
-        sides = self.V[self.F[:, 1:]] - self.V[self.F[:, :1]]
-        return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+        return triangle_areas(self.V, self.F)
 
     @property
     def area(self) -> float:

@@ -21,9 +21,8 @@ class Element:
 
     name: str
     rows: int
-    names: list[str] = dataclasses.field(default_factory=list)
-    types: list[str] = dataclasses.field(default_factory=list)
-    lengths: list[str | None] = dataclasses.field(default_factory=list)
+    # name, type, and type of the length of each
+    columns: list[tuple[str, str, str | None]] = dataclasses.field(default_factory=list)
 
 
 def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
@@ -41,12 +40,12 @@ def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any]
     rows = [part.split() for part in parts[: element.rows]]
     columns: dict[str, Any] = {}
     try:
-        if not any(element.lengths):
-            table = np.array([row[: len(element.names)] for row in rows], dtype=np.float64)
-            table = table.reshape(element.rows, len(element.names))
-            return dict(zip(element.names, table.T, strict=True)), rest
+        if not any(length for _, _, length in element.columns):
+            width = len(element.columns)
+            table = np.array([row[:width] for row in rows], dtype=np.float64).reshape(element.rows, width)
+            return {name: table[:, k] for k, (name, _, _) in enumerate(element.columns)}, rest
         at = [0] * len(rows)
-        for name, length in zip(element.names, element.lengths, strict=True):
+        for name, _, length in element.columns:
             sizes = [1] * len(rows) if length is None else [int(row[i]) for row, i in zip(rows, at, strict=True)]
             first = [i + (length is not None) for i in at]
             at = [i + size for i, size in zip(first, sizes, strict=True)]
@@ -71,11 +70,11 @@ def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, An
 
 def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:
     """Read rows that are all of one length, in one go; None where their lists are not."""
-    if not element.names:
+    if not element.columns:
         return {}, data
     fields: list[Any] = []
     sizes: dict[str, int] = {}
-    for name, kind, length in zip(element.names, element.types, element.lengths, strict=True):
+    for name, kind, length in element.columns:
         if length is None:
             fields.append((name, order + kind))
             continue
@@ -95,24 +94,26 @@ def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, An
     table = np.frombuffer(data, row, element.rows)
     if any((table[f"{name} length"] != size).any() for name, size in sizes.items()):
         return None
-    return {name: table[name] for name in element.names}, data[element.rows * row.itemsize :]
+    return {name: table[name] for name, _, _ in element.columns}, data[element.rows * row.itemsize :]
 
 
 def _read_rows(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
-    columns: dict[str, list[NDArray]] = {name: [] for name in element.names}
-    kinds = [np.dtype(order + kind) for kind in element.types]
-    lengths = [None if length is None else np.dtype(order + length) for length in element.lengths]
+    columns: dict[str, list[NDArray]] = {name: [] for name, _, _ in element.columns}
+    given = [
+        (columns[name], np.dtype(order + kind), None if length is None else np.dtype(order + length))
+        for name, kind, length in element.columns
+    ]
     at = 0
     try:
         for _ in range(element.rows):
-            for name, kind, length in zip(element.names, kinds, lengths, strict=True):
+            for column, kind, length in given:
                 size = 1
                 if length is not None:
                     size = int(np.frombuffer(data, length, 1, at)[0])
                     at += length.itemsize
                 if not 0 <= size <= len(data):
                     raise _ends_early(element)
-                columns[name].append(np.frombuffer(data, kind, size, at))
+                column.append(np.frombuffer(data, kind, size, at))
                 at += size * kind.itemsize
     except ValueError as error:  # numpy, where bytes are missing
         raise _ends_early(element) from error
@@ -292,13 +293,9 @@ def _header(content: bytes) -> tuple[str, list[Element], bytes]:
                 case ["element", name, rows]:
                     elements.append(Element(name, int(rows)))
                 case ["property", "list", length, kind, name]:
-                    elements[-1].names.append(name)
-                    elements[-1].types.append(_TYPES[kind])
-                    elements[-1].lengths.append(_TYPES[length])
+                    elements[-1].columns.append((name, _TYPES[kind], _TYPES[length]))
                 case ["property", kind, name]:
-                    elements[-1].names.append(name)
-                    elements[-1].types.append(_TYPES[kind])
-                    elements[-1].lengths.append(None)
+                    elements[-1].columns.append((name, _TYPES[kind], None))
     except (KeyError, ValueError, IndexError) as error:
         raise MeshError(f"the line {' '.join(words)[:60]!r} of its header is not understood") from error
     if order is None or any(element.rows < 0 for element in elements):

@@ -53,6 +53,12 @@ def edges_of(F: NDArray[np.int64]) -> Edges:
     return Edges(np.stack([low[sides[:, 0]], high[sides[:, 0]]], axis=1), of.reshape(-1, 3), sides)
 
 
+def triangle_areas(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Areas of triangles, [m], in the square of the unit of the vertices V [n, 3]."""
+    a, b, c = (V[F[:, k]] for k in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+
 def counting_sort(key: Ints, order: Ints, size: int) -> tuple[Ints, Ints]:
     """Sort numbers [k] stably by their keys [k], below `size`: where those of each key begin [size + 1], and all [k].
 
@@ -115,12 +121,8 @@ def undirected(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool
 
 def sides_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Sides of a manifold mesh, numbered 3 x triangle + side: pairs that lie together [k, 2], and those on rims [j]."""
-    key, _ = undirected(F)
-    order = np.argsort(key, kind="stable")
-    second = np.flatnonzero(key[order[1:]] == key[order[:-1]]) + 1
-    alone = np.ones(len(key), dtype=bool)
-    alone[second], alone[second - 1] = False, False
-    return np.stack([order[second - 1], order[second]], axis=1), np.sort(order[alone])
+    edges = edges_of(F)
+    return edges.sides[~edges.rim], np.sort(edges.sides[edges.rim, 0])
 
 
 def genera(F: NDArray[np.int64], part: NDArray[np.int64], rims: tuple[NDArray[np.int64], ...]) -> NDArray[np.int64]:

@@ -99,7 +99,11 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
         return None
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
     count = int(parts.max()) + 1
-    kept = np.array([_is_kept(operator, parts == part) for part in range(count)])
+    kept = np.zeros(count, bool)
+    for part in range(count):
+        own = parts == part
+        movable = own & operator.movable
+        kept[part] = movable.any() and not operator.anchored[own].any() and not np.ptp(operator.stiffness[movable])
     decay, span = damped_step(operator, dt)
     weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)
@@ -111,7 +115,9 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     velocities = weight * (decay - even_decay)
     if operator.viscosity_stencil is not None:
         velocities = velocities + operator.viscosity_stencil(moved)
-    heights, velocities = (_cleared(scale * each).reshape(-1) for each in (heights, velocities))
+    heights, velocities = ((scale * each).reshape(-1) for each in (heights, velocities))
+    for each in (heights, velocities):
+        each[np.abs(each) <= _NOTHING * np.abs(each).max(initial=0.0)] = 0.0
     texels = np.flatnonzero((heights != 0) | (velocities != 0))
     texels = texels[np.argsort(parts.reshape(-1)[texels], kind="stable")]
     begins = np.searchsorted(parts.reshape(-1)[texels], np.arange(count + 1))
@@ -121,16 +127,6 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     return VolumeRate(begins, texels, heights[texels].astype(np.float32), counting.astype(np.float32))
 
 
-def _is_kept(operator: WaveOperator, part: NDArray[np.bool_]) -> bool:
-    movable = part & operator.movable
-    return bool(movable.any() and not operator.anchored[part].any() and not np.ptp(operator.stiffness[movable]))
-
-
 def _mean(field: NDArray[np.float64]) -> float:
     """Mean of a field; of a uniform one its value, to the last bit."""
     return float(field.flat[0]) if not np.ptp(field) else float(field.mean())
-
-
-def _cleared(field: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A field without its round-off."""
-    return np.where(np.abs(field) > _NOTHING * np.abs(field).max(initial=0.0), field, 0.0)

@@ -234,7 +234,7 @@ class WaveOperator:
         if self.laplace_stencil is not None and self.rigidity is not None:
             bending = self.laplace_stencil.fastest(self.mass)
             bound += bending * float((self.rigidity * self.mass).max()) * bending
-        wave = self._rate(self.link_force, bound) + self.stiffness.max()
+        wave = self._lightened(self._rate(self.link_force, bound) + self.stiffness.max())
         viscous = 0.0
         if self.viscosity_stencil is not None:
             bound = self.viscosity_stencil.fastest(self.mass)
@@ -242,6 +242,10 @@ class WaveOperator:
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
         return np.inf if rate == 0 else float(SAFETY * 4 / rate)
+
+    def _lightened(self, rate: float) -> float:
+        """What a squared frequency is at most, whatever moves with the surface."""
+        return rate
 
     def _rate(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
         """Largest eigenvalue of -M^-1 force, or its bound."""

@@ -55,11 +55,6 @@ class Ride(NamedTuple):
             points += np.einsum("ij,ijk->ki", self.offsets, _frames(V, self.corners))
         return points
 
-    def of_each(self, which: Ints) -> Ride:
-        """The ride of some of the points, by their numbers."""
-        offsets = self.offsets[which] if len(self.offsets) else self.offsets
-        return Ride(self.corners[which], self.weights[which], offsets)
-
 
 class SurfaceRide:
     """All places of an atlas, with halo, on vertices that move.
@@ -136,6 +131,11 @@ class MovedStencil(Stencil):
     ----------
     multiple : (MovedStencil, float), optional
         One of which this is a multiple, and by how much.
+
+    Attributes
+    ----------
+    known_fastest : float or None
+        What `fastest` gives, where a GPU has found it.
     """
 
     def __init__(
@@ -146,9 +146,8 @@ class MovedStencil(Stencil):
         multiple: tuple[MovedStencil, float] | None = None,
     ) -> None:
         self.topology, self.cells, self.coefficient, self.places = cells.topology, cells, coefficient, places
-        self._multiple, self._fastest = multiple, None
-
-    _fastest: float | None
+        self._multiple = multiple
+        self.known_fastest: float | None = None
 
     @functools.cached_property
     def _made(self) -> tuple[Stencil, NDArray[np.float64]]:
@@ -172,13 +171,9 @@ class MovedStencil(Stencil):
         """Area of the texel mesh that belongs to each texel [m^2], [C, n, n]."""
         return self._made[1]
 
-    def note_fastest(self, rate: float) -> None:
-        """Take over what `fastest` gives from whoever knows it."""
-        self._fastest = rate
-
     def fastest(self, mass: NDArray[np.float64]) -> float:
-        """As for any stencil, or as noted."""
-        return super().fastest(mass) if self._fastest is None else self._fastest
+        """As for any stencil, or what is known."""
+        return super().fastest(mass) if self.known_fastest is None else self.known_fastest
 
 
 def _frames(V: Floats, corners: NDArray[np.integer]) -> NDArray[np.float64]:

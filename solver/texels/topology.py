@@ -116,7 +116,7 @@ def close_corners(
     for chart in range(len(glued)):
         for corner in range(4):
             fan, closed = _fan(glued, chart, corner)
-            texels = np.array([_corner_texel(c, k, n) for c, k in fan])
+            texels = np.array([c * n * n + _CORNERS[k] @ (n, 1) * (n - 1) for c, k in fan])
             place = (chart, *_CORNERS[corner] * (n + 1))
             count = len(fan)
             if corners[chart, corner] < 0:
@@ -153,11 +153,6 @@ def _fan(glued: NDArray[np.int64], chart: int, corner: int) -> tuple[list[tuple[
         if other < 0:
             return fan, False
         fan.insert(0, (other, (side + 1) % 4))
-
-
-def _corner_texel(chart: int, corner: int, n: int) -> int:
-    row, column = _CORNERS[corner] * (n - 1)
-    return int((chart * n + row) * n + column)
 
 
 def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:

@@ -12,20 +12,6 @@ from ..errors import SolverError, is_finite, shown, whole
 from ..texels.atlas import Atlas
 
 
-def where_not_finite(atlas: Atlas, field: NDArray) -> str | None:
-    """Name the place from which NaN or infinity spreads in a field [C, n, n], or None where all is finite."""
-    if np.isfinite(field.sum(dtype=np.float64)):
-        return None
-    bad = ~np.isfinite(field)
-    # it spreads by a texel a substep on all sides, so it began in the middle
-    places = atlas.positions[bad]
-    middle = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
-    chart, row, column = np.argwhere(bad)[middle]
-    x, y, z = places[middle]
-    where = f"at chart {chart}, row {row}, column {column}, ({x:.4g}, {y:.4g}, {z:.4g}) m"
-    return f"{where} ({bad.sum()} of {bad.size} texels)"
-
-
 def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """A number, or an array of the given shape, as a float32 field [C, n, n].
 
@@ -129,12 +115,17 @@ class FiniteGuard:
 
     def check(self, field: NDArray[np.float32], name: str, time: float) -> None:
         """Raise `SolverError` if a field [C, n, n] is not finite, the first time."""
-        if self._reported:
-            return
-        where = where_not_finite(self._atlas, field)
-        if where is None:
+        if self._reported or np.isfinite(field.sum(dtype=np.float64)):
             return
         self._reported = True
+        bad = ~np.isfinite(field)
+        # it spreads by a texel a substep on all sides, so it began in the middle
+        places = self._atlas.positions[bad]
+        middle = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
+        chart, row, column = np.argwhere(bad)[middle]
+        x, y, z = places[middle]
+        where = f"at chart {chart}, row {row}, column {column}, ({x:.4g}, {y:.4g}, {z:.4g}) m"
+        where += f" ({bad.sum()} of {bad.size} texels)"
         cause = "no source was given: the state held it"
         kind, value, unit, given = self._largest
         if kind:

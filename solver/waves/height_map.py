@@ -18,7 +18,7 @@ from ..backends.gl_fields import DeviceField
 from ..cache import kept_with
 from ..errors import SolverError
 from ..files import require_memory
-from ..gl import GLContext
+from ..gl import GLContext, bind_buffers
 from ..kernel import Floats32, kernel
 from ..texels.atlas import Atlas
 from ..texels.texel_atlas import ChartPage
@@ -133,21 +133,16 @@ class HeightMapShaders:
             if limit is not None and limited:
                 self._peak.write(bytes(4))
                 self._radii = self._radii or ctx.buffer(limit.radius.tobytes())
-            self._bind(self._around, self._peak, self._sources, field.buffer, self._radii)
+            bind_buffers(self._around, self._peak, self._sources, field.buffer, self._radii)
             self._run(ctx, self._limited if limited else self._heights, self._place_count)
             texture.bind_to_image(0, read=True, write=True)
-            self._bind(self._around, self._weights, self._sources)
+            bind_buffers(self._around, self._weights, self._sources)
             self._map["layer"] = layer
             self._run(ctx, self._map, self._place_count)
-            self._bind(self._corner_places)
+            bind_buffers(self._corner_places)
             self._corners["layer"], self._corners["means"], self._corners["count"] = layer, *self._corner_counts
             self._run(ctx, self._corners, self._corner_counts[1])
             return float(np.frombuffer(self._peak.read(), np.float32)[0]) if limited else highest
-
-    def _bind(self, *buffers: moderngl.Buffer | None) -> None:
-        for binding, buffer in enumerate(buffers):
-            if buffer is not None:
-                buffer.bind_to_storage_buffer(binding)
 
     def _run(self, ctx: moderngl.Context, shader: moderngl.ComputeShader, count: int) -> None:
         if count:

@@ -12,7 +12,7 @@ from ..errors import RippleWarning, SolverError, shown
 from ..kernel import Floats, Floats32, Ints, kernel
 from ..mesh.closest import refitted
 from ..mesh.mesh import Mesh
-from ..mesh.topology import Folds
+from ..mesh.topology import Folds, edges_of
 from ..operator.assembly import MovingOperator
 from ..operator.material import Material
 from ..operator.wave_operator import WaveOperator
@@ -54,10 +54,8 @@ class Motion:
         self._ride = SurfaceRide(atlas)
         self._operator = MovingOperator(atlas, material, operator)
         self._folds = Folds(atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64))
-        F = self._folds.F
-        self._edges = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-        self._squares = np.empty(len(self._edges))
-        _square_lengths(atlas.mesh.V, self._edges, self._squares)
+        self._edges = edges_of(self._folds.F).ends
+        self._squares = self._square_lengths()
         self._now = operator
         self._warned, self._looks = False, 0
 
@@ -73,7 +71,7 @@ class Motion:
         self.__dict__.pop("atlas", None)
         if not _stretches(self.V, self._edges, self._squares):
             return None
-        _square_lengths(self.V, self._edges, self._squares)
+        self._squares = self._square_lengths()
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
         self.__dict__.pop("areas", None)
         self._warn_of_folds()
@@ -97,6 +95,10 @@ class Motion:
         moved = Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
         moved.__dict__["tree"] = refitted(rest.tree, V, mesh.F)
         return moved
+
+    def _square_lengths(self) -> NDArray[np.float64]:
+        ends = self.V[self._edges]
+        return ((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1)
 
     def _checked(self, vertices: ArrayLike) -> NDArray[np.float64]:
         shape = self.rest.mesh.V.shape
@@ -129,28 +131,15 @@ class Motion:
 
 
 @kernel
-def _square_lengths(V: Floats, edges: Ints, squares: Floats) -> None:
-    """Fill in the squared lengths [k] of edges [k, 2]."""
-    for i in range(len(edges)):
-        squares[i] = _squared(V, edges, i)
-
-
-@kernel
 def _stretches(V: Floats, edges: Ints, squares: Floats) -> bool:
     """Whether any edge has another length than it had."""
-    i = 0
-    while i < len(edges) and abs(_squared(V, edges, i) - squares[i]) <= _CHANGED * squares[i]:
-        i += 1
-    return i < len(edges)
-
-
-@kernel
-def _squared(V: Floats, edges: Ints, i: int) -> float:
-    """Squared length of an edge."""
-    a, b, total = edges[i, 0], edges[i, 1], 0.0
-    for k in range(3):
-        total += (V[b, k] - V[a, k]) ** 2
-    return total
+    for i in range(len(edges)):
+        a, b, square = edges[i, 0], edges[i, 1], 0.0
+        for k in range(3):
+            square += (V[b, k] - V[a, k]) ** 2
+        if not abs(square - squares[i]) <= _CHANGED * squares[i]:
+            return True
+    return False
 
 
 class MovedGradients:

@@ -16,6 +16,7 @@ from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, uncut
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, glue, stretch_summary
 from ..energy import COLUMN, FIXED
+from .disks import signed_areas
 from .layout import PatchMap, patch_map
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
@@ -84,8 +85,13 @@ class PatchChartMap:
         return np.clip(coordinates[..., 1:], 0.0, 1.0)
 
     def quality(self, mesh: Mesh) -> dict[str, float]:
-        """Folds and stretch."""
-        return map_quality(mesh, self.pieces)
+        """Flipped pieces, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
+        pieces, flat = self.pieces, signed_areas(self.pieces.places)
+        # the determinant is the share of its triangle that each piece has
+        real = mesh.triangle_areas[pieces.triangle] * np.abs(np.linalg.det(pieces.barycentrics))
+        even = flat * mesh.area / (int(pieces.chart.max()) + 1)
+        stretch = np.sqrt(real / np.maximum(even, np.finfo(np.float64).tiny))
+        return {"flipped": int((flat <= 0).sum()), **stretch_summary(stretch, real)}
 
     def arrays(self) -> dict[str, NDArray]:
         """The pieces."""
@@ -256,18 +262,14 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
     pieces = chart_pieces(patches)
     if offsets.any():
         pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
-    sampled = _map_ratios(patches)[samples.small] / n**2
+    # real area of each triangle for each unit of its area on the charts
+    ratios = patches.surface.areas / signed_areas(corner_places(patches.seamless))
     return Atlas(
         mesh=mesh,
-        texels=TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond, sampled=sampled),
+        texels=TexelMesh.of(
+            topology, samples.positions, normals=samples.normals, beyond=beyond, sampled=ratios[samples.small] / n**2
+        ),
         chart_map=PatchChartMap(pieces),
         triangles=samples.triangles,
         barycentrics=samples.barycentrics,
     )
-
-
-def _map_ratios(patches: PatchMap) -> NDArray[np.float64]:
-    """Real area of each triangle for each unit of its area on the charts [m^2], [m]."""
-    places = corner_places(patches.seamless)
-    u, v = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
-    return patches.surface.areas / ((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)

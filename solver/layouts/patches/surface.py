@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mesh.topology import SPLITS, Edges, edges_of
+from ...mesh.topology import SPLITS, Edges, edges_of, triangle_areas
 
 # Of a triangle abc: its corners, a point on each of its sides, and one inside.
 A, B, C, AB, BC, CA, MIDDLE = range(7)
@@ -67,8 +67,7 @@ class Surface:
     @functools.cached_property
     def areas(self) -> NDArray[np.float64]:
         """Areas of the triangles [m^2], [m]."""
-        a, b, c = (self.V[self.F[:, k]] for k in range(3))
-        return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+        return triangle_areas(self.V, self.F)
 
     @functools.cached_property
     def angles(self) -> NDArray[np.float64]:

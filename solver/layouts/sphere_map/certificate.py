@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import Floats, kernel
+from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, cross, dot, row, subtract
 
 EPSILON = float(np.finfo(np.float64).eps)
@@ -59,13 +60,8 @@ def stretch(V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float6
 
     How many times wider than in an ideal even grid the texels are there.
     """
-    real = areas(V, F)
+    real = triangle_areas(V, F)
     return np.sqrt(4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny))
-
-
-def areas(P: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
-    """Areas of triangles, shape [m]."""
-    return 0.5 * np.linalg.norm(np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]]), axis=1)
 
 
 def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:

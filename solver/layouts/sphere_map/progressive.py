@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from ...errors import SphereMapError
 from ...kernel import Floats, Ints32, kernel
+from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
 from ..energy import FOLDED, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
 from ..newton import CG_TOLERANCE, System, add_triangle, conjugate_gradients, descend_by_newton, line_search
-from .certificate import align, areas, certify
+from .certificate import align, certify
 from .decimation import CornerTable, corner_table, decimate, following, gather_star, preceding, undo_collapse
 from .level import Level, RealSurface, build_level, carry, star_shapes, update_level, update_load, update_triangle
 
@@ -275,13 +276,13 @@ def _normalise(V: Floats, F: NDArray[np.integer]) -> Floats:
     Without rounding, the last bits would decide between the many equivalent ways out of a symmetric coarse level.
     """
     V = V - V.mean(axis=0)
-    return np.rint(V * np.sqrt(4 * np.pi / np.sum(areas(V, F))) * GRID) / GRID
+    return np.rint(V * np.sqrt(4 * np.pi / np.sum(triangle_areas(V, F))) * GRID) / GRID
 
 
 def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     n = len(V)
     carried = np.full(n, 1e-3 * 4 * np.pi / n)  # every vertex gets some room, even if its triangles have no area
-    carried += np.bincount(F.ravel(), np.repeat(areas(V, F) / 3, 3), n)
+    carried += np.bincount(F.ravel(), np.repeat(triangle_areas(V, F) / 3, 3), n)
     table = corner_table(F, n)
     log = decimate(table, V)
     removed, kept = table.tail[log], table.tail[table.twin[log]]

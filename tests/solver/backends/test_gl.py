@@ -36,7 +36,7 @@ def test_a_list_is_run_to_its_last_entry_and_not_beyond(count: int) -> None:
         places = ctx.buffer(layout.texels.astype(np.int32).tobytes())
         shader = dispatch.shader("kick")
         shader["dt"] = 0.5
-        dispatch.bind(height, velocity, places, ctx.buffer(kicks.tobytes()))
+        bind_buffers(height, velocity, places, ctx.buffer(kicks.tobytes()))
         dispatch.run_list(shader, count)
     kicks[count:] = 0
     np.testing.assert_allclose(layout.read(velocity).ravel(), v.ravel() + kicks, rtol=1e-6)
