@@ -163,16 +163,6 @@ def test_modes_without_ripples_say_so(path: Path) -> None:
         RippleWrapper(BallEnv(path, render_mode="human"), MATERIALS, **OPTIONS)
 
 
-def test_environments_in_parallel(path: Path) -> None:
-    envs = gymnasium.vector.SyncVectorEnv([lambda: RippleWrapper(BallEnv(path), MATERIALS, **OPTIONS)] * 2)
-    envs.reset(seed=1)
-    for _ in range(20):
-        *_, info = envs.step(np.zeros((2, 1)))
-    assert info["heights"]["block"].shape == (2, 6, N, N)
-    assert info["heights"]["block"][1].any()
-    envs.close()
-
-
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize(("mode", "keywords"), [("sync", {}), ("async", {"context": "spawn"})])
 def test_make_vec_makes_ripples_in_this_process_and_in_others(mode: str, keywords: dict[str, Any]) -> None:

@@ -68,15 +68,6 @@ def test_a_signal_that_the_parent_ignores_stays_ignored(number: int, take: objec
     signal.raise_signal(number)  # nothing happens
 
 
-@pytest.mark.parametrize(("number", "line"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
-def test_before_a_command_the_process_ends_with_one_line(number: int, line: str) -> None:
-    program = (
-        "import signal\nfrom ripple_sim.cli import signals\nsignals.end_at_once()\n"
-        f"try:\n    signal.raise_signal({int(number)})\nexcept BaseException as error:\n    print(repr(error))\n"
-    )
-    assert ended(program) == (128 + number, "", f"ripple-sim: {line}\n")
-
-
 def test_an_import_is_waited_for(tmp_path: Path) -> None:
     """An export that was interrupted while it imported its writer left a hidden folder behind."""
     (tmp_path / "slow.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nprint('imported')\n")

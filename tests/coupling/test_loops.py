@@ -180,8 +180,6 @@ def test_data_of_another_model_is_refused() -> None:
             call(data)
     with pytest.raises(RippleError, match="data is NoneType"):
         ripples.step(None)
-    same = mujoco.MjModel.from_xml_string(BALL)
-    ripples.step(mujoco.MjData(same))
 
 
 def spoilt(ripples: Ripples) -> None:

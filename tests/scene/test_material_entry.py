@@ -4,14 +4,13 @@ import dataclasses
 import inspect
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError
-from ripple_sim.scene import LAWS, MapEntry, MaterialChange, MaterialEntry, PresetEntry, load_scene, parse_scene
+from ripple_sim.scene import LAWS, MaterialChange, MaterialEntry, PresetEntry, load_scene, parse_scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver import SolverError, texture_map
+from ripple_sim.solver import texture_map
 
 
 def material_of(table: dict) -> Material:
@@ -111,10 +110,3 @@ def test_coefficients_are_numbers_paths_or_tables() -> None:
     assert (maps["damping"].low, maps["damping"].high) == (0.0, 5.0)
     material = content.ripple[0].material.material()
     assert (material.speed, material.damping, material.bending) == (1.0, 5.0, 0.2)
-
-
-def test_missing_picture_is_named() -> None:
-    scene = load_scene("face")
-    entry = msgspec.structs.replace(scene.targets[0], material=MaterialEntry(speed=MapEntry("slot_scratch.png")))
-    with pytest.raises(SolverError, match=r"slot_scratch\.png.* cannot be read"):
-        Simulation(dataclasses.replace(scene, targets=(entry,)), resolution=16, backend="cpu")

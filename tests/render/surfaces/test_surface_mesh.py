@@ -36,15 +36,14 @@ def vertices_at(chart, uv, positions=None, directions=None, midpoints=0, page=PA
     return SurfaceVertices(none, attributes, edges, places, places, np.zeros((0, 4)), none)
 
 
-def displaced(resources, vertices, height_map, place=STILL, used=(), layers=1, layer=0, page=PAGE) -> np.ndarray:
+def displaced(resources, vertices, height_map, place=STILL, used=(), page=PAGE) -> np.ndarray:
     """World positions and visibility [n, 4] as the GPU leaves them, NaN where it leaves nothing."""
-    height_maps = HeightMapTextures(resources, [page] * layers)
+    height_maps = HeightMapTextures(resources, [page])
     Occluders(resources, NoGeoms, np.zeros(0, dtype=np.int64)).bind(NoGeoms, np.zeros(3))
     with resources.gl as ctx:
-        for each in range(layers):
-            height_maps.write(each, height_map if each == layer else np.full_like(height_map, 1e6))
+        height_maps.write(0, height_map)
         height_maps.bind()
-        displacement = Displacement(resources, vertices, layer)
+        displacement = Displacement(resources, vertices, 0)
         displacement.moved.write(np.full(4 * len(vertices.attributes), np.nan, np.float32).tobytes())
         displacement.run(ctx, *place, np.array(used, dtype=np.int32))
         return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1]
