@@ -12,20 +12,9 @@ Limits that hold still, and short numbers.
 import numpy as np
 import pytest
 
+from ripple_sim import overlay
 from ripple_sim.errors import SceneError
-from ripple_sim.overlay import (
-    MOST_POINTS,
-    SIZE,
-    History,
-    Limit,
-    color_table,
-    colors,
-    compared_operators,
-    grid_spacing,
-    number,
-    readable,
-    round_up,
-)
+from ripple_sim.overlay import History, Limit
 
 # Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB
 DEUTAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
@@ -48,8 +37,8 @@ def lab(rgb: np.ndarray) -> np.ndarray:
 
 
 def test_colors_diverge_evenly_from_a_bright_middle() -> None:
-    table = lab(linear_rgb(color_table().astype(float)))
-    middle = SIZE // 2
+    table = lab(linear_rgb(overlay.color_table().astype(float)))
+    middle = overlay.SIZE // 2
     assert table[middle, 0] > 95
     assert np.abs(table[middle, 1:]).max() < 1
     np.testing.assert_allclose(table[:, 0], table[::-1, 0], atol=1.5)  # both arms equally light
@@ -63,39 +52,39 @@ def test_colors_diverge_evenly_from_a_bright_middle() -> None:
 
 @pytest.mark.parametrize("vision", [np.eye(3), DEUTAN, PROTAN])
 def test_signs_are_told_apart_by_every_eye(vision: np.ndarray) -> None:
-    seen = lab(linear_rgb(color_table().astype(float)) @ vision.T)
+    seen = lab(linear_rgb(overlay.color_table().astype(float)) @ vision.T)
     apart = np.linalg.norm(seen - seen[::-1], axis=1)
-    middle = SIZE // 2
+    middle = overlay.SIZE // 2
     assert apart[middle + middle // 4] > 15  # a difference of 2 to 3 is just seen
     assert apart[-1] > 50
 
 
 def test_colors_of_values() -> None:
-    table = color_table()
-    np.testing.assert_array_equal(colors([-3.0, -2.0, 0.0, 1.0, 2.0], 2.0), table[[0, 0, 256, 384, 512]])
+    table = overlay.color_table()
+    np.testing.assert_array_equal(overlay.colors([-3.0, -2.0, 0.0, 1.0, 2.0], 2.0), table[[0, 0, 256, 384, 512]])
 
 
 def test_comparison_names_its_baselines() -> None:
-    assert compared_operators(None) == ("fem",)
-    assert compared_operators("paper") == ("fem", "paper")
+    assert overlay.compared_operators(None) == ("fem",)
+    assert overlay.compared_operators("paper") == ("fem", "paper")
     with pytest.raises(SceneError, match="paper, uncorrected, dynamic-paint"):
-        compared_operators("fem")
+        overlay.compared_operators("fem")
 
 
 def test_grid_has_a_readable_number_of_cells() -> None:
-    assert [grid_spacing(n) for n in (8, 16, 24, 32, 96, 128, 256)] == [1, 1, 1, 2, 4, 8, 16]
+    assert [overlay.grid_spacing(n) for n in (8, 16, 24, 32, 96, 128, 256)] == [1, 1, 1, 2, 4, 8, 16]
 
 
-@pytest.mark.parametrize("frames", [1, 7, MOST_POINTS, MOST_POINTS + 1, 50 * MOST_POINTS + 3])
+@pytest.mark.parametrize("frames", [1, 7, overlay.MOST_POINTS, overlay.MOST_POINTS + 1, 50 * overlay.MOST_POINTS + 3])
 def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
     history, values = History(frames), np.random.default_rng(frames).random(frames)
     for value in values:
         history.add(value)
     at, kept = history.curve()
-    assert len(at) == len(kept) <= MOST_POINTS
+    assert len(at) == len(kept) <= overlay.MOST_POINTS
     assert kept.max() == values.max()
     assert at[-1] <= frames - 1
-    if frames <= MOST_POINTS:
+    if frames <= overlay.MOST_POINTS:
         np.testing.assert_array_equal(kept, values)
 
 
@@ -135,7 +124,7 @@ def test_limit_with_a_memory_overlooks_what_is_short() -> None:
 
 
 def test_numbers_are_short() -> None:
-    assert [round_up(x) for x in (0.001, 0.0011, 2.1, 81)] == [0.001, 0.0015, 3, 100]
-    assert [number(x) for x in (-20.0, 0.0, 2.5, -0.0)] == ["\N{MINUS SIGN}20", "0", "2.5", "0"]
-    assert [readable(x, "m")[1] for x in (2e-6, 0.02, 0.001, 3.0)] == ["\N{MICRO SIGN}m", "mm", "mm", "m"]
-    assert readable(0.02, "m")[0] * 0.02 == pytest.approx(20)
+    assert [overlay.round_up(x) for x in (0.001, 0.0011, 2.1, 81)] == [0.001, 0.0015, 3, 100]
+    assert [overlay.number(x) for x in (-20.0, 0.0, 2.5, -0.0)] == ["\N{MINUS SIGN}20", "0", "2.5", "0"]
+    assert [overlay.readable(x, "m")[1] for x in (2e-6, 0.02, 0.001, 3.0)] == ["\N{MICRO SIGN}m", "mm", "mm", "m"]
+    assert overlay.readable(0.02, "m")[0] * 0.02 == pytest.approx(20)

@@ -8,25 +8,9 @@ import numpy as np
 import pytest
 from mujoco_models import posed
 
+from ripple_sim import overlay
 from ripple_sim.coupling import Energy, Impulse
-from ripple_sim.overlay import (
-    TITLES,
-    ContactMarks,
-    EnergyPlot,
-    Layout,
-    Mark,
-    Notes,
-    Painter,
-    Projection,
-    Sprite,
-    arrow_key,
-    color_bar,
-    colors,
-    draw_marks,
-    label,
-    place_marks,
-    text_width,
-)
+from ripple_sim.overlay import Layout, Mark, Notes, Painter, Projection, Sprite
 from ripple_sim.render import Camera, Pose
 from ripple_sim.scene import NAMES, parse_request
 from ripple_sim.solver import sphere_atlas
@@ -42,7 +26,7 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, 
 
     def text(self: Sprite, x: float, y: float, text: str, size: int, *style: object) -> None:
         align = style[1] if len(style) > 1 else "left"
-        width = text_width(text, size)
+        width = overlay.text_width(text, size)
         left = x - {"left": 0.0, "middle": 0.5, "right": 1.0}[str(align)] * width
         boxes.append((left, y - 0.75 * size, left + width, y + 0.24 * size, self))
         plain(self, x, y, text, size, *style)
@@ -54,7 +38,7 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_ledger_stands_beside_nothing_else_or_is_left_out(size: tuple[int, int], written: list) -> None:
     layout = Layout(*size)
-    bare, plot = (EnergyPlot(layout, "wave energy", "J", 4.0, ledger=each) for each in (False, True))
+    bare, plot = (overlay.EnergyPlot(layout, "wave energy", "J", 4.0, ledger=each) for each in (False, True))
     curve = np.linspace(0, 3, 50), np.ones(50)
     height = bare.draw([curve], 1.0, 1.0).height
     written.clear()
@@ -72,11 +56,11 @@ def test_the_ledger_stands_beside_nothing_else_or_is_left_out(size: tuple[int, i
 def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], written: list) -> None:
     layout = Layout(*size)
     times, taken = np.linspace(0, 3, 200), np.zeros(size[::-1], int)
-    plot = EnergyPlot(layout, "wave energy", "J", 4.0, ["ripple-sim", "Dynamic Paint"])
+    plot = overlay.EnergyPlot(layout, "wave energy", "J", 4.0, ["ripple-sim", "Dynamic Paint"])
     panels = {
-        "top left": label("t = 12.34 s", layout.em, "slow"),
-        "top right": arrow_key(layout, 0.05, 0.05),
-        "bottom left": color_bar(layout, "velocity", "m/s", 0.5, 0.5),
+        "top left": overlay.label("t = 12.34 s", layout.em, "slow"),
+        "top right": overlay.arrow_key(layout, 0.05, 0.05),
+        "bottom left": overlay.color_bar(layout, "velocity", "m/s", 0.5, 0.5),
         "bottom right": plot.draw([(times, np.sin(times) ** 2)] * 2, 1.0, 1.0),
     }
     for corner, panel in panels.items():
@@ -94,7 +78,7 @@ def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], writ
 
 @pytest.mark.parametrize("size", [(320, 180), (1280, 720)])
 def test_a_comparison_fits(size: tuple[int, int], written: list) -> None:
-    titles = [TITLES["fem"], TITLES["dynamic-paint"]]
+    titles = [overlay.TITLES["fem"], overlay.TITLES["dynamic-paint"]]
     painter = Painter(parse_request(NAMES[1:]), Layout(*size), duration=5.0, spacing=8, titles=titles)
     curve = np.linspace(0, 5, 9), np.ones(9)
     scale = 1.0, 1.0
@@ -122,7 +106,7 @@ def test_a_tiny_frame_has_no_panels(size: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("size", SIZES)
 def test_numbers_on_an_axis_do_not_touch(size: tuple[int, int], written: list) -> None:
-    color_bar(Layout(*size), "height", "m", 0.0125, 0.0125)
+    overlay.color_bar(Layout(*size), "height", "m", 0.0125, 0.0125)
     rows: dict[float, list[tuple[float, float]]] = {}
     for left, _, right, bottom, _panel in written:
         rows.setdefault(bottom, []).append((left, right))
@@ -135,15 +119,15 @@ def test_numbers_on_an_axis_do_not_touch(size: tuple[int, int], written: list) -
 
 def test_bar_has_the_colors_of_its_values() -> None:
     layout = Layout(1280, 720)
-    bar = color_bar(layout, "height", "m", 0.02, 0.02)
+    bar = overlay.color_bar(layout, "height", "m", 0.02, 0.02)
     frame = np.zeros((bar.height, bar.width, 3), np.uint8)
     bar.over(frame, 0, 0)
     row = frame[round(2.25 * layout.em)].astype(int)
     for value in (-0.02, -0.01, 0.0, 0.005, 0.0199):
-        expected = colors(value, 0.02).astype(int)
+        expected = overlay.colors(value, 0.02).astype(int)
         nearest = np.abs(row - expected).max(axis=1)
         assert nearest.min() <= 2
-    middle = np.abs(row - colors(0.0, 0.02).astype(int)).sum(axis=1)
+    middle = np.abs(row - overlay.colors(0.0, 0.02).astype(int)).sum(axis=1)
     assert abs(int(np.argmin(middle)) - bar.width / 2) < 3
 
 
@@ -168,21 +152,23 @@ def mark(
 def test_an_arrow_across_the_view_is_as_long_as_its_impulse_at_any_distance(
     impulse: float, length: float, distance: float
 ) -> None:
-    [(tip, tail, _)] = place_marks([mark(2 * impulse, place=(0, distance, 0))], 2.0, LAYOUT, FRONT, *state())
+    [(tip, tail, _)] = overlay.place_marks([mark(2 * impulse, place=(0, distance, 0))], 2.0, LAYOUT, FRONT, *state())
     np.testing.assert_allclose(tip, [320, 240], atol=1e-9)
     np.testing.assert_allclose(tail, [320 + length * LAYOUT.arrow_length, 240], atol=1e-9)
 
 
 def test_an_arrow_along_the_view_is_foreshortened_and_one_behind_the_camera_left_out() -> None:
     marks = [mark(1.0, axis=(0, -1, 0), place=(0.5, 0, 0)), mark(1.0, place=(0, -9, 0))]
-    [(tip, tail, _)] = place_marks(marks, 1.0, LAYOUT, FRONT, *state())
+    [(tip, tail, _)] = overlay.place_marks(marks, 1.0, LAYOUT, FRONT, *state())
     assert np.linalg.norm(tail - tip) < 0.2 * LAYOUT.arrow_length
 
 
 def test_hidden_parts_are_faint_and_fading_marks_fainter() -> None:
     box = '<geom type="box" size=".2 .1 1" pos=".2 -1 0"/>'
     reach = 0.4 / FRONT.metres(np.zeros(3)) / LAYOUT.arrow_length
-    [(_, _, opacity)] = place_marks([mark(reach, place=(0.2, 0, 0), opacity=0.5)], 1.0, LAYOUT, FRONT, *state(box))
+    [(_, _, opacity)] = overlay.place_marks(
+        [mark(reach, place=(0.2, 0, 0), opacity=0.5)], 1.0, LAYOUT, FRONT, *state(box)
+    )
     assert opacity[0] == pytest.approx(0.15)
     assert opacity[-1] == pytest.approx(0.5)
     assert set(np.round(opacity, 9)) == {0.15, 0.5}
@@ -194,8 +180,8 @@ def test_a_mark_over_the_border_is_the_one_on_a_larger_frame_cut(shift: tuple[in
     layout, opacity = Layout(1280, 720), np.ones(9)
     tip, tail = np.array([40.3, 30.6]), np.array([-20.0, 60.0])
     small, large = (np.full((*size, channels), 200, np.uint8) for size in ((60, 80), (3060, 3080)))
-    draw_marks(small, [(tip + shift, tail + shift, opacity)], layout)
-    draw_marks(large, [(tip + shift + 1500, tail + shift + 1500, opacity)], layout)
+    overlay.draw_marks(small, [(tip + shift, tail + shift, opacity)], layout)
+    overlay.draw_marks(large, [(tip + shift + 1500, tail + shift + 1500, opacity)], layout)
     np.testing.assert_allclose(small.astype(int), large[1500:1560, 1500:1580], atol=1)
     assert (small != 200).any() == (max(map(abs, shift)) < 1000)
 
@@ -221,7 +207,7 @@ def test_a_mark_stands_on_the_risen_surface_in_the_world() -> None:
     still = Still()
     still.impulses = [still.touch(2.0)]
     still.ripples["ball"].height[0, 4, 4] = 0.1
-    [found] = ContactMarks(still, 1 / 60).follow()
+    [found] = overlay.ContactMarks(still, 1 / 60).follow()
     normal = still.turn @ still.atlas.normals[0, 4, 4]
     np.testing.assert_allclose(found.axis, normal)
     np.testing.assert_allclose(found.point, still.impulses[0].point + 0.1 * normal, atol=2e-3)
@@ -232,7 +218,7 @@ def test_contacts_in_one_place_add_up_and_others_are_apart_the_weakest_first() -
     still = Still()
     still.impulses = [still.touch(1.0), still.touch(2.0), still.touch(0.0, (1, 4, 4)), still.touch(0.5, other="leaf")]
     still.impulses.append(still.touch(0.7, (3, 2, 2)))
-    found = ContactMarks(still, 1 / 60).follow()
+    found = overlay.ContactMarks(still, 1 / 60).follow()
     assert [mark.impulse for mark in found] == pytest.approx([0.5, 0.7, 3.0])
 
 

@@ -4,21 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim import render
 from ripple_sim.errors import SceneError
-from ripple_sim.render import (
-    Camera,
-    Pose,
-    balls_about,
-    boxes_of,
-    enclosing,
-    find_viewpoint,
-    linear_to_srgb,
-    orthographic,
-    perspective,
-    srgb_to_linear,
-    view_matrix,
-    within,
-)
+from ripple_sim.render import Camera, Pose, linear_to_srgb, srgb_to_linear
 from ripple_sim.solver import RippleError
 
 MJCF = """<mujoco><worldbody>
@@ -63,7 +51,7 @@ def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look
     scene, option, everything = mujoco.MjvScene(model, maxgeom=50), mujoco.MjvOption(), mujoco.mjtCatBit.mjCAT_ALL
     mujoco.mjv_updateScene(model, data, option, None, theirs(model), everything, scene)
     eyes, seen = [np.array(eye.pos, dtype=float) for eye in scene.camera], scene.camera[0]
-    pose = find_viewpoint(model, data, given).pose()
+    pose = render.find_viewpoint(model, data, given).pose()
     np.testing.assert_allclose(pose.position, np.mean(eyes, axis=0), atol=1e-6)
     np.testing.assert_allclose(-pose.rotation[:, 2], seen.forward, atol=1e-6)
     np.testing.assert_allclose(pose.rotation[:, 1], seen.up, atol=1e-6)
@@ -86,7 +74,7 @@ def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look
 def test_what_is_no_camera_is_refused(given, message: str):
     model = mujoco.MjModel.from_xml_string(MJCF)
     with pytest.raises(SceneError, match=message):
-        find_viewpoint(model, mujoco.MjData(model), given)
+        render.find_viewpoint(model, mujoco.MjData(model), given)
 
 
 @pytest.mark.parametrize("broken", [{"distance": 0.0}, {"fovy": 180.0}, {"azimuth": np.nan}])
@@ -100,7 +88,7 @@ def test_balls_about_triangles_hold_each_and_are_small() -> None:
     angle = random.uniform(0, 2 * np.pi, 300)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(300)], axis=1)
     triangles = ring[:, None] + random.normal(size=(300, 3, 3)) * 0.02
-    balls = balls_about(triangles, 16)
+    balls = render.balls_about(triangles, 16)
     inside = np.linalg.norm(triangles[:, :, None] - balls[:, :3], axis=3) <= balls[:, 3] + 1e-12
     assert inside.all(axis=1).any(axis=1).all()
     assert len(balls) == 16
@@ -114,14 +102,14 @@ def random_balls(count: int) -> np.ndarray:
 
 def test_the_enclosing_ball_contains_every_ball() -> None:
     balls = random_balls(9)
-    centre, radius = enclosing(balls)
+    centre, radius = render.enclosing(balls)
     assert (np.linalg.norm(balls[:, :3] - centre, axis=1) + balls[:, 3] <= radius + 1e-12).all()
-    assert enclosing(balls[:1])[1] == balls[0, 3]
+    assert render.enclosing(balls[:1])[1] == balls[0, 3]
 
 
 def test_balls_within_reach_are_those_that_it_touches() -> None:
     balls = np.concatenate([random_balls(40), [[9.0, 0.0, 0.0, np.inf]]])
-    near = within(balls, np.zeros(3), 1.0)
+    near = render.within(balls, np.zeros(3), 1.0)
     gap = np.linalg.norm(balls[:, :3], axis=1) - balls[:, 3]
     np.testing.assert_array_equal(near, balls[gap < 1.0])
     assert 1 < len(near) < 40
@@ -146,7 +134,7 @@ def pose(seed: int, lens: tuple[float, float] = (0.0, 0.0)) -> Pose:
 
 def pixels(points: np.ndarray, camera: Pose) -> np.ndarray:
     """Where points show [pixels], [k, 2], and how far away along the camera's axis they lie."""
-    matrix = perspective(camera.fovy, SIZE[0] / SIZE[1], 0.01, 100.0, camera.shear) @ view_matrix(camera)
+    matrix = render.perspective(camera.fovy, SIZE[0] / SIZE[1], 0.01, 100.0, camera.shear) @ render.view_matrix(camera)
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
     return (0.5 + 0.5 * clip[:, :2] / clip[:, 3:]) * SIZE
 
@@ -160,7 +148,7 @@ def test_box_holds_the_ball(lens: tuple[float, float]) -> None:
     directions = random.normal(size=(500, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     for centre, radius, box in zip(
-        centres, radii, boxes_of(np.column_stack([centres, radii]), camera, SIZE), strict=True
+        centres, radii, render.boxes_of(np.column_stack([centres, radii]), camera, SIZE), strict=True
     ):
         shown = np.clip(pixels(centre + radius * directions, camera), 0, SIZE)
         assert (shown >= box[:2]).all() and (shown <= box[2:]).all()
@@ -170,7 +158,7 @@ def test_the_whole_frame_for_a_ball_about_the_eye_or_an_infinite_one_and_nothing
     camera = pose(4)
     behind = camera.eye + 2.0 * camera.rotation[:, 2]
     centres = np.stack([camera.eye, camera.eye + camera.rotation[:, 0], behind])
-    boxes = boxes_of(np.column_stack([centres, [0.5, np.inf, 0.5]]), camera, SIZE)
+    boxes = render.boxes_of(np.column_stack([centres, [0.5, np.inf, 0.5]]), camera, SIZE)
     np.testing.assert_array_equal(boxes[:2], [[0, 0, *SIZE]] * 2)
     assert (boxes[2, :2] == boxes[2, 2:]).all()
 
@@ -188,7 +176,7 @@ def test_corners_of_the_frustum_are_corners_of_clip_space(fovy, aspect):
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     depth = np.where(corners[:, 2] < 0, near, far)
     points = np.column_stack([corners[:, :2] * half * depth[:, None], -depth])
-    shown, w = projected(perspective(fovy, aspect, near, far), points)
+    shown, w = projected(render.perspective(fovy, aspect, near, far), points)
     np.testing.assert_allclose(shown, corners, atol=1e-12)
     np.testing.assert_allclose(w, depth)  # what attributes are divided by is the distance along the axis
 
@@ -197,6 +185,6 @@ def test_corners_of_the_frustum_are_corners_of_clip_space(fovy, aspect):
 def test_the_orthographic_box_is_clip_space(half_width, depth):
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     points = np.column_stack([corners[:, :2] * half_width, -depth * (corners[:, 2] + 1) / 2])
-    shown, w = projected(orthographic(half_width, depth), points)
+    shown, w = projected(render.orthographic(half_width, depth), points)
     np.testing.assert_allclose(shown, corners, atol=1e-12)
     np.testing.assert_array_equal(w, 1.0)

@@ -11,30 +11,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim import scene
 from ripple_sim.errors import SceneError
-from ripple_sim.scene import (
-    MAX_DURATION,
-    MAX_EXPOSURES,
-    NAMES,
-    CameraEntry,
-    DropEntry,
-    Events,
-    MaterialEntry,
-    PokeEntry,
-    Request,
-    RippleEntry,
-    Scene,
-    StillEntry,
-    check_camera,
-    check_scene,
-    drop_scene,
-    load_scene,
-    parse_request,
-    parse_scene,
-    read_toml,
-    through_camera,
-    with_exposure,
-)
+from ripple_sim.scene import CameraEntry, Events, RippleEntry, Scene, StillEntry
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
@@ -62,7 +41,7 @@ def changed(**entries: object) -> dict:
 )
 def test_mistakes_are_named_with_file_place_and_what_is_valid(table: dict, message: str) -> None:
     with pytest.raises(SceneError, match=message) as error:
-        parse_scene(table, "a.toml")
+        scene.parse_scene(table, "a.toml")
     assert str(error.value).startswith("scene file 'a.toml': ")
     assert "$" not in str(error.value)
 
@@ -75,8 +54,8 @@ def test_numbers_without_sense_are_refused_wherever_they_are(number: float) -> N
         ("ripple.still.radius", changed(ripple=[{"geom": "egg", "still": [{"point": [0, 0, 0], "radius": number}]}])),
     ):
         with pytest.raises(SceneError, match=rf"{place} is .*; valid are numbers up to 1e\+12"):
-            parse_scene(table, "a.toml")
-    assert parse_scene(changed(duration=1e12), "a.toml").duration == 1e12
+            scene.parse_scene(table, "a.toml")
+    assert scene.parse_scene(changed(duration=1e12), "a.toml").duration == 1e12
 
 
 def test_images_are_found_beside_the_scene_file_and_given_paths_stay() -> None:
@@ -101,14 +80,14 @@ MODEL = mujoco.MjModel.from_xml_string(
         {"name": "eye", "track": "stone", "focus": "pebble"},
         {"track": "world"},
         {"shutter": 0.0, "aperture": 0.0, "exposures": 1},
-        {"shutter": 360.0, "exposures": MAX_EXPOSURES},
+        {"shutter": 360.0, "exposures": scene.MAX_EXPOSURES},
         {"focus": (0.0, 0.0, 0.0)},
         {"focus": 1e-9},
         {"focus": "stone"},
     ],
 )
 def test_what_the_model_has_and_the_optics_allow_is_accepted(entry: dict) -> None:
-    check_camera(MODEL, CameraEntry(**entry))
+    scene.check_camera(MODEL, CameraEntry(**entry))
 
 
 @pytest.mark.parametrize(
@@ -126,12 +105,12 @@ def test_what_the_model_has_and_the_optics_allow_is_accepted(entry: dict) -> Non
         ({"aperture": -0.01}, "aperture is -0.01; valid is 0 m or more"),
         ({"aperture": np.inf}, "aperture is inf"),
         ({"exposures": 0}, "number of exposures is 0; valid is 1 to 1024"),
-        ({"exposures": MAX_EXPOSURES + 1}, "number of exposures is 1025"),
+        ({"exposures": scene.MAX_EXPOSURES + 1}, "number of exposures is 1025"),
     ],
 )
 def test_what_cannot_be_is_named_with_its_value_and_what_is_valid(entry: dict, message: str) -> None:
     with pytest.raises(SceneError, match=message):
-        check_camera(MODEL, CameraEntry(**entry))
+        scene.check_camera(MODEL, CameraEntry(**entry))
 
 
 EGGS = mujoco.MjModel.from_xml_string(
@@ -142,14 +121,14 @@ EGG = RippleEntry(geom="egg")
 
 
 def checked(*targets: RippleEntry, **others: object) -> None:
-    check_scene(
+    scene.check_scene(
         Scene(**{"name": "s", "model": EGGS, "targets": targets, "camera": CameraEntry(), "duration": 1.0, **others})
     )
 
 
 def test_a_scene_without_mistakes_passes() -> None:
     checked(EGG, RippleEntry(geom="pea", color=(0, 0.5, 1)))
-    checked(EGG, duration=MAX_DURATION - 1.0, overlay=("height=0.02", "time"), lighting="studio")
+    checked(EGG, duration=scene.MAX_DURATION - 1.0, overlay=("height=0.02", "time"), lighting="studio")
     checked(RippleEntry(geom="egg", still=[StillEntry((0, 0, 0.1), 0.01)]))
 
 
@@ -159,7 +138,7 @@ def test_a_scene_without_mistakes_passes() -> None:
         ((), {}, r"scene 's' has no \[\[ripple\]\] entry; name at least one geom"),
         ((EGG,), {"duration": 0.0}, "duration is 0.0 s; valid is a positive number, less than 86400"),
         ((EGG,), {"duration": float("nan")}, "duration is nan"),
-        ((EGG,), {"duration": float(MAX_DURATION)}, "duration is 86400.0"),
+        ((EGG,), {"duration": float(scene.MAX_DURATION)}, "duration is 86400.0"),
         ((EGG, EGG), {}, r"geom 'egg' has two \[\[ripple\]\] entries; valid is one"),
         ((RippleEntry(geom="leg"),), {}, "no geom 'leg'; its geoms are 'egg', 'floor', 'pea'"),
         ((RippleEntry(geom="floor"),), {}, "geom 'floor' is a plane, which cannot ripple"),
@@ -168,14 +147,14 @@ def test_a_scene_without_mistakes_passes() -> None:
         ((RippleEntry(geom="egg", rim="bent"),), {}, "rim 'bent' does not exist; valid are free, fixed"),
         ((RippleEntry(geom="egg", color=(0, 0, 1.1)),), {}, "color of geom 'egg' is .*three numbers from 0 to 1"),
         ((RippleEntry(geom="egg", color=(0, float("nan"), 1)),), {}, "three numbers from 0 to 1"),
-        ((RippleEntry(geom="egg", material=MaterialEntry(speed=-1.0)),), {}, "speed is -1"),
+        ((RippleEntry(geom="egg", material=scene.MaterialEntry(speed=-1.0)),), {}, "speed is -1"),
         ((EGG,), {"overlay": ("depth",)}, "no overlay 'depth'; valid are height, velocity"),
         ((EGG,), {"lighting": "dark"}, "lighting is 'dark'; valid are .*'auto'"),
         ((EGG,), {"camera": CameraEntry(name="eye")}, "no camera 'eye'; its cameras are none"),
-        ((EGG,), {"events": Events(drop=[DropEntry("egg", 0.0)])}, r"\[\[drop\]\] names the body 'egg'"),
+        ((EGG,), {"events": Events(drop=[scene.DropEntry("egg", 0.0)])}, r"\[\[drop\]\] names the body 'egg'"),
         (
             (EGG,),
-            {"events": Events(poke=[PokeEntry("pea", 0.0, (0, 0, 0), 1.0)])},
+            {"events": Events(poke=[scene.PokeEntry("pea", 0.0, (0, 0, 0), 1.0)])},
             "'pea', which does not ripple; the rippling geoms are 'egg'",
         ),
         ((RippleEntry(geom="egg", still_map="/none.png"),), {}, "ripple.still_map names the image '/none.png', which"),
@@ -230,13 +209,13 @@ def write(folder: Path, toml: str = TOML, mjcf: str = MJCF) -> Path:
 )
 def test_a_file_is_checked_in_itself_against_its_model_and_in_its_events(tmp_path, old, new, message) -> None:
     with pytest.raises(RippleError, match=message) as error:
-        load_scene(write(tmp_path, TOML.replace(old, new)))
+        scene.load_scene(write(tmp_path, TOML.replace(old, new)))
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("fps", [24, 60, 1000])
 def test_a_whole_number_of_physics_steps_makes_a_frame(tmp_path: Path, fps: int) -> None:
-    simulation = Simulation(load_scene(write(tmp_path)), fps=fps, backend="cpu")
+    simulation = Simulation(scene.load_scene(write(tmp_path)), fps=fps, backend="cpu")
     for _ in range(5):
         simulation.advance_frame()
     assert simulation.data.time == pytest.approx(5 / fps, rel=1e-9)
@@ -246,8 +225,8 @@ def test_a_whole_number_of_physics_steps_makes_a_frame(tmp_path: Path, fps: int)
 def test_every_body_of_a_drop_scene_hits_the_mesh(tmp_path: Path) -> None:
     V, F = peanut()
     write_obj(tmp_path / "peanut.obj", 37.0 * V[:, [0, 2, 1]] * [1, 1, -1] + 5.0, F)
-    scene = drop_scene(tmp_path / "peanut.obj", bodies=3, seed=1)
-    simulation, hit = Simulation(scene, fps=60, resolution=16, backend="cpu"), set()
+    dropped = scene.drop_scene(tmp_path / "peanut.obj", bodies=3, seed=1)
+    simulation, hit = Simulation(dropped, fps=60, resolution=16, backend="cpu"), set()
     for _ in range(180):
         simulation.advance_frame()
         hit |= {impulse.other for impulse in simulation.impulses}
@@ -260,20 +239,20 @@ def filmed(**camera: object) -> Scene:
 
 def test_through_camera_changes_the_camera_alone_and_not_the_scene_itself() -> None:
     before = filmed(shutter=180.0)
-    after = through_camera(before, "side")
+    after = scene.through_camera(before, "side")
     assert after.camera == CameraEntry(name="side")
     assert before.camera == CameraEntry(shutter=180.0)
     assert dataclasses.replace(after, camera=before.camera).__dict__ == before.__dict__
     with pytest.raises(SceneError, match="no camera 'ear'; its cameras are eye, side"):
-        through_camera(before, "ear")
+        scene.through_camera(before, "ear")
 
 
 def test_exposure_replaces_what_is_given_and_leaves_what_is_none() -> None:
     before = filmed(azimuth=12.0, shutter=90.0, aperture=0.1, exposures=8)
-    after = with_exposure(before, shutter=180, aperture=None, focus="stone", exposures=None)
+    after = scene.with_exposure(before, shutter=180, aperture=None, focus="stone", exposures=None)
     assert after.camera == CameraEntry(azimuth=12.0, shutter=180.0, aperture=0.1, focus="stone", exposures=8)
-    assert with_exposure(before).camera == before.camera
-    assert with_exposure(before, aperture=0.0).camera.aperture == 0.0, "0 is a value"
+    assert scene.with_exposure(before).camera == before.camera
+    assert scene.with_exposure(before, aperture=0.0).camera.aperture == 0.0, "0 is a value"
 
 
 @pytest.mark.parametrize(
@@ -290,21 +269,21 @@ def test_exposure_replaces_what_is_given_and_leaves_what_is_none() -> None:
 )
 def test_an_exposure_without_effect_or_sense_is_refused(camera: dict, changes: dict, message: str) -> None:
     with pytest.raises(SceneError, match=message):
-        with_exposure(filmed(**camera), **changes)
+        scene.with_exposure(filmed(**camera), **changes)
 
 
 def test_request_takes_every_name_and_ranges() -> None:
-    request = parse_request([" height=0.02", "contacts", "grid", "time", "energy "])
-    assert request == Request("height", 0.02, True, True, True, True)
-    assert parse_request(["velocity"]) == Request(heatmap="velocity")
-    assert not parse_request([])
-    assert parse_request(["time"])
+    request = scene.parse_request([" height=0.02", "contacts", "grid", "time", "energy "])
+    assert request == scene.Request("height", 0.02, True, True, True, True)
+    assert scene.parse_request(["velocity"]) == scene.Request(heatmap="velocity")
+    assert not scene.parse_request([])
+    assert scene.parse_request(["time"])
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["hight"], ", ".join(NAMES)),
+        (["hight"], ", ".join(scene.NAMES)),
         ([""], "valid are"),
         (["height", "velocity"], "choose one"),
         (["height=0"], "positive number"),
@@ -315,7 +294,7 @@ def test_request_takes_every_name_and_ranges() -> None:
 )
 def test_request_refuses(words: list[str], said: str) -> None:
     with pytest.raises(SceneError, match=said):
-        parse_request(words)
+        scene.parse_request(words)
 
 
 @pytest.mark.parametrize(
@@ -336,10 +315,10 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str, said: str) -> No
     path = tmp_path / "a.toml"
     path.write_bytes(text.encode(errors="surrogatepass"))
     with pytest.raises(SceneError, match=said):
-        read_toml(path, "plan")
+        scene.read_toml(path, "plan")
 
 
 def test_dots_in_numbers_paths_and_comments_are_no_keys(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_text(f"# {'.' * 300}\n# {'. ' * 300}\na = [{', '.join(['0.5'] * 300)}]\nb.c = '../../x.y'\n")
-    assert read_toml(path, "plan") == {"a": [0.5] * 300, "b": {"c": "../../x.y"}}
+    assert scene.read_toml(path, "plan") == {"a": [0.5] * 300, "b": {"c": "../../x.y"}}

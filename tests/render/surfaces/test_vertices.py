@@ -10,27 +10,15 @@ import trimesh
 from drawn import ball_surface
 
 from ripple_sim.coupling import target_atlas
-from ripple_sim.render.surfaces import (
-    BAKED,
-    COORDINATES,
-    DIRECTION,
-    NORMAL,
-    POSITION,
-    UV,
-    Charts,
-    Surface,
-    mapped_coordinates,
-    memory_order,
-    rounded_parts,
-    surface_vertices,
-)
+from ripple_sim.render import surfaces
+from ripple_sim.render.surfaces import POSITION, Charts, Surface
 from ripple_sim.render.visuals import TextureMapping
 from ripple_sim.solver import Mesh, build_atlas
 
 
 @pytest.fixture(scope="module")
 def vertices():
-    return surface_vertices(ball_surface("clay", 0.5), 0.2, 100)
+    return surfaces.surface_vertices(ball_surface("clay", 0.5), 0.2, 100)
 
 
 def test_vertices_and_midpoints_lie_on_the_ball_and_point_outwards(vertices):
@@ -38,15 +26,15 @@ def test_vertices_and_midpoints_lie_on_the_ball_and_point_outwards(vertices):
     # an edge of the mesh bulges out to a cubic close to the arc
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 0.5, atol=2e-3)
     outwards = position / np.linalg.norm(position, axis=1, keepdims=True)
-    for columns in (DIRECTION, NORMAL):
+    for columns in (surfaces.DIRECTION, surfaces.NORMAL):
         np.testing.assert_allclose(np.linalg.norm(vertices.attributes[:, columns], axis=1), 1.0, atol=1e-9)
         np.testing.assert_allclose(vertices.attributes[:, columns], outwards, atol=0.02)
-    np.testing.assert_allclose(vertices.attributes[:, BAKED][:, 0], 1.0, atol=1e-5)
+    np.testing.assert_allclose(vertices.attributes[:, surfaces.BAKED][:, 0], 1.0, atol=1e-5)
 
 
 def test_heights_at_one_point_are_looked_up_in_one_place(vertices):
     """Also at midpoints of edges along a border."""
-    points = np.concatenate([vertices.attributes[:, POSITION], vertices.attributes[:, DIRECTION]], axis=1)
+    points = np.concatenate([vertices.attributes[:, POSITION], vertices.attributes[:, surfaces.DIRECTION]], axis=1)
     _, point = np.unique(points, axis=0, return_inverse=True)
     pairs = np.unique(np.column_stack([point.ravel(), vertices.lookups]), axis=0)
     assert len(pairs) == len(np.unique(point)) < len(points)
@@ -56,7 +44,7 @@ def test_heights_at_one_point_are_looked_up_in_one_place(vertices):
 
 def test_midpoints_come_last_and_lie_halfway_on_the_map(vertices):
     count = len(vertices.edges.ends)
-    coordinates = vertices.attributes[:, COORDINATES]
+    coordinates = vertices.attributes[:, surfaces.COORDINATES]
     np.testing.assert_allclose(coordinates[-count:], coordinates[vertices.edges.ends].mean(axis=1), atol=1e-12)
     assert vertices.F.max() < len(coordinates) - count
 
@@ -66,7 +54,7 @@ def test_a_wave_over_the_edges_of_a_box_is_a_smooth_curve():
     model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom type="box" size=".5 .4 .3"/></worldbody></mujoco>')
     atlas = target_atlas(model, 0, 32)
     surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), "clay")
-    made = surface_vertices(surface, 0.02, 40_000)
+    made = surfaces.surface_vertices(surface, 0.02, 40_000)
     ends = made.edges.ends
     along = made.attributes[ends][..., POSITION]
     creases = np.flatnonzero((np.abs(along) > np.array([0.5, 0.4, 0.3]) - 1e-9).all(axis=1).sum(axis=1) == 2)
@@ -81,17 +69,17 @@ def test_a_wave_over_the_edges_of_a_box_is_a_smooth_curve():
 
 def test_a_surface_counts_v_from_below_and_a_model_from_above(vertices):
     attributes = vertices.attributes[:4].copy()
-    attributes[:, UV] = [[0, 0], [1, 0], [0.25, 1], [0.5, 0.75]]
-    own = mapped_coordinates(attributes, TextureMapping(own=True))
+    attributes[:, surfaces.UV] = [[0, 0], [1, 0], [0.25, 1], [0.5, 0.75]]
+    own = surfaces.mapped_coordinates(attributes, TextureMapping(own=True))
     np.testing.assert_allclose(own, [[0, 1, 0], [1, 1, 0], [0.25, 0, 0], [0.5, 0.25, 0]])
-    by_place = mapped_coordinates(attributes, TextureMapping(scale=np.array([1.0, 2.0, 4.0])))
+    by_place = surfaces.mapped_coordinates(attributes, TextureMapping(scale=np.array([1.0, 2.0, 4.0])))
     np.testing.assert_allclose(by_place, attributes[:, POSITION] * [1, 2, 4])
 
 
 def parts_of(shape: trimesh.Trimesh):
     mesh = Mesh.from_arrays(shape.vertices, shape.faces)
     atlas = build_atlas(mesh, 16, layout="patches", cache=False)
-    rounded = rounded_parts(mesh, atlas.chart_map)
+    rounded = surfaces.rounded_parts(mesh, atlas.chart_map)
     assert len(rounded[0].F) > 1.2 * len(mesh.F), "triangles were cut"
     return rounded
 
@@ -122,7 +110,7 @@ def test_a_mesh_keeps_its_triangles():
     rng = np.random.default_rng(2)
     position = rng.random((40, 3))
     F = rng.permuted(np.tile(np.arange(40), (90, 1)), axis=1)[:, :3]
-    ordered, vertices, _ = memory_order(F, position)
+    ordered, vertices, _ = surfaces.memory_order(F, position)
     assert sorted(vertices[ordered].tolist()) == sorted(F.tolist())
     _, first = np.unique(ordered, return_index=True)
     assert (np.diff(first) > 0).all()  # vertices stand in the order of their first use

@@ -13,31 +13,8 @@ from scipy.spatial import ConvexHull
 from surfaces import disk, sphere, torus
 
 from ripple_sim.solver import Mesh, glue
-from ripple_sim.solver.layouts import FIXED, FREE
-from ripple_sim.solver.layouts.patches import (
-    BorderedCells,
-    Metric,
-    Quads,
-    SeamlessMap,
-    Surface,
-    cell_sizes,
-    centred_cells,
-    chosen_joints,
-    corner_places,
-    cut_into_large_quads,
-    cut_into_quads,
-    disk_cells,
-    locate_texels,
-    move_tips,
-    patch_atlas,
-    relax,
-    seamless_map,
-    shapes_of,
-    signed_areas,
-    spread_seeds,
-    total_energy,
-    without_cuts,
-)
+from ripple_sim.solver.layouts import FIXED, FREE, patches
+from ripple_sim.solver.layouts.patches import Metric, Quads, SeamlessMap, Surface
 
 TIPS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 
@@ -50,13 +27,13 @@ def ball_with_limbs(length: float, sharpness: float, level: int) -> Mesh:
 
 def test_sizes_keep_to_their_bounds() -> None:
     ball = sphere(3)
-    sizes = cell_sizes(Metric.of(Surface.of(ball.V, ball.F)), 0.5, (0.2, 0.3))
+    sizes = patches.cell_sizes(Metric.of(Surface.of(ball.V, ball.F)), 0.5, (0.2, 0.3))
     assert sizes.min() >= 0.2
     assert sizes.max() <= 0.3 + 1e-12
 
 
 def test_texels_on_limbs_are_neither_folded_nor_wide() -> None:
-    atlas = patch_atlas(ball_with_limbs(3.0, 40.0, 4), 64)
+    atlas = patches.patch_atlas(ball_with_limbs(3.0, 40.0, 4), 64)
     quality = atlas.quality()
     assert quality["folded"] == 0
     assert quality["timestep"] > 0.5
@@ -67,16 +44,16 @@ MESHES = {"sphere": lambda: sphere(3), "torus": lambda: torus(24), "disk": lambd
 EULER = {"sphere": 2, "torus": 0, "disk": 1}
 
 
-def cells_of(name: str, cells: int) -> BorderedCells:
+def cells_of(name: str, cells: int) -> patches.BorderedCells:
     mesh = MESHES[name]()
     surface = Surface.of(mesh.V, mesh.F)
     metric = Metric.of(surface)
     reach = 0.75 * np.sqrt(surface.areas.sum() / cells) if cells > 1 else np.inf
-    return disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach)))
+    return patches.disk_cells(metric, patches.centred_cells(metric, patches.spread_seeds(metric, reach)))
 
 
 def quads_of(name: str, cells: int) -> Quads:
-    return cut_into_quads(cells_of(name, cells))
+    return patches.cut_into_quads(cells_of(name, cells))
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -90,7 +67,7 @@ def test_quads_cover_the_surface_and_their_squares_once(name: str, cells: int) -
 @pytest.mark.parametrize("name", MESHES)
 def test_large_quads_cover_the_surface_once_and_three_meet_at_least(name: str) -> None:
     cells = cells_of(name, 24)
-    quads = cut_into_large_quads(cells)
+    quads = patches.cut_into_large_quads(cells)
     assert quads is not None
     assert_covered_once(name, quads)
     assert len(quads.glued) < 1.5 * len(cells.arcs) < 0.5 * sum(map(len, cells.arcs))
@@ -100,11 +77,11 @@ def test_large_quads_cover_the_surface_once_and_three_meet_at_least(name: str) -
 
 
 def test_a_surface_of_too_few_cells_has_no_large_quads() -> None:
-    assert cut_into_large_quads(cells_of("sphere", 4)) is None
+    assert patches.cut_into_large_quads(cells_of("sphere", 4)) is None
 
 
 def assert_covered_once(name: str, quads: Quads) -> None:
-    areas = signed_areas(quads.places)
+    areas = patches.signed_areas(quads.places)
     assert areas.min() > 0
     np.testing.assert_allclose(np.bincount(quads.chart, areas), 1.0, atol=1e-9)
     assert quads.surface.areas.sum() == pytest.approx(Surface.of(MESHES[name]().V, MESHES[name]().F).areas.sum())
@@ -134,17 +111,17 @@ def quads(name: str) -> Quads:
 
 def assert_one_to_one(seamless: SeamlessMap) -> np.ndarray:
     """No triangle is folded, each chart is covered once, and every texel found; returns the places of corners."""
-    places = corner_places(seamless)
-    areas = signed_areas(places)
+    places = patches.corner_places(seamless)
+    areas = patches.signed_areas(places)
     assert areas.min() > 0
     np.testing.assert_allclose(areas.sum(), len(seamless.glued), rtol=1e-9)
-    assert (locate_texels(seamless, 9)[0] >= 0).all()
+    assert (patches.locate_texels(seamless, 9)[0] >= 0).all()
     return places
 
 
 def test_fewer_triangles_cover_the_same_surface_and_charts_once(mesh: Mesh, quads: Quads) -> None:
-    whole = seamless_map(quads)
-    surface, seamless = without_cuts(quads.surface, whole, quads.cut)
+    whole = patches.seamless_map(quads)
+    surface, seamless = patches.without_cuts(quads.surface, whole, quads.cut)
     assert len(surface.F) < 0.7 * len(quads.surface.F)
     assert_one_to_one(seamless)
     # each triangle of the mesh is covered once, by triangles that lie where they say
@@ -158,22 +135,22 @@ def test_fewer_triangles_cover_the_same_surface_and_charts_once(mesh: Mesh, quad
 
 
 def test_a_relaxed_map_covers_the_charts_once_with_less_energy(quads: Quads) -> None:
-    seamless = seamless_map(quads)
-    shapes = shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
-    before = total_energy(seamless, shapes)
-    relax(quads.surface.V, seamless)
+    seamless = patches.seamless_map(quads)
+    shapes = patches.shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    before = patches.total_energy(seamless, shapes)
+    patches.relax(quads.surface.V, seamless)
     assert_one_to_one(seamless)
     assert (seamless.x >= 0).all() and (seamless.x <= 1).all()
-    assert total_energy(seamless, shapes) < 0.9 * before
+    assert patches.total_energy(seamless, shapes) < 0.9 * before
 
 
 def test_moved_tips_lower_the_energy_and_leave_the_map_one_to_one(quads: Quads) -> None:
-    seamless = seamless_map(quads)
-    shapes = shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    seamless = patches.seamless_map(quads)
+    shapes = patches.shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
     tips = np.flatnonzero(seamless.freedom == FIXED)
-    before = total_energy(seamless, shapes)
-    assert len(move_tips(seamless, shapes, tips))
-    assert total_energy(seamless, shapes) < before
+    before = patches.total_energy(seamless, shapes)
+    assert len(patches.move_tips(seamless, shapes, tips))
+    assert patches.total_energy(seamless, shapes) < before
     assert (seamless.freedom == FIXED).sum() == len(tips)
     places = assert_one_to_one(seamless)
     total = np.zeros(len(seamless.x))
@@ -209,7 +186,7 @@ def off(middles: np.ndarray, corners: np.ndarray, chosen: np.ndarray) -> np.ndar
 @pytest.mark.parametrize("points", [12, 14])
 def test_the_best_of_all_pairings_is_found(points: int) -> None:
     joints, count, corners = hull(points)
-    chosen = chosen_joints(*joints, count, corners, np.full(points, 4.0))
+    chosen = patches.chosen_joints(*joints, count, corners, np.full(points, 4.0))
     assert chosen is not None
     assert (np.bincount(joints[0][chosen].ravel()) == 1).all()
     ways = [off(joints[1], corners, np.array(each)) for each in pairings(joints[0], frozenset(range(count)))]
@@ -221,7 +198,7 @@ def test_the_best_of_all_pairings_is_found(points: int) -> None:
 def test_where_their_number_is_odd_one_triangle_stays_alone() -> None:
     # three in a row, round points that have enough of others
     joints = (np.array([[0, 1], [1, 2], [0, -1], [2, -1]]), np.array([[0, 1], [1, 2], [3, 4], [5, 6]]), np.zeros(4))
-    chosen = chosen_joints(*joints, 3, np.full(7, 5), np.full(7, 4.0))
+    chosen = patches.chosen_joints(*joints, 3, np.full(7, 5), np.full(7, 4.0))
     assert chosen is not None
     alone = joints[0][chosen, 1] < 0
     assert alone.sum() == 1
@@ -230,4 +207,4 @@ def test_where_their_number_is_odd_one_triangle_stays_alone() -> None:
 
 def test_there_is_no_pairing_of_triangles_that_have_no_side_in_common() -> None:
     none = np.empty((0, 2), np.int64), np.empty((0, 2), np.int64), np.empty(0)
-    assert chosen_joints(*none, 2, np.full(3, 5), np.full(3, 4.0)) is None
+    assert patches.chosen_joints(*none, 2, np.full(3, 5), np.full(3, 4.0)) is None
