@@ -24,17 +24,6 @@ from .samples import centres, untangled
 from .seamless import SeamlessMap, corner_places, follow, places_seen_from
 
 
-def map_quality(mesh: Mesh, pieces: Pieces) -> dict[str, float]:
-    """Flipped pieces, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
-    u, v = pieces.places[:, 1] - pieces.places[:, 0], pieces.places[:, 2] - pieces.places[:, 0]
-    flat = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
-    # the determinant is the share of its triangle that each piece has
-    real = mesh.triangle_areas[pieces.triangle] * np.abs(np.linalg.det(pieces.barycentrics))
-    even = flat * mesh.area / (int(pieces.chart.max()) + 1)
-    stretch = np.sqrt(real / np.maximum(even, np.finfo(np.float64).tiny))
-    return {"flipped": int((flat <= 0).sum()), **stretch_summary(stretch, real)}
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class PatchChartMap:
     """Any mesh on charts; map coordinates are chart, column and row, the latter from 0 to 1. See `ChartMap`."""
