@@ -180,7 +180,7 @@ class Atlas:
     @property
     def resolution(self) -> int:
         """Texels along a chart's side, N."""
-        return self.texels.resolution
+        return self.texels.positions.shape[1]
 
     @property
     def positions(self) -> NDArray[np.float64]:

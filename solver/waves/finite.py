@@ -5,10 +5,13 @@ The guard names the source that was too much for them.
 
 from __future__ import annotations
 
+import numbers
+import sys
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SolverError, is_finite, shown, whole
+from ..errors import SolverError, shown, whole
 from ..texels.atlas import Atlas
 
 
@@ -34,7 +37,8 @@ def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.
 
 def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -> None:
     """Raise `SolverError` unless a value is a finite number, of at least `least`."""
-    if not (is_finite(value) and value >= least):
+    most = sys.float_info.max
+    if not (isinstance(value, numbers.Real) and max(least, -most) <= value <= most):
         bound = "" if least == -np.inf else f", {least:g} or greater"
         raise SolverError(f"{name} is {shown(value)} {unit}; valid is a finite number{bound}")
 
