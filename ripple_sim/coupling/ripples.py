@@ -85,8 +85,10 @@ class Ripples(Targets):
         Whether a flex keeps to itself the coarse motion that contacts give it, for all targets or by name: its waves
         then get what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in the flex
         and in its waves, which take theirs from nothing.
-    backend, operator, conserve_volume : str, str, bool
-        As for `WaveSolver`.
+    backend : str
+        As for `WaveSolver`; so are the next two.
+    operator : str
+    conserve_volume : bool
 
     Raises
     ------

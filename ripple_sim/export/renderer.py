@@ -62,7 +62,9 @@ class RippleRenderer:
     model : mujoco.MjModel
     scene : mujoco.MjvScene
         What the latest `update_scene` took in. Geoms may be added to it before `render`, to be seen in colours.
-    height, width : int
+    height : int
+        [pixels].
+    width : int
         [pixels].
 
     Raises
