@@ -116,7 +116,11 @@ def build_atlas(
         check_genus_zero(mesh)
     cube = layout == "cube" or (layout == "auto" and _fits_cube(mesh))
     start = time.perf_counter()
-    path = _cache_path(mesh, method if cube else f"patches {resolution}", sphere if cube else None) if cache else None
+    path = None
+    if cache:  # a file for each mesh and sphere map: that does not depend on the resolution, and rays are quick
+        kind = "given" if cube and sphere is not None else method if cube else f"patches {resolution}"
+        made_of = (mesh.V, mesh.F) if sphere is None or not cube else (mesh.V, mesh.F, sphere)
+        path = cache_path(f"{FORMAT} {kind}", made_of)
     stored = None if path is None else _read_cache(path, mesh, cube)
     # charts of the patch layout have a resolution of their own, and a file for each of the atlas's
     if stored is not None and (not cube or stored.resolution == resolution):
@@ -163,13 +167,6 @@ def _certified(mesh: Mesh, sphere: NDArray[np.float64]) -> NDArray[np.float64]:
             f"{len(mesh.V)} vertices; leave it out to have one computed"
         )
     return sphere
-
-
-def _cache_path(mesh: Mesh, kind: str, sphere: NDArray[np.float64] | None) -> Path:
-    """One file for each mesh and sphere map: that does not depend on the resolution, and rays are quick."""
-    if sphere is not None:
-        return cache_path(f"{FORMAT} given", (mesh.V, mesh.F, sphere))
-    return cache_path(f"{FORMAT} {kind}", (mesh.V, mesh.F))
 
 
 def _read_cache(path: Path, mesh: Mesh, cube: bool) -> Atlas | None:

@@ -125,9 +125,6 @@ FIXED, COLUMN, ROW, FREE = range(4)  # in which directions a vertex may move: no
 J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(9)
 TERMS = 9
 
-# a triangle's reference seen from one corner: area, and the cotangents there, at the next corner and at the one before
-Shape: TypeAlias = tuple[float, float, float, float]
-
 
 @kernel
 def expand_star(p: Vector, x: Vector, y: Vector, ring: Floats, shapes: Floats, degree: int, terms: Floats) -> None:
@@ -143,31 +140,24 @@ def expand_star(p: Vector, x: Vector, y: Vector, ring: Floats, shapes: Floats, d
     for k in range(degree):
         e = subtract(row(ring, k), p)
         bx, by, bz = dot(e, x), dot(e, y), dot(e, p)
-        shape = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
-        expand_triangle((ax, ay, az), (bx, by, bz), shape, terms, i)
+        area, opposite, left, right = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
+        half = 0.5 / area
+        cx, cy, cz = bx - ax, by - ay, bz - az
+        terms[i, J] = half * (ax * by - ay * bx)
+        terms[i, JX] = half * (ay * bz - az * by - cy)
+        terms[i, JY] = half * (az * bx - ax * bz + cx)
+        terms[i, D] = (
+            opposite * (cx * cx + cy * cy + cz * cz)
+            + left * (bx * bx + by * by + bz * bz)
+            + right * (ax * ax + ay * ay + az * az)
+        )
+        terms[i, DX] = -2.0 * (left * bx + right * ax)
+        terms[i, DY] = -2.0 * (left * by + right * ay)
+        terms[i, DZ] = -2.0 * (left * bz + right * az)
+        terms[i, BEND] = left + right
+        terms[i, AREA] = area
         ax, ay, az = bx, by, bz
         i = k
-
-
-@kernel
-def expand_triangle(a: Vector, b: Vector, shape: Shape, terms: Floats, i: int) -> None:
-    """Fill row i of `terms`, for a triangle whose other corners lie at a and b in the vertex's own coordinates."""
-    (ax, ay, az), (bx, by, bz), (area, opposite, left, right) = a, b, shape
-    half = 0.5 / area
-    cx, cy, cz = bx - ax, by - ay, bz - az
-    terms[i, J] = half * (ax * by - ay * bx)
-    terms[i, JX] = half * (ay * bz - az * by - cy)
-    terms[i, JY] = half * (az * bx - ax * bz + cx)
-    terms[i, D] = (
-        opposite * (cx * cx + cy * cy + cz * cz)
-        + left * (bx * bx + by * by + bz * bz)
-        + right * (ax * ax + ay * ay + az * az)
-    )
-    terms[i, DX] = -2.0 * (left * bx + right * ax)
-    terms[i, DY] = -2.0 * (left * by + right * ay)
-    terms[i, DZ] = -2.0 * (left * bz + right * az)
-    terms[i, BEND] = left + right
-    terms[i, AREA] = area
 
 
 @kernel

@@ -324,7 +324,12 @@ def softening(texels: TexelMesh) -> NDArray[np.float64]:
     """
     areas = texels.areas
     rate = texels.stencil(np.ones_like(areas)).absolute_sums() / areas
-    bound = min(_cheapest(rate.ravel(), areas.ravel() / areas.mean()), _even(areas))
+    # the least rate to which softening may bring the faster ones
+    order = np.argsort(-rate.ravel())
+    rates, shares = rate.ravel()[order], (areas.ravel() / areas.mean())[order]
+    lost = np.cumsum(shares) - rates * np.cumsum(shares / rates)
+    cheapest = float(rates[np.flatnonzero(lost <= _TEXELS * np.log2(rates[0] / rates) + 1e-9)[-1]])
+    bound = min(cheapest, _even(areas))
     return np.minimum(1, max(bound, _FASTER * _bulk(rate.ravel(), areas.ravel())) / rate)
 
 
@@ -333,14 +338,6 @@ def _bulk(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
     order = np.argsort(rates)
     covered = np.cumsum(areas[order])
     return float(rates[order[np.searchsorted(covered, _BULK * covered[-1])]])
-
-
-def _cheapest(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
-    """The least rate, of those of the texels, to which softening may bring the faster ones; areas in mean ones."""
-    order = np.argsort(-rates)
-    rates, areas = rates[order], areas[order]
-    lost = np.cumsum(areas) - rates * np.cumsum(areas / rates)
-    return float(rates[np.flatnonzero(lost <= _TEXELS * np.log2(rates[0] / rates) + 1e-9)[-1]])
 
 
 def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:

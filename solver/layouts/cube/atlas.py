@@ -169,16 +169,6 @@ def _walk_to_triangles(
     return lost
 
 
-def sphere_map_quality(mesh: Mesh, sphere: NDArray[np.float64]) -> dict[str, float]:
-    """Flipped triangles, solid angle, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
-    certificate = certify(mesh.F, sphere)
-    return {
-        "flipped": certificate.flipped,
-        "solid_angle": certificate.solid_angle,
-        **stretch_summary(stretch(mesh.V, mesh.F, sphere), mesh.triangle_areas),
-    }
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class CubeChartMap:
     """A closed genus-0 mesh on the six charts of the cube; see `ChartMap`.
@@ -221,8 +211,10 @@ class CubeChartMap:
         return chart_uv(coordinates, chart)
 
     def quality(self, mesh: Mesh) -> dict[str, float]:
-        """Folds, stretch and starved area of the sphere map."""
-        return sphere_map_quality(mesh, self.sphere)
+        """Flipped triangles, solid angle, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
+        found = certify(mesh.F, self.sphere)
+        spread = stretch_summary(stretch(mesh.V, mesh.F, self.sphere), mesh.triangle_areas)
+        return {"flipped": found.flipped, "solid_angle": found.solid_angle, **spread}
 
     def arrays(self) -> dict[str, NDArray]:
         """The sphere map."""

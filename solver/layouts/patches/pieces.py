@@ -6,7 +6,7 @@ each is laid out again as it was: a texel is then found at its own row and colum
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,18 +47,22 @@ def chart_pieces(patches: PatchMap) -> Pieces:
     first = np.floor(places.min(axis=1) + 1e-12).astype(np.int64)
     last = np.maximum(np.ceil(places.max(axis=1) - 1e-12).astype(np.int64), first + 1)
     given = seamless, corner, homes, places, first, last
-    size = _cut_at_borders(*given, *_room(0))
-    origin, chart, weights, cut = _room(size)
-    _cut_at_borders(*given, origin, chart, weights, cut)
+    origin, chart, weights, cut = _filled(_cut_at_borders, *given)
     triangle = patches.surface.parent[origin]
     order = np.argsort(triangle, kind="stable")
     barycentrics = weights @ patches.surface.inside[origin]
     return Pieces(triangle[order], barycentrics[order], chart[order], np.clip(cut[order], 0.0, 1.0))
 
 
-def _room(size: int) -> tuple[Ints, Ints, Floats, Floats]:
-    """For pieces: triangle and chart of each, barycentrics in that triangle and places of its corners."""
-    return np.empty(size, np.int64), np.empty(size, np.int64), np.empty((size, 3, 3)), np.empty((size, 3, 2))
+def _filled(cut: Any, *given: Any) -> tuple[Ints, Ints, Floats, Floats]:
+    """Triangle and chart of each piece that a cut makes, barycentrics in that triangle and places of its corners."""
+    size = 0
+    while True:  # once to count them, once to fill them in
+        room = np.empty(size, np.int64), np.empty(size, np.int64), np.empty((size, 3, 3)), np.empty((size, 3, 2))
+        count = cut(*given, *room)
+        if count == size:
+            return room
+        size = count
 
 
 @kernel
@@ -151,9 +155,7 @@ def warped(pieces: Pieces, offsets: NDArray[np.float64]) -> Pieces:
     first = np.maximum(np.floor(pieces.places.min(axis=1) * n).astype(np.int64) - 1, 0)
     last = np.minimum(np.floor(pieces.places.max(axis=1) * n).astype(np.int64) + 3, n + 1)
     given = pieces, nodes, bent, first, last
-    size = _cut_at_lattice(*given, *_room(0))
-    origin, chart, inside, places = _room(size)
-    _cut_at_lattice(*given, origin, chart, inside, places)
+    origin, chart, inside, places = _filled(_cut_at_lattice, *given)
     barycentrics = inside @ pieces.barycentrics[origin]
     return Pieces(pieces.triangle[origin], barycentrics, chart, np.clip(places, 0.0, 1.0))
 

@@ -15,10 +15,10 @@ from genus_zero import TETRAHEDRON, bipyramid, icosphere
 
 from ripple_sim.solver import Atlas, Mesh, sphere_atlas
 from ripple_sim.solver.layouts.cube import (
+    CubeChartMap,
     atlas_from_sphere_map,
     cast_rays,
     sphere_directions,
-    sphere_map_quality,
     texel_directions,
 )
 from ripple_sim.solver.texels import QUANTILES
@@ -62,7 +62,7 @@ def unit(V: np.ndarray) -> np.ndarray:
 
 def test_a_regular_solid_is_spread_evenly() -> None:
     V, F = TETRAHEDRON
-    quality = sphere_map_quality(Mesh(V, F), unit(V))
+    quality = CubeChartMap(unit(V)).quality(Mesh(V, F))
     assert quality["flipped"] == 0
     assert quality["solid_angle"] == pytest.approx(4 * np.pi)
     assert quality["starved"] == 0
@@ -79,7 +79,7 @@ def test_a_needle_is_starved_when_its_triangles_have_too_small_a_share_of_the_sp
     V = sphere.copy()
     V[0] *= 1e5
     assert (F == 0).sum() == 5
-    quality = sphere_map_quality(Mesh(V, F), sphere)
+    quality = CubeChartMap(sphere).quality(Mesh(V, F))
     assert quality["starved"] == pytest.approx(starved, abs=1e-3)
     assert quality["q50"] == pytest.approx({0: 2, 2: 8}[subdivisions], rel=0.15)
 
