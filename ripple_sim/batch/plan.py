@@ -9,6 +9,7 @@ import dataclasses
 import glob
 import importlib.util
 import math
+import os
 import re
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -378,13 +379,13 @@ def check_plan(plan: Plan) -> None:
 def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
     shipped = shipped_scenes()
     for name in content.scenes:
-        path = (folder / name).resolve()
-        if name not in shipped and not path.is_file():
+        path = folder / name
+        if name not in shipped and not os.path.isfile(path):  # noqa: PTH113 - False for what can be no name, too
             raise SceneError(
                 f"plan: there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, or give the path of "
                 "a TOML file, relative to the plan"
             )
-        yield name if name in shipped else str(path)
+        yield name if name in shipped else str(path.resolve())
     for pattern in content.meshes.files if content.meshes else ():
         found = _meshes(folder / pattern)
         if not found:

@@ -265,10 +265,8 @@ class Stencil:
 
     def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
-        n, h, result = self.topology.shape[1], self.topology.with_boundary(field), np.zeros(self.topology.shape)
-        for link, down, left, dr, dc in (*_SIDES, *_DIAGONALS):
-            weights = self.weights[:, link, 1 + down : n + 1 + down, 1 + left : n + 1 + left]
-            result += weights * (h[:, 1 + dr : n + 1 + dr, 1 + dc : n + 1 + dc] - h[:, 1:-1, 1:-1])
+        result = np.empty(self.topology.shape)
+        _gather(self.weights, self.topology.with_boundary(field), result)
         if self.irregular is not None:
             gather_links(self.irregular, field.reshape(-1), result.reshape(-1))
         return result
@@ -305,6 +303,20 @@ class Stencil:
 # link, the place from which it starts relative to the texel, and its other end
 _SIDES = ((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0))
 _DIAGONALS = ((2, 0, 0, 1, 1), (2, -1, -1, -1, -1), (3, -1, 0, -1, 1), (3, 0, -1, 1, -1))
+
+
+@kernel
+def _gather(w: Floats, h: Floats, out: Floats) -> None:
+    """Sum of weight (h_j - h_i) over the stencil; h has a halo."""
+    n = out.shape[1]
+    for chart in range(len(out)):
+        for r in range(1, n + 1):
+            for c in range(1, n + 1):
+                total = 0.0
+                for links in (_SIDES, _DIAGONALS):
+                    for link, i, j, dr, dc in links:
+                        total += w[chart, link, r + i, c + j] * (h[chart, r + dr, c + dc] - h[chart, r, c])
+                out[chart, r - 1, c - 1] = total
 
 
 def stiffness_matrix(stencil: Stencil) -> csr_array:

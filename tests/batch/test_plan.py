@@ -24,13 +24,15 @@ def test_keys_may_be_written_as_tables_or_with_quotes(tmp_path):
         ("count = 5", "count = 0", "count is 0; valid is a whole number from 1"),
         ("count = 5", "count = 5\nscene = 3", "unknown key 'scene'; valid are count, scenes"),
         ('"scene.toml"', '"duk"', "no scene 'duk'; shipped scenes are animal"),
+        ('"scene.toml"', r'"\u0000"', "no scene"),
+        ('"scene.toml"', f'"{"a" * 999}"', "no scene"),
         ('scenes = ["scene.toml"]', "", "names no scene"),
         ('scenes = ["scene.toml"]', 'meshes = {files = ["*.obj"]}', r"no mesh fits '\*.obj'"),
         ("uniform = [0, 360]", "uniform = 360", "camera.azimuth: Expected `array"),
         ("fps = 20", "fsp = 20", "unknown field `fsp`"),
         ("fps = 20", 'video = "avi"', "Invalid enum value 'avi'"),
     ],
-    ids=lambda value: value or "none",
+    ids=lambda value: value[:30] or "none",
 )
 def test_wrong_plans_are_refused_with_what_is_valid(tmp_path, old, new, message):
     assert old in PLAN

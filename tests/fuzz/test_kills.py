@@ -65,10 +65,10 @@ def finish(home: Path, words: str, kill: int = 0, after: float = 300) -> int:
 
 
 def made(folder: Path) -> dict[str, bytes]:
-    """All that a job makes but for the times in it."""
+    """All that a job makes but for the times in it, and where it was."""
     timed = ("times.json", "index.parquet", "index.html")
     return {
-        name: content
+        name: content.replace(str(folder.parent).encode(), b"home")
         for name, content in contents(folder).items()
         if not (name.endswith(timed) or name.startswith("work/") or "/." in f"/{name}")
     }

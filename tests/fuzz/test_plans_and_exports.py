@@ -20,7 +20,7 @@ from fuzzing import (
     places,
     put,
 )
-from hypothesis import given, strategies as st
+from hypothesis import assume, given, strategies as st
 from small_batch import PLAN, Here, write_files
 from unfinished_videos import contents
 
@@ -70,6 +70,7 @@ def tried(home: Path) -> None:
 @fuzzed
 @given(st.sampled_from(places(TABLE)[1:]), VALUES | DRAWN)
 def test_a_plan_with_any_value_anywhere(place: tuple, value: Any) -> None:
+    assume("\\ud800" not in repr(value))  # which no TOML file can hold
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         write_files(home)
         patch.setattr(plans, "read_toml", lambda *_: put(TABLE, place, value))
