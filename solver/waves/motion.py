@@ -55,7 +55,8 @@ class Motion:
         self._operator = MovingOperator(atlas, material, operator)
         self._folds = Folds(atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64))
         self._edges = edges_of(self._folds.F).ends
-        self._squares = self._square_lengths()
+        self._squares = np.empty(len(self._edges))
+        _square_lengths(self.V, self._edges, self._squares)
         self._now = operator
         self._warned, self._looks = False, 0
 
@@ -71,7 +72,7 @@ class Motion:
         self.__dict__.pop("atlas", None)
         if not _stretches(self.V, self._edges, self._squares):
             return None
-        self._squares = self._square_lengths()
+        _square_lengths(self.V, self._edges, self._squares)
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
         self.__dict__.pop("areas", None)
         self._warn_of_folds()
@@ -95,10 +96,6 @@ class Motion:
         moved = Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
         moved.__dict__["tree"] = refitted(rest.tree, V, mesh.F)
         return moved
-
-    def _square_lengths(self) -> NDArray[np.float64]:
-        ends = self.V[self._edges]
-        return ((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1)
 
     def _checked(self, vertices: ArrayLike) -> NDArray[np.float64]:
         shape = self.rest.mesh.V.shape
@@ -131,15 +128,28 @@ class Motion:
 
 
 @kernel
+def _square_lengths(V: Floats, edges: Ints, squares: Floats) -> None:
+    """Fill in the squared lengths [k] of edges [k, 2]; NumPy takes as long as all else that a motion takes."""
+    for i in range(len(edges)):
+        squares[i] = _squared(V, edges, i)
+
+
+@kernel
 def _stretches(V: Floats, edges: Ints, squares: Floats) -> bool:
     """Whether any edge has another length than it had."""
-    for i in range(len(edges)):
-        a, b, square = edges[i, 0], edges[i, 1], 0.0
-        for k in range(3):
-            square += (V[b, k] - V[a, k]) ** 2
-        if not abs(square - squares[i]) <= _CHANGED * squares[i]:
-            return True
-    return False
+    i = 0
+    while i < len(edges) and abs(_squared(V, edges, i) - squares[i]) <= _CHANGED * squares[i]:
+        i += 1
+    return i < len(edges)
+
+
+@kernel
+def _squared(V: Floats, edges: Ints, i: int) -> float:
+    """Squared length of an edge."""
+    a, b, total = edges[i, 0], edges[i, 1], 0.0
+    for k in range(3):
+        total += (V[b, k] - V[a, k]) ** 2
+    return total
 
 
 class MovedGradients:
