@@ -119,6 +119,7 @@ def with_ball(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray, side: n
     mass = 4000 * radius**3
     ball = spec.worldbody.add_body(name="our ball", pos=middle + side * (half + 2 * radius))
     ball.mass, ball.inertia, ball.explicitinertial = mass, np.full(3, 0.4 * mass * radius**2), True
+    ball.ipos = np.zeros(3)  # without it the mass is at the origin of the world
     ball.add_freejoint(name="our ball")
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
     ball.add_geom(type=sphere, size=(radius, 0, 0), contype=1, conaffinity=1, group=1, rgba=(0.8, 0.3, 0.2, 1))
