@@ -36,8 +36,10 @@ def ended(home: Path, words: str, begun: Event) -> None:
     """What a process does: a command, whose workers are this very process. It can be killed once it has `begun`."""
     from ripple_sim.batch import run
     from ripple_sim.cli.main import main
+    from ripple_sim.cli.signals import end_at_once
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    end_at_once()  # as the program does before it imports what is above
     os.chdir(home)
     os.environ["XDG_CACHE_HOME"] = str(home / "cache")
     os.dup2(os.open("said", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
