@@ -99,8 +99,12 @@ class BatchFolder:
         self.index, self.page = path / "index.parquet", path / "index.html"
 
     def make(self) -> None:
-        """Make the folders."""
-        for folder in (self.scenes, self.tars, self.failed, self.thumbnails, self.work):
+        """Make the folders; raises `BatchError` where a link lies, since it leads to what is not the batch's."""
+        folders = (self.scenes, self.tars, self.failed, self.thumbnails, self.work)
+        for path in (path for folder in (self.path, *folders) for path in _entries(folder)):
+            if path.is_symlink():
+                raise BatchError(f"{path} is a link, which no batch makes; remove it and run the same command again")
+        for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
 
     def scene(self, number: int) -> Path:

@@ -30,6 +30,7 @@ _NEVER_IN = (
     "importlib._bootstrap",
     "_frozen_importlib",
     "weakref.",
+    "_weakrefset.",
     "ripple_sim.encode.writer.open_writer",
 )
 

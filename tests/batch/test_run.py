@@ -43,6 +43,19 @@ def same_scenes(batch, reference, numbers=range(5)):
             assert (batch.scene(number) / name).read_bytes() == (reference.scene(number) / name).read_bytes()
 
 
+@pytest.mark.parametrize("name", ["index.html", "failed", "work/000000", "failed/000000.log"])
+def test_links_in_its_folder_are_not_followed(here, tmp_path, name):
+    plan, folder, mine = small_plan(tmp_path, DATA), tmp_path / "out", tmp_path / "mine"
+    run_batch(plan, folder, RunOptions(shard=(2, 2), limit=1))
+    mine.write_text("mine")
+    path = folder / name
+    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    path.symlink_to(mine)
+    with pytest.raises(BatchError, match=f"{name} is a link"):
+        run_batch(plan, folder)
+    assert mine.read_text() == "mine"
+
+
 def test_shards_and_limits_share_out_the_scenes(here, unbroken, tmp_path):
     plan, folder = small_plan(tmp_path, DATA), tmp_path / "out"
     batch = BatchFolder(folder)

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
+from weakref import WeakSet
 
 import pytest
 
@@ -124,9 +125,10 @@ def test_no_exception_is_raised_within_a_call_of_moderngls_but_soon_after(number
     from pyvista.plotting import render_window_interactor
     from zarr.core import sync
 
-    # VTK calls back, kernels are compiled or loaded, threads would write on
-    for module in (moderngl, ffi, render_window_interactor, sync):
-        assert within(module.__name__, number) == ["call ended"]
+    # VTK calls back, kernels are compiled or loaded, threads would write on, Python swallows what a weak set's raise
+    names = [each.__name__ for each in (moderngl, ffi, render_window_interactor, sync)]
+    for name in (*names, WeakSet.__module__):
+        assert within(name, number) == ["call ended"]
     assert within(open_writer.__module__, number, open_writer.__qualname__) == ["call ended"]
     assert within("elsewhere", number) == []
 

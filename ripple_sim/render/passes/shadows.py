@@ -197,6 +197,7 @@ class TransmissionMaps:
 
 _ENDLESS = 1e9  # half size of an infinite plane [m]
 _SOFT = 0.1  # margin about shadows for their penumbras, in half widths of the map
+_MOST_TEXELS = 2048  # of a texture, along a side, that its mean colour is taken from
 _LOWEST_SINE = 0.02  # elevation of a light at which shadows have no end
 
 _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # of a box about a ball
@@ -242,8 +243,9 @@ class Floor:
         self.tiling, self.albedo, self.tint = mapping.tiling, visual.color, visual.color
         self._image = assets.texture(mapping.texture) if self.tiled else None
         if self.tiled:
-            texels = srgb_to_linear(texture_pixels(model, mapping.texture) / 255.0)
-            self.albedo = self.tint * texels.mean(axis=(0, 1))
+            pixels = texture_pixels(model, mapping.texture)
+            apart = -(-max(pixels.shape) // _MOST_TEXELS)  # all of a large one would be gigabytes of numbers
+            self.albedo = self.tint * srgb_to_linear(pixels[::apart, ::apart] / 255.0).mean(axis=(0, 1))
         self.reflectance = 0.0 if visual.material < 0 else float(model.mat_reflectance[visual.material])
         half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)

@@ -386,6 +386,7 @@ _CORNERS = 6  # of a cell
 _RADIUS = 0.75  # of a cell, over the root of its share of the area
 _REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
 _SMALLEST = 0.85  # of the radius of cells elsewhere
+_FARTHEST = 300  # a surface reaches, in units of the root of a cell's area: beyond, the work takes minutes
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
@@ -409,7 +410,12 @@ def large_quads_of(part: Surface, count: int) -> Quads | None:
 
 
 def _cells_of(part: Surface, count: int) -> BorderedCells:
-    area = part.areas.sum()
+    area, extent = part.areas.sum(), float(np.ptp(part.V, axis=0).max())
+    if extent > _FARTHEST * np.sqrt(area / count):
+        raise AtlasError(
+            f"the surface is about {extent**2 / area:.2g} times as long as wide, too long for charts: shorten what "
+            "sticks out of it, or scale it alike along all axes"
+        )
     metric, reach = Metric.of(refined(part, np.sqrt(area / (_TRIANGLES / CELLS * count)))), np.inf
     if count > 1:
         largest = _RADIUS * np.sqrt(area / count)

@@ -1,5 +1,9 @@
 """The floor and the background: texture, edges, alpha, occlusion of the sky, and interpolation of coarse pixels."""
 
+import tracemalloc
+from types import SimpleNamespace
+
+import mujoco
 import numpy as np
 import pytest
 from drawn import BALL, FLOOR, FRONT, SIZE, SUN, frame_of
@@ -7,6 +11,7 @@ from scipy.ndimage import binary_erosion
 
 from ripple_sim.render import Camera, srgb_to_linear
 from ripple_sim.render.passes import deferred
+from ripple_sim.render.passes.shadows import Floor
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):
@@ -136,3 +141,20 @@ def test_interpolated_penumbras_end_where_those_of_each_pixel_do(gl, monkeypatch
     camera = Camera((0, 0, 0.2), 1.3, 110.0, -22.0)
     interpolated, exact = backgrounds(gl, monkeypatch, (803, 451), body, camera=camera)
     assert np.abs(interpolated - exact).max() <= 8
+
+
+def test_the_colour_of_a_large_image_takes_little_memory() -> None:
+    """All its texels as numbers would take 2 GB; some of them, of what is mixed evenly, have the same mean."""
+    asset = (
+        '<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="4096" height="4096"/>'
+        '<material name="c" texture="c"/>'
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset>{asset}</asset><worldbody><geom type="plane" size="1 1 1" material="c"/></worldbody></mujoco>'
+    )
+    tracemalloc.start()
+    floor = Floor(SimpleNamespace(model=model, texture=lambda _: None), 0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    np.testing.assert_allclose(floor.albedo, 0.5, atol=1e-3)
+    assert peak < 1e9

@@ -178,6 +178,14 @@ def assert_waves_are_stable(atlas: Atlas) -> None:
     assert waves.energy() < 1.5 * before
 
 
+@pytest.mark.parametrize("stretch", [1e4, 1e6])
+def test_a_surface_too_long_for_its_width_is_refused_at_once(stretch: float) -> None:
+    """It would be cut into a row of thousands of cells, for minutes."""
+    long = Mesh.from_arrays(sphere(1).V * [1, 1, stretch], sphere(1).F)
+    with pytest.raises(AtlasError, match="times as long as wide"):
+        build_atlas(long, 16, cache=False, layout="patches")
+
+
 def test_many_parts_none_of_which_has_a_share_to_speak_of(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with a thousand parts, in less time."""
     monkeypatch.setattr(layout, "_NEGLIGIBLE", 0.3)
