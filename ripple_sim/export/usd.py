@@ -23,6 +23,7 @@ from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.coupling.soft import is_soft
 from ripple_sim.encode.part import Part
 from ripple_sim.encode.replace import MARK
+from ripple_sim.errors import VideoError
 from ripple_sim.solver.files import final_path
 
 from .moving_mesh import Displaced, MovingMesh
@@ -62,7 +63,7 @@ class Chunks:
     Raises
     ------
     VideoError
-        If another process writes to the same place, or a run that is to be resumed has other settings.
+        If another process writes to the same place, or a run that is to be resumed has other settings, or is damaged.
     """
 
     def __init__(self, stage: Usd.Stage, path: Sdf.Path, chunking: Chunking) -> None:
@@ -75,6 +76,11 @@ class Chunks:
             resume=chunking.resume,
             overwrite=True,
         )
+        if damaged := [segment.name for segment, _ in self._part.segments() if not made_here(segment)]:
+            self._part.keep()
+            raise VideoError(
+                f"cannot resume {chunking.output}: {damaged[0]} is damaged; leave --resume out to start again"
+            )
         self.stored = self._part.frames
         self._layer: Sdf.Layer | None = None
         self._waiting = 0  # frames of the open layer

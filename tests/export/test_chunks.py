@@ -106,6 +106,10 @@ def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) 
 
     with pytest.raises(RippleError, match="not in the state"):
         export_scene(scene, path, dataclasses.replace(OPTIONS, resume=True), on_step=change)
+    (path.with_name("run.usdc.part") / "frames" / "frames_00000-00003.usdc").write_bytes(b"")
+    with pytest.raises(RippleError, match=r"run\.usdc: frames_00000-00003\.usdc is damaged; leave --resume out"):
+        export_scene(scene, path, dataclasses.replace(OPTIONS, resume=True))
+    assert export_scene(scene, path, OPTIONS).frames == 11
 
 
 @pytest.mark.parametrize(
