@@ -159,7 +159,7 @@ Owner = TypeVar("Owner")
 Result = TypeVar("Result")
 
 
-class Kept(Generic[Result]):
+class ResultCache(Generic[Result]):
     """The latest `count` results by their keys, as far as they are `small` enough to be kept.
 
     They are shared by all who ask, and not to be changed.

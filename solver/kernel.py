@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 from .cache import cache_folder
 
 
-class _Watch(event.Listener):
+class _CompileListener(event.Listener):
     """Seconds of compilation by module, and in this thread; a kernel that is compiled for another is part of it.
 
     Meanwhile Python looks for no garbage: it would go through all that numba makes, a sixth of the time.
@@ -61,7 +61,7 @@ class _Watch(event.Listener):
             self.running = event.data["dispatcher"].py_func.__module__, time.perf_counter()
 
     def on_end(self, event: Any) -> None:
-        """It has been compiled."""
+        """A kernel has been compiled."""
         self.own.depth -= 1
         if self.own.depth == 0 and self.running is not None:
             if self.collects:
@@ -73,7 +73,7 @@ class _Watch(event.Listener):
             self.running = None
 
 
-_watch = _Watch()
+_watch = _CompileListener()
 event.register("numba:compile", _watch)
 
 

@@ -36,7 +36,7 @@ class Energy(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Of both [J]."""
+        """Energy of bodies and waves [J]."""
         return self.bodies + self.waves
 
 
@@ -174,7 +174,7 @@ class Pair(NamedTuple):
         return min(self.key), max(self.key)
 
 
-class _Contact(NamedTuple):
+class _ContactRows(NamedTuple):
     """A contact: which of MuJoCo's, its rows that carry the normal force, all its rows, and its pairs, one a target."""
 
     which: int
@@ -205,7 +205,7 @@ class ContactProblem:
             first, dim = int(contact.efc_address[i]), int(contact.dim[i])
             count = 2 * (dim - 1) if is_pyramidal(model) and dim > 1 else 1
             rows = slice(first, first + count)
-            self._contacts.append(_Contact(i, rows, rows if count > 1 else slice(first, first + dim), mine))
+            self._contacts.append(_ContactRows(i, rows, rows if count > 1 else slice(first, first + dim), mine))
             for pair in mine:
                 rows_of[pair.key] += count
         # as they are without mobility, and what each row would add if all rows of its pairs bore alike [1/kg]
@@ -252,7 +252,7 @@ class ContactProblem:
         return self._total(force)
 
     def works(self) -> list[tuple[Pair, float, float]]:
-        """Of each pair the work that its contacts do on bodies [J], and the force on the surface [N]."""
+        """Work that each pair's contacts do on bodies [J], and the force on the surface [N]."""
         force, work = self._data.efc_force, dict[Key, float]()
         means = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
         for contact, normal in zip(self._contacts, self._normal(force), strict=True):

@@ -313,7 +313,7 @@ class TargetLoad:
 
 
 def time_constant(coupled: CoupledModel, target: int) -> float:
-    """Of a target's contacts [s]; of a spring without a time constant that of its frequency, 1 / omega."""
+    """Time constant of a target's contacts [s]; 1 / omega of a spring that has none."""
     surface = coupled.soft.get(target)
     if surface is None:
         constant = float(coupled.solref[target, 0])

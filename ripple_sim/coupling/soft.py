@@ -125,12 +125,12 @@ class SoftSurface:
 
     @property
     def degree(self) -> int:
-        """Of the polynomials by which a flex is interpolated between its nodes: 1 or 2; 0 where its vertices move."""
+        """Degree of the polynomials that interpolate a flex between its nodes, 1 or 2; 0 where its vertices move."""
         return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
 
     @property
     def mass(self) -> float:
-        """Of its bodies [kg]."""
+        """Mass of its bodies [kg]."""
         return float(self._model.body_mass[self.bodies].sum())
 
     @property

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.scenes.sphere_maps import shipped_sphere_map
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
-from ripple_sim.solver.cache import Kept, content_key
+from ripple_sim.solver.cache import ResultCache, content_key
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.clean import counted
 
@@ -89,7 +89,7 @@ def _on_round_surface(kind: str, size: NDArray[np.float64], V: NDArray[np.float6
 
 _MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB
 
-_atlases: Kept[Atlas] = Kept(4, lambda atlas: atlas.areas.size <= _MOST_TEXELS)
+_atlases: ResultCache[Atlas] = ResultCache(4, lambda atlas: atlas.areas.size <= _MOST_TEXELS)
 
 
 def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str = "auto") -> Atlas:

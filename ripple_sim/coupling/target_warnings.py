@@ -120,7 +120,7 @@ def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None
 
 
 def _touch_warning(coupled: CoupledModel, geom: int) -> str:
-    """Of a target that nothing can touch."""
+    """Warning of a target that nothing can touch."""
     model, name, colliders = coupled.model, coupled.names[geom], coupled.collision_geoms(geom)
     if not colliders:
         return (
@@ -135,7 +135,7 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
 
 
 def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
-    """Of collision geoms that are visibly off the surface."""
+    """Warning of collision geoms that are visibly off the surface."""
     name, solids = coupled.names[geom], coupled.collision_geoms(geom)
     colliders = [part for each in solids for part in coupled.convex_colliders.get(each, [each])]
     gap, size = collision_gap(coupled, geom, atlas, colliders), float(np.ptp(atlas.mesh.V, axis=0).max())
@@ -150,7 +150,7 @@ def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
 
 
 def _hull_warning(name: str, atlas: Atlas) -> str | None:
-    """Of a convex hull that is visibly off the surface."""
+    """Warning of a convex hull that is visibly off the surface."""
     gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
     if gap <= GAP_TOLERANCE * size:
         return None
@@ -161,7 +161,7 @@ def _hull_warning(name: str, atlas: Atlas) -> str | None:
 
 
 def _flex_warning(coupled: CoupledModel, geom: int) -> str | None:
-    """Of geoms that a flex collider meets badly, or not at all."""
+    """Warning of geoms that a flex collider meets badly, or not at all."""
     model, name = coupled.model, coupled.names[geom]
     body, weld = int(model.geom_bodyid[geom]), model.body_weldid[model.geom_bodyid]
     meets = coupled.masks_match(geom) & (weld != weld[geom])
@@ -194,7 +194,7 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> str | None:
 
 
 def _distance_warning(coupled: CoupledModel, geom: int) -> str | None:
-    """Of what an SDF geom does not meet."""
+    """Warning of geoms that an SDF geom does not meet."""
     model, name = coupled.model, coupled.names[geom]
     hills = coupled.can_collide(geom) & (model.geom_type == int(_GEOM.mjGEOM_HFIELD))
     if int(model.geom_type[geom]) != int(_GEOM.mjGEOM_SDF) or not hills.any():
@@ -310,7 +310,7 @@ class AmplitudeCheck:
 
     def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
         self._coupled = coupled
-        self._watched = {geom: _Watch(each) for geom, each in waves.items()}
+        self._watched = {geom: _WatchedTarget(each) for geom, each in waves.items()}
         self._steps = 0
 
     def __call__(self) -> None:
@@ -368,7 +368,7 @@ class AmplitudeCheck:
         return f"This would do: Material({python}), in a scene file material = {{{toml}}}"
 
 
-class _Watch:
+class _WatchedTarget:
     """One target's waves.
 
     Attributes

@@ -185,7 +185,7 @@ class Exporter:
         return kept
 
     def _repr_html_(self) -> str:
-        """In a notebook: the player of a complete page, or what was written."""
+        """HTML for a notebook: the player of a complete page, or what was written."""
         complete = self._place is None and self.output.is_file()
         if complete and self.output.suffix.lower() == ".html":
             width, height = self._source.size

@@ -258,7 +258,7 @@ class RippleRenderer:
         return camera_entry(self.model, camera if isinstance(camera, str) else None)
 
     def _repr_html_(self) -> str | None:
-        """In a notebook: the present state of what was rendered last, to turn and to zoom."""
+        """HTML for a notebook: the present state of what was rendered last, to turn and to zoom."""
         if self._seen is None:
             return None
         data, camera = self._seen

@@ -79,7 +79,7 @@ def target_finish(
 def _finish(
     model: mujoco.MjModel, look: Look, color: NDArray[np.float64], mapping: TextureMapping, opacity: float = 1.0
 ) -> Finish:
-    """With a flat texture, or else the mean colour of any other."""
+    """Surface with a flat texture, or else the mean colour of any other."""
     if mapping.kind == MappingKind.FLAT_IMAGE:
         return Finish(look, color, opacity, mapping.texture)
     return Finish(look, color * mean_color(model, mapping), opacity, -1)

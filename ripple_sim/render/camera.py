@@ -212,7 +212,7 @@ def orthographic(half_width: float, depth: float) -> NDArray[np.float64]:
 
 
 def within(balls: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
-    """Those balls that any point within `reach` [m] of a point [3] touches."""
+    """The balls that any point within `reach` [m] of a point [3] touches."""
     return balls[np.linalg.norm(balls[:, :3] - point, axis=1) - balls[:, 3] < reach]
 
 

@@ -356,7 +356,7 @@ class DrawnScene:
         return np.concatenate([*self._geom_balls(data), *(target.ball() for target in self.targets)])
 
     def _geom_balls(self, data: Any) -> list[NDArray[np.float64]]:
-        """Of everything but the targets that may cast a shadow."""
+        """Bounding balls of everything but the targets that may cast a shadow."""
         return [self._occluders.balls(data), *(ball_of(self._model, data, each) for each in self._others)]
 
     def draw(self) -> None:

@@ -202,7 +202,7 @@ class MovedHeightMap(NamedTuple):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the height map."""
+        """Shape of the height map."""
         return self.height_map.shape
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray:

@@ -51,7 +51,7 @@ class FrameFormat:
 
     @property
     def dtype(self) -> str:
-        """Of a channel on the GPU, as moderngl names it."""
+        """Type of a channel on the GPU, as moderngl names it."""
         return "f2" if self.linear else "f1"
 
 

@@ -49,12 +49,12 @@ class Shot:
 
     @property
     def number(self) -> int:
-        """Of the frame, from 0."""
+        """Number of the frame, from 0."""
         return self.snapshots[0].number
 
     @property
     def exposure(self) -> int:
-        """Of the frame's exposures, from 0."""
+        """Number of the exposure within its frame, from 0."""
         return self.snapshots[0].exposure
 
     def digest(self) -> str:

@@ -97,7 +97,7 @@ class FluidBackend:
         return self._v.copy()
 
     def move(self, operator: WaveOperator) -> None:
-        """It cannot; see `MovingOperator`."""
+        """Refuse: this backend cannot move; see `MovingOperator`."""
         raise NotImplementedError
 
     def crests(self) -> NDArray[np.float32]:
@@ -250,7 +250,7 @@ def measure(gl: GLContext) -> Measured:
 
 
 def _plain_operator(n: int) -> WaveOperator:
-    """Of a cube of n x n texels a face, without links: what the numbers are makes no difference to the time."""
+    """An operator on a cube of n x n texels a face, without links: the time does not depend on the numbers."""
     topology = cube_topology(n)
     ones = np.ones(topology.shape)
     return WaveOperator(Stencil(topology, np.zeros((6, 4, n + 1, n + 1))), ones, 0 * ones, 0 * ones)

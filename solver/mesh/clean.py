@@ -97,17 +97,17 @@ def merged_vertices(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArr
 
 
 def distinct_triangles(F: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which triangles have three different vertices, and are the first that has these three."""
+    """Mask of the triangles with three different vertices that are the first with these three."""
     return ~collapsed(F) & (_first_equal(np.sort(F, axis=1)) == np.arange(len(F)))
 
 
 def collapsed(F: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which triangles have a vertex twice."""
+    """Mask of the triangles that have a vertex twice."""
     return (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
 
 
 def _first_equal(rows: NDArray) -> NDArray[np.int64]:
-    """For every row the index of the first row that equals it."""
+    """Index of the first row that equals each row."""
     order = np.lexsort(rows.T)
     starts = np.ones(len(rows), dtype=bool)
     starts[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
@@ -160,7 +160,7 @@ def without_slivers(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, 
 
 
 def _flat(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Which triangles have no area, and the lengths of all sides [m, 3]."""
+    """Mask of the triangles without area, and the lengths of all sides [m, 3]."""
     sides = V[np.roll(F, -1, axis=1)] - V[F]
     length = np.linalg.norm(sides, axis=-1)
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)

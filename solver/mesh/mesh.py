@@ -76,7 +76,7 @@ def _worst(normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArr
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """As they are where they have no length."""
+    """Vectors [n, 3] scaled to length 1; those without length stay as they are."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(length > 0, length, 1)
 

@@ -34,7 +34,7 @@ class Edges(NamedTuple):
 
     @property
     def rim(self) -> NDArray[np.bool_]:
-        """Which edges have one side alone, [e]."""
+        """Mask of the edges with one triangle only, [e]."""
         return self.sides[:, 1] < 0
 
 
@@ -259,7 +259,7 @@ def labels(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 def turned(
     pairs: NDArray[np.int64], against: NDArray[np.bool_], count: int, cost: NDArray[np.float64] | None = None
 ) -> NDArray[np.bool_]:
-    """Which triangles to turn over, so that as far as possible the windings of linked ones agree.
+    """Mask of the triangles to turn over, so that the windings of linked ones agree as far as possible.
 
     Each component follows its first triangle, along a tree of shortest paths. Where a surface is one-sided, links are
     left that disagree: those where paths from both sides meet.

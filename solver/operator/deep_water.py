@@ -115,7 +115,7 @@ class FluidOperator(WaveOperator):
         return self.mass * self.deep * self.root.inverse(velocity)
 
     def _lightened(self, rate: float) -> float:
-        """With the greatest wave number, of which least of the fluid moves."""
+        """The rate at the greatest wave number, where least of the fluid moves."""
         return rate * self.root.most / self.deep
 
 

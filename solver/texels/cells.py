@@ -393,7 +393,7 @@ def _corner_places(topology: TexelTopology, cells: Ints) -> Ints:
 
 
 def _link_places(topology: TexelTopology, cells: Ints, links: tuple[tuple[int, int, int], ...]) -> tuple[Ints, Ints]:
-    """Of links [l, k] of cells [3, k], flat, those that are stored, and where in a stencil's weights."""
+    """Which links [l, k] of cells [3, k] are stored, and where in a stencil's weights; both flat."""
     n = topology.shape[1]
     link, down, right = np.transpose(links)[:, :, None]
     chart, row, column = cells[0], cells[1] + down, cells[2] + right

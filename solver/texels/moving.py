@@ -158,7 +158,7 @@ class MovedStencil(Stencil):
 
     @functools.cached_property
     def weights(self) -> NDArray[np.float64]:  # type: ignore[override]
-        """Of the nine-point stencil, [C, 4, n + 1, n + 1]."""
+        """Weights of the nine-point stencil, [C, 4, n + 1, n + 1]."""
         return self._made[0].weights
 
     @functools.cached_property
@@ -172,7 +172,7 @@ class MovedStencil(Stencil):
         return self._made[1]
 
     def fastest(self, mass: NDArray[np.float64]) -> float:
-        """As for any stencil, or what is known."""
+        """Bound of the largest eigenvalue as for any stencil, or the one that is known."""
         return super().fastest(mass) if self.known_fastest is None else self.known_fastest
 
 

@@ -147,7 +147,7 @@ def _shown(texels: TexelMesh, rows: list[int], columns: list[int]) -> NDArray[np
 
 
 def triangles_of(F: NDArray[np.int64], vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """For each of some vertices a triangle of which it is a corner, and the barycentrics [..., 3] of that corner."""
+    """A triangle at each of some vertices, and the barycentrics [..., 3] of that corner."""
     triangle = np.empty(F.max() + 1, np.int64)
     triangle[F[::-1].ravel()] = np.repeat(np.arange(len(F))[::-1], 3)
     triangles = triangle[vertices]

@@ -139,7 +139,7 @@ class WaveSolver:
 
     @property
     def backend(self) -> str:
-        """Which backend runs: "gl" or "cpu"."""
+        """Backend that runs: "gl" or "cpu"."""
         return self._backend.name
 
     @property

@@ -15,7 +15,7 @@ from ripple_sim.render.camera import balls_about
 from ripple_sim.render.visuals.corners import bake, corner_normals, normalized, smooth_normals, split_corners
 from ripple_sim.render.visuals.texture_mapping import TextureMapping
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.cache import Kept, content_key
+from ripple_sim.solver.cache import ResultCache, content_key
 from ripple_sim.solver.mesh.topology import Edges, edges_of
 from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
 
@@ -242,7 +242,7 @@ _APART = 0.1  # of the bounding radius: how far from each other the two sides of
 _MOST_KEPT_FACES = 100_000  # of a surface that is kept: 30 MB
 
 
-_kept: Kept[SurfaceVertices] = Kept(4, lambda each: len(each.F) <= _MOST_KEPT_FACES)
+_kept: ResultCache[SurfaceVertices] = ResultCache(4, lambda each: len(each.F) <= _MOST_KEPT_FACES)
 
 
 def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:

@@ -110,7 +110,7 @@ def bake(V: NDArray, F: NDArray, normals: NDArray) -> NDArray[np.float64]:
 
 
 def bounding_radius(V: NDArray) -> float:
-    """Of vertices [n, 3], about their mean [m]."""
+    """Radius of the ball about the mean of vertices [n, 3] that holds them [m]."""
     return float(np.linalg.norm(V - V.mean(axis=0), axis=1).max())
 
 

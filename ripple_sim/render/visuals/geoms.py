@@ -206,7 +206,7 @@ def visuals_of(model: Any, geoms: Iterable[int]) -> list[tuple[Visual, NamedShap
 
 
 def shaped(model: Any, visuals: Iterable[Visual]) -> list[tuple[Visual, NamedShape]]:
-    """Those visuals that have a shape, with that."""
+    """The visuals that have a shape, each with it."""
     return [(visual, shape) for visual in visuals if (shape := shape_of(model, visual)) is not None]
 
 

@@ -192,7 +192,7 @@ class Occluders:
         self._bound, self._bound_geoms = packed.astype(np.float64), self._geoms[nearest]
 
     def near(self, balls: NDArray[np.float64], geoms: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Which of the bound capsules darken objects by a hundredth or more, as bits; never an object's own.
+        """Bits of the bound capsules that darken objects by a hundredth or more; never an object's own.
 
         Parameters
         ----------

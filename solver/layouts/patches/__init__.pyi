@@ -28,4 +28,4 @@ from .seamless import (
     corner_places as corner_places,
     seamless_map as seamless_map,
 )
-from .surface import Surface as Surface
+from .surface import TriangleSurface as TriangleSurface

@@ -89,7 +89,7 @@ class PatchChartMap:
 
 @kernel
 def _find(first: Ints, corners: Floats, triangles: Ints, weights: Floats, piece: Ints, inside: Floats) -> None:
-    """For points at barycentrics [k, 3] in triangles [k], the piece in which each lies, and barycentrics in that."""
+    """Piece in which each point lies, and its barycentrics there; given triangles [k] and barycentrics [k, 3]."""
     for i in range(len(triangles)):
         piece[i], s, t = _piece_at(first, corners, triangles[i], weights[i, 0], weights[i, 1])
         inside[i, 0], inside[i, 1], inside[i, 2] = 1 - s - t, s, t

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ...mesh.topology import SPLITS
-from .surface import AB, BC, CA, MIDDLE, A, B, C, Patterns, Surface
+from .surface import AB, BC, CA, MIDDLE, A, B, C, Patterns, TriangleSurface
 
 _LEAST = 1e-12  # of the longest link: graphs know no links of length 0
 
@@ -26,19 +26,19 @@ class Metric:
 
     Attributes
     ----------
-    surface : Surface
+    surface : TriangleSurface
     graph : csr_array [n, n]
         Links between near vertices with their lengths in these units.
     unit : float64 [n]
         At each vertex [m].
     """
 
-    surface: Surface
+    surface: TriangleSurface
     graph: csr_array
     unit: NDArray[np.float64]
 
     @classmethod
-    def of(cls, surface: Surface) -> Metric:
+    def of(cls, surface: TriangleSurface) -> Metric:
         """Distances in metres."""
         return cls(surface, distance_graph(surface), np.ones(len(surface.V)))
 
@@ -63,7 +63,7 @@ class Metric:
         return lumped / self.unit**2 + np.finfo(np.float64).tiny
 
 
-def distance_graph(surface: Surface) -> csr_array:
+def distance_graph(surface: TriangleSurface) -> csr_array:
     """Vertices linked along edges, and straight across each edge between the two vertices opposite to it [m]."""
     edges, V, F = surface.edges, surface.V, surface.F
     inner = np.flatnonzero(~edges.rim)
@@ -159,7 +159,7 @@ def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
     return voronoi_cells(metric, seeds)
 
 
-def _gathered(surface: Surface, label: NDArray[np.int64], seeds: NDArray[np.int64]) -> NDArray[np.int64]:
+def _gathered(surface: TriangleSurface, label: NDArray[np.int64], seeds: NDArray[np.int64]) -> NDArray[np.int64]:
     """Give vertices that hang on their cell by no edge to a neighbour's."""
     ends, size = surface.edges.ends, len(surface.V)
     for _ in range(_MOST_PASSES):
@@ -192,7 +192,7 @@ class BorderedCells:
 
     Attributes
     ----------
-    surface : Surface
+    surface : TriangleSurface
     cell : int64 [m]
         To which each triangle belongs.
     arcs : list of lists of int64 [l]
@@ -201,7 +201,7 @@ class BorderedCells:
         How many vertices there were before the cut: the first ones.
     """
 
-    surface: Surface
+    surface: TriangleSurface
     cell: NDArray[np.int64]
     arcs: list[list[NDArray[np.int64]]]
     uncut: int
@@ -230,7 +230,7 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     return BorderedCells(cut, cell, arcs, len(surface.V))
 
 
-def _corners(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _corners(surface: TriangleSurface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Vertices in which three cells meet, two at a rim, or one at a sharp corner of the rim."""
     count = int(cell.max()) + 1
     pairs = np.unique(surface.F * count + cell[:, None])
@@ -239,7 +239,7 @@ def _corners(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
     return np.where(surface.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
 
 
-def _rim_sides(surface: Surface) -> NDArray[np.int64]:
+def _rim_sides(surface: TriangleSurface) -> NDArray[np.int64]:
     """The vertex that follows each along the rim, counter-clockwise about the surface; -1 elsewhere."""
     following = np.full(len(surface.V), -1)
     triangle, side = np.divmod(surface.edges.sides[surface.edges.rim, 0], 3)
@@ -247,7 +247,7 @@ def _rim_sides(surface: Surface) -> NDArray[np.int64]:
     return following
 
 
-def _border_loops(surface: Surface, cell: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
+def _border_loops(surface: TriangleSurface, cell: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
     """The vertices round each cell, counter-clockwise."""
     sides = surface.edges.sides
     beside = np.where(sides < 0, -1, cell[sides // 3])
@@ -318,7 +318,7 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> ND
     return (size + _GROWTH * distance).min(axis=1)[cells.label]
 
 
-def _coarse_graph(surface: Surface, cells: VoronoiCells) -> csr_array:
+def _coarse_graph(surface: TriangleSurface, cells: VoronoiCells) -> csr_array:
     """Cells linked to their neighbours, by the shortest way from seed to seed along an edge between them [m]."""
     count, ends = len(cells.seeds), surface.edges.ends
     between = cells.label[ends[:, 0]] != cells.label[ends[:, 1]]

@@ -16,13 +16,13 @@ from scipy.sparse.csgraph import connected_components
 from ...errors import AtlasError
 from .cells import BorderedCells
 from .disks import Border, along, flattened
-from .surface import Flat, Surface, central_vertices, cut_ray, halved, halved_chords
+from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved, halved_chords
 
 Path = NDArray[np.int64]
 Halves = list[tuple[Path, Path]]  # of each arc of a part's border
 
 
-def with_middles(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list[Halves]]:
+def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list[Halves]]:
     """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
     surface = cells.surface
     single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
@@ -50,7 +50,9 @@ def halves_of(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
     return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
 
 
-def cut_polygons(surface: Surface, part: NDArray[np.int64], halves: list[Halves]) -> tuple[Flat, list[list[Path]]]:
+def cut_polygons(
+    surface: TriangleSurface, part: NDArray[np.int64], halves: list[Halves]
+) -> tuple[Flat, list[list[Path]]]:
     """Lay out the first parts as regular polygons and cut them from their middles; return the paths of the cuts.
 
     Parts beyond those that have a border are left alone.
@@ -59,7 +61,7 @@ def cut_polygons(surface: Surface, part: NDArray[np.int64], halves: list[Halves]
     on_border[np.concatenate([half for each in halves for arc in each for half in arc])] = True
     chosen = part < len(halves)
     places = np.full((len(part), 3, 2), np.nan)
-    some = Surface(surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen])
+    some = TriangleSurface(surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen])
     places[chosen] = flattened(some, part[chosen], _polygon_border(surface, halves))
     centre = central_vertices(Flat(some, part[chosen], places[chosen]), on_border)
     count = int(part.max()) + 1
@@ -79,7 +81,7 @@ def cut_polygons(surface: Surface, part: NDArray[np.int64], halves: list[Halves]
     return flat, paths
 
 
-def _polygon_border(surface: Surface, halves: list[Halves]) -> Border:
+def _polygon_border(surface: TriangleSurface, halves: list[Halves]) -> Border:
     """Cells as regular polygons: corners on the unit circle, arcs along the sides."""
     paths, cells, ends = [], [], []
     for cell, arcs in enumerate(halves):
@@ -111,7 +113,7 @@ def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
     return sides
 
 
-def charts_of(surface: Surface, sides: list[Sides]) -> tuple[Surface, NDArray[np.int64]]:
+def charts_of(surface: TriangleSurface, sides: list[Sides]) -> tuple[TriangleSurface, NDArray[np.int64]]:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
     size = len(surface.V)
     walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
@@ -133,7 +135,7 @@ def charts_of(surface: Surface, sides: list[Sides]) -> tuple[Surface, NDArray[np
     return surface, chart[part]
 
 
-def square_border(surface: Surface, sides: list[Sides]) -> Border:
+def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
     """Charts as squares."""
     paths = [path for each in sides for path in each]
     lengths = [len(path) for path in paths]
@@ -142,7 +144,7 @@ def square_border(surface: Surface, sides: list[Sides]) -> Border:
     return side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None]
 
 
-def on_paths(surface: Surface, sides: list[Sides]) -> NDArray[np.bool_]:
+def on_paths(surface: TriangleSurface, sides: list[Sides]) -> NDArray[np.bool_]:
     """Vertices that lie on a side of a chart, [n]."""
     on_path = np.zeros(len(surface.V), bool)
     on_path[np.concatenate([path for each in sides for path in each])] = True
@@ -175,8 +177,8 @@ def fans_of(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[Fans, list[in
 
 
 def with_even_corners(
-    surface: Surface, chart: NDArray[np.int64], sides: list[Sides]
-) -> tuple[Surface, NDArray[np.int64], list[Sides]]:
+    surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]
+) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]]:
     """Move the corners in which three cells meet to the middle between the cells' middles.
 
     Voronoi cells often have very short sides, along which texels would be tiny. So the three charts round a corner,

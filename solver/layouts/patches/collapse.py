@@ -15,7 +15,7 @@ import numpy as np
 from ...kernel import Bools, Floats, Ints, kernel
 from ..energy import FIXED, FREE
 from .seamless import SeamlessMap, after, corner_place, frame_of, inverse, stars, turned
-from .surface import Surface
+from .surface import TriangleSurface
 
 _FLATTEST = 0.05  # double area over squared length of a triangle on the charts after a collapse
 _LEAST_INSIDE = 1e-9  # double area of a triangle in its parent, in barycentric coordinates
@@ -122,7 +122,7 @@ def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: 
 _MOST_ROUNDS, _LEAST_SHARE = 20, 0.01  # of the vertices in question, in a round that is worth another
 
 
-def without_cuts(surface: Surface, seamless: SeamlessMap, cut: Bools) -> tuple[Surface, SeamlessMap]:
+def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) -> tuple[TriangleSurface, SeamlessMap]:
     """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
     parents = surface.parent, np.ascontiguousarray(surface.inside)
     for _ in range(_MOST_ROUNDS):
@@ -145,7 +145,7 @@ def without_cuts(surface: Surface, seamless: SeamlessMap, cut: Bools) -> tuple[S
         star_start=start,
         star=star,
     )
-    return Surface(surface.V[used], F, parents[0], parents[1]), seamless
+    return TriangleSurface(surface.V[used], F, parents[0], parents[1]), seamless
 
 
 @kernel

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from ...errors import AtlasError
 from .cells import BorderedCells, Metric, VoronoiCells, centred_cells, cut_borders, voronoi_cells
-from .surface import Surface
+from .surface import TriangleSurface
 
 _MOST_ROUNDS = 200
 _FEWEST = 4  # cells of a closed surface
@@ -76,7 +76,7 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: NDArray[np.int64], t
     return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
 
 
-def _beside(surface: Surface, cells: VoronoiCells, cell: int) -> NDArray[np.bool_]:
+def _beside(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> NDArray[np.bool_]:
     """Vertices of other cells that have a neighbour in this one, [n]."""
     ends = surface.edges.ends[(cells.label[surface.edges.ends] == cell).any(axis=1)]
     beside = np.zeros(len(surface.V), bool)
@@ -84,7 +84,7 @@ def _beside(surface: Surface, cells: VoronoiCells, cell: int) -> NDArray[np.bool
     return beside & (cells.label != cell)
 
 
-def _euler(surface: Surface, cells: VoronoiCells) -> NDArray[np.int64]:
+def _euler(surface: TriangleSurface, cells: VoronoiCells) -> NDArray[np.int64]:
     """Euler characteristic of the vertices of each cell with the edges and triangles between them."""
     count, label = len(cells.seeds), cells.label
     ends, corners = label[surface.edges.ends], label[surface.F]
@@ -94,7 +94,7 @@ def _euler(surface: Surface, cells: VoronoiCells) -> NDArray[np.int64]:
     return vertices - links + faces
 
 
-def _far_side(surface: Surface, cells: VoronoiCells, cell: int) -> int:
+def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     """Vertex farthest along the shortest loop in a cell that does not shrink to a point.
 
     Edges that close no such loop are those of a tree of shortest paths, and those of a tree of triangles, longest loops
@@ -145,7 +145,7 @@ _LEAST, _MOST = 1e-3, 1e3
 Border = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
 
-def flattened(surface: Surface, part: NDArray[np.int64], border: Border) -> NDArray[np.float64]:
+def flattened(surface: TriangleSurface, part: NDArray[np.int64], border: Border) -> NDArray[np.float64]:
     """Places [m, 3, 2] of the triangles' corners, each part [m] laid out inside its border.
 
     A part that round-off folds with mean-value weights is laid out with equal ones.
@@ -187,7 +187,7 @@ def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.
     return shares[inside]
 
 
-def _mean_value_weights(surface: Surface) -> NDArray[np.float64]:
+def _mean_value_weights(surface: TriangleSurface) -> NDArray[np.float64]:
     """Weights [m, 3, 2], in corner k of a triangle, of its next vertex and of the one before."""
     weights = np.empty((len(surface.F), 3, 2))
     tiny = np.finfo(np.float64).tiny

@@ -22,7 +22,7 @@ from .collapse import without_cuts
 from .energy import ChartShapes, energy_of, gather, relax_all, scratch, shapes_of, star_energy, sweep, sweep_all
 from .quads import CELLS, Quads, large_quads_of, part_of, quads_of
 from .seamless import SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned
-from .surface import Surface
+from .surface import TriangleSurface
 
 _LAYERS = 3  # of vertices that a tip's move may move
 _SWEEPS = 3  # over the vertices round a tip, before it is judged
@@ -260,7 +260,7 @@ _MOST_MOVES = 5  # of a tip, by an edge each
 class PatchMap:
     """A surface laid out on charts."""
 
-    surface: Surface
+    surface: TriangleSurface
     seamless: SeamlessMap
 
 
@@ -306,7 +306,7 @@ def relax(V: NDArray[np.float64], seamless: SeamlessMap) -> None:
     relax_all(seamless, shapes, _FINE)
 
 
-def _recut(part: Surface, quads: Quads, count: int, wanted: float, large: bool) -> Quads:
+def _recut(part: TriangleSurface, quads: Quads, count: int, wanted: float, large: bool) -> Quads:
     """Cut a part again that has come to more or less than the charts that its area should have; the best of the tries.
 
     Cells are mended until they are disks with corners enough, which changes their number.
@@ -324,12 +324,12 @@ def _recut(part: Surface, quads: Quads, count: int, wanted: float, large: bool) 
 
 def _components(
     V: NDArray[np.float64], F: NDArray[np.int64], cells: int
-) -> tuple[list[Surface], list[int], NDArray[np.float64]]:
+) -> tuple[list[TriangleSurface], list[int], NDArray[np.float64]]:
     """Each connected component, how many cells it gets, and its share of the area."""
     links = coo_array((np.ones(F.size), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(len(V), len(V)))
     _, part = connected_components(links, directed=False)
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
-    areas = Surface.of(V, F).areas
+    areas = TriangleSurface.of(V, F).areas
     share = np.bincount(of, areas / areas.sum()).astype(np.float64)
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
     small = share[share >= min(_NEGLIGIBLE, share.max())].min()
@@ -343,7 +343,7 @@ def _joined(parts: list[Quads]) -> Quads:
         return parts[0]
     vertices = np.cumsum([0, *(len(each.surface.V) for each in parts)])
     charts = np.cumsum([0, *(len(each.glued) for each in parts)])
-    surface = Surface(
+    surface = TriangleSurface(
         np.concatenate([each.surface.V for each in parts]),
         np.concatenate([each.surface.F + first for each, first in zip(parts, vertices, strict=False)]),
         np.concatenate([each.surface.parent for each in parts]),

@@ -37,7 +37,7 @@ from .charts import (
     with_middles,
 )
 from .disks import disk_cells, flattened, signed_areas
-from .surface import Surface, halved_chords, refined
+from .surface import TriangleSurface, halved_chords, refined
 
 FEWEST = 3  # quads round a middle
 _TOO_FEW = 100.0  # what each costs that is missing
@@ -227,8 +227,8 @@ def _change(pairing: Pairing, e: int, quads: int) -> float:
 
 
 def joined(
-    surface: Surface, chart: NDArray[np.int64], sides: list[Sides]
-) -> tuple[Surface, NDArray[np.int64], list[Sides]] | None:
+    surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]
+) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]] | None:
     """Join the charts of cells [m] to larger ones; None where that is not possible."""
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
@@ -251,7 +251,7 @@ def joined(
     return surface, chart, new
 
 
-def _curvature(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.float64]:
+def _curvature(surface: TriangleSurface, cell: NDArray[np.int64]) -> NDArray[np.float64]:
     """Curvature of each cell, and of the rim in it, in right angles."""
     total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
     missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
@@ -321,7 +321,7 @@ class Quads:
 
     Attributes
     ----------
-    surface : Surface
+    surface : TriangleSurface
     chart : int64 [m]
         On which each triangle lies.
     places : float64 [m, 3, 2]
@@ -332,7 +332,7 @@ class Quads:
         Vertices that were not there before the surface was cut.
     """
 
-    surface: Surface
+    surface: TriangleSurface
     chart: NDArray[np.int64]
     places: NDArray[np.float64]
     glued: NDArray[np.int64]
@@ -362,7 +362,7 @@ def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
     return None if large is None else _laid_out(cells, *large)
 
 
-def _cut(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list[Sides]]:
+def _cut(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]]:
     """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
     surface, cell, halves = with_middles(cells)
     flat, paths = cut_polygons(surface, cell, halves)
@@ -370,7 +370,7 @@ def _cut(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list[Sides]]
     return *charts_of(flat.surface, sides), sides
 
 
-def _laid_out(cells: BorderedCells, surface: Surface, chart: NDArray[np.int64], sides: list[Sides]) -> Quads:
+def _laid_out(cells: BorderedCells, surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]) -> Quads:
     surface, origin = halved_chords(surface, chart, on_paths(surface, sides))
     chart = chart[origin]
     places = flattened(surface, chart, square_border(surface, sides))
@@ -390,13 +390,13 @@ _FARTHEST = 300  # a surface reaches, in units of the root of a cell's area: bey
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
-def part_of(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64]) -> Surface:
+def part_of(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64]) -> TriangleSurface:
     """A connected component, the triangles `faces` [m] of V, F."""
     used, corners = np.unique(F[faces], return_inverse=True)
-    return dataclasses.replace(Surface.of(V[used], corners.reshape(-1, 3)), parent=faces)
+    return dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces)
 
 
-def quads_of(part: Surface, count: int, large: bool) -> Quads:
+def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
     """The quads of a count of cells; large ones where they are wanted and possible, else about as many."""
     quads = large_quads_of(part, count) if large else None
     if quads is not None:
@@ -404,12 +404,12 @@ def quads_of(part: Surface, count: int, large: bool) -> Quads:
     return cut_into_quads(_cells_of(part, max(1, round(count * _LARGE / _CORNERS)) if large else count))
 
 
-def large_quads_of(part: Surface, count: int) -> Quads | None:
+def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:
     """About as many quads as cells, some more of these; None where the surface has none."""
     return cut_into_large_quads(_cells_of(part, round(_LARGE * count)))
 
 
-def _cells_of(part: Surface, count: int) -> BorderedCells:
+def _cells_of(part: TriangleSurface, count: int) -> BorderedCells:
     area, extent = part.areas.sum(), float(np.ptp(part.V, axis=0).max())
     if extent > _FARTHEST * np.sqrt(area / count):
         raise AtlasError(

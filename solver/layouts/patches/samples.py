@@ -76,7 +76,7 @@ def faults(texels: Texels, flat: int) -> float:
 
 @kernel
 def folded(texels: Texels) -> Bools:
-    """Which texels are folded between their neighbours, [T]."""
+    """Mask of the texels that are folded between their neighbours, [T]."""
     result = np.zeros(len(texels.positions), np.bool_)
     for flat in range(len(result)):
         result[flat] = _fault(texels, flat) >= 1.0

@@ -141,7 +141,7 @@ def places_seen_from(seamless: SeamlessMap, triangles: Ints, corner: Ints) -> tu
 
 
 def places_on_charts(seamless: SeamlessMap) -> tuple[Ints, Ints, Floats]:
-    """Of each triangle the first corner that sits on no cone's tip: it knows in which chart it lies; see above.
+    """First corner of each triangle that sits on no cone's tip: it knows in which chart it lies; see above.
 
     Returns these corners [m], charts [m], and the places [m, 3, 2] of all corners there.
     """

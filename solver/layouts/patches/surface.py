@@ -24,12 +24,12 @@ Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
 # in the order in which the triangles are put
 _SPLITS: Patterns = {number: SPLITS[number] for number in (1, 2, 4, 3, 6, 5, 7)}
 
-# see `Surface.subdivided`
-Cut: TypeAlias = "tuple[Surface, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]"
+# see `TriangleSurface.subdivided`
+Cut: TypeAlias = "tuple[TriangleSurface, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Surface:
+class TriangleSurface:
     """Triangles that cover a mesh; each is a part of one of its triangles, its parent.
 
     Attributes
@@ -49,7 +49,7 @@ class Surface:
     inside: NDArray[np.float64]
 
     @classmethod
-    def of(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> Surface:
+    def of(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> TriangleSurface:
         """The triangles of a mesh as they are."""
         return cls(V, F, np.arange(len(F)), np.broadcast_to(np.eye(3), (len(F), 3, 3)))
 
@@ -99,7 +99,7 @@ class Surface:
 
         Returns
         -------
-        Surface
+        TriangleSurface
             Its first vertices are those from before.
         middles : int64 [e]
             The new vertex on each edge from before; -1 where it was not cut.
@@ -131,7 +131,9 @@ class Surface:
                 weights.append(local[chosen][:, triangle])
                 origin.append(touched[chosen])
         source, share = np.concatenate(origin), np.concatenate(weights)
-        finer = Surface(np.concatenate(points), np.concatenate(F), self.parent[source], share @ self.inside[source])
+        finer = TriangleSurface(
+            np.concatenate(points), np.concatenate(F), self.parent[source], share @ self.inside[source]
+        )
         return finer, middles, source, share
 
     def _nodes(
@@ -158,13 +160,13 @@ _ON_RAY = 1e-9  # of the size of a polygon
 class Flat:
     """Parts of a surface [m] laid out in the plane; `places` [m, 3, 2] are those of the triangles' corners."""
 
-    surface: Surface
+    surface: TriangleSurface
     part: NDArray[np.int64]
     places: NDArray[np.float64]
 
 
 def central_vertices(flat: Flat, on_border: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Of each part the inner vertex nearest to the origin."""
+    """The inner vertex nearest to the origin, one for each part."""
     distance = np.where(on_border[flat.surface.F], np.inf, (flat.places**2).sum(axis=2)).ravel()
     part = np.repeat(flat.part, 3)
     order = np.lexsort((distance, part))
@@ -239,14 +241,14 @@ _MOST_ROUNDS = 100
 _MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
 
 
-def halved(surface: Surface, chosen: NDArray[np.bool_]) -> Cut:
-    """Split chosen edges [e] in their middle; see `Surface.subdivided`."""
+def halved(surface: TriangleSurface, chosen: NDArray[np.bool_]) -> Cut:
+    """Split chosen edges [e] in their middle; see `TriangleSurface.subdivided`."""
     return surface.subdivided(np.where(chosen, 0.5, np.nan))
 
 
 def halved_chords(
-    surface: Surface, part: NDArray[np.int64], on_border: NDArray[np.bool_]
-) -> tuple[Surface, NDArray[np.int64]]:
+    surface: TriangleSurface, part: NDArray[np.int64], on_border: NDArray[np.bool_]
+) -> tuple[TriangleSurface, NDArray[np.int64]]:
     """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side.
 
     Returns the finer surface, and the triangle from before in which each of its triangles lies.
@@ -257,7 +259,7 @@ def halved_chords(
     return finer, origin
 
 
-def refined(surface: Surface, longest: float) -> Surface:
+def refined(surface: TriangleSurface, longest: float) -> TriangleSurface:
     """Split edges until none is longer than `longest` [m], that of a triangle first, so that needles lose length.
 
     Where that would take too many triangles, longer ones are left.

@@ -14,7 +14,7 @@ from surfaces import disk, sphere, torus
 
 from ripple_sim.solver import Mesh, glue
 from ripple_sim.solver.layouts import FIXED, FREE, patches
-from ripple_sim.solver.layouts.patches import Metric, Quads, SeamlessMap, Surface
+from ripple_sim.solver.layouts.patches import Metric, Quads, SeamlessMap, TriangleSurface
 
 TIPS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 
@@ -27,7 +27,7 @@ def ball_with_limbs(length: float, sharpness: float, level: int) -> Mesh:
 
 def test_sizes_keep_to_their_bounds() -> None:
     ball = sphere(3)
-    sizes = patches.cell_sizes(Metric.of(Surface.of(ball.V, ball.F)), 0.5, (0.2, 0.3))
+    sizes = patches.cell_sizes(Metric.of(TriangleSurface.of(ball.V, ball.F)), 0.5, (0.2, 0.3))
     assert sizes.min() >= 0.2
     assert sizes.max() <= 0.3 + 1e-12
 
@@ -46,7 +46,7 @@ EULER = {"sphere": 2, "torus": 0, "disk": 1}
 
 def cells_of(name: str, cells: int) -> patches.BorderedCells:
     mesh = MESHES[name]()
-    surface = Surface.of(mesh.V, mesh.F)
+    surface = TriangleSurface.of(mesh.V, mesh.F)
     metric = Metric.of(surface)
     reach = 0.75 * np.sqrt(surface.areas.sum() / cells) if cells > 1 else np.inf
     return patches.disk_cells(metric, patches.centred_cells(metric, patches.spread_seeds(metric, reach)))
@@ -84,7 +84,9 @@ def assert_covered_once(name: str, quads: Quads) -> None:
     areas = patches.signed_areas(quads.places)
     assert areas.min() > 0
     np.testing.assert_allclose(np.bincount(quads.chart, areas), 1.0, atol=1e-9)
-    assert quads.surface.areas.sum() == pytest.approx(Surface.of(MESHES[name]().V, MESHES[name]().F).areas.sum())
+    assert quads.surface.areas.sum() == pytest.approx(
+        TriangleSurface.of(MESHES[name]().V, MESHES[name]().F).areas.sum()
+    )
 
 
 def assert_topology(name: str, quads: Quads) -> None:
