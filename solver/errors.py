@@ -12,6 +12,7 @@ import math
 import numbers
 import os
 import typing
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, ParamSpec, TypeVar
 
@@ -137,6 +138,11 @@ def shown(value: object) -> str:
     except Exception:  # of the value's own, or an int of too many digits
         text = f"a value of type {type(value).__name__}"
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+
+
+def deprecated(old: str, instead: str, goes: str) -> None:
+    """Warn, from what the user calls, that it is deprecated: it still works, and goes with the version `goes`."""
+    warnings.warn(f"{old} is deprecated and goes with {goes}; use {instead}", DeprecationWarning, stacklevel=3)
 
 
 def checked(

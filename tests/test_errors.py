@@ -8,7 +8,7 @@ import ripple_sim
 from ripple_sim import errors as of_application
 from ripple_sim.errors import RenderError, SceneError
 from ripple_sim.solver import errors as of_solver
-from ripple_sim.solver.errors import GLError, RippleError
+from ripple_sim.solver.errors import GLError, RippleError, deprecated
 
 CLASSES = sorted(
     {
@@ -39,3 +39,13 @@ def test_every_error_is_caught_as_a_ripple_error_and_keeps_its_message(error: ty
 def test_a_warning_is_no_error_so_that_the_program_goes_on() -> None:
     assert issubclass(of_application.RippleWarning, UserWarning)
     assert not issubclass(of_application.RippleWarning, RippleError)
+
+
+def test_what_is_deprecated_works_and_warns_where_it_is_used() -> None:
+    def old_name() -> int:
+        deprecated("old_name", "new_name", "2.0")
+        return 1
+
+    with pytest.warns(DeprecationWarning, match=r"^old_name is deprecated and goes with 2.0; use new_name$") as told:
+        assert old_name() == 1
+    assert told[0].filename == __file__
