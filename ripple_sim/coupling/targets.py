@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -54,7 +55,35 @@ class Target:
         if old.vertices is not None:
             new.move(old.vertices)
         new.state = old.state
+        new.listeners.all, new.listeners.find_points = old.listeners.all, old.listeners.find_points
         return dataclasses.replace(changed, waves=new)
+
+
+def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
+    """Where a site is in the frame of a target [m], [3]: of a geom on the same body, or welded to it.
+
+    In that of a flex or a skin, the world, it is where it stands in `qpos0`.
+
+    Raises
+    ------
+    SceneError
+        For an unknown site, or one on a body that moves against the geom's.
+    """
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+    if site < 0:
+        sites = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SITE, i) for i in range(model.nsite))
+        raise SceneError(f"the model has no site {name!r}; its sites are {', '.join(filter(None, sites)) or 'none'}")
+    data, soft = mujoco.MjData(model), is_soft(model, geom)
+    bodies = [] if soft else [model.site_bodyid[site], model.geom_bodyid[geom]]
+    if len({int(model.body_weldid[body]) for body in bodies}) > 1:
+        names = " and ".join(repr(model.body(body).name) for body in bodies)
+        raise SceneError(
+            f"site {name!r} and the geom it measures are on bodies {names}, which move; put it on the geom's"
+        )
+    mujoco.mj_kinematics(model, data)
+    if soft:
+        return data.site_xpos[site].copy()
+    return (data.site_xpos[site] - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
 
 
 class Targets:
@@ -92,6 +121,7 @@ class Targets:
             geom, own = find_target(model, name), {**options, "rim": rims[name]}
             atlas = target_atlas(model, geom, texels[name], layouts[name])
             self._targets[name] = Target(geom, material, own, WaveSolver(atlas, material, **own))
+            self[name].listeners.find_points = functools.partial(site_on, model, geom)
         # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here
         self._waves = {target.geom: target.waves for target in self._targets.values()}
 

@@ -27,7 +27,7 @@ from ..texels.stencil import Stencil
 from .cpu import CPUBackend
 from .gl import GLBackend
 from .gl_fields import DeviceField
-from .kernels import Amplitude
+from .kernels import Amplitude, Probes
 
 BACKENDS = ("auto", "gl", "cpu")
 
@@ -56,6 +56,8 @@ class Backend(Protocol):
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None: ...  # noqa: D102
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None: ...  # noqa: D102
     def advance(self, substeps: int, dt: float) -> None: ...  # noqa: D102
+    def probe(self, probes: Probes | None) -> None: ...  # noqa: D102
+    def probed(self) -> NDArray[np.float32]: ...  # noqa: D102
     def move(self, operator: WaveOperator) -> None: ...  # noqa: D102
     def wait(self) -> None: ...  # noqa: D102
     def finite(self) -> bool: ...  # noqa: D102
@@ -75,6 +77,8 @@ class FluidBackend:
         self._h, self._v, self._dent = np.zeros((3, *operator.mass.shape), np.float32)
         self._forces = np.zeros(operator.mass.size)
         self._crests = np.zeros_like(self._h)
+        self._probes: Probes | None = None
+        self._sums: list[NDArray] = []
 
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [C, n, n]."""
@@ -135,14 +139,25 @@ class FluidBackend:
         decay, span = damped_step(operator, dt)
         h, v = self._h.astype(np.float64), self._v.astype(np.float64)
         h += dt / 2 * v
+        self._sums = []
         for step in range(substeps):
             change = operator.acceleration(operator.elastic_force(h) + loads)
             if operator.viscosity_stencil is not None:
                 change += operator.viscosity_stencil(v) / operator.mass * operator.free
             v = decay * v + span * change
+            if self._probes is not None:
+                self._sums.append(self._probes.of(h + dt / 2 * v + self._dent, v))
             h += (dt if step < substeps - 1 else dt / 2) * v
         self._h[:], self._v[:] = h, v
         np.maximum(self._crests, np.abs(self.height()), out=self._crests)
+
+    def probe(self, probes: Probes | None) -> None:
+        """Take sums of texels after every substep from now on; None ends it."""
+        self._probes = probes
+
+    def probed(self) -> NDArray[np.float32]:
+        """The sums of the latest `advance`, [substeps, k]."""
+        return np.array(self._sums, np.float32)
 
     def wait(self) -> None:
         """Return when all steps are done: at once, they are."""

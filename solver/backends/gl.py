@@ -18,9 +18,9 @@ from ..texels.moving import MovedStencil, Ride
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
-from .gl_dispatch import Dispatch, Pressure, VolumeKeeper
+from .gl_dispatch import DeviceProbes, Dispatch, Pressure, VolumeKeeper
 from .gl_fields import DeviceField, FieldLayout, TexelList, link_buffers
-from .kernels import Amplitude
+from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
 _LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "TINY", "PER_TINY")
@@ -243,6 +243,7 @@ class GLBackend:
         self._drift = self._dispatch.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
         self._shift: Amplitude = 0.0
         self._crests: moderngl.Buffer | None = None
+        self._probes: DeviceProbes | None = None
         self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
@@ -320,6 +321,8 @@ class GLBackend:
             kick_drift = self._prepare(dt)
             self._start(dt / 2)
             self._flow()
+            if self._probes is not None:
+                self._probes.begin(substeps)
             for step in range(substeps):
                 drift = dt if step < substeps - 1 else dt / 2
                 self._dispatch.fill_halo(self._h)
@@ -334,9 +337,19 @@ class GLBackend:
                 self._kick_irregular(drift)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
+                if self._probes is not None:
+                    self._probes.take(step, drift - dt / 2, self._h, self._v, self._dent)
                 self._flow()
             if self._crests is not None:
                 self._raise_crests(self._crests)
+
+    def probe(self, probes: Probes | None) -> None:
+        """Take sums of texels after every substep from now on; None ends it."""
+        self._probes = probes and DeviceProbes(self._gl, self._fields, self._dispatch, probes)
+
+    def probed(self) -> NDArray[np.float32]:
+        """The sums of the latest `advance`, [substeps, k]."""
+        return np.zeros((0, 0), np.float32) if self._probes is None else self._probes.read()
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""

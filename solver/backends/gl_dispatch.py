@@ -15,7 +15,7 @@ from ..gl import GLContext, bind_buffers
 from ..operator.volume import VolumeRate
 from ..operator.wave_operator import WaveOperator
 from .gl_fields import FieldLayout
-from .kernels import Amplitude
+from .kernels import Amplitude, Probes
 
 # Threads of a group that works through a list.
 _LIST_GROUP = 64
@@ -115,3 +115,46 @@ def _chunks(begins: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.in
     bounds = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
     chunks = [np.stack([each[:-1], each[1:]], axis=1) for each in bounds]
     return np.concatenate(chunks), np.cumsum([0, *map(len, chunks)])
+
+
+class DeviceProbes:
+    """The sums of `Probes`, one group of threads each; those of all substeps of a step are read back together."""
+
+    def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, probes: Probes) -> None:
+        self._gl, self._count, self._steps, self._room = gl, len(probes.heights), 0, 0
+        self._shaders = dispatch.shader("probe"), dispatch.shader("probe", DENT=1)
+        weights = probes.weights.astype(np.float32).view(np.int32)
+        entries = np.stack([fields.texels[probes.texels].astype(np.int32), weights], axis=1)
+        rows = np.stack([probes.begins[:-1], probes.begins[1:], probes.heights], axis=1)
+        with gl as ctx:
+            self._rows, self._entries = ctx.buffer(rows.astype(np.int32).tobytes()), ctx.buffer(entries.tobytes())
+
+    def begin(self, substeps: int) -> None:
+        """Make room for the sums of so many substeps."""
+        self._steps = substeps
+        if substeps > self._room:
+            self._room = substeps
+            with self._gl as ctx:
+                self._sums = ctx.buffer(reserve=4 * substeps * self._count)
+
+    def take(
+        self,
+        step: int,
+        drifted: float,
+        height: moderngl.Buffer,
+        velocity: moderngl.Buffer,
+        dent: moderngl.Buffer | None,
+    ) -> None:
+        """The sums of a substep, whose heights have drifted beyond its velocities [s]."""
+        shader = self._shaders[dent is not None]
+        shader["first"], shader["drifted"] = step * self._count, drifted
+        bind_buffers(height, velocity, self._rows, self._entries, self._sums, dent)
+        shader.run(self._count)
+        self._gl.barrier()  # later substeps write what is read here
+
+    def read(self) -> NDArray[np.float32]:
+        """The sums of all substeps, [substeps, k]."""
+        with self._gl:
+            self._gl.wait()
+            sums = np.frombuffer(self._sums.read(4 * self._steps * self._count), np.float32)
+        return sums.reshape(self._steps, self._count).copy()

@@ -11,11 +11,13 @@ together are one argument.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import numba
 import numpy as np
 from numba.extending import overload
+from numpy.typing import NDArray
 
 from ..kernel import Floats, Floats32, Ints, kernel
 
@@ -182,6 +184,51 @@ NO_BALANCE = Balance(
 NO_FEATURES = Features(NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, NO_BALANCE)
 
 
+class Probes(NamedTuple):
+    """Weighted sums of heights or velocities that are taken after every substep: a sensor's points, or a sound.
+
+    Sum i has the texels and weights from begins[i] to begins[i + 1]; those of `heights` are of heights, the others of
+    velocities. `texels` are flat indices of texels, and addresses in a field where a backend holds them.
+    """
+
+    begins: Ints
+    texels: Ints
+    weights: Floats32
+    heights: NDArray[np.bool_]
+
+    @classmethod
+    def together(cls, probes: Sequence[Probes]) -> Probes:
+        """The sums of several, one after the other."""
+        counts = np.concatenate([np.diff(each.begins) for each in probes])
+        rest = (np.concatenate(each) for each in zip(*(each[1:] for each in probes), strict=True))
+        return cls(np.append(0, np.cumsum(counts)), *rest)
+
+    def of(self, height: NDArray, velocity: NDArray) -> NDArray[np.float64]:
+        """The sums [k] of fields [C, n, n]; every sum has a texel."""
+        both = (
+            np.add.reduceat(self.weights * x.reshape(-1)[self.texels], self.begins[:-1]) for x in (height, velocity)
+        )
+        return np.where(self.heights, *both)
+
+
+@kernel(no_cpython_wrapper=True)
+def _probe(
+    probes: Probes, h: Floats32, v: Floats32, dent: Floats32 | None, drifted: np.float32, sums: Floats32
+) -> None:
+    """Fill in the sums [k] of a substep, whose heights have drifted beyond its velocities [s]."""
+    for i in range(len(sums)):
+        total = 0.0
+        for j in range(probes.begins[i], probes.begins[i + 1]):
+            at = probes.texels[j]
+            value = v[at]
+            if probes.heights[i]:
+                value = h[at] - drifted * v[at]
+                if dent is not None:
+                    value += dent[at]
+            total += probes.weights[j] * value
+        sums[i] = total
+
+
 @kernel(no_cpython_wrapper=True)
 def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.float32) -> None:
     """One substep: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v.
@@ -250,10 +297,15 @@ def advance(
     kicks: Floats32,
     viscosity: Weights | None,
     features: Features | None,
+    probes: Probes | None,
+    dent: Floats32 | None,
+    sums: Floats32 | None,
 ) -> None:
     """Substeps of dt, from the first half drift to the last, and velocities [k] that kick the texels at addresses [k].
 
     The height ends in `h_next` where their number is odd.
+
+    `sums` [substeps, k] are filled with those of the probes; `dent` is what stays of the height.
 
     What is None is compiled away: `features` where a material has no more than viscosity, which then is `viscosity`.
     """
@@ -275,6 +327,8 @@ def advance(
         for i in range(len(addresses)):
             v[addresses[i]] += kicks[i]
             h[addresses[i]] += drifted * kicks[i]
+        if probes is not None and sums is not None:
+            _probe(probes, h, v, dent, drifted - half, sums[step])
         if features is not None and len(features.dent):
             flow(h, features.limit, features.dent)
 

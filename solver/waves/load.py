@@ -1,4 +1,4 @@
-"""Loads: forces on some texels, held over a step, and what a solver holds over the coming ones."""
+"""Loads: forces on some texels, held over a step, what a solver holds over the coming ones, and its state."""
 
 from __future__ import annotations
 
@@ -64,6 +64,32 @@ class Load:
         once = (first == row).nonzero()[0]
         place[texels[once]] = row[: len(once)]
         return Load(texels[once], np.bincount(place[texels], self.forces).astype(np.float64, copy=False))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class WaveState:
+    """The state of a wave solver at a time; see `WaveSolver.state`.
+
+    Attributes
+    ----------
+    elastic, dent : float32 [C, n, n]
+        The part of the height that springs back and the part that stays [m]; the height is their sum.
+    velocity : float32 [C, n, n]
+        [m/s].
+    held : Load
+        Forces held until further notice.
+    time, substep : float
+        [s]; the substep is the latest one, which `energy` needs.
+    substeps_taken : int
+    """
+
+    elastic: NDArray[np.float32]
+    dent: NDArray[np.float32]
+    velocity: NDArray[np.float32]
+    held: Load
+    time: float
+    substep: float
+    substeps_taken: int
 
 
 class HeldLoad:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -19,35 +18,9 @@ from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from .finite import FiniteGuard, as_field, check_kick, count_substeps, require_finite
 from .footprint import Footprint, spread
-from .load import HeldLoad, Load
+from .load import HeldLoad, Load, WaveState
 from .motion import Motion
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class WaveState:
-    """The state of a wave solver at a time; see `WaveSolver.state`.
-
-    Attributes
-    ----------
-    elastic, dent : float32 [C, n, n]
-        The part of the height that springs back and the part that stays [m]; the height is their sum.
-    velocity : float32 [C, n, n]
-        [m/s].
-    held : Load
-        Forces held until further notice.
-    time, substep : float
-        [s]; the substep is the latest one, which `energy` needs.
-    substeps_taken : int
-    """
-
-    elastic: NDArray[np.float32]
-    dent: NDArray[np.float32]
-    velocity: NDArray[np.float32]
-    held: Load
-    time: float
-    substep: float
-    substeps_taken: int
-
+from .sensor import Listeners, Sensor
 
 # Memory for each texel while a solver is made, at least [bytes]; half of it is kept.
 _TEXEL = 300
@@ -85,6 +58,8 @@ class WaveSolver:
     time : float
         [s].
     substeps_taken : int
+    listeners : Listeners
+        Sensors, and what else hears of every substep.
 
     Raises
     ------
@@ -125,6 +100,7 @@ class WaveSolver:
         self._balance = VolumeBalance(operator)
         self._held = HeldLoad(self._backend, operator.source_share, self._balance)
         self._guard = FiniteGuard(atlas)
+        self.listeners = Listeners(self._backend)
         self._least_mass = float(operator.mass.min())
 
     @property
@@ -177,6 +153,8 @@ class WaveSolver:
             self._backend.advance(substeps, self._substep)
         if force is not None:
             self._guard.note("forces", force, "N", self.time, abs(force) * dt / self._least_mass)
+        if self.listeners.all:
+            self.listeners.hear(self.time, self._substep)
         self.time += dt
         self.substeps_taken += substeps
         if self._guard.due(substeps) and not self._backend.finite():
@@ -188,6 +166,28 @@ class WaveSolver:
         self.pressure = 0.0
         self.time, self.substeps_taken = 0.0, 0
         self._guard.clear()
+        self.listeners.begin(self.time)
+
+    def sensor(
+        self, at: str | ArrayLike, kind: str = "acceleration", rate: float = 48_000, *, thickness: float | None = None
+    ) -> Sensor:
+        """Measure the surface from now on, along its normal, after every substep; see `Sensor`.
+
+        Parameters
+        ----------
+        at : [3], [k, 3] or str
+            Points in the frame of the mesh [m]; the nearest surface points are taken. In `Ripples` also a site's name.
+        kind : str
+            "acceleration" [m/s^2], "velocity" [m/s], "height" [m], or "strain" of a bent sheet's outer face.
+        rate : float
+            Samples a second [1/s].
+        thickness : float, optional
+            Of the sheet [m], for "strain" alone.
+        """
+        points = self.listeners.find(at) if isinstance(at, str) else at
+        return self.listeners.add(
+            Sensor(self.atlas, self.material, self.operator, points, kind, rate, thickness), self.time
+        )
 
     def move(self, V: ArrayLike) -> None:
         """Move the surface: the texels ride on their triangles, at their barycentric coordinates.
@@ -410,16 +410,11 @@ class WaveSolver:
         Assigning raises `SolverError` for a state of another resolution. Where the solver's own material clamps the
         surface or carries no waves, it takes over dents alone, and comes to rest.
         """
-        backend = self._backend
-        return WaveState(
-            self._finite(backend.elastic(), "height"),
-            self.dent,
-            self.velocity,
-            self._held.load,
-            self.time,
-            self._substep,
-            self.substeps_taken,
+        elastic, clock = (
+            self._finite(self._backend.elastic(), "height"),
+            (self.time, self._substep, self.substeps_taken),
         )
+        return WaveState(elastic, self.dent, self.velocity, self._held.load, *clock)
 
     @state.setter
     def state(self, state: WaveState) -> None:
@@ -431,6 +426,7 @@ class WaveSolver:
         self._held.load = state.held
         self.time, self._substep, self.substeps_taken = state.time, state.substep, state.substeps_taken
         self._guard.clear()
+        self.listeners.begin(self.time)
         self._note("height", state.elastic)
         self._note("velocity", state.velocity)
 

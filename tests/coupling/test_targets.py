@@ -121,3 +121,26 @@ def test_the_rim_of_the_surfaces_is_handed_on_and_outlives_changes() -> None:
     assert ripples["target"].operator.topology.fixed_rim
     with pytest.raises(RippleError, match="rim 'bent' does not exist"):
         Ripples(model, {"target": Material()}, resolution=8, backend="cpu", rim="bent")
+
+
+def test_a_sensor_on_a_site_goes_on_when_the_material_changes() -> None:
+    model = model_of(
+        '<body name="a" pos="3 0 0" euler="0 0 90"><geom name="target" type="ellipsoid" size="0.3 0.2 0.2" '
+        'pos="1 0 0" euler="0 90 0"/><body euler="0 0 20"><site name="end" pos="0.94 -0.34 -0.3"/></body></body>'
+        '<body name="b"><freejoint/><geom size="0.1"/><site name="off"/></body>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
+    sensor, geom = ripples["target"].sensor("end", "velocity", 1000.0), data.geom("target")
+    world = sensor.points @ geom.xmat.reshape(3, 3).T + geom.xpos
+    assert np.linalg.norm(world - data.site("end").xpos) < 0.02
+    ripples.poke("target", [1, 0, -0.3], 0.01, 0.1)
+    ripples["target"].step(1.0)
+    ripples.change_material("target", speed=0.3)
+    ripples["target"].step(1.0)
+    assert sensor.times[-1] > 1.1 and np.abs(sensor.samples).max() > 0
+    with pytest.raises(RippleError, match="no site 'tip'; its sites are end, off"):
+        ripples["target"].sensor("tip")
+    with pytest.raises(RippleError, match="bodies 'b' and 'a', which move"):
+        ripples["target"].sensor("off")
