@@ -159,8 +159,8 @@ class Sensor:
         )
         # where substeps are longer than samples there is nothing between them to filter out
         self._base = min(self.rate, 1 / operator.stable_timestep)
-        resolved = (resolved(atlas, material, int(center)) for center in centers)
-        self.bandwidth = min(*resolved, _PASSED * self._base)
+        shortest = (resolved(atlas, material, int(center)) for center in centers)
+        self.bandwidth = min(*shortest, _PASSED * self._base)
         self.begin(0.0, np.zeros(len(rows)))
 
     @property
