@@ -124,26 +124,26 @@ class Ear:
         """Add what the substeps of dt [s] from a time on give, later by their delays."""
         changes = np.diff(sums.astype(np.float64), axis=0, prepend=self._last[None]) / self._dt
         self._last = sums[-1].astype(np.float64)
-        # a change happens in the middle of its substep; of another length than the series' it lies between two entries
-        when = (time + dt * (np.arange(len(sums)) + 0.5)) / self._dt
-        whole = np.floor(when + 1e-6).astype(np.int64)
-        late = np.clip(when - whole, 0.0, None)[:, None]
-        late[late < 1e-3] = 0.0
-        places = whole[:, None] + self._delays
-        size = int(places.max()) + 2
+        # a change happens in the middle of its substep, and so do the series' entries
+        when = (time + dt * (np.arange(len(sums)) + 0.5)) / self._dt - 0.5
+        size = int(when[-1] + self._delays[-1]) + 3
         if size > len(self._series):
             self._series = np.append(self._series, np.zeros(max(size, 2 * len(self._series)) - len(self._series)))
-        low = int(places.min())
-        for offset, share in ((0, 1 - late), (1, late)):
-            if share.any():
-                added = np.bincount((places + (offset - low)).ravel(), (changes * share).ravel())
-                self._series[low : low + len(added)] += added
+        if abs(dt - self._dt) < 1e-9 * dt:
+            first, each = round(when[0]), np.ascontiguousarray(changes.T)
+            for delay, change in zip((first + self._delays).tolist(), each, strict=True):
+                self._series[delay : delay + len(change)] += change
+        else:  # substeps have another length since the material changed: a change lies between two entries
+            whole = np.maximum(np.floor(when), 0).astype(np.int64)
+            late, places = (when - whole)[:, None], whole[:, None] + self._delays
+            np.add.at(self._series, places, changes * (1 - late))
+            np.add.at(self._series, places + 1, changes * late)
 
     def heard(self, at: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
         """The series at other times [s], filtered for samples at a rate."""
         reach = np.zeros(max(len(self._series), int(at[-1] / self._dt) + 2) + 64)
         reach[: len(self._series)] = self._series
-        times = np.arange(len(reach)) * self._dt
+        times = (np.arange(len(reach)) + 0.5) * self._dt
         base = min(rate, 1 / self._dt)
         return np.concatenate(
             [
