@@ -55,7 +55,8 @@ class Target:
         if old.vertices is not None:
             new.move(old.vertices)
         new.state = old.state
-        new.listeners.all, new.listeners.find_points = old.listeners.all, old.listeners.find_points
+        new.listeners.use(old.listeners.all)
+        new.listeners.find_points = old.listeners.find_points
         return dataclasses.replace(changed, waves=new)
 
 

@@ -124,6 +124,7 @@ ENDINGS = {
     ".html": Ending(".page", "PageWriter"),
     ".csv": Ending(".tables", "CsvWriter"),
     ".parquet": Ending(".tables", "ParquetWriter", package="pyarrow", extra="parquet"),
+    ".wav": Ending(".wav", "WavWriter"),
 }
 
 

@@ -23,7 +23,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 
 from .events import Events
-from .scene_file import CameraEntry, RippleEntry, check_camera
+from .scene_file import CameraEntry, RippleEntry, SensorEntry, check_camera
 
 MAX_DURATION = 86_400  # [s], a day
 MAX_SLOW_MOTION = 1000
@@ -59,6 +59,7 @@ class Scene:
         One of `LIGHTING`: "auto", "model" or "studio", see `Renderer`.
     notes : tuple of str
         What was done to its mesh on reading, one line each, where it was made from one.
+    sensors : tuple of SensorEntry
     """
 
     name: str
@@ -71,6 +72,7 @@ class Scene:
     overlay: tuple[str, ...] = ()
     lighting: str = "auto"
     notes: tuple[str, ...] = ()
+    sensors: tuple[SensorEntry, ...] = ()
 
     @property
     def contacts(self) -> dict[str, list[str]]:
@@ -116,7 +118,7 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
 
 
 HEATMAPS = {"height": "m", "velocity": "m/s"}
-NAMES = (*HEATMAPS, "contacts", "grid", "time", "energy")
+NAMES = (*HEATMAPS, "contacts", "grid", "time", "energy", "sensors")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,9 +131,9 @@ class Request:
         "height" or "velocity": shown as colours on the targets, with a colour bar.
     limit : float or None
         End of the colours, in m or m/s; None: adapts to the waves during the video.
-    contacts, grid, time, energy : bool
+    contacts, grid, time, energy, sensors : bool
         Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves' energy, with that of
-        bodies and both.
+        bodies and both; the traces of the scene's sensors.
     """
 
     heatmap: str | None = None
@@ -140,6 +142,7 @@ class Request:
     grid: bool = False
     time: bool = False
     energy: bool = False
+    sensors: bool = False
 
     def __bool__(self) -> bool:
         return self != Request()

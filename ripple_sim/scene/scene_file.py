@@ -155,6 +155,27 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
         )
 
 
+class SensorEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """`[[sensor]]`: a signal from a target's surface, at a site or at points."""
+
+    name: str
+    """What it is called in overlays and exports."""
+    geom: str
+    """The target."""
+    site: str | None = None
+    """A site of the MJCF, on the geom's body; or else `point` or `points`."""
+    point: Vector | None = None
+    """In the frame of the geom's body [m]; the nearest point of the surface is taken."""
+    points: list[Vector] = []
+    """Several of them, such as a grid of taxels."""
+    kind: str = "acceleration"
+    """`acceleration`, `velocity`, `height` or `strain`."""
+    rate: float = 48_000.0
+    """Samples a second [1/s]."""
+    thickness: float | None = None
+    """Of the sheet whose outer face is strained [m], for `strain` alone."""
+
+
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     """The whole TOML file."""
 
@@ -185,6 +206,8 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     """Changes of materials, see below."""
     control: list[ControlEntry] = []
     """Controls of actuators, see below."""
+    sensor: list[SensorEntry] = []
+    """Signals from surfaces, see below."""
     random: RandomEntry | None = None
     """Variation by a seed, see below."""
 
@@ -239,6 +262,7 @@ _TABLES: dict[str, type[msgspec.Struct]] = {
     "change": ChangeEntry,
     "change.material": MaterialChange,
     "control": ControlEntry,
+    "sensor": SensorEntry,
     "random": RandomEntry,
 }
 

@@ -61,7 +61,11 @@ def scene_digest(scene: Scene) -> str:
             hasher.update(Path(each.map).read_bytes())
         if entry.still_map is not None:
             hasher.update(Path(entry.still_map).read_bytes())
-    hasher.update(msgspec.json.encode((scene.targets, scene.camera, scene.events, scene.two_way)))
+    hasher.update(
+        msgspec.json.encode(
+            (scene.targets, scene.camera, scene.events, scene.two_way, *([scene.sensors] if scene.sensors else []))
+        )
+    )
     return hasher.hexdigest()
 
 
