@@ -6,6 +6,7 @@ It reads the environment's model and data, the size of its frames, and its camer
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -101,6 +102,11 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         Geom to its `Material`, as for `Ripples`.
     looks : mapping, optional
         Geom to its look, as for `RippleRenderer`.
+    sensors : mapping, optional
+        Name to the arguments of a sensor: its `geom`, and those of `WaveSolver.sensor`, as in
+        `{"tap": {"geom": "board", "at": "site", "rate": 2000}}`. The observation is then a `Dict`: what it was, under
+        "observation" unless it is one already, and under each name the samples of a control step, float32
+        [samples, points], in one unbroken row from step to step, late by the sensor's `latency`, 0 before the reset.
     **options
         Keyword arguments of `Ripples`: resolution, backend, two_way and so on.
 
@@ -111,7 +117,8 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
     Raises
     ------
     RippleError
-        If the environment has no MuJoCo model, or as `Ripples` does.
+        If the environment has no MuJoCo model, a sensor's rate gives no whole number of samples in a control step, or
+        its name is taken, or as `Ripples` does.
     """
 
     _renderer: RippleRenderer | None
@@ -122,10 +129,11 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         materials: ByGeom[Material],
         *,
         looks: ByGeom[str] | None = None,
+        sensors: Mapping[str, Mapping[str, Any]] | None = None,
         **options: Any,
     ) -> None:
-        RecordConstructorArgs.__init__(self, materials=materials, looks=looks, **options)
-        EzPickle.__init__(self, env, materials, looks=looks, **options)
+        RecordConstructorArgs.__init__(self, materials=materials, looks=looks, sensors=sensors, **options)
+        EzPickle.__init__(self, env, materials, looks=looks, sensors=sensors, **options)
         gymnasium.Wrapper.__init__(self, env)
         if self.render_mode not in (None, *_DRAWN):
             warnings.warn(
@@ -136,14 +144,18 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             )
         self._materials, self._looks, self._options = materials, looks, options
         self._lookat: NDArray[np.float64] | None = None
+        self._given, self._counts = sensors or {}, dict[str, int]()
+        self._blocks: dict[str, NDArray[np.float32]] = {}
         self._couple()
+        if self._given:
+            self.observation_space = self._space()
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Step the environment, and the ripples with each of its physics steps."""
         _, data = model_and_data(self.unwrapped)
         with self.ripples.following(data):
             observation, reward, terminated, truncated, info = self.env.step(action)
-        return observation, reward, terminated, truncated, {**info, **self._info()}
+        return self._sensed(observation), reward, terminated, truncated, {**info, **self._info()}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset the environment, and flatten the ripples."""
@@ -153,7 +165,10 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             self.ripples.reset()
         else:  # environments may build a new one for each episode
             self._couple()
-        return observation, {**info, **self._info()}
+        for name, sensor in self._sensors.items():
+            late = int(np.ceil(sensor.latency * sensor.rate))
+            self._blocks[name] = np.zeros((late + self._counts[name], len(sensor.points)), np.float32)
+        return self._sensed(observation), {**info, **self._info()}
 
     def render(self) -> Any:
         """Return a frame, uint8 [height, width, 3], its depth buffer, float32 [height, width], or both, by the mode.
@@ -190,6 +205,37 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         model, _ = model_and_data(self.unwrapped)
         self.ripples = Ripples(model, self._materials, **self._options)
         self._renderer = None
+        self._sensors = {
+            name: self.ripples[given["geom"]].sensor(**{key: value for key, value in given.items() if key != "geom"})
+            for name, given in self._given.items()
+        }
+
+    def _space(self) -> gymnasium.spaces.Dict:
+        """Space of the observation with its sensors; sets how many samples each has in a control step."""
+        own = self.env.observation_space
+        spaces = dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
+        control = float(getattr(self.unwrapped, "dt", 0.0))
+        for name, sensor in self._sensors.items():
+            count = sensor.rate * control
+            if name in spaces or round(count) < 1 or abs(count - round(count)) > 1e-6 * count:
+                raise SceneError(
+                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s; valid are whole "
+                    f"numbers, and names other than {', '.join(map(repr, spaces))}"
+                )
+            shape = round(count), len(sensor.points)
+            self._counts[name], spaces[name] = shape[0], gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+        return gymnasium.spaces.Dict(spaces)
+
+    def _sensed(self, observation: Any) -> Any:
+        """An observation with the next block of each sensor, if there are any."""
+        if not self._sensors:
+            return observation
+        blocks = {}
+        for name, sensor in self._sensors.items():
+            there = np.concatenate([self._blocks[name], sensor.read().values])
+            blocks[name], self._blocks[name] = np.split(there, [self._counts[name]])
+        own = isinstance(self.env.observation_space, gymnasium.spaces.Dict)
+        return {**(observation if own else {"observation": observation}), **blocks}
 
     def _info(self) -> dict[str, Any]:
         heights = {name: self.ripples[name].height for name in self.ripples}

@@ -166,14 +166,16 @@ def test_modes_without_ripples_say_so(path: Path) -> None:
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize(("mode", "keywords"), [("sync", {}), ("async", {"context": "spawn"})])
 def test_make_vec_makes_ripples_in_this_process_and_in_others(mode: str, keywords: dict[str, Any]) -> None:
-    wrapper = functools.partial(RippleWrapper, materials={"torso_geom": Material(density=100.0)}, **OPTIONS)
+    materials, feel = {"torso_geom": Material(density=100.0)}, {"geom": "torso_geom", "at": [0, 0, 1.0], "rate": 1000}
+    wrapper = functools.partial(RippleWrapper, materials=materials, sensors={"feel": feel}, **OPTIONS)
     envs = gymnasium.make_vec(
         "Ant-v5", num_envs=2, vectorization_mode=mode, vector_kwargs=keywords, wrappers=[wrapper], max_episode_steps=3
     )
     _, info = envs.reset(seed=1)
     assert info["heights"]["torso_geom"].shape == (2, 6, N, N)
     for _ in range(3):
-        *_, truncated, info = envs.step(np.zeros(envs.action_space.shape))
+        observation, *_, truncated, info = envs.step(np.zeros(envs.action_space.shape))
+    assert observation["feel"].shape == (2, 50, 1) and observation["feel"].dtype == np.float32
     assert truncated.all()
     *_, info = envs.step(np.zeros(envs.action_space.shape))
     assert not info["heights"]["torso_geom"].any(), "flat in the new episode"
@@ -277,3 +279,29 @@ def test_environments_that_do_not_say_have_defaults() -> None:
     assert frame_size(env) == (480, 480)
     camera = environment_camera(env, model, np.median(data.geom_xpos, axis=0))
     assert (camera.type, camera.distance) == (mujoco.mjtCamera.mjCAMERA_FREE, model.stat.extent)
+
+
+def test_observations_with_sensors(path: Path) -> None:
+    sensors = {
+        "tap": {"geom": "block", "at": [[0.2, 0, 0.1], [-0.2, 0, 0.1]], "rate": 500},
+        "sag": {"geom": "block", "at": [0, 0, 0.1], "kind": "height", "rate": 1000},
+    }
+    env = RippleWrapper(BallEnv(path), MATERIALS, sensors=sensors, **OPTIONS)
+    observation, _ = env.reset(seed=0)
+    assert not observation["tap"].any()
+    steps = [env.step(np.zeros(1))[0] for _ in range(30)]
+    spaces = env.observation_space.spaces
+    assert all(each[name] in spaces[name] for each in steps for name in sensors)
+    assert steps[0]["tap"].shape == (5, 2) and steps[0]["sag"].shape == (10, 1)
+    blocks = np.concatenate([each["sag"] for each in steps])
+    other = RippleWrapper(BallEnv(path), MATERIALS, **OPTIONS)
+    other.reset(seed=0)
+    alone = other.ripples["block"].sensor([0, 0, 0.1], "height", 1000)
+    for _ in range(30):
+        other.step(np.zeros(1))
+    late = len(blocks) - int(np.argmax(np.abs(blocks) > 0))
+    np.testing.assert_array_equal(blocks[-late:], alone.samples[np.argmax(np.abs(alone.samples) > 0) :][:late])
+    again, _ = env.reset(seed=0)
+    assert not again["sag"].any()
+    with pytest.raises(RippleError, match=r"'tap' has 5\.01 samples in a control step of 0\.01 s; valid"):
+        RippleWrapper(BallEnv(path), MATERIALS, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS)

@@ -181,7 +181,7 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
 
 
 SAMPLES = 64
-_OURS_ALONE = ("compare", "overlay", "passes", "resume", "transparent")
+_OURS_ALONE = ("sound", "compare", "overlay", "passes", "resume", "transparent")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,14 +18,21 @@ from .replace import MARK
 # Fixed, since x264's output depends on it; small, since the renderer needs the processor too.
 THREADS = 2
 
+SOUND_RATE = 48_000  # samples a second
 
-@dataclasses.dataclass(frozen=True)
+# By the container; 192 kbit/s.
+_AUDIO = {"mp4": "aac", "webm": "libopus"}
+_BLOCK = 960  # samples that are encoded together, 20 ms
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Stream:
-    """Size [pixels] and rate [frames/s] of a video."""
+    """Size [pixels] and rate [frames/s] of a video, and what is heard with it, one channel from -1 to 1."""
 
     width: int
     height: int
     fps: int
+    sound: NDArray | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,8 +120,32 @@ def open_container(path: Path, container: str) -> Any:
     return opened
 
 
-def join_clips(clips: Sequence[tuple[Path, int]], path: Path, container: str, fps: int) -> None:
-    """Concatenate clips into one file.
+class _Track:
+    """The sound of a file, encoded as far as its pictures are there."""
+
+    def __init__(self, container: Any, name: str, sound: NDArray) -> None:
+        self._container, self._sound, self._done = container, sound.astype(np.float32), 0
+        self._stream = container.add_stream(_AUDIO[name], rate=SOUND_RATE, layout="mono", bit_rate=192_000)
+
+    def encode(self, time: float) -> None:
+        """Encode all up to a time [s]."""
+        while self._done < min(time * SOUND_RATE, len(self._sound)):
+            block = self._sound[None, self._done : self._done + _BLOCK]
+            frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(block), format="fltp", layout="mono")
+            frame.sample_rate, frame.pts, frame.time_base = SOUND_RATE, self._done, Fraction(1, SOUND_RATE)
+            self._container.mux(self._stream.encode(frame))
+            self._done += _BLOCK
+
+    def finish(self) -> None:
+        """Encode the rest."""
+        self.encode(float("inf"))
+        self._container.mux(self._stream.encode(None))
+
+
+def join_clips(
+    clips: Sequence[tuple[Path, int]], path: Path, container: str, fps: int, sound: NDArray | None = None
+) -> None:
+    """Concatenate clips into one file, and add the sound, if any.
 
     Parameters
     ----------
@@ -126,16 +157,20 @@ def join_clips(clips: Sequence[tuple[Path, int]], path: Path, container: str, fp
         FFmpeg's name.
     fps : int
         Frames a second.
+    sound : float [k], optional
+        See `Stream`.
     """
     output = open_container(path, container)
+    track = None
     try:
-        stream = None
+        target = None
         for clip, first in clips:
             with av.open(str(clip)) as source:
                 video = source.streams.video[0]
-                if stream is None:
-                    stream = output.add_stream_from_template(video)
-                    stream.time_base = Fraction(1, fps)
+                if target is None:
+                    target = output.add_stream_from_template(video)
+                    target.time_base = Fraction(1, fps)
+                    track = None if sound is None else _Track(output, container, sound)
                 for packet in source.demux(video):
                     if packet.pts is None:  # end of stream
                         continue
@@ -144,7 +179,11 @@ def join_clips(clips: Sequence[tuple[Path, int]], path: Path, container: str, fp
                     decoded = packet.pts if packet.dts is None else packet.dts
                     packet.pts, packet.dts = (first + round(time * tick * fps) for time in (packet.pts, decoded))
                     packet.time_base, packet.duration = Fraction(1, fps), 1
-                    packet.stream = stream
+                    packet.stream = target
                     output.mux_one(packet)
+                    if track is not None:
+                        track.encode(packet.pts / fps)
+        if track is not None:
+            track.finish()
     finally:
         output.close()

@@ -72,7 +72,7 @@ def _of_clips(suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream]
         suffix=suffix,
         length=FRAMES_IN_CLIP,
         start=lambda path, stream: Clip(path, codec, stream),
-        join=join or (lambda clips, path, stream: join_clips(clips, path, codec.container, stream.fps)),
+        join=join or (lambda clips, path, stream: join_clips(clips, path, codec.container, stream.fps, stream.sound)),
     )
 
 

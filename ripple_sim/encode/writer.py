@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import queue
 import threading
 import time
@@ -54,6 +55,7 @@ class FrameWriter:
         self._part, self._format, self._stream = part, video, stream
         self._shape, self._resumable = shape, resumable
         self._type = np.dtype(np.float16 if video.linear else np.uint8)
+        self.sound: NDArray | None = None  # heard with the frames, if set before it is closed; see `Stream`
         self._segment: Segment | None = None
         self._pending = 0  # frames of the segment
         self._error: Exception | None = None  # what made encoding fail; frames after that are dropped
@@ -188,7 +190,8 @@ class FrameWriter:
     def _finish(self) -> None:
         self._store()
         if self._format.join is not None:
-            self._format.join(self._part.segments(), self._part.whole, self._stream)
+            stream = dataclasses.replace(self._stream, sound=self.sound)
+            self._format.join(self._part.segments(), self._part.whole, stream)
         if not self._abandoned:
             self._part.finish()
             self._finished = True

@@ -53,6 +53,8 @@ class VideoOptions:
     overlay: Sequence[str] | None = None
     """Overlays on the video: height or velocity as a heatmap, contacts, grid, time, energy. Examples:
     height,contacts,time or velocity=0.5,energy, where the colours end at 0.5 m/s."""
+    sound: bool = False
+    """Add what is heard at the camera to the video (.mp4 and .webm)."""
     compare: str | None = None
     """Also run the scene with this wave operator and show both side by side."""
     resolution: int | None = None

@@ -35,6 +35,7 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.kernel import compile_times, work_clock
+from ripple_sim.sound import Microphone, gain
 
 from .options import VideoOptions
 from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
@@ -92,6 +93,7 @@ class Film:
         self._pass_files: PassFiles | None = None
         self._last_seen: tuple[int, Sighting] | None = None  # the number of a frame whose passes are not written yet
         self.seconds = 0.0  # spent on frames so far
+        self.microphone: Microphone | None = None
         operators = compared_operators(options.compare)
         ripples = simulations[0].ripples
         spacings = {grid_spacing(ripples[name].atlas.resolution) for name in ripples}
@@ -146,6 +148,8 @@ class Film:
                 notes = self._notebook.follow()
                 if self._on_frame is not None:
                     self._on_frame(self.simulations[0])
+                if self.microphone is not None:
+                    self.microphone.follow(self.simulations[0])
             yield Shot(exposures, notes)
 
     def render_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
@@ -380,9 +384,14 @@ def render_video(
         operators = compared_operators(options.compare)
         simulations = [Simulation.of(scene, options, operator=operator, on_step=on_step) for operator in operators]
         film = Film(simulations, options, frames, on_frame)
+        microphone = Microphone(simulations[0].ripples, options.slow_motion) if options.sound else None
+        film.microphone = microphone
         if options.passes:
             film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)
+        if microphone is not None:
+            pressure = microphone.pressure(frames / options.rate)
+            writer.sound = pressure * gain(pressure)
     return Summary(
         output=writer.path,
         frames=writer.frames,

@@ -19,6 +19,7 @@ import numpy as np
 
 from ripple_sim.encode import check_output, default_fps
 from ripple_sim.encode.images import check_passes
+from ripple_sim.encode.output import video_format
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay.notes import compared_operators
 from ripple_sim.scene.scene import Scene, check_duration, parse_request
@@ -119,6 +120,7 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         **origin(scene, options),
         "the OpenGL driver": f"{gl.renderer}, {gl.version}",
         **({"the passes": f"{','.join(options.passes)} in {options.pass_format}"} if options.passes else {}),
+        **({"the sound": "at the camera"} if options.sound else {}),
         **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
     }
 
@@ -141,6 +143,10 @@ def check_options(options: VideoOptions, output: Path) -> None:
         overlaid=bool(options.overlay) or len(operators) > 1,
         overwrite=options.overwrite,
     )
+    if options.sound and video_format(output) not in (".mp4", ".webm"):
+        raise VideoError(f"{output} has no sound; valid are .mp4 and .webm, or `ripple-sim export SCENE -o FILE.wav`")
+    if options.sound and len(operators) > 1:
+        raise VideoError("two runs side by side have no sound; leave out --sound or --compare")
     if options.passes:
         check_passes(output, tuple(options.passes), options.pass_format, options.overwrite)
         if len(operators) > 1:

@@ -195,7 +195,7 @@ class CPUBackend:
         self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
         self._crests: NDArray[np.float32] | None = None
-        self._probes: kernels.Probes | None = None
+        self._probes = kernels.NO_PROBES
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
@@ -269,9 +269,7 @@ class CPUBackend:
         self._add_shift()
         features = self._features
         drags = self._plain and len(features.viscosity.rows) > 0
-        sums = None
-        if self._probes is not None:
-            sums = self._sums = np.zeros((substeps, len(self._probes.heights)), np.float32)
+        self._sums = np.zeros((substeps, len(self._probes.heights)), np.float32)
         kernels.advance(
             substeps,
             np.float32(dt),
@@ -282,8 +280,8 @@ class CPUBackend:
             features.viscosity if drags else None,
             None if self._plain else features,
             self._probes,
-            None if self._dent is None or self._probes is None else self._dent.reshape(-1),
-            sums,
+            NO_WEIGHTS.irregular.weights if self._dent is None else self._dent.reshape(-1),
+            self._sums,
         )
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
@@ -292,7 +290,8 @@ class CPUBackend:
 
     def probe(self, probes: kernels.Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
-        self._probes = probes and probes._replace(texels=self._fields.addresses[probes.texels])
+        probes = kernels.NO_PROBES if probes is None else probes
+        self._probes = probes._replace(texels=self._fields.addresses[probes.texels])
 
     def probed(self) -> NDArray[np.float32]:
         """The sums of the latest `advance`, [substeps, k]."""

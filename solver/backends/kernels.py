@@ -211,10 +211,11 @@ class Probes(NamedTuple):
         return np.where(self.heights, *both)
 
 
+NO_PROBES = Probes(np.zeros(1, np.int64), _NO_INTS, _NO_FLOATS, np.zeros(0, np.bool_))
+
+
 @kernel(no_cpython_wrapper=True)
-def _probe(
-    probes: Probes, h: Floats32, v: Floats32, dent: Floats32 | None, drifted: np.float32, sums: Floats32
-) -> None:
+def _probe(probes: Probes, h: Floats32, v: Floats32, dent: Floats32, drifted: np.float32, sums: Floats32) -> None:
     """Fill in the sums [k] of a substep, whose heights have drifted beyond its velocities [s]."""
     for i in range(len(sums)):
         total = 0.0
@@ -223,7 +224,7 @@ def _probe(
             value = v[at]
             if probes.heights[i]:
                 value = h[at] - drifted * v[at]
-                if dent is not None:
+                if len(dent):
                     value += dent[at]
             total += probes.weights[j] * value
         sums[i] = total
@@ -297,15 +298,15 @@ def advance(
     kicks: Floats32,
     viscosity: Weights | None,
     features: Features | None,
-    probes: Probes | None,
-    dent: Floats32 | None,
-    sums: Floats32 | None,
+    probes: Probes,
+    dent: Floats32,
+    sums: Floats32,
 ) -> None:
     """Substeps of dt, from the first half drift to the last, and velocities [k] that kick the texels at addresses [k].
 
     The height ends in `h_next` where their number is odd.
 
-    `sums` [substeps, k] are filled with those of the probes; `dent` is what stays of the height.
+    `sums` [substeps, k] are filled with those of the probes, often none; `dent` is what stays of the height, or empty.
 
     What is None is compiled away: `features` where a material has no more than viscosity, which then is `viscosity`.
     """
@@ -327,7 +328,7 @@ def advance(
         for i in range(len(addresses)):
             v[addresses[i]] += kicks[i]
             h[addresses[i]] += drifted * kicks[i]
-        if probes is not None and sums is not None:
+        if len(probes.heights):
             _probe(probes, h, v, dent, drifted - half, sums[step])
         if features is not None and len(features.dent):
             flow(h, features.limit, features.dent)

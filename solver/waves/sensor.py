@@ -159,8 +159,8 @@ class Sensor:
         )
         # where substeps are longer than samples there is nothing between them to filter out
         self._base = min(self.rate, 1 / operator.stable_timestep)
-        resolved = (_resolved(atlas, material, int(center)) for center in centers)
-        self.bandwidth = min(*resolved, _PASSED * self._base)
+        shortest = (resolved(atlas, material, int(center)) for center in centers)
+        self.bandwidth = min(*shortest, _PASSED * self._base)
         self.begin(0.0, np.zeros(len(rows)))
 
     @property
@@ -292,7 +292,7 @@ def _tangents(normal: NDArray) -> NDArray[np.float64]:
     return np.stack([u, np.cross(normal, u)])
 
 
-def _resolved(atlas: Atlas, material: Material, center: int) -> float:
+def resolved(atlas: Atlas, material: Material, center: int) -> float:
     """Frequency [Hz] of the shortest wave that the texels round one carry, of the material there."""
     texels = _around(atlas.texels.topology, center, 1)
     away = np.linalg.norm(atlas.positions.reshape(-1, 3)[texels] - atlas.positions.reshape(-1, 3)[center], axis=1)

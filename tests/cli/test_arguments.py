@@ -80,6 +80,7 @@ WORDS = {
     "passes": ("depth,flow", ("depth", "flow")),
     "pass_format": ("exr", "exr"),
     "overlay": ("height,time", ("height", "time")),
+    "sound": (None, True),
     "compare": ("paper", "paper"),
     "resolution": ("48", 48),
     "layout": ("patches", "patches"),

@@ -1,0 +1,182 @@
+"""Sound: the pressure that rippling surfaces make at a place in the air, by Rayleigh's integral.
+
+p(x, t) = rho_0 / (2 pi) integral of a(y, t - r / c_0) / r over the surface, with a the acceleration along the outward
+normal and r the way from y to x (Rayleigh 1896, section 278). It holds for plane surfaces in a rigid wall; here texels
+that face away are left out instead. No air loads the surface, and there is no room.
+
+Texels of one delay act together: they are one sum of `Probes` after every substep, a texel on the two delays between
+which its own lies. The sums of all delays are added up late, each by its delay, in whole substeps.
+"""
+
+from __future__ import annotations
+
+import warnings
+import wave
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.capture.frame_source import viewpoint
+from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.coupling.soft import is_soft
+from ripple_sim.errors import RippleWarning
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver import WaveSolver
+from ripple_sim.solver.backends.kernels import Probes
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.solver.waves.finite import count_substeps
+from ripple_sim.solver.waves.sensor import filtered, resolved
+
+DENSITY, SPEED = 1.204, 343.2  # of dry air at 20 degrees Celsius [kg/m^3], [m/s]
+RATE = 48_000  # samples a second of what is heard
+
+_PEAK = 0.9  # of full scale: codecs may overshoot a little
+_HEARD = 20.0  # [Hz], the lowest tone
+_GRAZING = 0.1  # cosine from which on a texel counts in full: none appears at once
+_NEAREST = 0.01  # [m]: nearer texels count as if they were there
+
+
+class Microphone:
+    """Hears the ripples of a model from a place that may move.
+
+    Parameters
+    ----------
+    ripples : Ripples
+    slow_motion : float
+        Seconds of sound per second of the simulation: it is lower and longer by this.
+
+    Attributes
+    ----------
+    rate : float
+        Samples for each second of the simulation [1/s].
+    """
+
+    def __init__(self, ripples: Ripples, slow_motion: float = 1.0) -> None:
+        self.rate, self._ripples = RATE * slow_motion, ripples
+        self._ears = {name: Ear(ripples[name], ripples.model.opt.timestep) for name in ripples}
+        for name in ripples:
+            _warn_if_unheard(name, ripples[name], slow_motion)
+
+    def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:
+        """Stand at a point in the world from now on [m], [3]; call it again when it or a target has moved."""
+        for name, geom in self._ripples.geom_ids.items():
+            if is_soft(self._ripples.model, geom):
+                here = point
+            else:
+                here = (point - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+            self._ears[name].stand(self._ripples[name], here)
+
+    def follow(self, simulation: Simulation) -> None:
+        """Stand where the scene's camera is now."""
+        data = simulation.data
+        self.place(data, viewpoint(simulation.model, data, simulation.scene.camera, data.time).pose().position)
+
+    def pressure(self, duration: float) -> NDArray[np.float64]:
+        """The pressure from time 0 on, over a duration of the simulation [s]: [k] [Pa], k = rate times duration."""
+        at = np.arange(round(self.rate * duration)) / self.rate
+        return sum((ear.heard(at, self.rate) for ear in self._ears.values()), np.zeros(len(at)))
+
+
+class Ear:
+    """A listener to one target; `series` is its sound at the place, one value a substep of `dt` [s]."""
+
+    def __init__(self, waves: WaveSolver, timestep: float) -> None:
+        self._dt = timestep / count_substeps(timestep, waves.stable_timestep, None)
+        self._series = np.zeros(0)
+        self._here = np.full(3, np.inf)
+
+    def stand(self, waves: WaveSolver, here: NDArray[np.float64]) -> None:
+        """Listen from a place in the target's frame [m], if it is another one."""
+        if waves.vertices is None and np.abs(here - self._here).max() < 1e-6:
+            return
+        self._here, atlas = here, waves.atlas
+        way = here - atlas.positions.reshape(-1, 3)
+        distance = np.maximum(np.linalg.norm(way, axis=1), _NEAREST)
+        cosine = np.einsum("ij,ij->i", way, atlas.normals.reshape(-1, 3)) / distance
+        weight = DENSITY / (2 * np.pi) * atlas.areas.reshape(-1) / distance * np.clip(cosine / _GRAZING, 0, 1)
+        texels = np.flatnonzero(weight * waves.operator.movable.reshape(-1))
+        if not len(texels):
+            texels = np.zeros(1, np.int64)  # it faces away everywhere: a texel without weight
+        every = max(1, int(1 / (2 * RATE * self._dt)))  # substeps from one delay to the next
+        delay = distance[texels] / SPEED / (every * self._dt)
+        first = np.floor(delay).astype(np.int64)
+        slots, late = np.concatenate([first, first + 1]), delay - first
+        shares = np.concatenate([(1 - late) * weight[texels], late * weight[texels]])
+        order = np.argsort(slots, kind="stable")
+        delays, begins = np.unique(slots[order], return_index=True)
+        self._delays = every * delays
+        self.probes = Probes(
+            np.append(begins, len(slots)),
+            np.concatenate([texels, texels])[order],
+            shares[order].astype(np.float32),
+            np.zeros(len(begins), np.bool_),
+        )
+        waves.listeners.all = tuple(each for each in waves.listeners.all if each is not self)
+        waves.listeners.add(self, waves.time)
+
+    def begin(self, time: float, values: NDArray) -> None:
+        """Begin with the sums of velocities now."""
+        self._last = values
+
+    def take(self, time: float, dt: float, sums: NDArray[np.float32]) -> None:
+        """Add what the substeps of dt [s] from a time on give, later by their delays."""
+        changes = np.diff(sums.astype(np.float64), axis=0, prepend=self._last[None]) / self._dt
+        self._last = sums[-1].astype(np.float64)
+        # a change happens in the middle of its substep, and so do the series' entries
+        when = (time + dt * (np.arange(len(sums)) + 0.5)) / self._dt - 0.5
+        size = int(when[-1] + self._delays[-1]) + 3
+        if size > len(self._series):
+            self._series = np.append(self._series, np.zeros(max(size, 2 * len(self._series)) - len(self._series)))
+        if abs(dt - self._dt) < 1e-9 * dt:
+            first, each = round(when[0]), np.ascontiguousarray(changes.T)
+            for delay, change in zip((first + self._delays).tolist(), each, strict=True):
+                self._series[delay : delay + len(change)] += change
+        else:  # substeps have another length since the material changed: a change lies between two entries
+            whole = np.maximum(np.floor(when), 0).astype(np.int64)
+            late, places = (when - whole)[:, None], whole[:, None] + self._delays
+            np.add.at(self._series, places, changes * (1 - late))
+            np.add.at(self._series, places + 1, changes * late)
+
+    def heard(self, at: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+        """The series at other times [s], filtered for samples at a rate."""
+        reach = np.zeros(max(len(self._series), int(at[-1] / self._dt) + 2) + 64)
+        reach[: len(self._series)] = self._series
+        times = (np.arange(len(reach)) + 0.5) * self._dt
+        base = min(rate, 1 / self._dt)
+        return np.concatenate(
+            [
+                filtered(times, np.full(len(times), self._dt), reach[:, None], block, base)[:, 0]
+                for block in np.array_split(at, max(1, len(at) // 4096))
+            ]
+        )
+
+
+def gain(pressure: NDArray[np.float64]) -> float:
+    """By what a pressure [Pa] is multiplied so that it just does not clip."""
+    peak = float(np.abs(pressure).max(initial=0.0))
+    return _PEAK / peak if peak > 0 else 1.0
+
+
+def write_wav(path: Path, signals: NDArray, rate: int) -> None:
+    """Write signals [k] or [k, channels] between -1 and 1 to a file of 16 bits a sample; it appears whole."""
+    codes = np.rint(np.clip(signals, -1, 1) * 32767).astype("<i2")
+    with atomic_write(path) as unfinished, wave.open(str(unfinished), "wb") as file:
+        file.setnchannels(1 if signals.ndim == 1 else signals.shape[1])
+        file.setsampwidth(2)
+        file.setframerate(rate)
+        file.writeframes(codes.tobytes())
+
+
+def _warn_if_unheard(name: str, waves: WaveSolver, slow_motion: float) -> None:
+    """Say of a target whose waves are too slow to be heard, and of what would ring."""
+    highest = max(resolved(waves.atlas, waves.material, texel) for texel in range(0, waves.atlas.areas.size, 97))
+    if highest / slow_motion < _HEARD:
+        size = float(np.ptp(waves.atlas.positions.reshape(-1, 3), axis=0).max())
+        warnings.warn(
+            f"{name!r} is not heard: its waves swing at {highest:.2g} Hz at most, below hearing ({_HEARD:g} Hz); a "
+            f"speed of {200 * size / 0.77 * slow_motion:.2g} m/s would ring at about 200 Hz",
+            RippleWarning,
+            stacklevel=3,
+        )

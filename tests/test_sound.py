@@ -1,0 +1,123 @@
+"""Sound: Rayleigh's integral against the closed form of a piston, partials of the drums, and the track of a video."""
+
+import math
+import wave
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from hand_made import disk, square
+from scipy.special import jn_zeros
+from unfinished_videos import egg_scene
+
+from ripple_sim import Material, VideoOptions, load_scene, render_video
+from ripple_sim.encode.clip import H264, Clip, Stream, join_clips
+from ripple_sim.errors import VideoError
+from ripple_sim.scene.scene_file import uniform_material
+from ripple_sim.solver import WaveSolver, build_atlas, load_mesh
+from ripple_sim.solver.texels.texel_atlas import texel_atlas
+from ripple_sim.sound import DENSITY, RATE, SPEED, Ear, gain, write_wav
+
+
+@pytest.mark.usefixtures("opengl")
+@pytest.mark.parametrize("backend", ["cpu", "gl"])
+def test_a_piston_on_its_axis(backend: str) -> None:
+    """A velocity v that begins at once sounds as rho c v until the edge is heard, too (Stepanishen 1971)."""
+    atlas, timestep, speed, away = texel_atlas(disk(24)), 2e-5, 0.01, 0.8
+    waves = WaveSolver(atlas, Material(speed=0.01), backend=backend, conserve_volume=False)
+    ear = Ear(waves, timestep)
+    ear.stand(waves, atlas.positions.reshape(-1, 3).mean(axis=0) + np.array([0, 0, away]))
+    waves.velocity = speed
+    for _ in range(20):
+        waves.step(timestep)
+    at = np.arange(int(0.006 * RATE)) / RATE
+    pressure = ear.heard(at, RATE)
+    radius = math.sqrt(atlas.areas.sum() / math.pi)
+    edge = math.hypot(away, radius)
+    inside = (at > away / SPEED + 4e-4) & (at < edge / SPEED - 4e-4)
+    outside = (at < away / SPEED - 8e-4) | (at > edge / SPEED + 8e-4)
+    assert inside.sum() > 3
+    # the texels arrive one by one
+    assert pressure[inside].mean() == pytest.approx(DENSITY * SPEED * speed, rel=0.01)
+    assert pressure[inside].std() < 0.05 * DENSITY * SPEED * speed
+    assert np.abs(pressure[outside]).max() < 0.05 * DENSITY * SPEED * speed
+    assert pressure.sum() / RATE == pytest.approx(DENSITY * speed * (edge - away), rel=5e-3)
+
+
+def test_nothing_is_heard_from_behind() -> None:
+    waves = WaveSolver(texel_atlas(square(12)), backend="cpu", conserve_volume=False)
+    ear = Ear(waves, 0.01)
+    ear.stand(waves, np.array([0.5, 0.5, -1.0]))
+    waves.velocity = 1.0
+    waves.step(0.01)
+    assert not ear.heard(np.arange(100) / RATE, RATE).any()
+
+
+# wave numbers of a membrane with a fixed rim, times its radius: those with 0, 1 and 2 nodal lines
+MODES = sorted(jn_zeros(0, 2)[:1].tolist() + jn_zeros(1, 1).tolist() + jn_zeros(2, 1).tolist())
+
+
+@pytest.mark.parametrize(("name", "law", "duration"), [("low", 1, 0.3), ("bronze", 2, 0.06)])
+def test_partials_of_the_drums_are_at_their_modes(name: str, law: int, duration: float) -> None:
+    scene = load_scene("drums")
+    (entry,) = (each for each in scene.targets if each.geom == name)
+    mesh = load_mesh(Path(__file__).parents[1] / "scenes" / "meshes" / "drum_skin.obj")
+    radius = {"low": 0.16, "bronze": 0.07}[name]
+    scale = radius / 0.4
+    atlas = build_atlas(type(mesh)(scale * mesh.V, mesh.F), entry.resolution, cache=False)
+    waves = WaveSolver(atlas, uniform_material(entry), rim=entry.rim, backend="cpu")
+    center = atlas.mesh.V.mean(axis=0)
+    ear = Ear(waves, duration)
+    ear.stand(waves, center + np.array([0.3, 0, 0.5]))
+    waves.add_impulse(center + np.array([0.45 * radius, 0, 0]), 1e-3, 0.1 * radius)
+    waves.step(duration)
+    pressure = ear.heard(np.arange(int(duration * RATE)) / RATE, RATE)
+    heard = np.abs(np.fft.rfft(pressure * np.hanning(len(pressure)), 1 << 18))
+    hertz = np.fft.rfftfreq(1 << 18, 1 / RATE)
+    base = entry.material.speed if law == 1 else math.sqrt(entry.material.bending)
+    for number in MODES:
+        mode = base * (number / radius) ** law / (2 * math.pi)
+        near = np.abs(hertz - mode) < 0.06 * mode
+        assert hertz[near][heard[near].argmax()] == pytest.approx(mode, rel=0.01)
+        assert heard[near].max() > 3 * np.median(heard[hertz < 2000])
+
+
+def test_the_track_of_a_video_is_what_was_given(tmp_path: Path) -> None:
+    sound = 0.5 * np.sin(2 * np.pi * 440 * np.arange(RATE) / RATE)
+    clip = Clip(tmp_path / "clip.mp4", H264, Stream(32, 16, 24))
+    for _ in range(24):
+        clip.write(np.zeros((16, 32, 3), np.uint8))
+    clip.finish()
+    whole = []
+    for name in ("a.mp4", "b.mp4"):
+        join_clips([(tmp_path / "clip.mp4", 0)], tmp_path / name, "mp4", 24, sound)
+        whole.append((tmp_path / name).read_bytes())
+    assert whole[0] == whole[1]
+    with av.open(str(tmp_path / "a.mp4")) as file:
+        track = file.streams.audio[0]
+        assert (track.codec_context.name, track.rate, track.layout.name) == ("aac", RATE, "mono")
+        heard = np.concatenate([frame.to_ndarray()[0] for frame in file.decode(track)])
+    assert RATE <= len(heard) < RATE + 1024  # whole blocks
+    assert np.abs(heard[:RATE] - sound)[2000:-2000].max() < 0.01  # in time to the sample
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_video_with_sound(tmp_path: Path) -> None:
+    options = VideoOptions(size=(32, 32), fps=10, duration=0.3, slow_motion=2.0, sound=True, overlay=())
+    with pytest.warns(UserWarning, match="is not heard: its waves swing at .* Hz at most, below hearing"):
+        render_video(egg_scene(tmp_path), tmp_path / "a.mp4", options)
+    with av.open(str(tmp_path / "a.mp4")) as file:
+        assert float(file.streams.audio[0].duration * file.streams.audio[0].time_base) == pytest.approx(0.6, abs=0.03)
+    with pytest.raises(VideoError, match=r"has no sound; valid are \.mp4 and \.webm"):
+        render_video(egg_scene(tmp_path), tmp_path / "a.gif", options)
+
+
+def test_wav(tmp_path: Path) -> None:
+    pressure = np.array([0.0, 20.0, -40.0])
+    write_wav(tmp_path / "a.wav", np.stack([pressure, -pressure], axis=1) * gain(pressure), RATE)
+    with wave.open(str(tmp_path / "a.wav")) as file:
+        assert (file.getframerate(), file.getnchannels(), file.getnframes()) == (RATE, 2, 3)
+        codes = np.frombuffer(file.readframes(3), "<i2").reshape(3, 2)
+    np.testing.assert_array_equal(codes[:, 0], [0, 14745, -29490])
+    assert gain(np.zeros(3)) == 1.0
