@@ -101,6 +101,7 @@ def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
             "head": bool(not studio and np.allclose(light.direction, pose.rotation[:, 2]) and light.position is None),
             "radiance": light.radiance.tolist(),
             "position": None if light.position is None else light.position.tolist(),
+            "size": light.size,
             "cutoff": float(np.cos(light.cutoff)),
             "exponent": light.exponent,
             "falloff": light.falloff.tolist(),

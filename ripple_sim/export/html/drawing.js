@@ -1,11 +1,12 @@
 "use strict";
-// Draws a frame with WebGL 2: shadow map, surfaces, floor and background, transparent surfaces, arrows.
+// Draws a frame with WebGL 2: shadow map, shadows on the floor, surfaces, floor and background, transparent surfaces, arrows. Where pixels
+// are drawn by software, edges are smoothed afterwards: samples would cost more; with alpha, the canvas is copied for nothing.
 const SHADOW_CELL = 4;  // texels of the shadow map between the points of surfaces in it
 
 class Drawing {
   constructor(canvas, meta) {
     const software = drawsInSoftware();
-    const gl = canvas.getContext("webgl2", {antialias: !software, preserveDrawingBuffer: true, alpha: false});
+    const gl = canvas.getContext("webgl2", {antialias: !software, preserveDrawingBuffer: true, alpha: software});
     if (!gl) throw new Error("this browser has no WebGL 2");
     Object.assign(this, {gl, canvas, meta, software});
     this.shadowSize = software ? 512 : 1024;
@@ -19,12 +20,13 @@ class Drawing {
     this.parts = meta.parts.map(part => partOf(gl, part, cell));
     this.drawn = grouped(gl, this.parts);
     this.arrow = partOf(gl, arrowPart(), cell);
-    this.shadow = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, this.shadow);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, this.shadowSize, this.shadowSize);
-    for (const [name, value] of [["MIN_FILTER", "LINEAR"], ["MAG_FILTER", "LINEAR"], ["COMPARE_MODE", "COMPARE_REF_TO_TEXTURE"]])
-      gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${name}`], gl[value]);
-    this.target = framebufferOf(gl, "DEPTH_ATTACHMENT", this.shadow);
+    const sides = [this.shadowSize, this.shadowSize], linear = {MIN_FILTER: "LINEAR", MAG_FILTER: "LINEAR"};
+    this.shadow = tableOf(gl, "DEPTH_COMPONENT24", ...sides, {...linear, COMPARE_MODE: "COMPARE_REF_TO_TEXTURE"});
+    this.blockers = tableOf(gl, "RG8", ...sides, {...linear, MIN_FILTER: "LINEAR_MIPMAP_LINEAR"}, 8);
+    this.target = framebufferOf(gl, {DEPTH_ATTACHMENT: this.shadow, COLOR_ATTACHMENT0: this.blockers});
+    this.shades = tableOf(gl, "R8", this.shadowSize / 2, this.shadowSize / 2, linear);
+    this.shadeTarget = framebufferOf(gl, {COLOR_ATTACHMENT0: this.shades});
+    this.screen = tableOf(gl, "RGBA8", 1, 1, linear, 0);
   }
 
   async load() {
@@ -45,8 +47,10 @@ class Drawing {
     this.floor = floor && new Floor(gl, floor, [floorVertex(light, onFloor), floorFragment(light, onFloor)], plain);
     this.sky = programOf(gl, SKY_VERTEX, skyFragment(light));
     this.depth = programOf(gl, DEPTH_VERTEX, DEPTH_FRAGMENT);
+    this.shading = programOf(gl, DEPTH_VERTEX, shadeFragment(shadowSize));
+    this.smoothing = programOf(gl, EVERYWHERE_VERTEX, SMOOTH_FRAGMENT);
     this.triangles = programOf(gl, LIT_POINTS_VERTEX, LIT_POINTS_FRAGMENT);
-    this.shaders = {surface: [SURFACE_VERTEX, surfaceFragment(light, lit)], points: [EVERYWHERE_VERTEX, pointsFragment(light, lit)]};
+    this.shaders = {surface: [SURFACE_VERTEX, surfaceFragment(light, lit)], points: [EVERYWHERE_VERTEX, pointsFragment(light, litShader({...told, taps: 4}))]};
     this.known = new Map();
   }
 
@@ -73,11 +77,11 @@ class Drawing {
     const gl = this.gl, light = lightOf(this.meta, view, this.environment.diffuse([0, 0, 1]), this.shadowSize);
     const parts = this.placed(bodies, view.eye), casters = parts.filter(({part}) => part.opacity === 1);
     const floor = this.meta.floor && this.setFloor(view, bodies, light, casters);
-    this.shared = {...light, eye: view.eye, viewProjection: view.matrix, shadowMap: 0, image: 1, heatColors: 2, places: 3, normals: 4, ambientMap: 5, coatMap: 6, mirrorMap: 7};
+    this.shared = {...light, eye: view.eye, viewProjection: view.matrix, shadowMap: 0, image: 1, heatColors: 2, places: 3, normals: 4, ambientMap: 5, coatMap: 6, mirrorMap: 7, shades: 8};
     this.ready = new Set();  // programs that have these
     gl.enable(gl.DEPTH_TEST); gl.enable(gl.CULL_FACE); gl.depthMask(true); gl.disable(gl.BLEND);
-    this.drawShadows(casters, light.shadowMatrix);
-    this.bind(0, this.shadow); this.bind(2, this.heat); this.bind(5, this.environment.ambient); this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
+    this.drawShadows(casters, light, floor);
+    this.bind(8, this.shades); this.bind(0, this.shadow); this.bind(2, this.heat); this.bind(5, this.environment.ambient); this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
     gl.disable(gl.DEPTH_TEST);
     for (const {part, model} of parts) if (part.lit) { this.look("points", part, model, heat); part.lit.light(); }
     gl.enable(gl.DEPTH_TEST);
@@ -91,6 +95,19 @@ class Drawing {
     for (const each of parts) if (each.opacity < 1) this.drawPart(each, heat);
     gl.disable(gl.BLEND);
     for (const model of arrows) this.drawPart({part: this.arrow, model}, false);
+    if (this.software) this.smooth();
+  }
+
+  // Smooths the edges on the canvas.
+  smooth() {
+    const gl = this.gl;
+    this.bind(1, this.screen);
+    gl.copyTexImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 0, 0, this.canvas.width, this.canvas.height, 0);
+    gl.disable(gl.DEPTH_TEST); gl.disable(gl.CULL_FACE);
+    gl.useProgram(this.smoothing.program);
+    this.smoothing.set({image: 1});
+    gl.bindVertexArray(this.empty);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   // Parts with their places, the most opaque first.
@@ -111,13 +128,23 @@ class Drawing {
     return {focus: view.focus, fade: [...fade, view.distance], floorFrame, floorColor: floor.color, floorTiling: floor.tiling};
   }
 
-  drawShadows(casters, viewProjection) {
+  drawShadows(casters, {shadowMatrix, softness}, floor) {
     const gl = this.gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target);
     gl.viewport(0, 0, this.shadowSize, this.shadowSize);
-    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.clear(gl.DEPTH_BUFFER_BIT | gl.COLOR_BUFFER_BIT);
     gl.useProgram(this.depth.program);
-    for (const {part, model} of casters) { this.depth.set({modelProjection: times(viewProjection, model)}); this.mesh(part, part.shadow); }
+    for (const {part, model} of casters) { this.depth.set({modelProjection: times(shadowMatrix, model)}); this.mesh(part, part.shadow); }
+    this.bind(8, this.blockers);
+    gl.generateMipmap(gl.TEXTURE_2D);
+    if (!floor) return;
+    gl.disable(gl.DEPTH_TEST); gl.disable(gl.CULL_FACE);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadeTarget);
+    gl.viewport(0, 0, this.shadowSize / 2, this.shadowSize / 2);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.useProgram(this.shading.program);
+    this.shading.set({modelProjection: times(shadowMatrix, floor.floorFrame), blockers: 8, softness});
+    this.floor.drawCells(1);
   }
 
   drawPart({part, model}, heat) {

@@ -2,7 +2,7 @@
 // The floor in cells, of which only those are drawn that the camera sees. Only cells that a shadow may reach look into the
 // shadow map: where software draws, its samples take most of the time.
 const INNER = 14, OUTER = 8, HALF = INNER + OUTER;  // cells from the middle to a side: of one size up to the camera's distance, and growing
-const MARGIN = 3;  // by which shadows may be wider [texels of the shadow map]
+const MARGIN = 3, WIDER = 1.5;  // by which shadows may be wider [texels of the shadow map], and [radii of their penumbras]
 const ROWS = 24;  // of the picture, each of which the sky is drawn in or not
 
 class Floor {
@@ -37,13 +37,14 @@ class Floor {
 
   // Draws it with what `use` does to make a program the present one.
   draw(use) {
-    const gl = this.gl;
+    for (const shadow of [0, 1]) if (this.counts[shadow]) { use(this.programs[shadow]); this.drawCells(shadow); }
+  }
+
+  // Those in light, or those in shadow.
+  drawCells(shadow) {
+    const gl = this.gl, count = this.counts[shadow];
     gl.bindVertexArray(this.array);
-    this.counts.forEach((count, shadow) => {
-      if (!count) return;
-      use(this.programs[shadow]);
-      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, shadow ? 2 * (this.triangles.length - count) : 0);
-    });
+    gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, shadow ? 2 * (this.triangles.length - count) : 0);
   }
 
   // Places of the cells' corners, and outside which sides of the picture each lies.
@@ -86,12 +87,13 @@ class Floor {
       return Math.max(0, Math.min(side - 1, Math.floor(HALF + (x < 0 ? -steps : steps))));
     };
     // along the light on the floor's axes
-    const rows = [0, 4].map(i => add(frame.slice(i, i + 3), up, -dot(way, frame.slice(i, i + 3)) / rise));
+    const rows = [...[0, 4].map(i => add(frame.slice(i, i + 3), up, -dot(way, frame.slice(i, i + 3)) / rise)), up];
     for (const {part: {shadow: {reaches: {points, far}}, data: [places]}, model} of casters) {
-      const [[ax, bx, cx, dx], [ay, by, cy, dy]] = rows.map((row, i) =>
-        [...[0, 4, 8].map(k => dot(row, model.slice(k, k + 3))), dot(row, add(model.slice(12, 15), frame.slice(12, 15), -1)) - middle[i]]);
+      const [[ax, bx, cx, dx], [ay, by, cy, dy], [az, bz, cz, dz]] = rows.map((row, i) =>
+        [...[0, 4, 8].map(k => dot(row, model.slice(k, k + 3))), dot(row, add(model.slice(12, 15), frame.slice(12, 15), -1)) - (middle[i] || 0)]);
       for (let k = 0; k < points.length; k++) {
-        const point = points[k], margin = (MARGIN * light.shadowTexel + far[k]) / rise, x = places[3 * point], y = places[3 * point + 1], z = places[3 * point + 2];
+        const point = points[k], x = places[3 * point], y = places[3 * point + 1], z = places[3 * point + 2];
+        const away = (az * x + bz * y + cz * z + dz) / rise, margin = (MARGIN * light.shadowTexel + far[k] + WIDER * light.lampSize * away) / rise;
         const u = ax * x + bx * y + cx * z + dx, v = ay * x + by * y + cy * z + dy, left = cell(u - margin), right = cell(u + margin);
         for (let i = cell(v - margin), high = cell(v + margin); i <= high; i++) for (let j = left; j <= right; j++) shadowed[i * side + j] = 1;
       }

@@ -21,8 +21,8 @@ function lightOf(meta, view, boxes, shadowSize) {
     horizon: tint, zenith, sky, around, bounce, turn: right.slice(0, 2),
     lampWay: pad(ways), lampRadiance: pad(lamps.map(lamp => lamp.radiance)), lampPosition: pad(lamps.map(lamp => lamp.position || [0, 0, 0])),
     lampFalloff: pad(lamps.map(lamp => lamp.falloff)), lampShape: pad(lamps.map(lamp => [lamp.position ? 1 : 0, lamp.cutoff, lamp.exponent])),
-    casts: lamps.length && lamps[0].shadow ? 1 : 0, shadowTexel: SHADOW_WIDTH * view.distance / shadowSize,
-    shadowMatrix: shadowMatrixOf(lamps.length ? ways[0] : up, lamps.length ? lamps[0].position : null, view),
+    lampSize: lamps.length ? lamps[0].size : 0, casts: lamps.length && lamps[0].shadow ? 1 : 0, shadowTexel: SHADOW_WIDTH * view.distance / shadowSize,
+    ...shadowMapOf(lamps.length ? ways[0] : up, lamps.length ? lamps[0] : {position: null, size: 0}, view),
   };
 }
 
@@ -34,12 +34,13 @@ function strength(lamp, way, point) {
   return beam / dot(lamp.falloff, [1, d, d * d]) * Math.max(off[2] / d, 0);
 }
 
-// World to shadow map of a far lamp, or of one at a position.
-function shadowMatrixOf(way, position, view) {
+// World to shadow map of a far lamp, or of one at a position, and the radius of a penumbra over the depth between what casts it
+// and where it falls, both in the map.
+function shadowMapOf(way, {position, size}, view) {
   const half = 0.5 * SHADOW_WIDTH * view.distance, depth = 2.4 * view.distance;
   const off = position ? add(position, view.focus, -1) : way, back = unit(off), distance = Math.hypot(...off);
   const right = unit(cross(Math.abs(back[2]) > 0.99 ? [0, 1, 0] : [0, 0, 1], back)), up = cross(back, right);
-  if (!position) return times(orthographic(half, depth), viewOf(view.focus, right, up, back));
-  const angle = 360 / Math.PI * Math.atan(half / distance);
-  return times(perspective(angle, 1, Math.max(distance - half, 0.05 * distance), distance + depth), viewOf(position, right, up, back));
+  if (!position) return {shadowMatrix: times(orthographic(half, depth), viewOf(view.focus, right, up, back)), softness: size * depth / half};
+  const near = Math.max(distance - half, 0.05 * distance), far = distance + depth, angle = 360 / Math.PI * Math.atan(half / distance);
+  return {shadowMatrix: times(perspective(angle, 1, near, far), viewOf(position, right, up, back)), softness: size * distance * (1 / near - 1 / far) / (2 * half)};
 }

@@ -1,8 +1,8 @@
 "use strict";
 // The renderer's light (render/glsl/lights.glsl, render/passes/deferred.glsl) with a single shadow map and without its occlusion maps.
 // Loops are written out: in software an array at an index that changes takes longer than the sums.
-// With `lamps`: their number, `near`: whether any has a position, `taps`: of the shadow map, along each side, which has `shadowSize` texels.
-const lightShader = ({lamps, near, taps, shadowSize}) => `#version 300 es
+// With `lamps`: their number, `near`: whether any has a position.
+const lightShader = ({lamps, near}) => `#version 300 es
 precision highp float;
 precision highp sampler2DShadow;
 uniform vec3 eye, horizon, zenith, sky, around, bounce;  // around: what lights the floor; bounce: what it sends back
@@ -11,18 +11,13 @@ uniform float casts, shadowTexel;
 uniform vec3 lampWay[4], lampRadiance[4], lampPosition[4], lampFalloff[4];
 uniform vec3 lampShape[4];  // 1 at a position; cosine of the beam's half angle; exponent
 uniform mat4 shadowMatrix;
-uniform sampler2DShadow shadowMap;
 
 vec3 inShadowMap(vec3 p, vec3 n) {
   vec3 way = ${near ? "lampShape[0].x > 0.0 ? normalize(lampPosition[0] - p) : lampWay[0]" : "lampWay[0]"};
   vec4 q = shadowMatrix * vec4(p + 1.5 * shadowTexel * (n + way), 1.0);
   return q.xyz / q.w * 0.5 + 0.5;
 }
-
-float shadowOf(vec3 c) {
-  if (casts == 0.0 || any(lessThan(c, vec3(0.0))) || any(greaterThan(c, vec3(1.0)))) return 1.0;
-  return ${samples(taps, shadowSize)};
-}
+bool outsideShadows(vec3 c) { return casts == 0.0 || any(lessThan(c, vec3(0.0))) || any(greaterThan(c, vec3(1.0))); }
 
 ${lampNumbers(lamps).map(i => incident(i, near)).join("\n")}
 
@@ -74,7 +69,10 @@ const CASTS = `
 `;
 
 // What a surface reflects, in linear light. Defined are COAT, METAL, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
-const litShader = ({lamps}) => `
+// With `taps` of the shadow map along each side, which has `shadowSize` texels.
+const litShader = ({lamps, taps, shadowSize}) => `
+uniform sampler2DShadow shadowMap;
+float shadowOf(vec3 c) { return outsideShadows(c) ? 1.0 : ${samples(taps, shadowSize)}; }
 uniform sampler2D ambientMap, mirrorMap, coatMap;
 uniform vec4 base, volume;  // roughness, metallic, sheen, coat; translucency, transparency, emission, opacity
 #ifdef METAL
@@ -155,6 +153,8 @@ vec4 shownAt(vec3 point, vec3 normal, vec3 albedo, float height) {
 
 // What the screen shows of the floor, which fades into the sky.
 const floorShader = ({lamps}) => `
+uniform sampler2D shades;
+float shadowOn(vec3 c) { return outsideShadows(c) ? 1.0 : 1.0 - texture(shades, c.xy).x; }
 uniform vec3 focus, floorColor, fade;
 vec3 floorAt(vec3 point, vec3 up, vec3 albedo, float shadow) {
   vec3 light = around, way, radiance;

@@ -9,7 +9,7 @@ class LitPoints {
     const rows = Math.ceil(part.source.length / COLUMNS);
     [this.places, this.normals] = [0, 1].map(() => tableOf(gl, "RGBA32F", COLUMNS, rows));
     this.colors = tableOf(gl, "RGBA8", COLUMNS, rows);
-    this.target = framebufferOf(gl, "COLOR_ATTACHMENT0", this.colors);
+    this.target = framebufferOf(gl, {COLOR_ATTACHMENT0: this.colors});
     this.data = [0, 1].map(() => new Float32Array(4 * COLUMNS * rows));
     this.number = new Int32Array(part.source.length);  // of each point in the table
     this.triangles = new Uint32Array(part.index.length);

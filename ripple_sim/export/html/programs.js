@@ -44,19 +44,19 @@ function textureOf(gl, source, software) {
   return texture;
 }
 
-// A texture without filters, of a format such as RGBA8.
-function tableOf(gl, format, width, height) {
-  const texture = gl.createTexture();
+// A texture of a format such as RGBA8, without filters where its parameters name none.
+function tableOf(gl, format, width, height, parameters = {}, levels = 1) {
+  const texture = gl.createTexture(), all = {MIN_FILTER: "NEAREST", MAG_FILTER: "NEAREST", WRAP_S: "CLAMP_TO_EDGE", WRAP_T: "CLAMP_TO_EDGE", ...parameters};
   gl.bindTexture(gl.TEXTURE_2D, texture);
-  gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], width, height);
-  for (const side of ["MIN", "MAG"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${side}_FILTER`], gl.NEAREST);
+  if (levels) gl.texStorage2D(gl.TEXTURE_2D, levels, gl[format], width, height);
+  for (const [name, value] of Object.entries(all)) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${name}`], gl[value]);
   return texture;
 }
 
-// What draws into a texture, as an attachment such as COLOR_ATTACHMENT0.
-function framebufferOf(gl, attachment, texture) {
+// What draws into textures, by attachments such as COLOR_ATTACHMENT0.
+function framebufferOf(gl, textures) {
   const framebuffer = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl[attachment], gl.TEXTURE_2D, texture, 0);
+  for (const [attachment, texture] of Object.entries(textures)) gl.framebufferTexture2D(gl.FRAMEBUFFER, gl[attachment], gl.TEXTURE_2D, texture, 0);
   return framebuffer;
 }

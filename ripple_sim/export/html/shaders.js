@@ -71,7 +71,7 @@ void main() {
   plane = inPlane;
   gl_Position = viewProjection * vec4(place, 1.0);
 #ifdef PLAIN
-  bright = floorAt(place, up, floorColor, 1.0); dark = floorAt(place, up, floorColor, 0.0); inMap = inShadowMap(place, up);
+  bright = floorAt(place, up, floorColor, 1.0); dark = floorAt(place, up, floorColor, 0.0); inMap = inShadowMap(place, vec3(0.0));
   bright *= bright; dark *= dark;
 #else
   point = place;
@@ -91,7 +91,7 @@ out vec4 fragment;
 void main() {
 #ifdef PLAIN
 #ifdef SHADOW
-  fragment = vec4(sqrt(mix(dark, bright, shadowOf(inMap))), 1.0);
+  fragment = vec4(sqrt(mix(dark, bright, shadowOn(inMap))), 1.0);
 #else
   fragment = vec4(sqrt(bright), 1.0);
 #endif
@@ -101,7 +101,7 @@ void main() {
   albedo *= linear(texture(image, plane * floorTiling.xy + floorTiling.zw).rgb);
 #endif
 #ifdef SHADOW
-  float shadow = shadowOf(inShadowMap(point, up));
+  float shadow = shadowOn(inShadowMap(point, vec3(0.0)));
 #else
   const float shadow = 1.0;
 #endif
@@ -130,4 +130,50 @@ void main() { gl_Position = modelProjection * vec4(inPoint, 1.0); }`;
 
 const DEPTH_FRAGMENT = `#version 300 es
 precision highp float;
-void main() {}`;
+out vec2 blocker;
+void main() { blocker = vec2(1.0, gl_FragCoord.z); }`;
+
+// How much of the first lamp's light does not reach the floor, by places of the shadow map. All that it covers lies above the floor,
+// so shadows are means of that, as wide as the mean depth makes penumbras; what is near is looked for in two steps.
+const WIDEST_SEARCH = 0.06;  // [widths of the map]
+const shadeFragment = size => `#version 300 es
+precision highp float;
+uniform sampler2D blockers;  // share of a texel that is covered, and that times the depth
+uniform float softness;
+out vec4 shade;
+vec2 covered(vec2 at, float radius) {
+  float level = max(log2(0.7 * radius * ${size}.0), 0.0), off = exp2(level) / ${2 * size}.0;
+  return 0.25 * (textureLod(blockers, at + off, level).xy + textureLod(blockers, at - off, level).xy +
+    textureLod(blockers, at + vec2(off, -off), level).xy + textureLod(blockers, at + vec2(-off, off), level).xy);
+}
+float penumbra(vec2 found) { return softness * max(gl_FragCoord.z - found.y / found.x, 0.0); }
+void main() {
+  vec2 at = gl_FragCoord.xy / ${size / 2}.0, found = covered(at, ${WIDEST_SEARCH});
+  shade = vec4(0.0);
+  if (found.x > 1e-4) {
+    found = covered(at, penumbra(found));
+    if (found.x > 1e-4) { found = covered(at, penumbra(found)); shade = vec4(found.y < gl_FragCoord.z * found.x ? found.x : 0.0); }
+  }
+}`;
+
+// Smooths edges along themselves where no samples do so: fast approximate antialiasing (FXAA, Lottes 2009), by the brightness of green.
+const SMOOTH_FRAGMENT = `#version 300 es
+precision highp float;
+uniform sampler2D image;
+out vec4 fragment;
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  vec4 middle = texelFetch(image, at, 0);
+  float a = texelFetch(image, at - 1, 0).g, b = texelFetch(image, at + 1, 0).g, c = texelFetch(image, at + ivec2(1, -1), 0).g, d = texelFetch(image, at + ivec2(-1, 1), 0).g;
+  float low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));
+  fragment = middle;
+  if (max(high, middle.g) - min(low, middle.g) > 0.06) {  // returning or discarding would not spare software the rest
+    vec2 size = vec2(textureSize(image, 0));
+    vec2 along = vec2(a + c - b - d, b + c - a - d);
+    along = clamp(along / (min(abs(along.x), abs(along.y)) + max(0.03 * (a + b + c + d), 0.008)), -8.0, 8.0) / size;
+    vec2 place = gl_FragCoord.xy / size;
+    vec4 inner = 0.5 * (texture(image, place - along / 6.0) + texture(image, place + along / 6.0));
+    vec4 wide = 0.5 * inner + 0.25 * (texture(image, place - 0.5 * along) + texture(image, place + 0.5 * along));
+    fragment = wide.g < min(low, middle.g) || wide.g > max(high, middle.g) ? inner : wide;
+  }
+}`;
