@@ -239,16 +239,19 @@ def filtered(times: NDArray, spans: NDArray, values: NDArray, at: NDArray, rate:
     places = first[:, None] + np.arange((last - first).max())
     inside = places < last[:, None]
     places = np.minimum(places, len(times) - 1)
-    ages = np.abs(times[places] - at[:, None]) * rate
-    weights = np.interp(ages, np.arange(_HALF * _FINE + 1) / _FINE, _filter()) * spans[places] * inside
+    ages = np.minimum(np.abs(times[places] - at[:, None]) * (rate * _FINE), _HALF * _FINE)
+    whole = ages.astype(np.int64)
+    taps, slopes = _filter()
+    weights = (taps[whole] + slopes[whole] * (ages - whole)) * spans[places] * inside
     return np.einsum("kw,kwp->kp", weights / weights.sum(axis=1, keepdims=True), values[places])
 
 
 @functools.cache
-def _filter() -> NDArray[np.float64]:
-    """The filter's values from its middle on, `_FINE` to a sample: a windowed sinc, without delay."""
+def _filter() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The filter's values from its middle on, `_FINE` to a sample, and from each to the next: a windowed sinc."""
     window = "kaiser", scipy.signal.kaiser_beta(_ATTENUATION)
-    return scipy.signal.firwin(2 * _HALF * _FINE + 1, 2 * _CUT / _FINE, window=window)[_HALF * _FINE :]
+    taps = scipy.signal.firwin(2 * _HALF * _FINE + 1, 2 * _CUT / _FINE, window=window)[_HALF * _FINE :]
+    return taps, np.append(np.diff(taps), 0.0)
 
 
 def _around(topology: TexelTopology, center: int, rings: int) -> NDArray[np.int64]:

@@ -1,0 +1,59 @@
+"""What sensors at eight points add to a physics step, and what the sound of the drums takes beside their waves.
+
+    python examples/benchmarks/sensors.py
+
+Processor time, runs with and without taking turns; medians over frames.
+"""
+
+import time
+
+import numpy as np
+
+from ripple_sim.scene import load_scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.sound import Microphone
+
+FRAMES, SOUND = 240, 0.5  # [s]
+
+
+def add_sensors(simulation: Simulation) -> None:
+    """Eight points of the drum's skin, at random."""
+    waves, rng = simulation.ripples["skin"], np.random.default_rng(0)
+    chosen = rng.choice(waves.atlas.areas.size, 8, replace=False)
+    simulation.sensors["skin"] = waves.sensor(waves.atlas.positions.reshape(-1, 3)[chosen], rate=2000)
+
+
+def main() -> None:
+    runs = [Simulation(load_scene("drum"), fps=60, backend="cpu") for _ in range(2)]
+    add_sensors(runs[1])
+    seconds: list[list[float]] = [[], []]
+    for frame in range(FRAMES):
+        for k in (0, 1) if frame % 2 else (1, 0):
+            begun = time.process_time()
+            runs[k].advance_frame()
+            seconds[k].append((time.process_time() - begun) / runs[k].steps_per_frame)
+    begun = time.process_time()
+    runs[1].sensors["skin"].read()
+    read = 1e3 * (time.process_time() - begun) / FRAMES / runs[1].steps_per_frame
+    plain, measured = (1e3 * np.median(each) for each in seconds)
+    print(f"drum: a step {plain:.3f} ms, with eight points {measured:.3f} ms, and {read:.3f} ms when they are read")
+
+    drums = Simulation(load_scene("drums"), fps=60, backend="cpu")
+    drums.advance_frame()
+    taken = []
+    for heard in (False, True):
+        drums.reset()
+        begun = time.process_time()
+        microphone = Microphone(drums.ripples) if heard else None
+        for _ in range(round(60 * SOUND)):
+            if microphone is not None:
+                microphone.follow(drums)
+            drums.advance_frame()
+        if microphone is not None:
+            microphone.pressure(SOUND)
+        taken.append((time.process_time() - begun) / SOUND)
+    print(f"drums: {taken[0]:.1f} s of processor time a second of the scene, {taken[1]:.1f} s with sound")
+
+
+if __name__ == "__main__":
+    main()
