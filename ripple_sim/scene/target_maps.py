@@ -24,8 +24,6 @@ from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, textu
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.volume import is_volume
 
-from .events import Vector
-
 # name: function and how many arguments it takes
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{name: (getattr(np, name), 1) for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tan")},
@@ -188,7 +186,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
     """Value of the volume at the body's surface."""
     spacing: float | None = None
     """Between the nodes of a .npy [m]; a scan has its own."""
-    origin: Vector = (0.0, 0.0, 0.0)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the first node of a .npy is [m]."""
     scale: float = 1.0
     """To metres, where the file is in other units. Scans are read in metres."""
@@ -231,7 +229,7 @@ def load_inside(
     path: str | Path,
     threshold: float | None = None,
     spacing: float | None = None,
-    origin: Vector = (0.0, 0.0, 0.0),
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     scale: float = 1.0,
 ) -> Mesh | Volume:
     """Read what lies inside: a volume where the path is that of one, else a mesh; scaled.
