@@ -10,8 +10,8 @@ which its own lies. The sums of all delays are added up late, each by its delay,
 
 from __future__ import annotations
 
+import struct
 import warnings
-import wave
 from pathlib import Path
 
 import mujoco
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.coupling.soft import is_soft
+from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import RippleWarning
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver
@@ -113,7 +114,7 @@ class Ear:
             shares[order].astype(np.float32),
             np.zeros(len(begins), np.bool_),
         )
-        waves.listeners.all = tuple(each for each in waves.listeners.all if each is not self)
+        waves.listeners.use([each for each in waves.listeners.all if each is not self])
         waves.listeners.add(self, waves.time)
 
     def begin(self, time: float, values: NDArray) -> None:
@@ -160,13 +161,19 @@ def gain(pressure: NDArray[np.float64]) -> float:
 
 
 def write_wav(path: Path, signals: NDArray, rate: int) -> None:
-    """Write signals [k] or [k, channels] between -1 and 1 to a file of 16 bits a sample; it appears whole."""
+    """Write signals [k] or [k, channels] between -1 and 1 to a file of 16 bits a sample, marked as made here."""
     codes = np.rint(np.clip(signals, -1, 1) * 32767).astype("<i2")
-    with atomic_write(path) as unfinished, wave.open(str(unfinished), "wb") as file:
-        file.setnchannels(1 if signals.ndim == 1 else signals.shape[1])
-        file.setsampwidth(2)
-        file.setframerate(rate)
-        file.writeframes(codes.tobytes())
+    channels = 1 if codes.ndim == 1 else codes.shape[1]
+    mark = MARK.encode() + b"\0" * (2 - len(MARK) % 2)
+    form = struct.pack("<HHIIHH", 1, channels, rate, 2 * channels * rate, 2 * channels, 16)
+    comment = b"INFO" + _chunk(b"ICMT", mark)
+    content = b"WAVE" + _chunk(b"fmt ", form) + _chunk(b"LIST", comment) + _chunk(b"data", codes.tobytes())
+    with atomic_write(path) as unfinished:
+        unfinished.write_bytes(_chunk(b"RIFF", content))
+
+
+def _chunk(name: bytes, content: bytes) -> bytes:
+    return name + struct.pack("<I", len(content)) + content
 
 
 def _warn_if_unheard(name: str, waves: WaveSolver, slow_motion: float) -> None:
@@ -175,8 +182,8 @@ def _warn_if_unheard(name: str, waves: WaveSolver, slow_motion: float) -> None:
     if highest / slow_motion < _HEARD:
         size = float(np.ptp(waves.atlas.positions.reshape(-1, 3), axis=0).max())
         warnings.warn(
-            f"{name!r} is not heard: its waves swing at {highest:.2g} Hz at most, below hearing ({_HEARD:g} Hz); a "
-            f"speed of {200 * size / 0.77 * slow_motion:.2g} m/s would ring at about 200 Hz",
+            f"{name!r} is not heard: its waves sound at {highest / slow_motion:.2g} Hz at most, below hearing "
+            f"({_HEARD:g} Hz); a speed of {200 * size / 0.77 * slow_motion:.2g} m/s would ring at about 200 Hz",
             RippleWarning,
             stacklevel=3,
         )

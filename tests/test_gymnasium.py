@@ -286,7 +286,8 @@ def test_observations_with_sensors(path: Path) -> None:
         "tap": {"geom": "block", "at": [[0.2, 0, 0.1], [-0.2, 0, 0.1]], "rate": 500},
         "sag": {"geom": "block", "at": [0, 0, 0.1], "kind": "height", "rate": 1000},
     }
-    env = RippleWrapper(BallEnv(path), MATERIALS, sensors=sensors, **OPTIONS)
+    materials = {"block": Material(speed=20.0, density=100.0)}
+    env = RippleWrapper(BallEnv(path), materials, sensors=sensors, **OPTIONS)
     observation, _ = env.reset(seed=0)
     assert not observation["tap"].any()
     steps = [env.step(np.zeros(1))[0] for _ in range(30)]
@@ -294,7 +295,7 @@ def test_observations_with_sensors(path: Path) -> None:
     assert all(each[name] in spaces[name] for each in steps for name in sensors)
     assert steps[0]["tap"].shape == (5, 2) and steps[0]["sag"].shape == (10, 1)
     blocks = np.concatenate([each["sag"] for each in steps])
-    other = RippleWrapper(BallEnv(path), MATERIALS, **OPTIONS)
+    other = RippleWrapper(BallEnv(path), materials, **OPTIONS)
     other.reset(seed=0)
     alone = other.ripples["block"].sensor([0, 0, 0.1], "height", 1000)
     for _ in range(30):
@@ -304,4 +305,4 @@ def test_observations_with_sensors(path: Path) -> None:
     again, _ = env.reset(seed=0)
     assert not again["sag"].any()
     with pytest.raises(RippleError, match=r"'tap' has 5\.01 samples in a control step of 0\.01 s; valid"):
-        RippleWrapper(BallEnv(path), MATERIALS, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS)
+        RippleWrapper(BallEnv(path), materials, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS)

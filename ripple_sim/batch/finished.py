@@ -30,7 +30,7 @@ from .folder import BatchFolder, member_name, members, times_of, write_tar
 # An array `height_TARGET` a target, [frames, C, n, n] float32, in metres, a frame a chunk.
 HEIGHTS = "heights.zarr.zip"
 
-IMPULSES, POSITIONS = "impulses.csv", "qpos.npy"
+IMPULSES, POSITIONS, SENSORS = "impulses.csv", "qpos.npy", "sensors.npz"
 FACTS, TIMES = "scene.json", "times.json"
 
 

@@ -178,10 +178,7 @@ _LISTED = 5  # failures
 def status_text(path: Path) -> str:
     """What is finished, what failed and why, and what is still to be made.
 
-    Raises
-    ------
-    BatchError
-        If there is no batch in the folder.
+    Raises `BatchError` if there is no batch in the folder.
     """
     batch = BatchFolder(path)
     batch.check()
@@ -210,10 +207,7 @@ _SHOWN = 3  # scenes whose values are told
 def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     """Make one scene in a temporary folder; tell the first ones' values, and the time and room that all will take.
 
-    Raises
-    ------
-    RippleError
-        If the plan or one of the first scenes is invalid.
+    Raises `RippleError` if the plan or one of the first scenes is invalid.
     """
     if plan is None:
         plan = load_stored(BatchFolder(folder).plan).plan

@@ -34,10 +34,11 @@ from ripple_sim.export.tables import HEADER, rows
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.files import atomic_write
+from ripple_sim.solver.waves.sensor import Sensor
 from ripple_sim.video.render_video import render_video
 from ripple_sim.video.settings import frame_count, settled
 
-from .finished import FACTS, HEIGHTS, IMPULSES, POSITIONS, TIMES, FinishedScene, facts_hash
+from .finished import FACTS, HEIGHTS, IMPULSES, POSITIONS, SENSORS, TIMES, FinishedScene, facts_hash
 from .folder import BatchFolder, clear, load_plan
 from .plan import Plan, StoreEntry, options_of, video_name
 from .variation import Variation
@@ -78,6 +79,7 @@ class FrameRecord:
         self._highest: dict[str, float] = {}
         self._energies: dict[str, list[float]] = {}
         self._digest = hashlib.blake2b(digest_size=16)
+        self._sensors: Mapping[str, Sensor] = {}
         self.frame = 0
 
     def __call__(self, simulation: Simulation) -> None:
@@ -95,6 +97,7 @@ class FrameRecord:
             self._digest.update(height.tobytes())
             self._highest[name] = max(self._highest.get(name, 0.0), float(np.abs(height).max()))
             self._energies.setdefault(name, []).append(ripples[name].energy())
+        self._sensors = simulation.sensors
         self._total += sum(each.impulse for each in simulation.impulses)
         self._rows += rows(self.frame, data, simulation.impulses)
         self.frame += 1
@@ -107,6 +110,10 @@ class FrameRecord:
         if self._heights is not None:
             self._heights.finish()
             self._pack(self._folder / HEIGHTS.removesuffix(".zip"))
+        if self._sensors:
+            arrays = {name: sensor.samples for name, sensor in self._sensors.items()}
+            times = {f"{name} time": sensor.times for name, sensor in self._sensors.items()}
+            np.savez(self._folder / SENSORS, allow_pickle=False, **arrays, **times)
         if self._store.impulses:
             with (self._folder / IMPULSES).open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file)

@@ -68,7 +68,7 @@ class ExportCommand(ExportOptions):
     then drop."""
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file; its ending says what is written: .usdc, .usda or .usdz (the moving scene), .html (a player),
-    .zarr (fields over time), .csv or .parquet (impulses)."""
+    .zarr (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or what is heard)."""
     camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
     """Camera of the MJCF."""
     seed: SceneSeed = None

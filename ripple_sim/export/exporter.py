@@ -41,7 +41,7 @@ class Exporter:
     ripples : Ripples
         Whose targets are written with their ripples.
     output : path
-        Its ending says what is written: .usdc, .usda, .usdz, .html, .zarr, .csv or .parquet.
+        Its ending says what is written: .usdc, .usda, .usdz, .html, .zarr, .csv, .parquet or .wav.
     fps : float
         Frames per second of the file.
     camera : str or CameraEntry, optional
@@ -216,10 +216,7 @@ class Exporter:
 def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> CameraEntry:
     """What `[camera]` of a scene file would say; MuJoCo's free camera by default.
 
-    Raises
-    ------
-    SceneError
-        If the model has not what it names.
+    Raises `SceneError` if the model has not what it names.
     """
     if not isinstance(camera, CameraEntry):
         free = model.vis.global_
@@ -293,6 +290,8 @@ def export_scene(
     check_export(Path(output), options.overwrite, chunked=options.chunk is not None)
     frames = frame_count(options, scene)
     simulation = Simulation.of(scene, options, on_step=on_step)
+    if options.signals and not scene.sensors:
+        raise ExportError(f"scene {scene.name!r} has no sensors; add a [[sensor]], or leave out --signals")
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)
     if options.chunk is not None:
@@ -325,6 +324,8 @@ def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -
         limited=simulation.limited,
         tessellation=options.tessellation,
         triangles=options.triangles,
+        sensors={} if options.sound else simulation.sensors,
+        signals=options.signals,
     )
 
 

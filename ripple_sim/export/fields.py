@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.encode.replace import MARK
 from ripple_sim.solver.texels.moving import SurfaceRide
+from ripple_sim.solver.waves.sensor import UNITS
 
 from .source import Source
 from .tables import COLUMNS, rows
@@ -147,7 +148,12 @@ class FieldWriter:
             self._store.flush()
 
     def finish(self) -> None:
-        """Complete the store."""
+        """Complete the store, with the samples of sensors."""
+        for name, sensor in self._source.sensors.items():
+            suffix, unit = re.sub(r"\W", "_", name), UNITS[sensor.kind]
+            time, point = f"time_{suffix}", f"point_{suffix}"
+            self._store.fixed(time, [time], sensor.times, "s", f"time of the samples of sensor {name}")
+            self._store.fixed(f"sensor_{suffix}", [time, point], sensor.samples, unit, f"{sensor.kind} at {name}")
         self._store.finish()
 
     def close(self) -> str:

@@ -43,6 +43,10 @@ class ExportOptions:
     """What the rims of open surfaces do: free, or fixed as that of a drum's skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
+    signals: bool = False
+    """Write the samples of the scene's sensors, in place of impulses (.csv, .parquet)."""
+    sound: bool = False
+    """Write what is heard at the camera also where the scene has sensors (.wav)."""
     chunk: int | None = None
     """Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside it."""
     resume: bool = False

@@ -13,6 +13,7 @@ from ripple_sim.capture.frame_source import focal_distance, viewpoint
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.render.camera import Pose
 from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.solver.waves.sensor import Sensor
 
 from .moving_mesh import MovingMesh
 
@@ -64,6 +65,10 @@ class Source:
         Of the surfaces, see `MovingMesh`.
     chunking : Chunking, optional
         Of the formats that have it.
+    sensors : mapping
+        Of a scene, by name.
+    signals : bool
+        Whether a table is of their samples.
     """
 
     model: mujoco.MjModel
@@ -78,6 +83,8 @@ class Source:
     triangles: int
     slow_motion: float = 1.0
     chunking: Chunking | None = None
+    sensors: Mapping[str, Sensor] = dataclasses.field(default_factory=dict)
+    signals: bool = False
 
     def mesh(self, name: str) -> MovingMesh:
         """The surface of a target."""

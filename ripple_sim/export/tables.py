@@ -1,10 +1,10 @@
-"""The impulses of a run as a table: a .csv or .parquet file."""
+"""The impulses of a run as a table, or the samples of its sensors: a .csv or .parquet file."""
 
 from __future__ import annotations
 
 import contextlib
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import mujoco
 
 from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.encode.replace import MARK
+from ripple_sim.solver.waves.sensor import UNITS, Sensor
 
 from .source import Source
 
@@ -30,7 +31,21 @@ COLUMNS = {
     "column": ("", "int64"),
     "inner": ("", "bool"),
 }
-HEADER = [f"{name} [{unit}]" if unit else name for name, (unit, _) in COLUMNS.items()]
+SIGNALS = {
+    "sensor": ("", "string"),
+    "point": ("", "int64"),
+    "time": ("s", "float64"),
+    "value": ("", "float64"),
+    "unit": ("", "string"),
+}
+
+
+def header(columns: Mapping[str, tuple[str, str]]) -> list[str]:
+    """The names of columns, with their units."""
+    return [f"{name} [{unit}]" if unit else name for name, (unit, _) in columns.items()]
+
+
+HEADER = header(COLUMNS)
 _GROUP = 10_000  # rows that are kept in memory
 
 
@@ -41,17 +56,28 @@ def rows(number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> Itera
         yield (number, data.time, each.geom, each.other, *point, each.impulse, *each.texel, each.inner)
 
 
+def samples(sensors: Mapping[str, Sensor]) -> Iterator[tuple]:
+    """The samples of sensors that were not read yet, in the order of the columns of `SIGNALS`."""
+    for name, sensor in sensors.items():
+        times, values = sensor.read()
+        for point, column in enumerate(values.T.tolist()):
+            unit = UNITS[sensor.kind]
+            yield from ((name, point, at, value, unit) for at, value in zip(times.tolist(), column, strict=True))
+
+
 class CsvWriter:
-    """Writes impulses as comma-separated values, one row an impulse, units in the header."""
+    """Writes impulses or samples as comma-separated values, one a row, units in the header."""
 
     def __init__(self, source: Source, path: Path) -> None:
         self._file = path.open("w", newline="", encoding="utf-8")
         self._writer = csv.writer(self._file)
-        self._writer.writerow(HEADER)
+        self._source = source
+        self._writer.writerow(header(SIGNALS if source.signals else COLUMNS))
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
-        """Add the impulses of a frame."""
-        self._writer.writerows(rows(number, data, impulses))
+        """Add the impulses of a frame, or the samples that are there."""
+        source = self._source
+        self._writer.writerows(samples(source.sensors) if source.signals else rows(number, data, impulses))
 
     def finish(self) -> None:
         """Complete the file."""
@@ -65,23 +91,24 @@ class CsvWriter:
 
 
 class ParquetWriter:
-    """Writes impulses as columns, units in their metadata."""
+    """Writes impulses or samples as columns, units in their metadata."""
 
     def __init__(self, source: Source, path: Path) -> None:
         import pyarrow
         import pyarrow.parquet
 
+        self._source = source
         fields = [
             pyarrow.field(name, getattr(pyarrow, f"{kind}_" if kind == "bool" else kind)(), metadata={"unit": unit})
-            for name, (unit, kind) in COLUMNS.items()
+            for name, (unit, kind) in (SIGNALS if source.signals else COLUMNS).items()
         ]
         self._schema = pyarrow.schema(fields, metadata={"software": MARK})
         self._writer = pyarrow.parquet.ParquetWriter(path, self._schema)
         self._rows: list[tuple] = []
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
-        """Add the impulses of a frame."""
-        self._rows += rows(number, data, impulses)
+        """Add the impulses of a frame, or the samples that are there."""
+        self._rows += samples(self._source.sensors) if self._source.signals else rows(number, data, impulses)
         if len(self._rows) >= _GROUP:
             self._flush()
 
@@ -99,7 +126,7 @@ class ParquetWriter:
     def _flush(self) -> None:
         import pyarrow
 
-        columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [[] for _ in COLUMNS]
+        columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [[] for _ in self._schema]
         self._writer.write_table(pyarrow.table(columns, schema=self._schema))
         self._rows = []
 
@@ -110,7 +137,8 @@ def made_here(path: Path) -> bool:
         return False
     if path.suffix.lower() == ".csv":
         with path.open("rb") as file:
-            return file.readline(1000).decode("utf-8", "replace").rstrip("\r\n") == ",".join(HEADER)
+            first = file.readline(1000).decode("utf-8", "replace").rstrip("\r\n")
+        return first in (",".join(HEADER), ",".join(header(SIGNALS)))
     import pyarrow
     import pyarrow.parquet
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -26,6 +26,7 @@ from ripple_sim.render.tone_mapping import linear_to_srgb
 from ripple_sim.scene.scene import Request
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.texels.topology import with_filled_halo
+from ripple_sim.solver.waves.sensor import UNITS, Sensor
 
 from .marks import ContactMarks, Mark
 
@@ -95,10 +96,7 @@ BASELINES = tuple(name for name in TITLES if name != OWN)
 def compared_operators(baseline: str | None) -> tuple[str, ...]:
     """Wave operators of the runs of a video: our own, and a baseline if given.
 
-    Raises
-    ------
-    SceneError
-        For an unknown baseline.
+    Raises `SceneError` for an unknown baseline.
     """
     if baseline is None:
         return (OWN,)
@@ -122,6 +120,7 @@ def grid_spacing(resolution: int) -> int:
     return 1 << max(0, (resolution // 16).bit_length() - 1)
 
 
+COLUMNS = 512  # of a trace
 MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
 
 
@@ -218,6 +217,7 @@ _LEAST = 1e-3
 _MEMORY = 0.25
 
 
+Trace: TypeAlias = tuple[str, NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], str]
 Scale: TypeAlias = tuple[float, float]  # its present end, and the round number that this approaches
 
 
@@ -237,6 +237,8 @@ class Notes:
         Of the waves, from the beginning.
     ledgers : sequence of Energy
         Of bodies, waves and both, now.
+    traces : sequence of (name, times [s], least, greatest, unit)
+        Of the first point of each sensor of the first run: one value a column, over the time so far.
     """
 
     time: float
@@ -247,6 +249,19 @@ class Notes:
     energies: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
     energy_scale: Scale
     ledgers: Sequence[Energy] = ()
+    traces: Sequence[Trace] = ()
+
+
+def traces(sensors: Mapping[str, Sensor]) -> list[Trace]:
+    """The signals of sensors so far: least and greatest value in `COLUMNS` stretches of equal length, or fewer."""
+    made = []
+    for name, sensor in sensors.items():
+        values = sensor.samples[:, 0]
+        stride = max(1, -(-len(values) // COLUMNS))
+        begins = np.arange(0, len(values), stride)
+        low, high = (each.reduceat(values, begins) if len(values) else values for each in (np.minimum, np.maximum))
+        made.append((name, sensor.times[begins], low, high, UNITS[sensor.kind]))
+    return made
 
 
 class Notebook:
@@ -288,6 +303,7 @@ class Notebook:
             energies=[(frames * self._dt, values) for frames, values in curves],
             energy_scale=self._scale(self._energy_limit, [values[-1] for _, values in curves if len(values)]),
             ledgers=ledgers,
+            traces=traces(self._simulations[0].sensors) if request.sensors else [],
         )
 
     def _scale(self, limit: Limit, magnitudes: Sequence[float]) -> Scale:

@@ -22,7 +22,7 @@ from ripple_sim.render.camera import Pose
 from ripple_sim.scene.scene import HEATMAPS, Request
 
 from .marks import FAINT, HEAD_WIDTH, INK, RIM, Color, Mark, Sprite, draw_arrow, overlap, text_width
-from .notes import Notes, colors, number, readable, round_up
+from .notes import Notes, Trace, colors, number, readable, round_up
 
 
 @dataclasses.dataclass(frozen=True)
@@ -350,6 +350,27 @@ class EnergyPlot:
         return self._bottom - (self._bottom - self._top) * np.clip(share, 0, 1)
 
 
+def trace_panel(layout: Layout, traces: Sequence[Trace], duration: float) -> Sprite:
+    """The signals of sensors over the time of the whole video, one below the other, each with its greatest value."""
+    em, small, pitch = layout.em, round(0.85 * layout.em), round(2.4 * layout.em)
+    sprite = panel(layout.panel_width(26), round(pitch * len(traces) + 0.5 * em), em)
+    left, right = round(0.7 * em), sprite.width - round(0.7 * em)
+    for number_of, (name, times, low, high, unit) in enumerate(traces):
+        top, peak = pitch * number_of + 0.3 * em, float(max(-low.min(initial=0.0), high.max(initial=0.0)))
+        at = np.linspace(0, duration, right - left, endpoint=False)
+        place = np.searchsorted(times, at[at <= times.max(initial=-1.0)], side="right") - 1
+        low, high = low[place], high[place]
+        low[1:], high[1:] = np.minimum(low[1:], high[:-1]), np.maximum(high[1:], low[:-1])  # joined
+        middle, scale, thick = top + 0.64 * pitch, 0.34 * pitch / (peak or 1.0), em / 18
+        line = overlap(middle - scale * high - thick, middle - scale * low + thick, sprite.height)
+        sprite.fill(np.pad(line, ((0, 0), (left, sprite.width - left - len(low)))), COLORS[0])
+        factor, prefixed = readable(peak or 1.0, unit)
+        value = f"{number(float(f'{peak * factor:.3g}'))} {prefixed}"
+        sprite.text(left, top + 0.85 * em, name, small)
+        sprite.text(right, top + 0.85 * em, value, small, FAINT, "right")
+    return sprite
+
+
 class Painter:
     """Draws the requested panels.
 
@@ -377,7 +398,7 @@ class Painter:
         self._request, self._layout, self._titles = request, layout, titles
         names = [title for title, _ in titles]
         self._energy_plot = EnergyPlot(self._layout, "wave energy", "J", duration, names, ledger=not names)
-        self._spacing = spacing
+        self._spacing, self._duration = spacing, duration
         self._decimals = 2 if duration < 100 else 1
         # a title leaves room for the clock on the seam
         self._title_width = layout.width / 2 - 2 * layout.margin - 4.5 * layout.em
@@ -419,6 +440,8 @@ class Painter:
         if request.heatmap:
             bar = self._bar(layout, request.heatmap, HEATMAPS[request.heatmap], *notes.heatmap_scale)
             corners["bottom left"].append(bar)
+        if request.sensors and notes.traces:
+            corners["bottom right"].append(trace_panel(layout, notes.traces, self._duration))
         if request.energy:
             ledger = None if self._titles or not notes.ledgers else notes.ledgers[0]
             corners["bottom right"].append(self._energy_plot.draw(notes.energies, *notes.energy_scale, ledger))

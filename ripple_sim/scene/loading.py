@@ -23,6 +23,7 @@ import numpy as np
 
 from ripple_sim.coupling.geoms import find_target, named_collision_geoms, own_model, target_name
 from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.coupling.targets import site_on
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import FUNCTION, PATH, checked
 from ripple_sim.solver.files import open_image
@@ -57,10 +58,28 @@ def check_scene(scene: Scene) -> None:
         _check_target(scene.model, entry)
     named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
     parse_request(scene.overlay)
+    _check_sensors(scene)
     if scene.lighting not in LIGHTING:
         raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
     Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
     check_camera(scene.model, scene.camera)
+
+
+def _check_sensors(scene: Scene) -> None:
+    targets, names = [entry.geom for entry in scene.targets], set()
+    for entry in scene.sensors:
+        if entry.name in names:
+            raise SceneError(f"two sensors are called {entry.name!r}; valid is one")
+        names.add(entry.name)
+        if entry.geom not in targets:
+            valid = ", ".join(map(repr, targets))
+            raise SceneError(f"sensor {entry.name!r} is on {entry.geom!r}, which does not ripple; valid are {valid}")
+        if [entry.site is not None, entry.point is not None, len(entry.points) > 0].count(True) != 1:
+            raise SceneError(f"sensor {entry.name!r} needs one of site, point and points")
+        if entry.site is not None:
+            site_on(scene.model, find_target(scene.model, entry.geom), entry.site)
+    if parse_request(scene.overlay).sensors and not scene.sensors:
+        raise SceneError("the overlay sensors shows those of the scene, which has no [[sensor]]; add one")
 
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
@@ -119,12 +138,8 @@ _MANY_BODIES, _THEIR_SECONDS, _GROWTH = 15_000, 13.0, 2.8
 def check_files(path: Path) -> None:
     """Make sure that an MJCF and all that it includes or names are regular files, as far as they exist.
 
-    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is warned of.
-
-    Raises
-    ------
-    SceneError
-        Naming the file.
+    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is warned of. Raises
+    `SceneError` naming the file.
     """
     waiting, seen = [path], set()
     folders = {path.parent}
@@ -244,7 +259,17 @@ def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[
     """The scene of a name and notes that the content of a scene file makes of a model, checked; raises as that does."""
     events = Events(**{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)})
     look = content.two_way, tuple(content.overlay), content.lighting
-    scene = Scene(name, model, tuple(content.ripple), content.camera, content.duration, events, *look, notes)
+    scene = Scene(
+        name,
+        model,
+        tuple(content.ripple),
+        content.camera,
+        content.duration,
+        events,
+        *look,
+        notes,
+        tuple(content.sensor),
+    )
     check_scene(scene)
     return scene
 
@@ -254,10 +279,8 @@ def load_model(
 ) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
     """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
 
-    Raises
-    ------
-    SceneError
-        If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
+    Raises `SceneError` if the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is
+    invalid.
     """
     if not path.is_file():
         problem = "is not a file" if path.exists() else "does not exist"

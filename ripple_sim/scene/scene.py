@@ -23,7 +23,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 
 from .events import Events
-from .scene_file import CameraEntry, RippleEntry, check_camera
+from .scene_file import CameraEntry, RippleEntry, SensorEntry, check_camera
 
 MAX_DURATION = 86_400  # [s], a day
 MAX_SLOW_MOTION = 1000
@@ -59,6 +59,7 @@ class Scene:
         One of `LIGHTING`: "auto", "model" or "studio", see `Renderer`.
     notes : tuple of str
         What was done to its mesh on reading, one line each, where it was made from one.
+    sensors : tuple of SensorEntry
     """
 
     name: str
@@ -71,6 +72,7 @@ class Scene:
     overlay: tuple[str, ...] = ()
     lighting: str = "auto"
     notes: tuple[str, ...] = ()
+    sensors: tuple[SensorEntry, ...] = ()
 
     @property
     def contacts(self) -> dict[str, list[str]]:
@@ -79,13 +81,7 @@ class Scene:
 
 
 def through_camera(scene: Scene, name: str) -> Scene:
-    """The scene seen through a camera of its model.
-
-    Raises
-    ------
-    SceneError
-        If the model has no such camera.
-    """
+    """The scene seen through a camera of its model; raises `SceneError` if the model has no such camera."""
     camera = CameraEntry(name=name)
     check_camera(scene.model, camera)
     return dataclasses.replace(scene, camera=camera)
@@ -94,10 +90,7 @@ def through_camera(scene: Scene, name: str) -> Scene:
 def with_exposure(scene: Scene, **changes: Any) -> Scene:
     """The scene with other values of its camera's shutter, aperture, focus and exposures; None leaves one as it is.
 
-    Raises
-    ------
-    SceneError
-        If a value is invalid, or would have no effect.
+    Raises `SceneError` if a value is invalid, or would have no effect.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     try:
@@ -116,7 +109,7 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
 
 
 HEATMAPS = {"height": "m", "velocity": "m/s"}
-NAMES = (*HEATMAPS, "contacts", "grid", "time", "energy")
+NAMES = (*HEATMAPS, "contacts", "grid", "time", "energy", "sensors")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,9 +122,9 @@ class Request:
         "height" or "velocity": shown as colours on the targets, with a colour bar.
     limit : float or None
         End of the colours, in m or m/s; None: adapts to the waves during the video.
-    contacts, grid, time, energy : bool
+    contacts, grid, time, energy, sensors : bool
         Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves' energy, with that of
-        bodies and both.
+        bodies and both; the traces of the scene's sensors.
     """
 
     heatmap: str | None = None
@@ -140,6 +133,7 @@ class Request:
     grid: bool = False
     time: bool = False
     energy: bool = False
+    sensors: bool = False
 
     def __bool__(self) -> bool:
         return self != Request()
@@ -148,10 +142,8 @@ class Request:
 def parse_request(words: Iterable[str]) -> Request:
     """Read names of overlays; "height" and "velocity" may have a range, such as "height=0.02" [m, m/s].
 
-    Raises
-    ------
-    SceneError
-        For an unknown name, a range that is not a positive number or of an overlay without range, or two heatmaps.
+    Raises `SceneError` for an unknown name, a range that is not a positive number or of an overlay without range, or
+    two heatmaps.
     """
     chosen: dict[str, float | None] = {}
     for word in words:
@@ -197,10 +189,7 @@ def shipped_scenes() -> list[str]:
 def scene_path(name_or_path: str | Path) -> Path:
     """Path of a scene's TOML file, of a shipped scene's name or as it is given.
 
-    Raises
-    ------
-    SceneError
-        If there is no such scene or file.
+    Raises `SceneError` if there is no such scene or file.
     """
     name, shipped = str(name_or_path), shipped_scenes()
     if name in shipped:

@@ -64,12 +64,7 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
 
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Make sure that the model has what the camera names, and that the exposure is possible.
-
-    Raises
-    ------
-    SceneError
-    """
+    """Make sure that the model has what the camera names, and that the exposure is possible; raises `SceneError`."""
     for name, kind, count, missing in (
         (entry.name, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam, "camera {!r}; its cameras are"),
         (entry.track, mujoco.mjtObj.mjOBJ_BODY, model.nbody, "body {!r} for the camera to track; its bodies are"),
@@ -155,6 +150,27 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
         )
 
 
+class SensorEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """`[[sensor]]`: a signal from a target's surface, at a site or at points."""
+
+    name: str
+    """What it is called in overlays and exports."""
+    geom: str
+    """The target."""
+    site: str | None = None
+    """A site of the MJCF, on the geom's body; or else `point` or `points`."""
+    point: Vector | None = None
+    """In the frame of the geom's body [m]; the nearest point of the surface is taken."""
+    points: list[Vector] = []
+    """Several of them, such as a grid of taxels."""
+    kind: str = "acceleration"
+    """`acceleration`, `velocity`, `height` or `strain`."""
+    rate: float = 48_000.0
+    """Samples a second [1/s]."""
+    thickness: float | None = None
+    """Of the sheet whose outer face is strained [m], for `strain` alone."""
+
+
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     """The whole TOML file."""
 
@@ -185,18 +201,14 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     """Changes of materials, see below."""
     control: list[ControlEntry] = []
     """Controls of actuators, see below."""
+    sensor: list[SensorEntry] = []
+    """Signals from surfaces, see below."""
     random: RandomEntry | None = None
     """Variation by a seed, see below."""
 
 
 def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
-    """Check a scene's table against the schema.
-
-    Raises
-    ------
-    SceneError
-        Naming the place, the value and what is valid.
-    """
+    """Check a scene's table against the schema; raises `SceneError` naming the place, the value and what is valid."""
     _check_keys(table, SceneFile, "", origin)
     _check_values(table, "", origin)
     try:
@@ -239,6 +251,7 @@ _TABLES: dict[str, type[msgspec.Struct]] = {
     "change": ChangeEntry,
     "change.material": MaterialChange,
     "control": ControlEntry,
+    "sensor": SensorEntry,
     "random": RandomEntry,
 }
 
@@ -268,10 +281,7 @@ def uniform_material(entry: RippleEntry) -> Material:
 def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
     """Give a target the coefficients that vary over it, and hold still what is to be still.
 
-    Raises
-    ------
-    RippleError
-        If a file cannot be read, or does not suit the target.
+    Raises `RippleError` if a file cannot be read, or does not suit the target.
     """
     atlas, coefficients = ripples[entry.geom].atlas, {}
     if entry.inside:

@@ -55,12 +55,8 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
     """Value of an expression of some variables, arrays of one shape.
 
     It may hold numbers, the variables, pi, + - * / % **, parentheses, the functions of `FUNCTIONS`, and one comparison
-    at a time as the condition of `where`. Nothing of Python is run.
-
-    Raises
-    ------
-    SceneError
-        If it holds anything else, or its value is not finite everywhere.
+    at a time as the condition of `where`. Nothing of Python is run. Raises `SceneError` if it holds anything else, or
+    its value is not finite everywhere.
     """
     try:
         if len(text) > _LONGEST:
@@ -143,10 +139,7 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
     def heights(self, ripples: Ripples, geom: str) -> NDArray[np.float64]:
         """Height at every texel of a geom [m], [C, n, n].
 
-        Raises
-        ------
-        RippleError
-            If a file cannot be read or does not suit the target, or an expression is not finite.
+        Raises `RippleError` if a file cannot be read or does not suit the target, or an expression is not finite.
         """
         atlas = ripples[geom].atlas
         if self.expression is not None:
@@ -221,13 +214,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
                 raise SceneError(f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater than 0")
 
     def body(self) -> Mesh | Volume:
-        """What is inside, in the frame of the geom's body.
-
-        Raises
-        ------
-        MeshError
-            If the file cannot be read.
-        """
+        """What is inside, in the frame of the geom's body; raises `MeshError` if the file cannot be read."""
         return load_inside(self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale)
 
 

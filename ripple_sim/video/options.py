@@ -51,7 +51,7 @@ class VideoOptions:
     pass_format: Literal["npz", "exr"] = "npz"
     """Format of the passes: NumPy's, or EXR (needs OpenEXR)."""
     overlay: Sequence[str] | None = None
-    """Overlays on the video: height or velocity as a heatmap, contacts, grid, time, energy. Examples:
+    """Overlays on the video: height or velocity as a heatmap, contacts, grid, time, energy, sensors. Examples:
     height,contacts,time or velocity=0.5,energy, where the colours end at 0.5 m/s."""
     sound: bool = False
     """Add what is heard at the camera to the video (.mp4 and .webm)."""

@@ -18,10 +18,7 @@ from ..texels.atlas import Atlas
 def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """A number, or an array of the given shape, as a float32 field [C, n, n].
 
-    Raises
-    ------
-    SolverError
-        If the shape is another one, or a value is not finite.
+    Raises `SolverError` if the shape is another one, or a value is not finite.
     """
     try:
         array = np.asarray(value, dtype=np.float32)
@@ -141,10 +138,7 @@ class FiniteGuard:
 def check_kick(velocities: NDArray[np.float64], kind: str, value: float, unit: str) -> float:
     """The greatest of the velocities [k] that a source gives at once [m/s].
 
-    Raises
-    ------
-    SolverError
-        If it is beyond float32.
+    Raises `SolverError` if it is beyond float32.
     """
     fastest = float(np.abs(velocities).max(initial=0.0))
     if not fastest <= _GREATEST:

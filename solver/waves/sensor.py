@@ -23,7 +23,8 @@ from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas, check_points
 from ..texels.topology import TexelTopology
 
-KINDS = ("acceleration", "velocity", "height", "strain")
+UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "height": "m", "strain": "1"}
+KINDS = tuple(UNITS)
 
 # Texels along the shortest wave that a sensor is honest about.
 _TEXELS = 5.0
@@ -54,40 +55,36 @@ class Listeners:
     Attributes
     ----------
     all : tuple of Listener
-        Assign to end some, or to take over those of another solver of the same surface.
+        See `use`.
     find_points : callable or None
         From a name to the points [k, 3] that `WaveSolver.sensor` takes for it; None: names are not known.
     """
 
     def __init__(self, backend: Backend) -> None:
         self._backend = backend
-        self._all: tuple[Listener, ...] = ()
+        self.all: tuple[Listener, ...] = ()
         self.find_points: Callable[[str], ArrayLike] | None = None
 
-    @property
-    def all(self) -> tuple[Listener, ...]:  # noqa: D102
-        return self._all
-
-    @all.setter
-    def all(self, listeners: Sequence[Listener]) -> None:
-        self._all = tuple(listeners)
+    def use(self, listeners: Sequence[Listener]) -> None:
+        """Listen with these alone from now on; they go on as they are, also those of another solver of the surface."""
+        self.all = tuple(listeners)
         self._backend.probe(Probes.together([each.probes for each in listeners]) if listeners else None)
 
     def add(self, listener: Heard, time: float) -> Heard:
         """Listen from a time [s] on, beside those that do."""
-        self.all = (*self._all, listener)
+        self.use([*self.all, listener])
         self._begin(listener, time)
         return listener
 
     def begin(self, time: float) -> None:
         """All begin anew."""
-        for each in self._all:
+        for each in self.all:
             self._begin(each, time)
 
     def hear(self, time: float, dt: float) -> None:
         """Hand each its own sums of the latest substeps, of dt [s] from a time on."""
         sums, end = self._backend.probed(), 0
-        for listener in self._all:
+        for listener in self.all:
             begin, end = end, end + len(listener.probes.heights)
             listener.take(time, dt, sums[:, begin:end])
 

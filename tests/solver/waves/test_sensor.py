@@ -122,7 +122,7 @@ def test_a_constant_stays_what_it_is_and_a_reset_begins_anew() -> None:
     assert len(sensor.times) == 0
     waves.step(2.0)
     np.testing.assert_array_equal(sensor.samples, 0.0)
-    waves.listeners.all = ()
+    waves.listeners.use([])
     before = len(sensor.read().times)
     waves.step(1.0)
     assert before > 0 and len(sensor.times) == 0

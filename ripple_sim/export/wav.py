@@ -1,0 +1,62 @@
+"""Signals as a .wav file: those of a scene's sensors, a channel a point, or what is heard at the camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from ripple_sim.coupling.ripples import Impulse
+from ripple_sim.encode.replace import MARK
+from ripple_sim.errors import ExportError
+from ripple_sim.sound import Microphone, gain, write_wav
+
+from .source import Source
+
+
+class WavWriter:
+    """Writes one file of 16 bits a sample, with one gain for all channels; see `Writer`.
+
+    Slow motion makes it longer and lower.
+    """
+
+    def __init__(self, source: Source, path: Path) -> None:
+        self._source, self._path = source, path
+        self._microphone = None if source.sensors else Microphone(source.ripples, source.slow_motion)
+        if len({sensor.rate for sensor in source.sensors.values()}) > 1:
+            rates = ", ".join(f"{name!r} {sensor.rate:g}" for name, sensor in source.sensors.items())
+            raise ExportError(f"the sensors of a .wav have one rate; these have {rates}: change them, or write .zarr")
+        self._frames = 0
+
+    def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
+        """Hear the frame from where the camera stands."""
+        if self._microphone is not None:
+            self._microphone.place(data, self._source.pose(data)[0].position)
+        self._frames = number
+
+    def finish(self) -> None:
+        """Write all that was measured or heard."""
+        source = self._source
+        if self._microphone is not None:
+            signals = self._microphone.pressure(self._frames / (source.fps * source.slow_motion))
+            rate = self._microphone.rate
+        else:
+            each = [sensor.samples for sensor in source.sensors.values()]
+            shortest = min(map(len, each))  # of sensors of coarser surfaces the last samples come later
+            signals = np.concatenate([samples[:shortest] for samples in each], axis=1).astype(np.float64)
+            rate = next(iter(source.sensors.values())).rate
+        write_wav(self._path, signals * gain(signals), round(rate / source.slow_motion))
+
+    def close(self) -> str:
+        """Keep nothing: no file is open."""
+        return ""
+
+
+def made_here(path: Path) -> bool:
+    """Whether a file has the comment of one from here."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return MARK.encode() in file.read(200)
