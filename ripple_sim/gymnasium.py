@@ -34,10 +34,7 @@ _SIZE = 480  # of frames where an environment does not say [pixels]
 def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Model and data of an unwrapped environment: its own, or those of its dm_control `physics`.
 
-    Raises
-    ------
-    SceneError
-        If it has none.
+    Raises `SceneError` if it has none.
     """
     holder = getattr(env, "physics", env)
     if not (hasattr(holder, "model") and hasattr(holder, "data")):

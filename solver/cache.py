@@ -79,13 +79,7 @@ def _private_folder(reason: str) -> Path:
 
 
 def cache_path(name: str, arrays: Iterable[NDArray]) -> Path:
-    """Place in the cache of what is made from arrays by the method `name`.
-
-    Raises
-    ------
-    RippleError
-        As `cache_limit`.
-    """
+    """Place in the cache of what is made from arrays by the method `name`; raises `RippleError` as `cache_limit`."""
     cache_limit()  # a mistake is told before anything that takes time
     return cache_folder() / f"{content_key(name, arrays)}.npz"
 
@@ -102,10 +96,7 @@ def content_key(name: str, arrays: Iterable[NDArray]) -> str:
 def cache_limit() -> int:
     """How large the cache may grow [bytes]: RIPPLE_SIM_CACHE_LIMIT megabytes, or 500.
 
-    Raises
-    ------
-    RippleError
-        If the variable is not a number, or negative.
+    Raises `RippleError` if the variable is not a number, or negative.
     """
     given = os.environ.get(LIMIT, "").strip()
     try:

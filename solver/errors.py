@@ -104,10 +104,7 @@ def instance(kind: type, hint: str = "", *, optional: bool = False) -> Valid:
 def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
     """Check the fields of a dataclass by their annotations, and those of these names by more.
 
-    Raises
-    ------
-    RippleError
-        Of the given kind, for the first that is not valid.
+    Raises `RippleError` of the given kind, for the first that is not valid.
     """
     for name, hint in typing.get_type_hints(type(record)).items():
         value = getattr(record, name)

@@ -44,10 +44,8 @@ _LONGEST_SUFFIX = ".0123456789.part"
 def final_path(path: Path) -> Path:
     """Where a path to be written leads, its symbolic links followed.
 
-    Raises
-    ------
-    OSError
-        If links lead in a circle, or the name is too long for the system, or too long to be written beside first.
+    Raises `OSError` if links lead in a circle, or the name is too long for the system, or too long to be written beside
+    first.
     """
     final = Path(os.path.realpath(path))
     if final.is_symlink():
@@ -64,12 +62,8 @@ def final_path(path: Path) -> Path:
 def atomic_write(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path` to write to, renamed to `path` at the end, removed after an exception.
 
-    Symbolic links are followed, missing folders made.
-
-    Raises
-    ------
-    OSError
-        If the path exists and is not a regular file (renaming would destroy a device, say), or cannot be written.
+    Symbolic links are followed, missing folders made. Raises `OSError` if the path exists and is not a regular file
+    (renaming would destroy a device, say), or cannot be written.
     """
     path = final_path(path)
     if path.exists() and not path.is_file():

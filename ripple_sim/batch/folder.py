@@ -223,10 +223,7 @@ class StoredPlan(msgspec.Struct, frozen=True):
 def stored(plan: Plan) -> StoredPlan:
     """The plan with the fingerprints of its files; reads all of them.
 
-    Raises
-    ------
-    RippleError
-        If one is invalid.
+    Raises `RippleError` if one is invalid.
     """
     files = {source: _fingerprint(source) for source in dict.fromkeys(plan.sources)}
     return StoredPlan(plan, files, versions())
@@ -235,10 +232,7 @@ def stored(plan: Plan) -> StoredPlan:
 def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
     """Write the plan into the folder of its batch, or make sure that the one there is the same.
 
-    Raises
-    ------
-    BatchError
-        Naming what has changed.
+    Raises `BatchError` naming what has changed.
     """
     if batch.plan.exists():
         before, now = _flat(load_stored(batch.plan)), _flat(plan)

@@ -155,13 +155,7 @@ Step = tuple[str, str]
 
 
 def parse_key(key: str) -> tuple[Step, ...]:
-    """Read a key of a plan.
-
-    Raises
-    ------
-    SceneError
-        If it is not names between dots.
-    """
+    """Read a key of a plan; raises `SceneError` if it is not names between dots."""
     steps, place = [], 0
     while place < len(key):
         found = _STEP.match(key, place)
@@ -180,10 +174,7 @@ def parse_key(key: str) -> tuple[Step, ...]:
 def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
     """Numbers of the items that a step chooses from items of these names; without brackets all of them.
 
-    Raises
-    ------
-    SceneError
-        If there is none.
+    Raises `SceneError` if there is none.
     """
     kind, chosen = step
     if not chosen:
@@ -251,10 +242,7 @@ def options_of(store: StoreEntry) -> VideoOptions:
 def check_store(store: StoreEntry) -> None:
     """Make sure that scenes can be kept in this way, before one is made.
 
-    Raises
-    ------
-    RippleError
-        Naming what is invalid, or the package that is missing.
+    Raises `RippleError` naming what is invalid, or the package that is missing.
     """
     if store.passes and store.video == "none":
         raise SceneError("plan: store.passes need frames, and store.video is 'none'; name a video, or leave passes out")

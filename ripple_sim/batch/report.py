@@ -1,4 +1,4 @@
-"""What is told of a batch: its index, a Parquet table with a row a scene, and its page; how far it is; and a trial.
+"""What is told of a batch: its index, a Parquet table with a row a scene, and its page; and how far it is.
 
 `load_batch` reads its finished scenes, one after another or by number.
 """
@@ -7,9 +7,6 @@ from __future__ import annotations
 
 import html
 import json
-import shutil
-import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,14 +14,9 @@ from typing import Any
 from ripple_sim.errors import BatchError
 from ripple_sim.solver.errors import PATH, checked
 from ripple_sim.solver.files import atomic_write
-from ripple_sim.solver.kernel import compile_times
 
-from .executors import usual_workers
 from .finished import finished_scenes
-from .folder import BatchFolder, keep_plan, load_stored, stored
-from .plan import Plan
-from .variation import Variation
-from .worker import make_scene
+from .folder import BatchFolder, load_stored
 
 _MOST = 5_000  # scenes on the page
 
@@ -178,10 +170,7 @@ _LISTED = 5  # failures
 def status_text(path: Path) -> str:
     """What is finished, what failed and why, and what is still to be made.
 
-    Raises
-    ------
-    BatchError
-        If there is no batch in the folder.
+    Raises `BatchError` if there is no batch in the folder.
     """
     batch = BatchFolder(path)
     batch.check()
@@ -201,42 +190,4 @@ def status_text(path: Path) -> str:
         lines.append(f"and {len(failures) - _LISTED} more failed")
     if aside:
         lines.append(f"`ripple-sim batch {path} --retry-failed` tries them again")
-    return "\n".join(lines)
-
-
-_SHOWN = 3  # scenes whose values are told
-
-
-def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
-    """Make one scene in a temporary folder; tell the first ones' values, and the time and room that all will take.
-
-    Raises
-    ------
-    RippleError
-        If the plan or one of the first scenes is invalid.
-    """
-    if plan is None:
-        plan = load_stored(BatchFolder(folder).plan).plan
-    lines = []
-    for number in range(min(_SHOWN, plan.count)):
-        variation = Variation(plan, number)
-        values = ", ".join(f"{key} = {value}" for key, value in variation.load()[1].items()) or "nothing varies"
-        lines.append(f"scene {number} ({Path(variation.source).name}, seed {variation.seed}): {values}")
-    with tempfile.TemporaryDirectory(prefix="ripple-sim-trial-") as name:
-        batch = BatchFolder(Path(name))
-        keep_plan(batch, stored(plan))
-        start, compiled = time.perf_counter(), sum(compile_times().values())
-        outcome = make_scene(name, 0)
-        if outcome.state != "made":
-            raise BatchError(f"scene 0 cannot be made: {outcome.error}")
-        seconds = time.perf_counter() - start - (sum(compile_times().values()) - compiled)
-        size = sum(path.stat().st_size for path in batch.scene(0).rglob("*") if path.is_file())
-    count = workers or usual_workers()
-    folder = next(each for each in (folder, *folder.absolute().parents) if each.exists())
-    lines.append(
-        f"{plan.count} scenes of {outcome.row['frames']} frames: {seconds:.1f} s and {size / 1e6:.2f} MB for one, "
-        f"so about {plan.count * seconds / 3600:.2g} h of work (here by {count} workers, at best "
-        f"{plan.count * seconds / 3600 / count:.2g} h) and {plan.count * size / 1e9:.2g} GB; "
-        f"{shutil.disk_usage(folder).free / 1e9:.1f} GB are free"
-    )
     return "\n".join(lines)

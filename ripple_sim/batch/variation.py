@@ -212,10 +212,7 @@ class Variation:
     def load(self) -> tuple[Scene, dict[str, Any]]:
         """Load the scene, and the values drawn for it by their keys.
 
-        Raises
-        ------
-        RippleError
-            If a key of the plan fits nothing, or the scene refuses a value.
+        Raises `RippleError` if a key of the plan fits nothing, or the scene refuses a value.
         """
         values: dict[str, Any] = {}
 

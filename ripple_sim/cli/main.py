@@ -180,9 +180,7 @@ class UsageError(Exception):
 def parse(argv: Sequence[str]) -> Any:
     """Return the command to run, or None if the help or a completion script was printed instead.
 
-    Raises
-    ------
-    UsageError
+    Raises `UsageError`.
     """
     command = _read(argv)
     if isinstance(command, CompletionCommand):  # which tyro makes from all the commands

@@ -326,7 +326,7 @@ class BatchCommand:
 
             print(status_text(folder))
         elif self.dry_run:
-            from ripple_sim.batch.report import trial_text
+            from ripple_sim.batch.run import trial_text
 
             print(trial_text(plan, folder, self.workers))
         else:

@@ -133,11 +133,7 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     """Vertices of the convex parts of a mesh [m], each [n, 3]; the same for the same mesh.
 
     Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity and tree search".
-
-    Raises
-    ------
-    SceneError
-        If the package coacd is missing.
+    Raises `SceneError` if the package coacd is missing.
     """
     try:
         version = importlib.metadata.version("coacd")
@@ -174,10 +170,7 @@ _LISTS = ("friction", "solref", "solimp")
 def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
     """A geom's mesh in the frame of its body, as MuJoCo compiles it.
 
-    Raises
-    ------
-    SceneError
-        If the specification does not compile as it is, or would lose geoms that do not collide.
+    Raises `SceneError` if the specification does not compile as it is, or would lose geoms that do not collide.
     """
     if spec.compiler.discardvisual:
         raise SceneError(
@@ -243,11 +236,8 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
 def convex_parts_of(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> list[NDArray[np.float64]]:
     """Vertices of the convex parts of a geom's mesh in the frame of its body [m].
 
-    Raises
-    ------
-    SceneError
-        If the mesh is open, the package coacd is missing, or the specification does not compile or discards geoms that
-        do not collide.
+    Raises `SceneError` if the mesh is open, the package coacd is missing, or the specification does not compile or
+    discards geoms that do not collide.
     """
     mesh = mesh_on_body(spec, geom)
     if not mesh.closed:

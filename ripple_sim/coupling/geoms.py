@@ -51,10 +51,7 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
 def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
     """Id of a geom, by its name, "body/index" (also where it has a name), "geom <id>", or its id.
 
-    Raises
-    ------
-    SceneError
-        If there is no such geom.
+    Raises `SceneError` if there is no such geom.
     """
     if isinstance(key, (int, np.integer)) and 0 <= key < model.ngeom:
         return int(key)
@@ -80,10 +77,7 @@ def target_name(model: mujoco.MjModel, target: int) -> str:
 def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
     """Id of what is to ripple: a geom, see `find_geom`, or else the flex or skin of a name, see `soft_ids`.
 
-    Raises
-    ------
-    SceneError
-        If there is nothing of that name, or a geom's type has no closed surface.
+    Raises `SceneError` if there is nothing of that name, or a geom's type has no closed surface.
     """
     geom = find_any(model, key)
     if is_soft(model, geom):
@@ -97,10 +91,7 @@ def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
 def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str, Value]:
     """Values by the names that `target_name` gives to their geoms, flexes and skins.
 
-    Raises
-    ------
-    SceneError
-        If they are no mapping, or a geom is missing, or has two values.
+    Raises `SceneError` if they are no mapping, or a geom is missing, or has two values.
     """
     if not isinstance(values, Mapping):
         raise SceneError(f"{what} is {shown(values)}; valid is a dict of them by geom")
@@ -116,10 +107,7 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
 def find_any(model: mujoco.MjModel, key: GeomKey) -> int:
     """Id of a geom, whatever its type, or else of the flex or skin of a name.
 
-    Raises
-    ------
-    SceneError
-        If there is nothing of that name.
+    Raises `SceneError` if there is nothing of that name.
     """
     soft = find_soft(model, key)
     if soft >= 0 and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, str(key)) < 0:
@@ -158,10 +146,7 @@ _LONGEST_STEP = 1.0
 def own_model(model: Any) -> mujoco.MjModel:
     """MuJoCo's model itself, also of dm_control's wrapper.
 
-    Raises
-    ------
-    SceneError
-        If it is something else, or has a time step, a place, a size, a mass or a gravity out of range.
+    Raises `SceneError` if it is something else, or has a time step, a place, a size, a mass or a gravity out of range.
     """
     found = getattr(model, "ptr", model)
     if not isinstance(found, mujoco.MjModel):
@@ -183,12 +168,8 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
     """MuJoCo's data itself, also of dm_control's wrapper.
 
     Its model is `model`, whatever was changed there since, or a copy in which bodies move and collide alike. Where it
-    is only `drawn`, they need not: shapes and places have to do.
-
-    Raises
-    ------
-    SceneError
-        If it is something else, or belongs to another model.
+    is only `drawn`, they need not: shapes and places have to do. Raises `SceneError` if it is something else, or
+    belongs to another model.
     """
     found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
     if not isinstance(found, mujoco.MjData):
@@ -214,10 +195,7 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
 def check_targets(model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping[str, int]) -> None:
     """Make sure that targets, by name their geom ids in the `other` model, are those of a model that is to be drawn.
 
-    Raises
-    ------
-    SceneError
-        If any geom has another shape or place, or a target another name.
+    Raises `SceneError` if any geom has another shape or place, or a target another name.
     """
     if model is other:
         return
@@ -256,10 +234,7 @@ def _sizes(model: mujoco.MjModel) -> str:
 def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dict[str, Material]:
     """Materials by the names of their geoms.
 
-    Raises
-    ------
-    SceneError
-        For arguments of a wrong type, a geom that cannot ripple, or one that has two materials.
+    Raises `SceneError` for arguments of a wrong type, a geom that cannot ripple, or one that has two materials.
     """
     if not isinstance(materials, Mapping):
         raise SceneError(f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material")
@@ -273,10 +248,7 @@ def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dic
 def for_each(model: mujoco.MjModel, names: Iterable[str], what: str, value: Value | ByGeom[Value]) -> dict[str, Value]:
     """What an argument says for each target, by name: one value for all, or a mapping.
 
-    Raises
-    ------
-    SceneError
-        For a target that a mapping leaves out.
+    Raises `SceneError` for a target that a mapping leaves out.
     """
     if not isinstance(value, Mapping):
         return dict.fromkeys(names, value)

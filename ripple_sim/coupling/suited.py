@@ -324,10 +324,7 @@ def suited_targets(
 ) -> tuple[dict[str, Material], dict[str, int]]:
     """Materials without unset coefficients, and resolutions, by the names of the targets.
 
-    Raises
-    ------
-    MeshError
-        If a target's mesh cannot ripple.
+    Raises `MeshError` if a target's mesh cannot ripple.
     """
     suited, texels = dict(materials), {name: n for name, n in resolutions.items() if n is not None}
     geoms = {name: find_target(model, name) for name in materials}

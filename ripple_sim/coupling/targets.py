@@ -63,12 +63,8 @@ class Target:
 def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
     """Where a site is in the frame of a target [m], [3]: of a geom on the same body, or welded to it.
 
-    In that of a flex or a skin, the world, it is where it stands in `qpos0`.
-
-    Raises
-    ------
-    SceneError
-        For an unknown site, or one on a body that moves against the geom's.
+    In that of a flex or a skin, the world, it is where it stands in `qpos0`. Raises `SceneError` for an unknown site,
+    or one on a body that moves against the geom's.
     """
     site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
     if site < 0:
@@ -229,10 +225,7 @@ class Targets:
     def change_operator(self, operator: str) -> None:
         """Change the wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
 
-        Raises
-        ------
-        SolverError
-            For an unknown operator.
+        Raises `SolverError` for an unknown operator.
         """
         for name, target in list(self._targets.items()):
             self._change(name, options={**target.options, "operator": operator})

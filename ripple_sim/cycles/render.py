@@ -61,10 +61,7 @@ _ADVICE = (
 def python_with_bpy() -> str:
     """Python that can import bpy: the one that the environment names, or this one.
 
-    Raises
-    ------
-    VideoError
-        If there is none, its bpy is too old, or cannot be imported.
+    Raises `VideoError` if there is none, its bpy is too old, or cannot be imported.
     """
     named = os.environ.get(PYTHON)
     if named:
@@ -257,9 +254,7 @@ def render_cycles(
 def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) -> str:
     """Make sure, before anything that takes time, that Cycles can render with these options; return its Python.
 
-    Raises
-    ------
-    RippleError
+    Raises `RippleError`.
     """
     for name in _OURS_ALONE:
         if getattr(options, name):

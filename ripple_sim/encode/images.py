@@ -36,13 +36,7 @@ _CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
 def check_exr() -> None:
-    """Make sure that EXR frames can be written.
-
-    Raises
-    ------
-    VideoError
-        If OpenEXR is not installed.
-    """
+    """Make sure that EXR frames can be written; raises `VideoError` if OpenEXR is not installed."""
     if importlib.util.find_spec("OpenEXR") is None:
         raise VideoError(
             "EXR frames need OpenEXR, which is not installed; install it with: pip install 'ripple-sim[exr]'"
@@ -184,10 +178,7 @@ class PassFiles:
     def write(self, frame: int, passes: Mapping[str, NDArray]) -> None:
         """Write the passes of a frame, by name, [height, width] or [height, width, 2 or 3].
 
-        Raises
-        ------
-        EncodingError
-            If they cannot be written.
+        Raises `EncodingError` if they cannot be written.
         """
         write = _write_npz if self._form == "npz" else _write_exr
         self._write(self._path(frame), lambda path: write(path, passes))
@@ -217,11 +208,8 @@ def passes_folder(video: Path) -> Path:
 def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: bool) -> None:
     """Make sure that passes can be written beside a video.
 
-    Raises
-    ------
-    VideoError
-        If there is no such pass or format, OpenEXR is missing, or the folder holds the passes of another video or
-        anything that was not made here.
+    Raises `VideoError` if there is no such pass or format, OpenEXR is missing, or the folder holds the passes of
+    another video or anything that was not made here.
     """
     if unknown := [name for name in passes if name not in PASSES]:
         raise VideoError(f"there is no pass {unknown[0]!r}; valid are {', '.join(PASSES)}")

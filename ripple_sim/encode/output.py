@@ -120,10 +120,8 @@ _VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder 
 def video_format(path: Path, frame_format: str = "png") -> str:
     """Format of an output path: one of `ENDINGS`, or for a folder the format of its frames.
 
-    Raises
-    ------
-    VideoError
-        If the path is not a file name, has any other ending and is not a folder, or the frame format is unknown.
+    Raises `VideoError` if the path is not a file name, has any other ending and is not a folder, or the frame format is
+    unknown.
     """
     if frame_format not in FRAME_FORMATS:
         raise VideoError(f"frame format is {frame_format!r}; valid is {' or '.join(map(repr, FRAME_FORMATS))}")
@@ -194,10 +192,7 @@ def check_output(
 def check_size(width: int, height: int) -> None:
     """Make sure that frames of this size [pixels] can be drawn.
 
-    Raises
-    ------
-    VideoError
-        If a side is shorter than `MIN_SIZE` or longer than `MAX_SIZE`.
+    Raises `VideoError` if a side is shorter than `MIN_SIZE` or longer than `MAX_SIZE`.
     """
     if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
         raise VideoError(f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each side")

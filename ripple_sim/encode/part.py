@@ -123,10 +123,7 @@ class Part:
     def check_state(self, frame: int, digest: str) -> None:
         """Record the simulation's fingerprint at a frame, or compare it with the one that is known.
 
-        Raises
-        ------
-        VideoError
-            If it differs.
+        Raises `VideoError` if it differs.
         """
         if frame not in self._states:
             self._states[frame] = digest
@@ -141,10 +138,7 @@ class Part:
     def finish(self) -> None:
         """Put the file, or else the folder of segments, in the video's place, and remove everything else.
 
-        Raises
-        ------
-        VideoError
-            If there is something in that place by now that was not made here.
+        Raises `VideoError` if there is something in that place by now that was not made here.
         """
         if self.video.exists():
             check_replaceable(self.video, self._overwrite)  # again: a render takes long

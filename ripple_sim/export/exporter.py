@@ -216,10 +216,7 @@ class Exporter:
 def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> CameraEntry:
     """What `[camera]` of a scene file would say; MuJoCo's free camera by default.
 
-    Raises
-    ------
-    SceneError
-        If the model has not what it names.
+    Raises `SceneError` if the model has not what it names.
     """
     if not isinstance(camera, CameraEntry):
         free = model.vis.global_

@@ -60,10 +60,7 @@ class Unfinished:
 def check_companion(folder: Path, recognised: Recognised, overwrite: bool) -> None:
     """Make sure that a folder of images or chunks that belongs to an export may be replaced.
 
-    Raises
-    ------
-    ExportError
-        If it holds anything but those that were made here.
+    Raises `ExportError` if it holds anything but those that were made here.
     """
     made = {".png": made_here, ".usdc": recognised}
 
@@ -129,13 +126,7 @@ ENDINGS = {
 
 
 def ending_of(path: Path) -> Ending:
-    """How a path's file is written.
-
-    Raises
-    ------
-    ExportError
-        If its ending is unknown, or needs what is not installed.
-    """
+    """How a path's file is written; raises `ExportError` if its ending is unknown, or needs what is not installed."""
     suffix = path.suffix.lower()
     if path.name.lower() in ENDINGS or suffix not in ENDINGS:
         problem = f"ends in {path.suffix}" if path.suffix else "has no ending"
@@ -178,12 +169,7 @@ MAX_FPS, LARGEST_MESH = 1000, 10_000_000
 
 
 def check_options(options: ExportOptions) -> None:
-    """Make sure that the options are possible, before anything that takes time.
-
-    Raises
-    ------
-    RippleError
-    """
+    """Make sure that the options are possible, before anything that takes time; raises `RippleError`."""
     if not isinstance(options.fps, int) or not 1 <= options.fps <= MAX_FPS:
         raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
     if options.resume and options.chunk is None:
@@ -193,12 +179,7 @@ def check_options(options: ExportOptions) -> None:
 
 
 def check_write_options(options: WriteOptions) -> None:
-    """Make sure that there are such options, and that their values are possible.
-
-    Raises
-    ------
-    RippleError
-    """
+    """Make sure that there are such options, and that their values are possible; raises `RippleError`."""
     if unknown := [name for name in options if name not in WRITE_OPTIONS]:
         raise ExportError(f"there is no option {unknown[0]!r}; valid are {', '.join(WRITE_OPTIONS)}")
     given = WRITE_OPTIONS | options

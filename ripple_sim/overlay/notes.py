@@ -96,10 +96,7 @@ BASELINES = tuple(name for name in TITLES if name != OWN)
 def compared_operators(baseline: str | None) -> tuple[str, ...]:
     """Wave operators of the runs of a video: our own, and a baseline if given.
 
-    Raises
-    ------
-    SceneError
-        For an unknown baseline.
+    Raises `SceneError` for an unknown baseline.
     """
     if baseline is None:
         return (OWN,)

@@ -141,12 +141,8 @@ class SurfaceMesh:
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
         """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.
 
-        Storage buffers are bound for that; `update` displaces the vertices.
-
-        Raises
-        ------
-        RippleError
-            If the height map has another shape.
+        Storage buffers are bound for that; `update` displaces the vertices. Raises `RippleError` if the height map has
+        another shape.
         """
         if isinstance(height_map, MovedHeightMap):
             self._move(height_map.V)
@@ -208,10 +204,8 @@ class SurfaceMesh:
     def set_heatmap(self, values: NDArray[np.float32], limit: float) -> None:
         """Replace the heatmap's values, [C, n + 2, n + 2] with a halo; the colours range from -limit to limit.
 
-        Raises
-        ------
-        RippleError
-            If the surface has no heatmap, the shape is another, or the limit is not a positive, finite number.
+        Raises `RippleError` if the surface has no heatmap, the shape is another, or the limit is not a positive, finite
+        number.
         """
         if self._heatmap is None:
             raise RippleError(f"geom {self.geom} has no heatmap; give its `Surface` heatmap_colors")
@@ -311,13 +305,7 @@ class DrawnScene:
         self._occluding = [each for each in drawn if each.occludes]
 
     def target(self, geom: int) -> SurfaceMesh:
-        """The target of a geom.
-
-        Raises
-        ------
-        RippleError
-            If the geom is no target.
-        """
+        """The target of a geom; raises `RippleError` if the geom is no target."""
         if (found := next((target for target in self.targets if target.geom == geom), None)) is not None:
             return found
         geoms = ", ".join(str(target.geom) for target in self.targets) or "none"

@@ -64,10 +64,7 @@ def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
 def load_image(source: Any) -> NDArray[np.uint8]:
     """Pixels of an image file or of a PIL image, uint8 [height, width, 3], top row first.
 
-    Raises
-    ------
-    SceneError
-        If the file cannot be read as an image, or is too large.
+    Raises `SceneError` if the file cannot be read as an image, or is too large.
     """
     return read_image(SceneError, source, "texture", lambda mode: "RGB")
 
@@ -134,10 +131,7 @@ def _embedded(mesh_path: Path) -> list[Image.Image]:
 def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None) -> None:
     """Give the geom "target" the image that is asked for or that the mesh names, if the mesh can show it.
 
-    Raises
-    ------
-    SceneError
-        If an image that is asked for cannot be read, or the mesh has no texture coordinates.
+    Raises `SceneError` if an image that is asked for cannot be read, or the mesh has no texture coordinates.
     """
     if mesh.corner_uv is None:
         if texture is not None:
@@ -298,13 +292,7 @@ def find_scene(target: str | Path, *, seed: int | None = None) -> Scene:
 
 
 def is_scene(target: str | Path) -> bool:
-    """Whether a target is a scene, by its name or its file, and not a mesh.
-
-    Raises
-    ------
-    SceneError
-        If there is neither.
-    """
+    """Whether a target is a scene, by its name or its file, and not a mesh; raises `SceneError` if there is neither."""
     path = Path(target)
     if str(target) in shipped_scenes() or path.suffix.lower() == ".toml":
         scene_path(target)

@@ -138,12 +138,8 @@ _MANY_BODIES, _THEIR_SECONDS, _GROWTH = 15_000, 13.0, 2.8
 def check_files(path: Path) -> None:
     """Make sure that an MJCF and all that it includes or names are regular files, as far as they exist.
 
-    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is warned of.
-
-    Raises
-    ------
-    SceneError
-        Naming the file.
+    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is warned of. Raises
+    `SceneError` naming the file.
     """
     waiting, seen = [path], set()
     folders = {path.parent}
@@ -283,10 +279,8 @@ def load_model(
 ) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
     """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
 
-    Raises
-    ------
-    SceneError
-        If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
+    Raises `SceneError` if the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is
+    invalid.
     """
     if not path.is_file():
         problem = "is not a file" if path.exists() else "does not exist"

@@ -64,10 +64,7 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
         """The preset's material; its layer's thickness may be one at every texel [m], [C, n, n].
 
-        Raises
-        ------
-        SceneError
-            For an unknown preset, a parameter that it does not take, or a missing one.
+        Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing one.
         """
         if self.name not in (*LAWS, *PRESETS):
             raise SceneError(

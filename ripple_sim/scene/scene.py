@@ -81,13 +81,7 @@ class Scene:
 
 
 def through_camera(scene: Scene, name: str) -> Scene:
-    """The scene seen through a camera of its model.
-
-    Raises
-    ------
-    SceneError
-        If the model has no such camera.
-    """
+    """The scene seen through a camera of its model; raises `SceneError` if the model has no such camera."""
     camera = CameraEntry(name=name)
     check_camera(scene.model, camera)
     return dataclasses.replace(scene, camera=camera)
@@ -96,10 +90,7 @@ def through_camera(scene: Scene, name: str) -> Scene:
 def with_exposure(scene: Scene, **changes: Any) -> Scene:
     """The scene with other values of its camera's shutter, aperture, focus and exposures; None leaves one as it is.
 
-    Raises
-    ------
-    SceneError
-        If a value is invalid, or would have no effect.
+    Raises `SceneError` if a value is invalid, or would have no effect.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     try:
@@ -151,10 +142,8 @@ class Request:
 def parse_request(words: Iterable[str]) -> Request:
     """Read names of overlays; "height" and "velocity" may have a range, such as "height=0.02" [m, m/s].
 
-    Raises
-    ------
-    SceneError
-        For an unknown name, a range that is not a positive number or of an overlay without range, or two heatmaps.
+    Raises `SceneError` for an unknown name, a range that is not a positive number or of an overlay without range, or
+    two heatmaps.
     """
     chosen: dict[str, float | None] = {}
     for word in words:
@@ -200,10 +189,7 @@ def shipped_scenes() -> list[str]:
 def scene_path(name_or_path: str | Path) -> Path:
     """Path of a scene's TOML file, of a shipped scene's name or as it is given.
 
-    Raises
-    ------
-    SceneError
-        If there is no such scene or file.
+    Raises `SceneError` if there is no such scene or file.
     """
     name, shipped = str(name_or_path), shipped_scenes()
     if name in shipped:

@@ -64,12 +64,7 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
 
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Make sure that the model has what the camera names, and that the exposure is possible.
-
-    Raises
-    ------
-    SceneError
-    """
+    """Make sure that the model has what the camera names, and that the exposure is possible; raises `SceneError`."""
     for name, kind, count, missing in (
         (entry.name, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam, "camera {!r}; its cameras are"),
         (entry.track, mujoco.mjtObj.mjOBJ_BODY, model.nbody, "body {!r} for the camera to track; its bodies are"),
@@ -213,13 +208,7 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
-    """Check a scene's table against the schema.
-
-    Raises
-    ------
-    SceneError
-        Naming the place, the value and what is valid.
-    """
+    """Check a scene's table against the schema; raises `SceneError` naming the place, the value and what is valid."""
     _check_keys(table, SceneFile, "", origin)
     _check_values(table, "", origin)
     try:
@@ -292,10 +281,7 @@ def uniform_material(entry: RippleEntry) -> Material:
 def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
     """Give a target the coefficients that vary over it, and hold still what is to be still.
 
-    Raises
-    ------
-    RippleError
-        If a file cannot be read, or does not suit the target.
+    Raises `RippleError` if a file cannot be read, or does not suit the target.
     """
     atlas, coefficients = ripples[entry.geom].atlas, {}
     if entry.inside:

@@ -24,8 +24,6 @@ from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, textu
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.volume import is_volume
 
-from .events import Vector
-
 # name: function and how many arguments it takes
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{name: (getattr(np, name), 1) for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tan")},
@@ -55,12 +53,8 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
     """Value of an expression of some variables, arrays of one shape.
 
     It may hold numbers, the variables, pi, + - * / % **, parentheses, the functions of `FUNCTIONS`, and one comparison
-    at a time as the condition of `where`. Nothing of Python is run.
-
-    Raises
-    ------
-    SceneError
-        If it holds anything else, or its value is not finite everywhere.
+    at a time as the condition of `where`. Nothing of Python is run. Raises `SceneError` if it holds anything else, or
+    its value is not finite everywhere.
     """
     try:
         if len(text) > _LONGEST:
@@ -143,10 +137,7 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
     def heights(self, ripples: Ripples, geom: str) -> NDArray[np.float64]:
         """Height at every texel of a geom [m], [C, n, n].
 
-        Raises
-        ------
-        RippleError
-            If a file cannot be read or does not suit the target, or an expression is not finite.
+        Raises `RippleError` if a file cannot be read or does not suit the target, or an expression is not finite.
         """
         atlas = ripples[geom].atlas
         if self.expression is not None:
@@ -195,7 +186,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
     """Value of the volume at the body's surface."""
     spacing: float | None = None
     """Between the nodes of a .npy [m]; a scan has its own."""
-    origin: Vector = (0.0, 0.0, 0.0)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the first node of a .npy is [m]."""
     scale: float = 1.0
     """To metres, where the file is in other units. Scans are read in metres."""
@@ -221,13 +212,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
                 raise SceneError(f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater than 0")
 
     def body(self) -> Mesh | Volume:
-        """What is inside, in the frame of the geom's body.
-
-        Raises
-        ------
-        MeshError
-            If the file cannot be read.
-        """
+        """What is inside, in the frame of the geom's body; raises `MeshError` if the file cannot be read."""
         return load_inside(self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale)
 
 
@@ -244,7 +229,7 @@ def load_inside(
     path: str | Path,
     threshold: float | None = None,
     spacing: float | None = None,
-    origin: Vector = (0.0, 0.0, 0.0),
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     scale: float = 1.0,
 ) -> Mesh | Volume:
     """Read what lies inside: a volume where the path is that of one, else a mesh; scaled.

@@ -76,12 +76,8 @@ EXPOSURE = ("shutter", "aperture", "focus", "exposures")
 def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
     """The options with None and "auto" replaced by what the scene, the output and this machine say.
 
-    Shutter, aperture, focus and exposures stay as they are: see `with_exposure`.
-
-    Raises
-    ------
-    VideoError
-        For an output of unknown format.
+    Shutter, aperture, focus and exposures stay as they are: see `with_exposure`. Raises `VideoError` for an output of
+    unknown format.
     """
     return dataclasses.replace(
         options,
@@ -132,9 +128,7 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
 def check_options(options: VideoOptions, output: Path) -> None:
     """Make sure, before anything that takes time, that a video with these options can be written to `output`.
 
-    Raises
-    ------
-    RippleError
+    Raises `RippleError`.
     """
     parse_request(options.overlay or ())
     operators = compared_operators(options.compare)
@@ -160,10 +154,7 @@ def check_options(options: VideoOptions, output: Path) -> None:
 def frame_count(options: Any, scene: Scene | None = None) -> int:
     """Frames of a video with settled options, or of an export of a scene.
 
-    Raises
-    ------
-    SceneError
-        If the duration or the slow motion is out of range.
+    Raises `SceneError` if the duration or the slow motion is out of range.
     """
     duration = options.duration if scene is None or options.duration is not None else scene.duration
     check_duration(duration or 0.0, options.slow_motion)

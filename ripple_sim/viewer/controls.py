@@ -86,10 +86,7 @@ class Recorder:
     def save(self, frame: NDArray[np.uint8]) -> Path:
         """Write a frame to an image, uint8 [height, width, 3], and return its path.
 
-        Raises
-        ------
-        VideoError
-            If it cannot be written.
+        Raises `VideoError` if it cannot be written.
         """
         path = self._free(".png")
         try:
@@ -101,10 +98,7 @@ class Recorder:
     def start(self, frame: NDArray[np.uint8]) -> Path:
         """Begin a video of frames of this size; an odd row or column is left out. Return its path.
 
-        Raises
-        ------
-        VideoError
-            If it cannot be written.
+        Raises `VideoError` if it cannot be written.
         """
         height, width, _ = _even(frame).shape
         path = self._free(".mp4")

@@ -163,10 +163,7 @@ class Session:
     def set_operator(self, operator: str) -> None:
         """Switch the wave operator on all surfaces; the waves stay as they are.
 
-        Raises
-        ------
-        SolverError
-            For an unknown operator.
+        Raises `SolverError` for an unknown operator.
         """
         self.simulation.ripples.change_operator(operator)
         self.operator = operator
@@ -174,10 +171,7 @@ class Session:
     def set_material(self, **coefficients: float) -> None:
         """Change coefficients of all surfaces' material; the waves stay as they are.
 
-        Raises
-        ------
-        SolverError
-            For an invalid coefficient.
+        Raises `SolverError` for an invalid coefficient.
         """
         self._change_material(**coefficients)
         self._material.update(coefficients)

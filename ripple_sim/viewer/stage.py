@@ -218,7 +218,7 @@ class Stage:
 
     def __init__(self, plotter: pv.Plotter, session: Session) -> None:
         self._plotter, self._session = plotter, session
-        self._heatmap = True
+        self._heatmap = False
         # shadows lie side by side on the floor: plain blending will do, without buffers of the window's size
         plotter.renderer.SetUseOIT(False)
         plotter.set_background(BACKGROUND)
@@ -270,3 +270,4 @@ class Stage:
             n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
         )  # fmt: skip
         self._bar.SetVerticalTitleSeparation(10)
+        self._bar.SetVisibility(self._heatmap)

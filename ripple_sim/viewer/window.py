@@ -345,13 +345,7 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
 
 
 def check_display() -> None:
-    """Make sure that a window can be opened.
-
-    Raises
-    ------
-    DisplayError
-        With what is missing, and the alternatives.
-    """
+    """Make sure that a window can be opened; raises `DisplayError` with what is missing, and the alternatives."""
     if problem := display_problem():
         raise DisplayError(
             f"no window can be opened: {problem}; add --web to use a browser instead, or render a video with "

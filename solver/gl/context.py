@@ -337,12 +337,8 @@ class GLContext:
     def wait_for(self, fence: int) -> None:
         """Wait until the driver has reached a fence, as `wait` does for all commands; the fence is then deleted.
 
-        Outside of the context's `with` block other threads may enter meanwhile.
-
-        Raises
-        ------
-        GLError
-            If the driver reports a failure.
+        Outside of the context's `with` block other threads may enter meanwhile. Raises `GLError` if the driver reports
+        a failure.
         """
         while True:
             with self:

@@ -138,10 +138,7 @@ _WHOLE = re.compile(r"-?\d{1,15}", flags=re.ASCII)
 def read_obj(content: bytes) -> Soup:
     """Triangles of a Wavefront OBJ file: all its objects, groups and materials together.
 
-    Raises
-    ------
-    MeshError
-        For a line that cannot be read, or a vertex that does not exist.
+    Raises `MeshError` for a line that cannot be read, or a vertex that does not exist.
     """
     places: list[str] = []
     pairs: list[str] = []
@@ -188,10 +185,8 @@ def read_obj(content: bytes) -> Soup:
 def read_off(content: bytes) -> Soup:
     """Triangles of an OFF file in text form, with or without colours and normals.
 
-    Raises
-    ------
-    MeshError
-        If the file is not an OFF file in text form, ends early, or refers to a vertex that does not exist.
+    Raises `MeshError` if the file is not an OFF file in text form, ends early, or refers to a vertex that does not
+    exist.
     """
     rows = [words for line in _decoded(content).splitlines() if (words := line.partition("#")[0].split())]
     if not rows or not re.fullmatch(r"(ST)?C?N?OFF", rows[0][0].upper()) or "BINARY" in rows[0]:
@@ -304,12 +299,7 @@ def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mes
 
 
 def check_mesh_file(path: Path) -> None:
-    """Make sure, before anything that takes time, that there is a file to read a mesh from.
-
-    Raises
-    ------
-    MeshError
-    """
+    """Make sure, before anything that takes time, that there is a file to read a mesh from; raises `MeshError`."""
     try:
         if path.is_dir():
             raise MeshError(f"{str(path)!r} is a folder; give the path of an OBJ, PLY, STL, OFF or GLB file")

@@ -28,10 +28,7 @@ class Element:
 def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
     """Columns of an element by name, and the data after it.
 
-    Raises
-    ------
-    MeshError
-        If the data end early, or a row has something other than numbers.
+    Raises `MeshError` if the data end early, or a row has something other than numbers.
     """
     parts = data.split(b"\n", element.rows) if element.rows <= len(data) else []
     if len(parts) < element.rows or (len(parts) == element.rows and element.rows and not parts[-1].strip()):
@@ -60,10 +57,7 @@ def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any]
 def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
     """Columns of an element by name, and the data after it; `order` is "<" or ">".
 
-    Raises
-    ------
-    MeshError
-        If the data end early.
+    Raises `MeshError` if the data end early.
     """
     return _read_table(element, data, order) or _read_rows(element, data, order)
 
@@ -238,10 +232,7 @@ _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 def read_ply(content: bytes) -> Soup:
     """Triangles of a PLY file.
 
-    Raises
-    ------
-    MeshError
-        If the file is not a PLY file, ends early, or refers to a vertex that does not exist.
+    Raises `MeshError` if the file is not a PLY file, ends early, or refers to a vertex that does not exist.
     """
     order, elements, data = _header(content)
     columns: dict[str, dict[str, Any]] = {}

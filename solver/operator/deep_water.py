@@ -122,10 +122,7 @@ class FluidOperator(WaveOperator):
 def over_fluid(operator: WaveOperator, deep: float, geometry: Stencil, areas: NDArray[np.float64]) -> FluidOperator:
     """The operator of a surface with deep fluid below; see `FluidOperator`.
 
-    Raises
-    ------
-    SolverError
-        If the density varies, or the surface bends or yields.
+    Raises `SolverError` if the density varies, or the surface bends or yields.
     """
     for wrong, what in (
         (operator.density is not None, "a density that varies"),

@@ -127,13 +127,7 @@ PRESETS: dict[str, Preset] = {
 
 
 def preset_named(name: str) -> Preset:
-    """The preset of a name.
-
-    Raises
-    ------
-    SolverError
-        If there is none.
-    """
+    """The preset of a name; raises `SolverError` if there is none."""
     if not isinstance(name, str) or name not in PRESETS:
         raise SolverError(f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}")
     return PRESETS[name]

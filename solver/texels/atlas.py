@@ -66,10 +66,7 @@ _INDICES = {"F", "triangles", "glued", "charts", "piece_triangle", "piece_chart"
 def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
     """Write an atlas's arrays; the file appears whole or not at all.
 
-    Raises
-    ------
-    AtlasError
-        If the file cannot be written.
+    Raises `AtlasError` if the file cannot be written.
     """
     small = {name: arrays[name].astype(np.int32) for name in _INDICES & arrays.keys()}
     try:
@@ -82,10 +79,8 @@ def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
 def check_atlas_place(path: Path, overwrite: bool) -> None:
     """Make sure that an atlas may be written to a path.
 
-    Raises
-    ------
-    AtlasError
-        If there can be no such name, or another file is there, unless it is empty or `overwrite` says that it is to go.
+    Raises `AtlasError` if there can be no such name, or another file is there, unless it is empty or `overwrite` says
+    that it is to go.
     """
     try:
         final_path(path)
@@ -108,10 +103,7 @@ def check_atlas_place(path: Path, overwrite: bool) -> None:
 def read_atlas_file(path: Path) -> dict[str, NDArray]:
     """Read the arrays of an atlas.
 
-    Raises
-    ------
-    AtlasError
-        If the file is missing, truncated, changed, or not an atlas of this version.
+    Raises `AtlasError` if the file is missing, truncated, changed, or not an atlas of this version.
     """
     try:
         if not path.is_file():

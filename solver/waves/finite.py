@@ -12,16 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError, shown, whole
-from ..texels.atlas import Atlas
 
 
 def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """A number, or an array of the given shape, as a float32 field [C, n, n].
 
-    Raises
-    ------
-    SolverError
-        If the shape is another one, or a value is not finite.
+    Raises `SolverError` if the shape is another one, or a value is not finite.
     """
     try:
         array = np.asarray(value, dtype=np.float32)
@@ -92,10 +88,13 @@ _GREATEST = float(np.finfo(np.float32).max)
 
 
 class FiniteGuard:
-    """Reports once, with its place, time and source, that a field is no longer finite."""
+    """Reports once, with its place, time and source, that a field is no longer finite.
 
-    def __init__(self, atlas: Atlas) -> None:
-        self._atlas = atlas
+    The texels are at `positions`, [C, n, n, 3] [m].
+    """
+
+    def __init__(self, positions: NDArray[np.float64]) -> None:
+        self._positions = positions
         self.clear()
 
     def clear(self) -> None:
@@ -124,7 +123,7 @@ class FiniteGuard:
         self._reported = True
         bad = ~np.isfinite(field)
         # it spreads by a texel a substep on all sides, so it began in the middle
-        places = self._atlas.positions[bad]
+        places = self._positions[bad]
         middle = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
         chart, row, column = np.argwhere(bad)[middle]
         x, y, z = places[middle]
@@ -141,10 +140,7 @@ class FiniteGuard:
 def check_kick(velocities: NDArray[np.float64], kind: str, value: float, unit: str) -> float:
     """The greatest of the velocities [k] that a source gives at once [m/s].
 
-    Raises
-    ------
-    SolverError
-        If it is beyond float32.
+    Raises `SolverError` if it is beyond float32.
     """
     fastest = float(np.abs(velocities).max(initial=0.0))
     if not fastest <= _GREATEST:

@@ -116,10 +116,7 @@ class HeightMapShaders:
     def fill(self, field: DeviceField, texture: moderngl.TextureArray, layer: int) -> float:
         """Write the height map's page into a layer of a texture, RGBA32F; return the largest height drawn [m].
 
-        Raises
-        ------
-        SolverError
-            If a height is not finite.
+        Raises `SolverError` if a height is not finite.
         """
         highest = field.peak
         if not np.isfinite(highest):

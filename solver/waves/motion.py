@@ -63,10 +63,7 @@ class Motion:
     def to(self, vertices: ArrayLike) -> WaveOperator | None:
         """Move the vertices [n, 3] [m]; return the operator there, or None where lengths are as they were.
 
-        Raises
-        ------
-        SolverError
-            If the vertices are not finite, or others than those of the mesh.
+        Raises `SolverError` if the vertices are not finite, or others than those of the mesh.
         """
         self.V = self._checked(vertices)
         self.__dict__.pop("atlas", None)

@@ -99,7 +99,7 @@ class WaveSolver:
         self._backend = make_backend(backend, operator, keeps_volume=conserve_volume)
         self._balance = VolumeBalance(operator)
         self._held = HeldLoad(self._backend, operator.source_share, self._balance)
-        self._guard = FiniteGuard(atlas)
+        self._guard = FiniteGuard(atlas.positions)
         self.listeners = Listeners(self._backend)
         self._least_mass = float(operator.mass.min())
 

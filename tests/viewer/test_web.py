@@ -151,6 +151,8 @@ def test_the_surface_moves_after_a_poke(page: Page) -> None:
     wait_for(lambda: "paused" in page.inner_text("#status"))
     page.click("#reset")
     wait_for(lambda: seconds(page) == 0)
+    assert blueness(page) > 60  # the scene's own colour
+    page.click("#colors")
     wait_for(lambda: blueness(page) < 30)  # pictures come after the numbers
     before = picture(page)
     box = page.locator("#picture").bounding_box()
@@ -171,6 +173,14 @@ def test_operator_and_colours_can_be_changed(page: Page) -> None:
     wait_for(lambda: blueness(page) > 60)  # the scene's own colour
     page.click("#colors")
     wait_for(lambda: blueness(page) < 60)
+
+
+def test_the_picture_fits_into_a_low_window(page: Page) -> None:
+    page.set_viewport_size({"width": 500, "height": 300})
+    box = page.locator("#status").bounding_box()
+    assert box["y"] + box["height"] <= 300
+    page.set_viewport_size({"width": 500, "height": 500})
+    wait_for(lambda: page.locator("#picture").bounding_box()["height"] == 300)
 
 
 def test_a_drag_turns_the_camera(page: Page) -> None:

@@ -144,10 +144,7 @@ class HeatmapTexture:
     def set(self, values: NDArray[np.float32], limit: float) -> None:
         """Replace the values, [C, n + 2, n + 2]; the colours range from -limit to limit.
 
-        Raises
-        ------
-        RippleError
-            If the shape is another, or the limit is not a positive, finite number.
+        Raises `RippleError` if the shape is another, or the limit is not a positive, finite number.
         """
         if values.shape != self._shape:
             raise RippleError(

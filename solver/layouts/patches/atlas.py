@@ -220,13 +220,7 @@ _TEXELS_OF_CELL, _LEAST_CELLS = 245, 24
 
 
 def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
-    """Atlas of about 6 N^2 texels, for a resolution N.
-
-    Raises
-    ------
-    AtlasError
-        If the mesh cannot be laid out.
-    """
+    """Atlas of about 6 N^2 texels, for a resolution N; raises `AtlasError` if the mesh cannot be laid out."""
     start = time.perf_counter()
     patches = patch_map(mesh.V, mesh.F, cells_for(resolution))
     mapped = time.perf_counter()

@@ -26,12 +26,7 @@ def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
 
     A cell that is no disk gets a seed half-way round its shortest loop that does not shrink to a point; one with fewer
     corners gets a further neighbour on its border or, if that was tried before, loses its seed. Cells with new
-    neighbours are centred anew, and mended once more.
-
-    Raises
-    ------
-    AtlasError
-        If none are found.
+    neighbours are centred anew, and mended once more. Raises `AtlasError` if none are found.
     """
     count = len(cells.seeds)
     cells, bordered = _mended(metric, cells)

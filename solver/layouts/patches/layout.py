@@ -267,12 +267,8 @@ class PatchMap:
 def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) -> PatchMap:
     """Lay a manifold, oriented mesh out on charts, without a fold; on about so many cells of four to six charts.
 
-    Where the largest part allows it charts are large, one for each of some more cells.
-
-    Raises
-    ------
-    AtlasError
-        If its triangles are too thin, or no cells are found.
+    Where the largest part allows it charts are large, one for each of some more cells. Raises `AtlasError` if its
+    triangles are too thin, or no cells are found.
     """
     parts, counts, shares = _components(V, F, cells)
     widest = int(shares.argmax())

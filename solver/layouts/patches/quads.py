@@ -342,10 +342,7 @@ class Quads:
 def cut_into_quads(cells: BorderedCells) -> Quads:
     """Cut cells into quads, as many as they have corners; even these out, and lay out each of them as a square.
 
-    Raises
-    ------
-    AtlasError
-        If round-off folds a triangle: they are too thin.
+    Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
     return _laid_out(cells, *with_even_corners(*_cut(cells)))
 
@@ -353,10 +350,7 @@ def cut_into_quads(cells: BorderedCells) -> Quads:
 def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
     """The same with about as many quads as cells; None if there are none, as where two cells go all round a limb.
 
-    Raises
-    ------
-    AtlasError
-        If round-off folds a triangle: they are too thin.
+    Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
     large = joined(*_cut(cells))
     return None if large is None else _laid_out(cells, *large)

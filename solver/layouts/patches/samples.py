@@ -90,10 +90,7 @@ _REACH = 2  # of triangles, in charts beyond that in which they begin
 def locate_texels(seamless: SeamlessMap, n: int) -> tuple[Ints, Floats]:
     """Triangle [C, n, n] of each of the n x n texels of a chart, and barycentric coordinates in it, [C, n, n, 3].
 
-    Raises
-    ------
-    AtlasError
-        If a texel lies in no triangle, which a map without a fold rules out.
+    Raises `AtlasError` if a texel lies in no triangle, which a map without a fold rules out.
     """
     triangles, barycentrics = locate_in_charts(seamless, n, np.arange(len(seamless.glued)))
     missed = int((triangles < 0).sum())
