@@ -130,7 +130,8 @@ _QUALITY = 85  # of the JPEG frames, per cent
 
 _STYLE = """
 body { margin: 0; font: 14px sans-serif; background: #bdc4cf; color: #111; }
-main { outline: none; margin: 0 auto; padding: 12px 0; box-sizing: border-box; height: 100vh; display: flex; flex-direction: column; }
+main { outline: none; margin: 0 auto; padding: 12px 0; box-sizing: border-box; height: 100vh;
+  display: flex; flex-direction: column; }
 #picture { flex: 0 1 auto; min-height: 0; }
 nav { display: flex; flex-wrap: wrap; gap: 6px; margin-bottom: 8px; }
 button { font: inherit; padding: 4px 10px; border: 1px solid #667; border-radius: 4px; background: #eef0f3; }
