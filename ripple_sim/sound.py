@@ -28,13 +28,14 @@ from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.backends.kernels import Probes
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.waves.finite import count_substeps
-from ripple_sim.solver.waves.sensor import filtered, resolved
+from ripple_sim.solver.waves.sensor import filtered, hertz
 
 DENSITY, SPEED = 1.204, 343.2  # of dry air at 20 degrees Celsius [kg/m^3], [m/s]
 RATE = 48_000  # samples a second of what is heard
 
 _PEAK = 0.9  # of full scale: codecs may overshoot a little
 _HEARD = 20.0  # [Hz], the lowest tone
+_PARTS = 5.0  # a surface over the length of the shortest wave that counts as long
 _GRAZING = 0.1  # cosine from which on a texel counts in full: none appears at once
 _NEAREST = 0.01  # [m]: nearer texels count as if they were there
 
@@ -177,13 +178,14 @@ def _chunk(name: bytes, content: bytes) -> bytes:
 
 
 def _warn_if_unheard(name: str, waves: WaveSolver, slow_motion: float) -> None:
-    """Say of a target whose waves are too slow to be heard, and of what would ring."""
-    highest = max(resolved(waves.atlas, waves.material, texel) for texel in range(0, waves.atlas.areas.size, 97))
-    if highest / slow_motion < _HEARD:
-        size = float(np.ptp(waves.atlas.positions.reshape(-1, 3), axis=0).max())
+    """Say of a target whose long waves are too slow to be heard, and of what would ring."""
+    size = float(np.ptp(waves.atlas.positions.reshape(-1, 3), axis=0).max())
+    texels = range(0, waves.atlas.areas.size, 97)
+    highest = max(hertz(waves.material, texel, size / _PARTS) for texel in texels) / slow_motion
+    if highest < _HEARD:
         warnings.warn(
-            f"{name!r} is not heard: its waves sound at {highest / slow_motion:.2g} Hz at most, below hearing "
-            f"({_HEARD:g} Hz); a speed of {200 * size / 0.77 * slow_motion:.2g} m/s would ring at about 200 Hz",
+            f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound at {highest:.2g} Hz at most, "
+            f"below hearing ({_HEARD:g} Hz); a speed of {200 * size / 0.77 * slow_motion:.2g} m/s would ring at 200 Hz",
             RippleWarning,
             stacklevel=3,
         )

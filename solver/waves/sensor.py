@@ -156,7 +156,7 @@ class Sensor:
         )
         # where substeps are longer than samples there is nothing between them to filter out
         self._base = min(self.rate, 1 / operator.stable_timestep)
-        shortest = (resolved(atlas, material, int(center)) for center in centers)
+        shortest = (_resolved(atlas, material, int(center)) for center in centers)
         self.bandwidth = min(*shortest, _PASSED * self._base)
         self.begin(0.0, np.zeros(len(rows)))
 
@@ -292,13 +292,18 @@ def _tangents(normal: NDArray) -> NDArray[np.float64]:
     return np.stack([u, np.cross(normal, u)])
 
 
-def resolved(atlas: Atlas, material: Material, center: int) -> float:
+def _resolved(atlas: Atlas, material: Material, center: int) -> float:
     """Frequency [Hz] of the shortest wave that the texels round one carry, of the material there."""
     texels = _around(atlas.texels.topology, center, 1)
     away = np.linalg.norm(atlas.positions.reshape(-1, 3)[texels] - atlas.positions.reshape(-1, 3)[center], axis=1)
     widest = np.sort(away)[: min(5, len(away))].max()  # the four beside it
+    return hertz(material, center, _TEXELS * widest)
+
+
+def hertz(material: Material, texel: int, length: float) -> float:
+    """Frequency [Hz] of a wave of a length [m], of the material at a texel of a flat index."""
     here = {
-        name: value if np.ndim(value) == 0 or name == "wavelengths" else np.asarray(value).reshape(-1)[center]
+        name: value if np.ndim(value) == 0 or name == "wavelengths" else np.asarray(value).reshape(-1)[texel]
         for name, value in vars(material).items()
     }
-    return frequency(Material(**here), 2 * np.pi / (_TEXELS * widest)) / (2 * np.pi)
+    return frequency(Material(**here), 2 * np.pi / length) / (2 * np.pi)
