@@ -192,7 +192,7 @@ class StepContacts(NamedTuple):
         timestep : float
             How long the forces were held [s].
         """
-        n, geom, others = atlas.areas.shape[1], names[owners[self.target]], owners[self.on_texels.geoms]
+        geom, others = names[owners[self.target]], owners[self.on_texels.geoms]
         places, forces, texels, inner = self.places, self.forces, self.texels, self.inner
         # the last ids are those of a flex's vertices, which touch for themselves and are told of together
         if others[-1] != self.on_texels.geoms[-1]:
@@ -212,10 +212,10 @@ class StepContacts(NamedTuple):
             places, texels = atlas.nearest(np.concatenate([places, middles])[kept])
             others, inner = others[whose], inner[whose]
         points = self.position + places @ self.rotation.T
-        told = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
-        for other, point, force, texel, behind in told:
-            row = texel // n
-            yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
+        at = zip(*(each.tolist() for each in np.unravel_index(texels, atlas.areas.shape)), strict=True)
+        told = zip(others.tolist(), points, (forces * timestep).tolist(), at, inner.tolist(), strict=True)
+        for other, point, impulse, texel, behind in told:
+            yield Impulse(geom, names[other], point, impulse, texel, behind)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""
@@ -290,9 +290,8 @@ class TargetLoad:
             pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
             inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
         loads = load_points(
-            points, contacts.forces, starts, self._radii[geoms], self._convex[geoms],
-            lambda probes: self._atlas.nearest_places(probes)[0],
-        )  # fmt: skip
+            points, contacts.forces, starts, self._radii[geoms], self._convex[geoms], self._atlas.closest_places
+        )
         under = self._footprints.under(geoms[loads.patches], loads.points, loads.radii, self._filter.active)
         # what touches from inside pushes outwards
         pushes = loads.forces * np.where(inner, -timestep / elapsed, timestep / elapsed)[loads.patches]

@@ -216,6 +216,10 @@ class Atlas:
         triangle, closest = closest_points(self.tree, points)
         return closest, self.chart_map.texels_at(self.mesh, self.resolution, triangle, closest)
 
+    def closest_places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Those surface points alone [m], [k, 3]: without the texels they take half the time."""
+        return closest_points(self.tree, points)[1]
+
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
         """Flat index (chart N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
         return self.nearest(points)[1]

@@ -285,9 +285,17 @@ class SphereAtlas(Atlas):
 
     def nearest_places(self, points: Floats) -> tuple[Floats, Ints]:
         """The same of finite points; of the centre, to which all are as near, the one towards z."""
-        length = np.linalg.norm(points, axis=1, keepdims=True)
-        directions = np.where(length > 0, points / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+        directions = _directions(points)
         return self.radius * directions, texels_towards(directions, self.resolution)
+
+    def closest_places(self, points: Floats) -> Floats:
+        """The points alone."""
+        return self.radius * _directions(points)
+
+
+def _directions(points: Floats) -> Floats:
+    length = np.linalg.norm(points, axis=1, keepdims=True)
+    return np.where(length > 0, points / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
 
 
 @checked(AtlasError, radius=POSITIVE)

@@ -136,6 +136,7 @@ def test_places_are_those_of_points_carried_to_the_charts(layout: str) -> None:
     points = atlas.mesh.V[rng.integers(len(atlas.mesh.V), size=400)] + 0.02 * size * rng.standard_normal((400, 3))
     closest, texels = atlas.nearest_places(points)
     np.testing.assert_allclose(closest, atlas.project(points)[0], atol=1e-12)
+    np.testing.assert_array_equal(atlas.closest_places(points), closest)
     chart, row, column = atlas.locate(points)
     places = np.clip([row, column], 0, n - 1)
     found = np.array(np.unravel_index(texels, atlas.areas.shape))
