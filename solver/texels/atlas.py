@@ -217,7 +217,7 @@ class Atlas:
         return closest, self.chart_map.texels_at(self.mesh, self.resolution, triangle, closest)
 
     def closest_places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Those surface points alone [m], [k, 3]: without the texels they take half the time."""
+        """Those surface points alone [m], [k, 3], where no texels are asked for."""
         return closest_points(self.tree, points)[1]
 
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
