@@ -321,8 +321,8 @@ class TargetLoad:
                 at = slice(begins[row], begins[row + 1])
                 # what a unit of the contact's impulse gives each texel
                 shares = on_texels.forces[at] * (elapsed / (timestep * forces[row]))
-                lent = self._hits.begin(data, self._atlas, pairs[row], texels[at], shares)
-                self._filter.lend(int(geoms[row]), lent)
+                prepaid = self._hits.begin(data, self._atlas, pairs[row], texels[at], shares)
+                self._filter.prepay(int(geoms[row]), prepaid)
         return self._over(self._filter(on_texels, elapsed), elapsed), done
 
     def untouched(self, elapsed: float) -> Load:

@@ -5,7 +5,7 @@ every step. The sum of its contact forces is smooth, and passes as it is; the pl
 while nothing changes, and is short where force or place do.
 
 A contact that chatters is the exception: its force is averaged over some periods too. The deficit [N s] is what the
-surface has yet to receive, so that nothing is lost. Its debt is what the surface has got before MuJoCo's contact gives
+surface has yet to receive, so that nothing is lost. What is prepaid the surface has got before MuJoCo's contact gives
 it, in the pulse of a hit: the contact's first impulses pay for it.
 
 A geom on stiff, springy contacts chatters: contact opens for a step and closes again, at the natural frequency of the
@@ -58,7 +58,7 @@ _FIELDS = [
     ("side", np.float64),  # 1 where it pushes inwards, -1 outwards; forces are amounts along that
     ("level", np.float64),  # its force, averaged over chatter [N]
     ("deficit", np.float64),  # impulse that the target has not received yet [N s]
-    ("debt", np.float64),  # impulse that the target has received before [N s]
+    ("prepaid", np.float64),  # impulse that the target has received before [N s]
     ("memory", np.float64),  # time over which means are taken, short where something changes [s]
     ("mean_force", np.float64),  # mean force [N]
     ("place", np.float64, 3),  # where it is [m]
@@ -133,7 +133,7 @@ class RestFilter:
         """Scale all times for physics steps of this length [s]."""
         unit = max(timestep / _TIME_STEP, self._time_constant / DEFAULT_TIME_CONSTANT)
         if unit != self._unit:
-            for name in ("deficit", "debt"):
+            for name in ("deficit", "prepaid"):
                 self._states[name] *= self._unit / unit
             self._unit = unit
 
@@ -142,12 +142,12 @@ class RestFilter:
         states, dt = list(self._states[geoms]), dt / self._unit
         return [i for i, each in enumerate(states) if not each.active or _has_left(each, dt)]
 
-    def lend(self, geom: int, impulse: float) -> None:
+    def prepay(self, geom: int, impulse: float) -> None:
         """What a geom will give next, so much of it [N s], positive inwards, the target has already."""
         state, side = self._states[geom], np.sign(impulse)
         if impulse:
             state.side, state.deficit = side, side * state.side * state.deficit
-            state.debt += abs(impulse) / self._unit
+            state.prepaid += abs(impulse) / self._unit
 
     def __call__(self, present: TexelForces, dt: float) -> Load:
         """Load over a time [s] in which these forces act."""
@@ -195,7 +195,7 @@ def _filter(
             side = 1.0 if force > 0 else -1.0
             if state.side != side:
                 # what the target has not received yet stays as it is
-                state.side, state.deficit, state.debt = side, state.debt - state.deficit, 0.0
+                state.side, state.deficit, state.prepaid = side, state.prepaid - state.deficit, 0.0
             total = side * _touch(state, abs(force), present.middles[row - 1], present.place_radii[row - 1], dt)
             weight = dt / (dt + state.memory) if state.first < state.last else 1.0
             if weight < 1:
@@ -296,7 +296,7 @@ def _miss(state: Any, dt: float) -> float:
     # that of a springy contact does from its first opening on
     state.chatters = state.springy and not _has_left(state, dt)
     if _has_left(state, dt):  # nothing comes that would pay for it
-        state.deficit, state.debt = state.deficit - state.debt, 0.0
+        state.deficit, state.prepaid = state.deficit - state.prepaid, 0.0
     given = _given(state, 0.0, 0.0, dt)
     state.active = state.deficit != 0 or not _has_left(state, dt)
     return given
@@ -306,10 +306,10 @@ def _miss(state: Any, dt: float) -> float:
 def _given(state: Any, force: float, hit: float, dt: float) -> float:
     """Force that the target gets [N]; the difference goes to the deficit, of which a part is paid.
 
-    What pays for the debt it does not get.
+    What is prepaid it does not get again.
     """
-    repaid = min(state.debt / dt, force)
-    state.debt -= dt * repaid
+    repaid = min(state.prepaid / dt, force)
+    state.prepaid -= dt * repaid
     force -= repaid
     given = state.level + hit if state.chatters else force
     state.deficit += dt * (force - given)
