@@ -100,11 +100,15 @@ _SHADER_CACHE = 64e6
 
 
 def _spare_full_disks() -> None:
-    """Switch Mesa's shader cache off where its disk is nearly full: it is mapped, and a page without room kills."""
+    """Switch Mesa's shader cache off where its disk is nearly full, or its folder cannot be made.
+
+    It is mapped, and a page without room kills; of a folder Mesa complains on standard error.
+    """
     names = ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
     folder = Path(next((os.environ[name] for name in names if os.environ.get(name)), "/"))
     with contextlib.suppress(OSError):
-        if shutil.disk_usage(next(each for each in (folder, *folder.parents) if each.exists())).free < _SHADER_CACHE:
+        there = next(each for each in (folder, *folder.parents) if each.exists())
+        if shutil.disk_usage(there).free < _SHADER_CACHE or not os.access(there, os.W_OK):
             os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
 
 

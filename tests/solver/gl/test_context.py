@@ -241,10 +241,15 @@ def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(tmp_path, 
         assert (again["factor"].value, again["more"].value) == (3.0, 0.0)
 
 
-@pytest.mark.parametrize(("free", "expected"), [(1e6, "true"), (1e9, None)])
-def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full(free: float, expected: str | None, monkeypatch) -> None:
+@pytest.mark.parametrize(
+    ("free", "writable", "expected"), [(1e6, True, "true"), (1e9, True, None), (1e9, False, "true")]
+)
+def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(
+    free: float, writable: bool, expected: str | None, monkeypatch
+) -> None:
     """Its cache is mapped into memory: a page for which the disk has no room ends the process by a bus error."""
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=free))
+    monkeypatch.setattr("os.access", lambda *_: writable)
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
     create_context(None).release()
     assert os.environ.get("MESA_SHADER_CACHE_DISABLE") == expected
