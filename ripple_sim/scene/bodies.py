@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.mesh.rays import RayScene, downward_hits
 
 from .events import DropEntry
 
@@ -52,6 +52,7 @@ def drop_model(
     shapes: list[str],
     rng: np.random.Generator,
     eye: NDArray[np.float64] | None = None,
+    scale: float = 1.0,
 ) -> tuple[mujoco.MjSpec, list[DropEntry]]:
     """Model of a mesh on a floor, with bodies, and when and where these drop.
 
@@ -66,6 +67,8 @@ def drop_model(
         Of the bodies' sizes, places and colours.
     eye : float64 [3], optional
         Whence the hits are to be seen [m].
+    scale : float
+        Of the bodies' sizes.
     """
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.002
@@ -90,17 +93,23 @@ def drop_model(
         condim=6,
         friction=[0.8, 0.01, 0.02],
     )
-    landing = _landing_points(V, F, len(shapes), rng, eye)
+    landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
     times = 0.1 + 3.4 * np.arange(len(shapes)) / max(len(shapes), 1)
-    return spec, [_add_body(spec, i, shape, float(times[i]), landing[i], rng) for i, shape in enumerate(shapes)]
+    return spec, [_add_body(spec, i, shape, float(times[i]), landing[i], rng, scale) for i, shape in enumerate(shapes)]
 
 
 def _add_body(
-    spec: mujoco.MjSpec, number: int, shape: str, time: float, landing: NDArray[np.float64], rng: np.random.Generator
+    spec: mujoco.MjSpec,
+    number: int,
+    shape: str,
+    time: float,
+    landing: NDArray[np.float64],
+    rng: np.random.Generator,
+    scale: float,
 ) -> DropEntry:
     """Add a body of a shape that drops at a time [s] on a landing point [m]."""
     kind, proportions = BODY_SHAPES[shape]
-    radius = rng.uniform(*_RADII)
+    radius = scale * rng.uniform(*_RADII)
     name = f"body_{number}"
     # parked high above until it drops, out of sight and out of reach of the others
     body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 20.0 + number], quat=rng.standard_normal(4))
@@ -118,10 +127,11 @@ def _landing_points(
     count: int,
     rng: np.random.Generator,
     eye: NDArray[np.float64] | None,
+    room: float,
 ) -> NDArray[np.float64]:
     """Random points of the surface with nothing above them, or vertices where there are none, shape [count, 3] [m].
 
-    First those that face upwards, have as much room about them as a body needs, and are seen from the eye.
+    First those that face upwards, have room about them [m], and are seen from the eye.
     """
     scene, low, high = RayScene(V, F), V.min(axis=0), V.max(axis=0)
     points, good = np.empty((0, 3)), np.empty(0)
@@ -129,27 +139,18 @@ def _landing_points(
         if (good == 3).sum() >= count or len(points) >= max(count, _TRIED):
             break
         xy = rng.uniform(low[:2], high[:2], size=(64, 2))
-        face, z = _downward(scene, xy, high[2])
+        face, z = downward_hits(scene, xy, high[2])
         hit = face >= 0
         found, (a, b, c) = np.column_stack([xy, z])[hit], np.moveaxis(V[F[face[hit]]], 1, 0)
         normals = np.cross(b - a, c - a)
         upward = np.abs(normals[:, 2]) > _UPWARD * np.linalg.norm(normals, axis=1)
-        around = [_downward(scene, found[:, :2] + step, high[2])[1] - found[:, 2] for step in _ROOM * _STEPS]
-        room = (np.abs(around) < _ROOM).all(axis=0)
+        around = [downward_hits(scene, found[:, :2] + step, high[2])[1] - found[:, 2] for step in room * _STEPS]
+        roomy = (np.abs(around) < room).all(axis=0)
         rays = np.zeros_like(found) if eye is None else eye - found
-        seen = scene.distances(found + [0.0, 0.0, 1e-3], rays) > 1
-        points, good = np.vstack([points, found]), np.append(good, 1.0 * upward + room + seen)
+        seen = scene.distances(found + np.array([0.0, 0.0, 1e-3]), rays) > 1
+        points, good = np.vstack([points, found]), np.append(good, 1.0 * upward + roomy + seen)
     points = points[np.argsort(-good, kind="stable")[:count]]
     return np.vstack([points, V[rng.integers(len(V), size=count - len(points))]])
-
-
-def _downward(
-    scene: RayScene, xy: NDArray[np.float64], top: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles that vertical rays from above at xy [k, 2] first meet, -1 for none, and how high [m]; each [k]."""
-    starts = np.column_stack([xy, np.full(len(xy), top + 0.1)])
-    face, distance, _, _ = scene.cast(starts, np.tile([0.0, 0.0, -1.0], (len(xy), 1)))
-    return face, top + 0.1 - distance
 
 
 class RandomEntry(msgspec.Struct, forbid_unknown_fields=True):

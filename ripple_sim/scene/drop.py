@@ -169,8 +169,15 @@ def usual_up(path: str | Path) -> str:
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
 DURATION = 5.0
 
-# Depth of a typical hit over half the usual thickness of the target, and at most over its size.
-_AMPLITUDE, _DEEPEST = 0.9, 0.2
+# Depth of a typical hit, over half the usual thickness of the target, over the radius of a tube that is as slender, and
+# at most over its size.
+_THICK, _SLIM, _DEEPEST = 5.6, 2.8, 0.2
+
+# Stiff enough for crest behind crest [1/s^2].
+_STIFFNESS = 1000.0
+
+# Tubes of this radius, over the size, get bodies of the usual size, and more slender ones smaller bodies.
+_SLENDER, _SMALLEST = 0.05, 0.5
 
 _FOOT = 0.02  # how high over the floor what touches it may be, over the size
 _FLAT, _LIFTED = 1e-6, 0.25  # thickness over size of what lies down; how high, so that waves have room below [m]
@@ -227,7 +234,14 @@ def drop_scene(
     camera, eye = _camera(V, mesh.F, mesh.closed)
     # MuJoCo may throw boxes and cylinders aside from a sheet
     shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape not in ("box", "cylinder")]
-    spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], np.random.default_rng(seed), eye)
+    extent = Extent.of(mesh)
+    # a tube has as much surface a length as a strip, which is what a hit can set in motion
+    rim = sum(float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum()) for rim in mesh.rims)
+    slender = extent.area / (np.pi * max(rim, 2 * extent.size) * extent.size)
+    scale = float(np.clip(slender / _SLENDER, _SMALLEST, 1.0))
+    amplitude = min(_THICK * extent.radius / extent.size, _SLIM * slender, _DEEPEST)
+    rng = np.random.default_rng(seed)
+    spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], rng, eye, scale)
     if not mesh.closed:
         make_collidable(spec, "target", "flex")
     paint_target(spec, mesh, mesh_path, texture)
@@ -238,7 +252,7 @@ def drop_scene(
     return Scene(
         name=Path(mesh_path).stem,
         model=model,
-        targets=(RippleEntry(geom="target", look=look, material=_material(mesh), warn=False),),
+        targets=(RippleEntry(geom="target", look=look, material=_material(amplitude, scale), warn=False),),
         camera=camera,
         duration=DURATION,
         events=Events(drop=tuple(drops)),
@@ -246,12 +260,14 @@ def drop_scene(
     )
 
 
-def _material(mesh: Mesh) -> MaterialEntry:
-    """Waves slow and high enough to watch under typical bodies, and lower on a thin target."""
-    extent = Extent.of(mesh)
-    amplitude = min(_AMPLITUDE * extent.radius / extent.size, _DEEPEST)
-    suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, amplitude=amplitude, crossing=1.5, decay=3.0)
-    return MaterialEntry(**{name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))})
+def _material(amplitude: float, scale: float) -> MaterialEntry:
+    """Waves slow and high enough to watch under typical bodies of a scale, crest behind crest."""
+    mass, speed = TYPICAL_HIT
+    suited = Material.suited(
+        SIZE, (mass * scale**3, speed), radius=TYPICAL_FOOTPRINT * scale, amplitude=amplitude, crossing=1.5, decay=2.5
+    )
+    given = {name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))}
+    return MaterialEntry(**given | {"stiffness": max(_STIFFNESS, suited.stiffness)})
 
 
 # Candidates of the camera: three-quarter views, first those of what faces -y, as most files have it [degrees].
@@ -268,9 +284,7 @@ _SEEN_AT = 1500  # points of the surface
 _TOP = 0.4  # least upward part of the normal of what bodies fall on
 
 
-def _camera(
-    V: NDArray[np.float64], F: NDArray[np.int64], closed: bool
-) -> tuple[CameraEntry, NDArray[np.float64]]:
+def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple[CameraEntry, NDArray[np.float64]]:
     """The three-quarter view that shows most of a target, and the eye half-way of the orbit [m].
 
     It fills the frame, shows the upper side, the head, which is what is uppermost where that is not over the middle,
@@ -303,7 +317,7 @@ def _camera(
     x, y, z = (float(each) for each in lookat)
     start = azimuth - _ORBIT * DURATION / 2
     entry = CameraEntry(
-        lookat=(x, y, z), distance=distance, azimuth=start, elevation=elevation, fovy=_FOVY, orbit=_ORBIT
+        lookat=(x, y, z), distance=float(distance), azimuth=start, elevation=float(elevation), fovy=_FOVY, orbit=_ORBIT
     )
     return entry, eye
 
