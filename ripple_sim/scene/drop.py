@@ -298,7 +298,7 @@ def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple
     upper = points[points[:, 2] >= np.quantile(points[:, 2], 0.9)]
     head = (upper.mean(axis=0) - points.mean(axis=0))[:2] / SIZE
     bins = np.rint(1.5 * normals).astype(int) @ [25, 5, 1] + 62
-    scene, best = RayScene(V, F), (-np.inf, 0.0, np.zeros(3), 0.0, np.zeros(3))
+    scene, best = RayScene(V, F), -np.inf
     for azimuth in _AZIMUTHS:
         lookat, distance, eye = _fitted(V, azimuth, elevation)
         rays = eye - points
@@ -312,14 +312,15 @@ def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple
         towards = (eye - lookat)[:2] / distance
         detail = (scene.distances(corners + 1e-3 * (eye - corners), eye - corners) > 1).mean()
         score = variety + top + 2 * head @ towards + np.log(max(shown.sum() * detail, 1e-300))
-        best = max(best, (score, azimuth, lookat, distance, eye), key=lambda each: each[0])
-    _, azimuth, lookat, distance, eye = best
+        if score > best:
+            best, chosen, eye_of_best = score, (azimuth, lookat, distance), eye
+    azimuth, lookat, distance = chosen
     x, y, z = (float(each) for each in lookat)
     start = azimuth - _ORBIT * DURATION / 2
     entry = CameraEntry(
         lookat=(x, y, z), distance=float(distance), azimuth=start, elevation=float(elevation), fovy=_FOVY, orbit=_ORBIT
     )
-    return entry, eye
+    return entry, eye_of_best
 
 
 def _sampled(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
