@@ -17,6 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 from tyro.conf import Positional, arg
 
+from ripple_sim.errors import VideoError
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.video.options import VideoOptions
 
@@ -366,6 +367,8 @@ class ViewCommand:
         # refuse what cannot work before anything that takes time: first what is asked for, then what this machine lacks
         is_scene(self.scene)
         check_size(*self.size)
+        if not self.folder.is_dir():
+            raise VideoError(f"there is no folder {str(self.folder)!r} for screenshots and videos; make it first")
         if self.benchmark:
             from ripple_sim.viewer.window import benchmark
 

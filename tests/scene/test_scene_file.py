@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import scene
-from ripple_sim.errors import SceneError
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import CameraEntry, Events, RippleEntry, Scene, StillEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
@@ -31,7 +31,8 @@ def changed(**entries: object) -> dict:
         (changed(ripple=[{"geom": "egg"}, {"geo": "b"}]), r"unknown key 'geo' in \[ripple\]; valid are geom, resol"),
         (changed(ripple=[{"geom": "a", "still": [{"r": 1}]}]), r"unknown key 'r' in \[ripple.still\]; valid are point"),
         ({"ripple": []}, "Object missing required field `model`"),
-        (changed(ripple={"geom": "egg"}), "Expected `array`, got `object` - at `ripple`"),
+        (changed(ripple={"geom": "egg"}), r"\[ripple\] is one table, where there may be several; write \[\[ripple\]\]"),
+        (changed(ripple=[{"geom": "a", "still": {"radius": 1}}]), r"write \[\[ripple.still\]\]"),
         (changed(camera={"lookat": [1, 2]}), "length 3.* at `camera.lookat`"),
         (changed(poke=[{"geom": "egg", "time": "now"}]), r"Expected `float`, got `str` - at `poke\[0\].time`"),
         (changed(throw=[{"body": "stone", "time": 0}]), "missing required field `velocity`"),
@@ -129,6 +130,12 @@ def test_a_scene_without_mistakes_passes() -> None:
     checked(EGG, RippleEntry(geom="pea", color=(0, 0.5, 1)))
     checked(EGG, duration=scene.MAX_DURATION - 1.0, overlay=("height=0.02", "time"), lighting="studio")
     checked(RippleEntry(geom="egg", still=[StillEntry((0, 0, 0.1), 0.01)]))
+
+
+def test_an_event_after_the_end_is_told_of() -> None:
+    poke = scene.PokeEntry("egg", 1.0, (0, 0, 0.1), 1.0)
+    with pytest.warns(RippleWarning, match=r"a \[\[poke\]\] at 1 s is not before the scene's end, 1 s; give"):
+        checked(EGG, events=Events(poke=[poke]))
 
 
 @pytest.mark.parametrize(
