@@ -267,7 +267,7 @@ def _material(amplitude: float, scale: float) -> MaterialEntry:
         SIZE, (mass * scale**3, speed), radius=TYPICAL_FOOTPRINT * scale, amplitude=amplitude, crossing=1.5, decay=2.5
     )
     given = {name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))}
-    return MaterialEntry(**given | {"stiffness": max(_STIFFNESS, suited.stiffness)})
+    return MaterialEntry(**given | {"stiffness": max(_STIFFNESS, given["stiffness"])})
 
 
 # Candidates of the camera: three-quarter views, first those of what faces -y, as most files have it [degrees].
