@@ -24,8 +24,9 @@ import tyro.extras
 from tyro.conf import Positional, arg
 
 from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
-from .reports import AtlasCommand, BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
+from .reports import BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
+from .surfaces import AtlasCommand, ModesCommand
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -36,6 +37,7 @@ _LONGEST = 800  # of a message [characters]
 _ADDRESS_SPACE = {
     InfoCommand: 1.3,
     AtlasCommand: 1.2,
+    ModesCommand: 1.2,
     BenchCommand: 2.4,
     RenderCommand: 2.4,
     DropCommand: 2.4,
@@ -162,6 +164,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "export": ExportCommand,
     "batch": BatchCommand,
     "atlas": AtlasCommand,
+    "modes": ModesCommand,
     "info": InfoCommand,
     "bench": BenchCommand,
     "view": ViewCommand,
