@@ -23,6 +23,9 @@ import tyro.conf
 import tyro.extras
 from tyro.conf import Positional, arg
 
+from ripple_sim import __version__
+from ripple_sim.solver.errors import RippleError
+
 from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
 from .reports import BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
@@ -69,7 +72,7 @@ def _run(command: Any) -> int:
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
 
     from ripple_sim.errors import DisplayError, EncodingError
-    from ripple_sim.solver.errors import GLError, RippleError, shown
+    from ripple_sim.solver.errors import GLError, shown
     from ripple_sim.solver.files import OF_THE_DISK, OF_THE_NAME
 
     end_in_good_order()
@@ -142,8 +145,8 @@ def _parse(argv: list[str]) -> Any:
         return _fail("a word of the command line holds a NUL; no name can", BAD_INPUT)
     try:
         command = parse(argv)
-        sys.stdout.flush()  # of the help or a completion script
-    except UsageError as error:
+        sys.stdout.flush()  # of the help, the version or a completion script
+    except (UsageError, RippleError) as error:
         return _fail(error, BAD_INPUT)
     except OSError as error:
         return _give_up_output(error)
@@ -173,7 +176,9 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "completion": CompletionCommand,
 }
 
-_DESCRIPTION = "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation."
+_DESCRIPTION = (
+    "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation. --version tells which."
+)
 
 
 class UsageError(Exception):
@@ -181,10 +186,13 @@ class UsageError(Exception):
 
 
 def parse(argv: Sequence[str]) -> Any:
-    """Return the command to run, or None if the help or a completion script was printed instead.
+    """Return the command to run, or None if the help, the version or a completion script was printed instead.
 
-    Raises `UsageError`.
+    Raises `UsageError`, and `RippleError` where the options of a command are out of range.
     """
+    if list(argv) == ["--version"]:
+        print(f"ripple-sim {__version__}")
+        return None
     command = _read(argv)
     if isinstance(command, CompletionCommand):  # which tyro makes from all the commands
         command = _read(["--tyro-print-completion", command.shell])
