@@ -105,8 +105,8 @@ def plot_modes(atlas: Atlas, found: Modes, path: str | Path, *, title: str, subt
 
 def _cropped(images: NDArray[np.float64]) -> NDArray[np.float64]:
     """Images [k, h, w, 4] without the margin that all of them have."""
-    seen = images[..., 3].any(axis=0)
-    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    seen = images[..., 3].max(axis=0)
+    rows, columns = np.flatnonzero(seen.max(axis=1)), np.flatnonzero(seen.max(axis=0))
     return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
