@@ -28,8 +28,9 @@ from ripple_sim import __version__
 from ripple_sim.solver.errors import RippleError
 
 from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
-from .reports import AtlasCommand, BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
+from .reports import BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
+from .surfaces import AtlasCommand, ModesCommand
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -40,6 +41,7 @@ _LONGEST = 800  # of a message [characters]
 _ADDRESS_SPACE = {
     InfoCommand: 1.3,
     AtlasCommand: 1.2,
+    ModesCommand: 1.2,
     BenchCommand: 2.4,
     RenderCommand: 2.4,
     DropCommand: 2.4,
@@ -177,6 +179,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "export": ExportCommand,
     "batch": BatchCommand,
     "atlas": AtlasCommand,
+    "modes": ModesCommand,
     "info": InfoCommand,
     "bench": BenchCommand,
     "view": ViewCommand,

@@ -277,7 +277,7 @@ class DropCommand(_VideoCommand):
     seed: Seed = 0
     """Seed for the bodies' places and sizes; the same seed gives the same video."""
     up: UpAxis = None
-    """Axis of the mesh that points up; a flat sheet lies down."""
+    """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
     repair: bool = False
@@ -342,7 +342,7 @@ class ViewCommand:
     seed: Seed = 0
     """Seed for the bodies' places and sizes."""
     up: UpAxis = None
-    """Axis of the mesh that points up; a flat sheet lies down."""
+    """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
     wrap: bool = False
