@@ -393,18 +393,19 @@ def _number(material: Material, name: str) -> float:
 
 
 # A wave of fewer texels is slower than it should be by more than a twentieth.
-_TEXELS = 6.0
+SHORTEST_TEXELS = 6.0
 
 
 def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
     """Warn where no wave that fits on an atlas is one that the material's coefficients hold for."""
     shortest, longest = np.asarray(material.wavelengths, dtype=np.float64)
     areas = atlas.areas
-    finest, whole = _TEXELS * float(np.sqrt(np.mean(areas))), float(np.sqrt(np.pi * areas.sum()))
+    texel, whole = float(np.sqrt(np.mean(areas))), float(np.sqrt(np.pi * areas.sum()))
+    finest = SHORTEST_TEXELS * texel
     if longest < finest:
         resolution = int(np.ceil(np.sqrt(areas.size / 6) * finest / longest))
         warnings.warn(
-            f"the material holds for waves up to {longest:.3g} m, and texels of {finest / _TEXELS:.2g} m carry none "
+            f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m carry none "
             f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer",
             RippleWarning,
             stacklevel=4,
