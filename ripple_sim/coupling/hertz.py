@@ -277,7 +277,8 @@ class Hits:
         if meet is None or not shares.any() or meet.speed <= max(meet.pull, 0.0) * _PUT_DOWN:
             return 0.0
         radius = self._radius(data, atlas, pair, texels, other)
-        if radius is None:
+        if isinstance(radius, str):
+            self._refuse(other, radius)
             return 0.0
         duration = hertz_time(meet.mass, radius, self._modulus, meet.speed)
         impulses = meet.impulse(model.opt.timestep) * shares
@@ -293,27 +294,27 @@ class Hits:
         self._pulses = [each for each in older if each.age < _WHOLE * each.duration]
         return PulsedLoad(load.texels, load.forces, pulses)
 
-    def _radius(self, data: mujoco.MjData, atlas: Atlas, pair: Contacts, texels: Ints, other: int) -> float | None:
-        """Radius of the ball on a plane whose gap is like that of a pair [m]; None where it is not round."""
+    def _radius(self, data: mujoco.MjData, atlas: Atlas, pair: Contacts, texels: Ints, other: int) -> float | str:
+        """Radius of the ball on a plane whose gap is like that of a pair [m], or why there is none."""
         coupled = self._coupled
         if self._target in coupled.soft or other >= coupled.model.ngeom:
-            return self._refuse(other, "Hertz's law is one of rigid geoms, not of flexes and skins")
+            return "Hertz's law is one of rigid geoms, not of flexes and skins"
         shares = pair.forces / pair.forces.sum()
         normal = shares @ pair.normals
         normal /= np.linalg.norm(normal)
         turn, own = data.geom_xmat[other].reshape(3, 3), data.geom_xmat[self._target].reshape(3, 3)
         theirs = surface_bend(coupled.model, other, -normal @ turn)
         if theirs is None:
-            return self._refuse(other, "only spheres, ellipsoids, capsules and sides of cylinders are round")
+            return "only spheres, ellipsoids, capsules and sides of cylinders are round"
         ours = atlas_bend(atlas, texels, normal @ own)
         if ours is None:
-            return self._refuse(other, "an edge is hit")
+            return "an edge is hit"
         across = np.eye(3) - np.outer(normal, normal)
         gap = across @ (turn @ theirs @ turn.T + own @ ours @ own.T) @ across
         total = float(np.trace(gap))
         product = (total**2 - float((gap * gap).sum())) / 2
         if total <= 0 or product < _ROUND * total**2:
-            return self._refuse(other, "they touch along a line, or over an area, not at a point")
+            return "they touch along a line, or over an area, not at a point"
         return product**-0.5
 
     def _refuse(self, other: int, reason: str) -> None:

@@ -318,10 +318,10 @@ class TargetLoad:
         if self._hits is not None and data is not None:
             arrived, pairs = self._filter.arrived(geoms, elapsed), contacts.by_other()
             for row in arrived:
-                at = slice(begins[row], begins[row + 1])
+                mine = slice(begins[row], begins[row + 1])
                 # what a unit of the contact's impulse gives each texel
-                shares = on_texels.forces[at] * (elapsed / (timestep * forces[row]))
-                prepaid = self._hits.begin(data, self._atlas, pairs[row], texels[at], shares)
+                shares = on_texels.forces[mine] * (elapsed / (timestep * forces[row]))
+                prepaid = self._hits.begin(data, self._atlas, pairs[row], texels[mine], shares)
                 self._filter.prepay(int(geoms[row]), prepaid)
         return self._over(self._filter(on_texels, elapsed), elapsed), done
 
