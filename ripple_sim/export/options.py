@@ -9,8 +9,8 @@ import dataclasses
 from typing import Literal, TypedDict
 
 from ripple_sim.errors import ExportError
-from ripple_sim.solver.errors import check_fields
-from ripple_sim.video.options import Backend
+from ripple_sim.solver.errors import check_fields, whole
+from ripple_sim.video.options import IN_ANY_CASE, Backend
 
 TESSELLATIONS = ("refined", "own")
 MOST_TRIANGLES = 100_000
@@ -55,7 +55,7 @@ class ExportOptions:
     """Replace an output that ripple-sim has not made."""
 
     def __post_init__(self) -> None:
-        check_fields(ExportError, self)
+        check_fields(ExportError, self, triangles=whole(1), chunk=whole(1), **IN_ANY_CASE)
 
     @property
     def rate(self) -> float:

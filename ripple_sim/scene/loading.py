@@ -24,7 +24,7 @@ import numpy as np
 from ripple_sim.coupling.geoms import find_target, named_collision_geoms, own_model, target_name
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.coupling.targets import site_on
-from ripple_sim.errors import SceneError
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver.errors import FUNCTION, PATH, checked
 from ripple_sim.solver.files import open_image
 from ripple_sim.solver.layouts.build import LAYOUTS
@@ -62,6 +62,14 @@ def check_scene(scene: Scene) -> None:
     if scene.lighting not in LIGHTING:
         raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
     Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
+    for each in dataclasses.fields(scene.events):
+        if late := [event.time for event in getattr(scene.events, each.name) if event.time >= scene.duration]:
+            warnings.warn(
+                f"a [[{each.name}]] at {late[0]:g} s is not before the scene's end, {scene.duration:g} s; give the "
+                "scene a longer duration, or the event an earlier time",
+                RippleWarning,
+                stacklevel=4,
+            )
     check_camera(scene.model, scene.camera)
 
 

@@ -66,32 +66,41 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
 
         Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing one.
         """
-        if self.name not in (*LAWS, *PRESETS):
-            raise SceneError(
-                f"ripple.material.preset {self.name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}"
-            )
-        given, real = given_fields(self, without="name"), self.name in PRESETS
-        law = PRESETS[self.name].law if real else self.name
-        parameters = inspect.signature(getattr(Material, law)).parameters
+        given = given_fields(self, without="name")
         if thickness is not None:
-            if law not in _LAYERED:
+            if _law(self.name) not in _LAYERED:
                 raise SceneError(
                     f"[[ripple.inside]] needs a material with a layer, not the preset {self.name!r}; {_LAYER}"
                 )
             given["thickness"] = thickness
-        for key in given:
-            if key not in parameters:
-                raise SceneError(
-                    f"the preset {self.name!r} has no parameter {key!r}; valid are {', '.join(parameters)}"
-                )
-        if real:
-            return Material.preset(self.name, **given)
-        for key, parameter in parameters.items():
-            if parameter.default is inspect.Parameter.empty and key not in given:
-                raise SceneError(
-                    f"the preset {self.name!r} needs {key}: write preset = {{name = {self.name!r}, {key} = ...}}"
-                )
-        return getattr(Material, self.name)(**given)
+        return preset_material(self.name, given)
+
+
+def _law(name: str) -> str:
+    """Constructor of `Material` that makes a preset; raises `SceneError` for an unknown one."""
+    if name not in (*LAWS, *PRESETS):
+        raise SceneError(f"the preset {name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}")
+    return PRESETS[name].law if name in PRESETS else name
+
+
+def preset_material(name: str, given: dict[str, Any]) -> Material:
+    """Material of a preset, with parameters that are given.
+
+    Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing one.
+    """
+    parameters = inspect.signature(getattr(Material, _law(name))).parameters
+    for key in given:
+        if key not in parameters:
+            raise SceneError(f"the preset {name!r} has no parameter {key!r}; valid are {', '.join(parameters)}")
+    if name in PRESETS:
+        return Material.preset(name, **given)
+    for key, parameter in parameters.items():
+        if parameter.default is inspect.Parameter.empty and key not in given:
+            raise SceneError(
+                f"the preset {name!r} needs {key}: write {name},{key}=..., or in a scene file "
+                f"preset = {{name = {name!r}, {key} = ...}}"
+            )
+    return getattr(Material, name)(**given)
 
 
 class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):

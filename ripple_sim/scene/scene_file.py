@@ -10,6 +10,7 @@ import dataclasses
 import functools
 import math
 import re
+import typing
 from pathlib import Path
 from typing import Any
 
@@ -268,6 +269,11 @@ def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: st
         inner_place = f"{place}.{key}" if place else key
         inner = _TABLES.get(inner_place)
         if inner is not None:
+            if isinstance(value, dict) and typing.get_origin(fields[key]) is list:
+                raise SceneError(
+                    f"scene file {origin!r}: [{inner_place}] is one table, where there may be several; write "
+                    f"[[{inner_place}]]"
+                )
             for item in value if isinstance(value, list) else [value]:
                 _check_keys(item, inner, inner_place, origin)
 

@@ -54,7 +54,7 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
             {"preset": {"name": "membrane", "modulus": 1.0}},
             "no parameter 'modulus'; valid are tension, density, damping",
         ),
-        ({"preset": "dent"}, "needs yield_height: write preset = "),
+        ({"preset": "dent"}, "needs yield_height: write dent,yield_height="),
         ({"preset": {"name": "jelly", "modulus": -1.0}}, "modulus is -1.0 Pa"),
         (
             {"preset": {"name": "jelly", "elasticity": 1.0}},
