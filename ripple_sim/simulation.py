@@ -91,6 +91,8 @@ class Simulation:
             two_way=scene.two_way,
             contacts=scene.contacts,
             high_pass={entry.geom: entry.high_pass for entry in scene.targets},
+            pulse={entry.geom: entry.pulse for entry in scene.targets},
+            modulus={entry.geom: entry.modulus for entry in scene.targets},
         )
         for entry in scene.targets:
             apply_maps(self.ripples, entry)

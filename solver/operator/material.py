@@ -311,7 +311,8 @@ class Material:
         hit : float or (float, float)
             A typical hit: its impulse [N s], or the mass [kg] and the speed [m/s] of a body, which then gives 1.5 m v.
         radius : float, optional
-            Of a typical footprint [m], about half the radius of what hits; by default a twentieth of the size.
+            Of a typical footprint [m], about half the radius of what hits; by default a twentieth of the size, and a
+            fortieth at least.
         amplitude : float
             Deepest dent of a typical hit, over the size.
         crossing : float

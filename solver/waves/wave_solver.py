@@ -137,7 +137,7 @@ class WaveSolver:
         substeps : int, optional
             How many, instead of the fewest.
         load : Load, optional
-            Forces that act over this step alone, beside those that are held.
+            Forces that act over this step alone, beside those that are held; see `Load.parts`.
 
         Raises
         ------
@@ -150,15 +150,17 @@ class WaveSolver:
         if dt == 0:
             return
         substeps = count_substeps(dt, self.stable_timestep, substeps)
-        self._substep = dt / substeps
-        # values too large for float32 become infinite here; the next look reports them
-        with np.errstate(over="ignore", invalid="ignore"):
-            force = self._held.upload(load)
-            self._backend.advance(substeps, self._substep)
-        if force is not None:
-            self._guard.note("forces", force, "N", self.time, abs(force) * dt / self._least_mass)
-        if self.listeners.all:
-            self.listeners.hear(self.time, self._substep)
+        self._substep, begin = dt / substeps, self.time
+        for count, part in [(substeps, None)] if load is None else load.parts(dt, substeps):
+            # values too large for float32 become infinite here; the next look reports them
+            with np.errstate(over="ignore", invalid="ignore"):
+                force = self._held.upload(part)
+                self._backend.advance(count, self._substep)
+            if force is not None:
+                self._guard.note("forces", force, "N", begin, abs(force) * dt / self._least_mass)
+            if self.listeners.all:
+                self.listeners.hear(begin, self._substep)
+            begin += count * self._substep
         self.time += dt
         self.substeps_taken += substeps
         if self._guard.due(substeps) and not self._backend.finite():
