@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import io
+import logging
 import os
 import re
 import resource
@@ -70,6 +71,9 @@ def _run(command: Any) -> int:
         text = f"this needs {need} GB of address space, but the limit (ulimit -v) is {most / 1e9:.2f} GB; allow more"
         return _fail(text, FAILED)
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
+    log = logging.getLogger("ripple_sim")
+    if not log.handlers:
+        log.addHandler(_Log())
 
     from ripple_sim.errors import DisplayError, EncodingError
     from ripple_sim.solver.errors import GLError, shown
@@ -126,6 +130,14 @@ def _say(message: str) -> None:
         print(f"ripple-sim: {text}", file=sys.stderr, flush=True)
     except OSError:  # standard error is full, or a closed pipe: nothing more goes there, not even at exit
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
+
+
+class _Log(logging.Handler):
+    """Prints what is logged, that something takes long, as the program's lines."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it."""
+        _say(record.getMessage())
 
 
 def _open_standard_streams() -> None:

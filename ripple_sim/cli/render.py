@@ -1,6 +1,7 @@
 """Commands that show a scene or write it to a file: `render`, `drop`, `export` and `view`.
 
-On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log stays silent.
+On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log gets a line
+where that takes long.
 """
 
 from __future__ import annotations

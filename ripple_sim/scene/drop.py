@@ -1,162 +1,31 @@
 """A default scene around any mesh: the target on a floor, and bodies that drop on it.
 
-The target has the image of its file, and the side up that its format has.
+The target shows most of itself, and stands as its format has it, or as it stands best.
 """
 
 from __future__ import annotations
 
-import logging
 import numbers
-import warnings
 from pathlib import Path
-from typing import Any
 
-import mujoco
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
-from PIL import Image
 
 from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.coupling.suited import Extent
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.render.camera import Camera
 from ripple_sim.solver import Material, Mesh, load_mesh
 from ripple_sim.solver.errors import shown
-from ripple_sim.solver.files import read_image
 from ripple_sim.solver.mesh.rays import RayScene
 
 from .bodies import BODY_SHAPES, TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
 from .events import Events
 from .loading import Edit, load_scene, refusal_of
 from .material_entry import COEFFICIENTS, MaterialEntry
+from .paint import paint_target
 from .scene import Scene, scene_path, shipped_scenes
 from .scene_file import CameraEntry, RippleEntry
-
-_SUFFIXES = (".png", ".jpg", ".jpeg")
-_SCENES = (".glb", ".gltf")
-
-
-def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
-    """Image of a mesh file, or None: named in an OBJ's material library or in a GLB, or NAME_texture.png beside it.
-
-    If several images colour one mesh, none is used, with a warning.
-
-    Returns
-    -------
-    uint8 [height, width, 3], top row first, or None
-    """
-    mesh_path = Path(mesh_path)
-    if mesh_path.suffix.lower() in _SCENES:
-        found: list[Any] = _embedded(mesh_path)
-    else:
-        named = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
-        beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in _SUFFIXES]
-        found = named or [path for path in beside if path.is_file()][:1]
-    if len(found) > 1:
-        warnings.warn(
-            f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: none is used; join "
-            "them into one image, or choose one with --texture",
-            RippleWarning,
-            stacklevel=3,
-        )
-    return load_image(found[0]) if len(found) == 1 else None
-
-
-def load_image(source: Any) -> NDArray[np.uint8]:
-    """Pixels of an image file or of a PIL image, uint8 [height, width, 3], top row first.
-
-    Raises `SceneError` if the file cannot be read as an image, or is too large.
-    """
-    return read_image(SceneError, source, "texture", lambda mode: "RGB")
-
-
-def _of_materials(mesh_path: Path) -> list[Path]:
-    """Existing images (map_Kd) of the materials that an OBJ file uses."""
-    libraries, used = [], set()
-    for words in _statements(mesh_path):
-        if words[0] == "mtllib":
-            libraries.append(mesh_path.parent / words[1])
-        elif words[0] == "usemtl":
-            used.add(words[1])
-    images: dict[Path, None] = {}
-    for library in filter(Path.is_file, libraries):
-        material = ""
-        for words in _statements(library):
-            if words[0] == "newmtl":
-                material = words[1]
-            elif words[0] == "map_Kd" and (material in used or not used):
-                # options come first, and the file's name may have spaces and backslashes
-                name = words[1].replace("\\", "/")
-                path = library.parent / (name if not name.startswith("-") else name.split()[-1])
-                if path.is_file():
-                    images[path] = None
-    return list(images)
-
-
-def _statements(path: Path) -> list[tuple[str, str]]:
-    """Keyword and rest of every line that has both."""
-    text = path.read_text(encoding="utf-8", errors="replace")
-    pairs = (line.strip().split(maxsplit=1) for line in text.splitlines() if line[:1] not in "vf#")
-    return [(pair[0], pair[1].strip()) for pair in pairs if len(pair) == 2]
-
-
-def _embedded(mesh_path: Path) -> list[Image.Image]:
-    """Base colour images in a GLB or glTF file."""
-    log, handler = logging.getLogger("trimesh"), logging.Handler()
-    logged: list[Any] = []
-
-    def hear(record: logging.LogRecord) -> bool:
-        logged.append(record.exc_info and record.exc_info[1])
-        return False
-
-    # an image beyond pillow's limit is logged, at the lowest level, and left out
-    level = log.level
-    handler.addFilter(hear)
-    log.addHandler(handler)
-    log.setLevel(logging.DEBUG)
-    try:
-        parts = trimesh.load_scene(mesh_path).geometry.values()
-    finally:
-        log.removeHandler(handler)
-        log.setLevel(level)
-    for error in logged:
-        if isinstance(error, Image.DecompressionBombError):
-            raise SceneError(f"an image in {mesh_path.name} cannot be read: {error} Scale it down")
-    materials = {
-        id(material): material for part in parts if (material := getattr(part.visual, "material", None)) is not None
-    }
-    images = (getattr(material, "baseColorTexture", None) for material in materials.values())
-    return list({id(image): image for image in images if image is not None}.values())
-
-
-def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None) -> None:
-    """Give the geom "target" the image that is asked for or that the mesh names, if the mesh can show it.
-
-    Raises `SceneError` if an image that is asked for cannot be read, or the mesh has no texture coordinates.
-    """
-    if mesh.corner_uv is None:
-        if texture is not None:
-            raise SceneError(
-                f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no texture coordinates: "
-                "choose a mesh that has them (a wrap has none)"
-            )
-        return
-    pixels = mesh_image(mesh_path) if texture is None else load_image(texture)
-    if pixels is None:
-        return
-    asset = spec.mesh("target")
-    # MuJoCo counts v from the image's upper edge
-    asset.usertexcoord = (mesh.corner_uv * [1.0, -1.0] + [0.0, 1.0]).ravel()
-    asset.userfacetexcoord = np.arange(mesh.F.size)
-    height, width, channels = pixels.shape
-    image = spec.add_texture(
-        name="target", type=mujoco.mjtTexture.mjTEXTURE_2D, height=height, width=width, nchannel=channels
-    )
-    image.data = pixels.tobytes()
-    spec.add_material(name="target").textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "target"
-    spec.geom("target").material = "target"
-
 
 UP_AXES = ("y", "z")
 

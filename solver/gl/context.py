@@ -88,8 +88,7 @@ _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
 
 def is_software(renderer: str) -> bool:
     """Whether a driver renders on the processor, by its GL_RENDERER."""
-    name = renderer.lower()
-    return any(word in name for word in _SOFTWARE)
+    return any(word in renderer.lower() for word in _SOFTWARE)
 
 
 # The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
@@ -116,8 +115,7 @@ def create_context(device: int | None) -> moderngl.Context:
     """Create a headless OpenGL 4.3 context on a device, or on the first that yields one; raises GLError."""
     if not sys.platform.startswith("linux"):  # macOS ends at OpenGL 4.1, without compute shaders
         raise GLError(
-            f"there is no OpenGL 4.3 over EGL on {sys.platform}, which rendering and backend 'gl' need; waves run with "
-            "backend 'cpu', and videos are rendered on Linux, also in WSL 2 or a container"
+            f"no OpenGL 4.3 over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'"
         )
     _spare_full_disks()
     devices = range(8) if device is None else [device]
@@ -125,8 +123,7 @@ def create_context(device: int | None) -> moderngl.Context:
     for libraries in _LIBRARIES:
         for index in devices:
             try:
-                # moderngl's hints lack the keywords of its backends
-                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
+                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}  # not in its hints
                 return moderngl.create_context(require=430, standalone=True, **settings)
             except Exception as error:  # moderngl raises bare Exception here
                 reason = str(error)
@@ -149,8 +146,7 @@ def _older(settings: dict[str, Any]) -> str:
     """What there is with these settings of an earlier version, "NAME has OpenGL 4.1"; empty without any."""
     with contextlib.suppress(Exception):
         ctx = moderngl.create_context(require=330, standalone=True, **settings)
-        major, minor = divmod(ctx.version_code // 10, 10)
-        found = f"{ctx.info['GL_RENDERER']} has OpenGL {major}.{minor}"
+        found = f"{ctx.info['GL_RENDERER']} has OpenGL {ctx.version_code / 100:.1f}"
         ctx.release()
         return found
     return ""

@@ -171,12 +171,23 @@ def test_the_image_of_a_glb_is_inside_it(tmp_path):
     assert tuple(mesh_image(tmp_path / "p.glb")[0, 0]) == RED
 
 
-@pytest.mark.parametrize("named", [True, False])
-def test_a_dropped_on_mesh_wears_its_image(tmp_path, named):
+def coloured(path: Path) -> Path:
+    """The same peanut without texture coordinates; its vertices are red in its upper half and blue in its lower one."""
+    V, F = peanut()
+    colors = np.where(V[:, 1:2] > np.median(V[:, 1]), RED, BLUE).astype(np.uint8)
+    trimesh.Trimesh(V, F, vertex_colors=colors, process=False).export(path)
+    return path
+
+
+@pytest.mark.parametrize("how", ["named", "asked for", "p.ply", "p.glb", "p.obj"])
+def test_a_dropped_on_mesh_wears_its_image_or_the_colours_of_its_vertices(tmp_path, how):
     """Red above and blue below, in the film and in the model that MuJoCo would draw."""
-    mesh = textured_obj(tmp_path / "p.obj")
-    half_and_half(tmp_path / ("p_texture.png" if named else "paint.png"))
-    scene = drop_scene(mesh, bodies=0, texture=None if named else tmp_path / "paint.png")
+    if how.startswith("p."):
+        scene = drop_scene(coloured(tmp_path / how), bodies=0, up="y")
+    else:
+        mesh = textured_obj(tmp_path / "p.obj")
+        half_and_half(tmp_path / ("p_texture.png" if how == "named" else "paint.png"))
+        scene = drop_scene(mesh, bodies=0, up="y", texture=None if how == "named" else tmp_path / "paint.png")
     model = scene.model
     assert model.mat_texid[model.geom("target").matid[0], mujoco.mjtTextureRole.mjTEXROLE_RGB] == 0
     simulation = Simulation(scene, fps=10, resolution=16, backend="cpu")
