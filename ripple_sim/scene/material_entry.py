@@ -19,7 +19,7 @@ from ripple_sim.solver import Material
 from ripple_sim.solver.operator.presets import PRESETS
 
 # Constructors of `Material`; the presets of a scene file are these and the real materials by name.
-LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water")
+LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water", "suited")
 _LAYERED = ("layer", "jelly")
 
 
@@ -44,8 +44,9 @@ _LAYER = "write preset = {name = 'layer', modulus = ...} or another of a layer u
 class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     """A preset by name, with its parameters in their units.
 
-    The name is a constructor of `Material`, membrane, layer, jelly, plate, dent or water, or that of a real material,
-    see `PRESETS`. The other fields are parameters of these constructors; each takes some of them.
+    The name is a constructor of `Material`, membrane, layer, jelly, plate, dent, water or suited, or that of a real
+    material, see `PRESETS`. The other fields are parameters of these constructors; each takes some of them. What is
+    left out of "suited", waves that are to be seen, is found from the target and from the bodies that can touch it.
     """
 
     name: str
@@ -60,6 +61,12 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     stiffness: float | None = None
     speed: float | None = None
     gravity: float | None = None
+    size: float | None = None
+    hit: float | tuple[float, float] | None = None
+    radius: float | None = None
+    amplitude: float | None = None
+    crossing: float | None = None
+    decay: float | None = None
 
     def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
         """The preset's material; its layer's thickness may be one at every texel [m], [C, n, n].
@@ -107,7 +114,7 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
     """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
     Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a preset, those that
-    are left out are those of `Material()`. Two are the same everywhere: no map gives them.
+    are left out are those of `Material()`. The last three are the same everywhere: no map gives them.
     """
 
     speed: Coefficient | None = None
@@ -119,6 +126,7 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
     yield_height: Coefficient | None = None
     deep: float | None = None
     tightening: float | None = None
+    poisson: float | None = None
     preset: str | PresetEntry | None = None
     """Gives the coefficients that are left out; by its name, or as a table with its parameters."""
 
@@ -171,6 +179,7 @@ class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
     yield_height: float | None = None
     deep: float | None = None
     tightening: float | None = None
+    poisson: float | None = None
 
 
 COEFFICIENTS = MaterialChange.__struct_fields__
