@@ -40,7 +40,7 @@ class Simulation:
     layout : str, optional
         Overrides the scene's layouts.
     rim : str, optional
-        Overrides what the scene's rims do, "free" or "fixed".
+        Overrides what the scene's rims do, see `WaveSolver`.
     backend : str
         As for `WaveSolver`.
     operator : str

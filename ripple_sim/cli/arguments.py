@@ -14,7 +14,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from ripple_sim.solver.errors import shown
 
 # Written out, since the modules that have these names take seconds to import; a test compares them.
-UP_AXES, RIMS = ("y", "z"), ("free", "fixed")
+UP_AXES, RIMS = ("y", "z"), ("free", "supported", "clamped", "fixed")
 LAYOUTS, BASELINES = ("auto", "cube", "patches"), ("paper", "uncorrected", "dynamic-paint")
 
 
@@ -134,6 +134,7 @@ LayoutName = Annotated[str, _one_word(parse_layout, "{auto,cube,patches}")]
 SceneLayout = Annotated[
     str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
 ]
-RimName = Annotated[str, _one_word(parse_rim, "{free,fixed}")]
+_RIM_NAMES = "{free,supported,clamped,fixed}"
+RimName = Annotated[str, _one_word(parse_rim, _RIM_NAMES)]
 NamedMaterial = Annotated[tuple[str, dict[str, float]], _one_word(parse_material, "NAME[,PARAMETER=VALUE ...]")]
-Rim = Annotated[str | None, _one_word(parse_rim, "{free,fixed}"), arg(help_behavior_hint="(default: the scene's)")]
+Rim = Annotated[str | None, _one_word(parse_rim, _RIM_NAMES), arg(help_behavior_hint="(default: the scene's)")]

@@ -71,7 +71,7 @@ class Ripples(Targets):
     layout : str or mapping
         How surfaces get their charts: "auto", "cube" or "patches", for all targets or by geom; see `build_atlas`.
     rim : str or mapping
-        "free" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
+        "free", "supported", "clamped" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
     two_way : bool
         Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
         Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects

@@ -94,7 +94,7 @@ def _check_sensors(scene: Scene) -> None:
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     from ripple_sim.render import LOOKS
-    from ripple_sim.solver.operator.assembly import RIMS
+    from ripple_sim.solver.operator.plate_rim import RIMS
 
     find_target(model, entry.geom)
     for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):

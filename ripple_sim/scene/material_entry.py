@@ -114,7 +114,7 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
     """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
     Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a preset, those that
-    are left out are those of `Material()`. Two are the same everywhere: no map gives them.
+    are left out are those of `Material()`. The last three are the same everywhere: no map gives them.
     """
 
     speed: Coefficient | None = None
@@ -126,6 +126,7 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
     yield_height: Coefficient | None = None
     deep: float | None = None
     tightening: float | None = None
+    poisson: float | None = None
     preset: str | PresetEntry | None = None
     """Gives the coefficients that are left out; by its name, or as a table with its parameters."""
 
@@ -178,6 +179,7 @@ class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
     yield_height: float | None = None
     deep: float | None = None
     tightening: float | None = None
+    poisson: float | None = None
 
 
 COEFFICIENTS = MaterialChange.__struct_fields__

@@ -114,7 +114,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     layout: str = "auto"
     """How the surface gets its charts, see `build_atlas`."""
     rim: str = "free"
-    """Rims of an open surface: waves come back upright from a free one, inverted from a fixed one."""
+    """Rims of an open surface: waves come back upright from a free one, inverted from one that is held."""
     look: str = "rubber"
     """What the surface looks made of; `model` as the MJCF's material says."""
     color: Color | None = None

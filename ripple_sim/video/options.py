@@ -71,7 +71,7 @@ class VideoOptions:
     layout: str | None = None
     """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
     rim: str | None = None
-    """What the rims of open surfaces do: free, or fixed as that of a drum's skin."""
+    """What the rims of open surfaces do: free, supported, clamped, or fixed as that of a drum's skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     resume: bool = False

@@ -71,6 +71,8 @@ class Material:
         Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are faster.
     yield_height : [m]
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
+    poisson : nu
+        Poisson's ratio, which counts at the rims of a surface that bends: one number from 0 to 0.5.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
     deep : [1/m]
@@ -96,6 +98,7 @@ class Material:
     bending: float | ArrayLike = 0.0
     yield_height: float | ArrayLike = np.inf
     deep: float = 0.0
+    poisson: float = 0.3
     fixed: bool | ArrayLike = False
     tightening: float = 0.0
     wavelengths: ArrayLike = (0.0, np.inf)
@@ -108,6 +111,8 @@ class Material:
             raise SolverError(
                 f"material tightening is {shown(self.tightening)}; valid is from {-_STEEPEST:g} to {_STEEPEST:g}"
             )
+        if not (is_finite(self.poisson) and 0 <= self.poisson <= 0.5):
+            raise SolverError(f"material poisson is {shown(self.poisson)}; valid is a number from 0 to 0.5")
         if np.ndim(self.deep):
             raise SolverError(f"material deep has shape {np.shape(self.deep)}; valid is one number")
         check_wavelengths(self.wavelengths)
@@ -245,11 +250,10 @@ class Material:
         damping : [1/s]
         """
         require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
-        if not (is_finite(poisson) and 0 <= poisson <= 0.5):
-            raise SolverError(f"plate poisson is {shown(poisson)}; valid is a number from 0 to 0.5")
+        plate = cls(speed=0.0, poisson=poisson, damping=damping)  # which looks at them
         rigidity = modulus * thickness**3 / (12 * (1 - poisson**2))
         surface_density = density * thickness
-        return cls(speed=0.0, bending=rigidity / surface_density, density=surface_density, damping=damping)
+        return dataclasses.replace(plate, bending=rigidity / surface_density, density=surface_density)
 
     @classmethod
     def dent(

@@ -17,6 +17,7 @@ from ..texels.stencil import stiffness_matrix
 from .assembly import build_operator
 from .deep_water import FluidOperator, factorised
 from .material import SHORTEST_TEXELS, Material, warn_of_wavelengths
+from .plate_rim import Rim
 from .wave_operator import WaveOperator
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -54,7 +55,7 @@ class Modes(NamedTuple):
     atlas=instance(Atlas, ", from build_atlas or sphere_atlas"),
     material=instance(Material, ", for instance Material(speed=1.0)"),
 )
-def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: str = "free") -> Modes:
+def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free") -> Modes:
     """Find the lowest modes of a surface: how it swings by itself under the operator that `WaveSolver` steps with.
 
     Motions that nothing pulls back, as of a free membrane on the whole, are left out. A solver that conserves volume
@@ -79,7 +80,8 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: str = "free
     """
     warn_of_wavelengths(atlas, material)
     operator = build_operator(atlas, material, "fem", rim)
-    matrix, weight, least = elastic_matrix(operator), operator.mass.ravel(), float(operator.stiffness.min())
+    # not of the operator's stiffness, which links outweigh beside the rims of a plate
+    matrix, weight, least = elastic_matrix(operator), operator.mass.ravel(), float(np.min(material.stiffness))
     moving = np.flatnonzero(operator.free.ravel() & (matrix.diagonal() > 0))
     most = int(np.pi * len(moving) / SHORTEST_TEXELS**2)  # by Weyl's law
     if not (isinstance(count, numbers.Integral) and 1 <= count <= most):
@@ -89,7 +91,7 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: str = "free
         )
     if isinstance(operator, FluidOperator):
         # where all is even, water has the modes of the Laplacian, which keep its volume
-        uneven = np.ptp(material.speed) or np.ptp(material.stiffness)
+        uneven = np.ptp(material.speed) or np.ptp(operator.stiffness)
         if operator.topology.fixed_rim or not operator.free.all() or uneven:
             raise SolverError("modes of deep fluid are known with a free rim, no clamp, one speed and stiffness alone")
         matrix, weight, least = stiffness_matrix(operator.geometry), operator.areas.ravel(), 0.0

@@ -150,7 +150,11 @@ def test_an_event_after_the_end_is_told_of() -> None:
         ((RippleEntry(geom="floor"),), {}, "geom 'floor' is a plane, which cannot ripple"),
         ((RippleEntry(geom="egg", look="lead"),), {}, "look 'lead' does not exist; valid are .*rubber"),
         ((RippleEntry(geom="egg", layout="octahedron"),), {}, "layout .octahedron. does not exist; valid are auto"),
-        ((RippleEntry(geom="egg", rim="bent"),), {}, "rim 'bent' does not exist; valid are free, fixed"),
+        (
+            (RippleEntry(geom="egg", rim="bent"),),
+            {},
+            "rim 'bent' does not exist; valid are free, supported, clamped, fixed",
+        ),
         ((RippleEntry(geom="egg", color=(0, 0, 1.1)),), {}, "color of geom 'egg' is .*three numbers from 0 to 1"),
         ((RippleEntry(geom="egg", color=(0, float("nan"), 1)),), {}, "three numbers from 0 to 1"),
         ((RippleEntry(geom="egg", material=scene.MaterialEntry(speed=-1.0)),), {}, "speed is -1"),
