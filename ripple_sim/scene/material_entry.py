@@ -60,6 +60,7 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     stiffness: float | None = None
     speed: float | None = None
     gravity: float | None = None
+    short: bool | None = None
 
     def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
         """The preset's material; its layer's thickness may be one at every texel [m], [C, n, n].
