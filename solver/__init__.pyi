@@ -14,6 +14,7 @@ from .mesh.volume import Volume as Volume, load_volume as load_volume
 from .mesh.wrap import Wrap as Wrap, wrap as wrap
 from .operator.assembly import absorbing_damping as absorbing_damping, build_operator as build_operator, hold as hold
 from .operator.material import Material as Material
+from .operator.modes import Modes as Modes, modes as modes
 from .texels.atlas import Atlas as Atlas
 from .texels.maps import texture_map as texture_map, vertex_map as vertex_map
 from .texels.texel_atlas import texel_atlas as texel_atlas

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import errno
 import queue
 import shutil
 import tempfile
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from ripple_sim.errors import BatchError
+from ripple_sim.solver.files import OF_THE_DISK
 from ripple_sim.solver.kernel import compile_times
 
 from .executors import DaskExecutor, LocalExecutor, first_alone, usual_workers
@@ -241,17 +243,24 @@ def run_batch(
         plan = load_stored(batch.plan).plan
     for number in range(min(len(plan.sources), plan.count, _TRIED)):
         Variation(plan, number).load()  # a key that fits nothing is told before anything is made
-    keep_plan(batch, stored(plan))
-    if options.retry_failed:
-        for number in batch.failures():
-            batch.forget_failure(number)
-    parquet()  # before anything that takes time
-    run = BatchRun(batch, plan, options)
-    with _executor(options, run) as executor:
-        run.work(executor, progress)
-    write_index(batch, run.rows)
-    if run.full is not None:
-        raise BatchError(f"{run.full}; make room, or lower --keep-free, and run the same command again to go on")
+    try:
+        keep_plan(batch, stored(plan))
+        if options.retry_failed:
+            for number in batch.failures():
+                batch.forget_failure(number)
+        parquet()  # before anything that takes time
+        run = BatchRun(batch, plan, options)
+        with _executor(options, run) as executor:
+            run.work(executor, progress)
+        write_index(batch, run.rows)
+        full = run.full
+    except OSError as error:
+        if error.errno not in OF_THE_DISK:
+            raise
+        full = f"the disk is full: {error.strerror}"
+    if full is not None:
+        advice = "make room, or lower --keep-free, and run the same command again to go on"
+        raise BatchError(f"{full}; {advice}") from OSError(errno.ENOSPC, full)
     return run.progress
 
 

@@ -195,14 +195,14 @@ def make_scene(folder: str, number: int) -> Outcome:
             return Outcome(number, "there" if batch.is_finished(number) else "busy")
         try:
             facts = _make(load_plan(batch.plan), number, place, batch)
+            seconds = time.perf_counter() - start
+            times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
+            _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
         except Exception as error:  # of any kind: the batch goes on without this scene
             clear(place)
             state: Literal["full", "failed"] = "full" if _is_full(error) else "failed"
             reason = " ".join(str(error).split()) or type(error).__name__
             return Outcome(number, state, error=reason, log=traceback.format_exc())
-        seconds = time.perf_counter() - start
-        times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
-        _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
         batch.finish(number, place)
     return Outcome(number, "made", times, facts)
 

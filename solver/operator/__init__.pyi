@@ -1,6 +1,5 @@
 from .assembly import (
     OPERATORS as OPERATORS,
-    RIMS as RIMS,
     MovingOperator as MovingOperator,
     absorbing_damping as absorbing_damping,
     build_operator as build_operator,
@@ -13,8 +12,9 @@ from .coefficients import (
     check_numbers as check_numbers,
     require_positive as require_positive,
 )
-from .deep_water import FluidOperator as FluidOperator, HalfLaplacian as HalfLaplacian
+from .deep_water import FluidOperator as FluidOperator, HalfLaplacian as HalfLaplacian, factorised as factorised
 from .material import (
+    SHORTEST_TEXELS as SHORTEST_TEXELS,
     STIFF as STIFF,
     Material as Material,
     decay_time as decay_time,
@@ -22,6 +22,8 @@ from .material import (
     phase_speed as phase_speed,
     warn_of_wavelengths as warn_of_wavelengths,
 )
+from .modes import Modes as Modes, elastic_matrix as elastic_matrix
+from .plate_rim import RIMS as RIMS, Rim as Rim
 from .presets import (
     BOUNCE as BOUNCE,
     PRESETS as PRESETS,

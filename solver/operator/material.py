@@ -77,6 +77,8 @@ class Material:
         Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are faster.
     yield_height : [m]
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
+    poisson : nu
+        Poisson's ratio, which counts at the rims of a surface that bends: one number from 0 to 0.5.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
     deep : [1/m]
@@ -102,6 +104,7 @@ class Material:
     bending: float | ArrayLike = 0.0
     yield_height: float | ArrayLike = np.inf
     deep: float = 0.0
+    poisson: float = 0.3
     fixed: bool | ArrayLike = False
     tightening: float = 0.0
     wavelengths: ArrayLike = (0.0, np.inf)
@@ -114,6 +117,8 @@ class Material:
             raise SolverError(
                 f"material tightening is {shown(self.tightening)}; valid is from {-_STEEPEST:g} to {_STEEPEST:g}"
             )
+        if not (is_finite(self.poisson) and 0 <= self.poisson <= 0.5):
+            raise SolverError(f"material poisson is {shown(self.poisson)}; valid is a number from 0 to 0.5")
         if np.ndim(self.deep):
             raise SolverError(f"material deep has shape {np.shape(self.deep)}; valid is one number")
         check_wavelengths(self.wavelengths)
@@ -263,11 +268,10 @@ class Material:
         damping : [1/s]
         """
         require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
-        if not (is_finite(poisson) and 0 <= poisson <= 0.5):
-            raise SolverError(f"plate poisson is {shown(poisson)}; valid is a number from 0 to 0.5")
+        plate = cls(speed=0.0, poisson=poisson, damping=damping)  # which looks at them
         rigidity = modulus * thickness**3 / (12 * (1 - poisson**2))
         surface_density = density * thickness
-        return cls(speed=0.0, bending=rigidity / surface_density, density=surface_density, damping=damping)
+        return dataclasses.replace(plate, bending=rigidity / surface_density, density=surface_density)
 
     @classmethod
     def dent(
@@ -325,7 +329,8 @@ class Material:
         hit : float or (float, float)
             A typical hit: its impulse [N s], or the mass [kg] and the speed [m/s] of a body, which then gives 1.5 m v.
         radius : float, optional
-            Of a typical footprint [m], about half the radius of what hits; by default a twentieth of the size.
+            Of a typical footprint [m], about half the radius of what hits; by default a twentieth of the size, and a
+            fortieth at least.
         amplitude : float
             Deepest dent of a typical hit, over the size.
         crossing : float
@@ -412,18 +417,19 @@ def _number(material: Material, name: str) -> float:
 
 
 # A wave of fewer texels is slower than it should be by more than a twentieth.
-_TEXELS = 6.0
+SHORTEST_TEXELS = 6.0
 
 
 def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
     """Warn where no wave that fits on an atlas is one that the material's coefficients hold for."""
     shortest, longest = np.asarray(material.wavelengths, dtype=np.float64)
     areas = atlas.areas
-    finest, whole = _TEXELS * float(np.sqrt(np.mean(areas))), float(np.sqrt(np.pi * areas.sum()))
+    texel, whole = float(np.sqrt(np.mean(areas))), float(np.sqrt(np.pi * areas.sum()))
+    finest = SHORTEST_TEXELS * texel
     if longest < finest:
         resolution = int(np.ceil(np.sqrt(areas.size / 6) * finest / longest))
         warnings.warn(
-            f"the material holds for waves up to {longest:.3g} m, and texels of {finest / _TEXELS:.2g} m carry none "
+            f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m carry none "
             f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer",
             RippleWarning,
             stacklevel=4,

@@ -1,3 +1,4 @@
+import errno
 import os
 import shutil
 import signal
@@ -141,6 +142,18 @@ def test_a_full_disk_stops_the_batch_and_counts_as_no_failure(here, tmp_path, mo
     with pytest.raises(BatchError, match="the disk is full: No space left"):
         run_batch(plan, tmp_path / "out")
     assert BatchFolder(tmp_path / "out").failures() == {}
+
+
+@pytest.mark.parametrize("name", ["keep_plan", "write_index"])
+def test_a_disk_too_full_for_the_batchs_own_files_is_told_as_one(name, here, tmp_path, monkeypatch, capsys):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(run, name, full)
+    monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
+    small_plan(tmp_path, DATA)
+    assert main(["batch", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "out")]) == 1
+    assert "the disk is full: No space left on device; make room" in capsys.readouterr().err
 
 
 def test_a_plan_that_has_changed_is_refused_with_what_changed(tmp_path):

@@ -34,11 +34,10 @@ def test_the_status_is_told_from_the_folder(tmp_path, capsys):
     [
         (["{plan}"], "add -o DIR"),
         (["{plan}", "-o", "{folder}/out", "--shard", "5/4"], "'5/4' is not valid; it must be a part of how many"),
-        (["{plan}", "-o", "{folder}/out", "--keep-free", "1e9"], "GB to be kept free; make room"),
         (["{folder}"], "it has no plan.json"),
         (["{folder}/lost.toml", "-o", "out"], "does not exist"),
     ],
-    ids=["no folder", "shard", "full", "no batch", "no plan"],
+    ids=["no folder", "shard", "no batch", "no plan"],
 )
 def test_what_is_wrong_is_told_in_a_line(plan, refusal, options, message):
     assert message in refusal("batch", *(each.format(plan=plan, folder=plan.parent) for each in options))

@@ -5,6 +5,7 @@ includes and defines put in.
 """
 
 import os
+import re
 import sys
 import textwrap
 import threading
@@ -186,6 +187,19 @@ def test_without_any_device_the_error_says_what_to_install(
     assert len(asked) == 2 * devices
 
 
+def test_a_driver_that_is_too_old_is_named_with_its_version_and_the_one_needed(opengl: None) -> None:
+    code = "from ripple_sim.solver.gl import create_context; create_context(None)"
+    result = ended("-c", code, env={**os.environ, "MESA_GL_VERSION_OVERRIDE": "4.1"})
+    assert re.search(r"GLError: .+ has OpenGL 4\.1; rendering and backend 'gl' need 4\.3 or later", result.stderr)
+
+
+@pytest.mark.parametrize("system", ["darwin", "win32"])
+def test_a_system_without_egl_is_named(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", system)
+    with pytest.raises(GLError, match=rf"no OpenGL 4\.3 over EGL on {system}.*backend 'cpu'"):
+        create_context(None)
+
+
 def test_the_context_that_is_entered_is_the_current_one(opengl: None) -> None:
     context = shared_context()
     with context:
@@ -227,10 +241,15 @@ def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(tmp_path, 
         assert (again["factor"].value, again["more"].value) == (3.0, 0.0)
 
 
-@pytest.mark.parametrize(("free", "expected"), [(1e6, "true"), (1e9, None)])
-def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full(free: float, expected: str | None, monkeypatch) -> None:
+@pytest.mark.parametrize(
+    ("free", "writable", "expected"), [(1e6, True, "true"), (1e9, True, None), (1e9, False, "true")]
+)
+def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(
+    free: float, writable: bool, expected: str | None, monkeypatch
+) -> None:
     """Its cache is mapped into memory: a page for which the disk has no room ends the process by a bus error."""
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=free))
+    monkeypatch.setattr("os.access", lambda *_: writable)
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
     create_context(None).release()
     assert os.environ.get("MESA_SHADER_CACHE_DISABLE") == expected
