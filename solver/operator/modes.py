@@ -128,7 +128,8 @@ def _are_tilts(atlas: Atlas, material: Material, operator: WaveOperator, heights
         for matrix, weight in ((elastic_matrix(operator), mass), (atlas.stiffness(), areas))
     )
     is_linear = np.linalg.norm(left, axis=0) < 0.1 * np.linalg.norm(heights, axis=1)
-    return is_linear & (squares < 0.01 * float(np.mean(material.bending)) * numbers**2)
+    bending = material.texels("bending", atlas.areas.shape).mean()
+    return is_linear & (squares < 0.01 * bending * numbers**2)
 
 
 def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Floats:

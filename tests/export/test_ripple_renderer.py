@@ -96,6 +96,18 @@ def test_a_copy_of_the_model_in_other_colours_is_drawn_in_them(egg):
     assert blue_light > 1.5 * red
 
 
+def test_what_has_no_colour_is_grey_as_in_mujoco_unless_a_look_is_named(egg):
+    model, data, ripples, _ = egg
+    plain = copy.copy(model)
+    plain.geom_rgba[0] = [0.5, 0.5, 0.5, 1.0]
+    spreads = [
+        np.ptp(RippleRenderer(plain, ripples, 72, 96, looks=looks).render(data)[30:42, 42:54].mean(axis=(0, 1)))
+        for looks in ({}, {"egg": "rubber"})
+    ]
+    assert spreads[0] < 15
+    assert spreads[1] > 60
+
+
 @pytest.fixture(scope="module")
 def mujocos(tmp_path_factory):
     """What `mujoco.Renderer` draws; it takes over the context of its process."""
