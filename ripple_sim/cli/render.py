@@ -97,8 +97,9 @@ class ExportCommand(ExportOptions):
             scene = through_camera(scene, self.camera)
         with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
             summary = export_scene(scene, self.output, options, progress=progress)
+        size = summary.output.stat().st_size if summary.output.is_file() else 0
         print(
-            f"{summary.output}: {summary.frames} frames\n"
+            f"{summary.output}: {summary.frames} frames{f', {size / 1e6:.1f} MB' if size else ''}\n"
             f"stages    simulation {summary.simulate_seconds:.1f} s, writing {summary.write_seconds:.1f} s"
         )
 

@@ -1,10 +1,14 @@
 """What is installed is the source tree: pyproject.toml names packages one by one, and one is soon forgotten."""
 
+import re
+import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
 from programs import ended
+
+import ripple_sim
 
 ROOT = Path(__file__).parents[2]
 SUFFIXES = {".py", ".glsl", ".toml", ".xml", ".obj", ".png", ".npy", ".typed"}
@@ -36,6 +40,12 @@ def test_every_source_file_is_in_the_wheel(wheel):
     }
     assert expected - wheel == set()
     assert "ripple_sim/py.typed" in wheel
+
+
+def test_the_version_is_the_same_wherever_it_stands():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)[1]
+    assert project == cited == ripple_sim.__version__
 
 
 def test_nothing_else_becomes_a_top_level_name(wheel):
