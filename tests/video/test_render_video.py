@@ -38,11 +38,14 @@ def _push(simulation) -> None:
 @pytest.mark.parametrize("name", ["clip.mp4", "frames"])
 def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
     whole, broken = tmp_path / "whole" / name, tmp_path / "broken" / name
-    assert render_video(scene, whole, VideoOptions(**OPTIONS)).resumed_at == 0
+    # with sound, which is heard from where the camera is at each frame
+    scene = dataclasses.replace(scene, camera=msgspec.structs.replace(scene.camera, orbit=90.0))
+    options = {**OPTIONS, "sound": name == "clip.mp4"}
+    assert render_video(scene, whole, VideoOptions(**options)).resumed_at == 0
     for frame in (20, 58):
         with pytest.raises(KeyboardInterrupt):
-            render_video(scene, broken, VideoOptions(resume=True, **OPTIONS), progress=interrupting_at(frame))
-    summary = render_video(scene, broken, VideoOptions(resume=True, **OPTIONS))
+            render_video(scene, broken, VideoOptions(resume=True, **options), progress=interrupting_at(frame))
+    summary = render_video(scene, broken, VideoOptions(resume=True, **options))
     # frames that wait to be encoded are lost
     assert summary.resumed_at == FRAMES_IN_CLIP if name == "clip.mp4" else 48 <= summary.resumed_at <= 58
     assert contents(broken.parent) == contents(whole.parent)
