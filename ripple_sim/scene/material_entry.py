@@ -61,6 +61,7 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     stiffness: float | None = None
     speed: float | None = None
     gravity: float | None = None
+    short: bool | None = None
     size: float | None = None
     hit: float | tuple[float, float] | None = None
     radius: float | None = None
