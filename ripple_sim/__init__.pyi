@@ -8,6 +8,7 @@ from .export.exporter import Exporter as Exporter, export_scene as export_scene
 from .export.options import ExportOptions as ExportOptions
 from .export.renderer import RippleRenderer as RippleRenderer
 from .figures.atlas_plot import plot_atlas as plot_atlas
+from .figures.mode_plot import plot_modes as plot_modes
 from .render import Camera as Camera
 from .scene.drop import drop_scene as drop_scene
 from .scene.loading import load_scene as load_scene

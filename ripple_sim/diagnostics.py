@@ -20,6 +20,7 @@ from typing import Any
 
 import mujoco
 
+from ripple_sim import __version__
 from ripple_sim.solver.backends.backend import auto_backend, measured
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context
@@ -213,6 +214,8 @@ def as_text(info: dict[str, Any]) -> str:
 
 
 def _version(name: str) -> str | None:
+    if name == "ripple-sim":  # of the source tree, whose metadata is of when it was set up
+        return __version__
     if name == "mujoco":  # installed under that name, or as `mujoco-core`
         return mujoco.__version__
     try:

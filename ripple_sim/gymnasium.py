@@ -104,6 +104,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         `{"tap": {"geom": "board", "at": "site", "rate": 2000}}`. The observation is then a `Dict`: what it was, under
         "observation" unless it is one already, and under each name the samples of a control step, float32
         [samples, points], in one unbroken row from step to step, late by the sensor's `latency`, 0 before the reset.
+        Their spaces have no bounds: nothing limits how hard a body may hit.
     **options
         Keyword arguments of `Ripples`: resolution, backend, two_way and so on.
 

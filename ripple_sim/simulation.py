@@ -40,7 +40,7 @@ class Simulation:
     layout : str, optional
         Overrides the scene's layouts.
     rim : str, optional
-        Overrides what the scene's rims do, "free" or "fixed".
+        Overrides what the scene's rims do, see `WaveSolver`.
     backend : str
         As for `WaveSolver`.
     operator : str
@@ -91,6 +91,8 @@ class Simulation:
             two_way=scene.two_way,
             contacts=scene.contacts,
             high_pass={entry.geom: entry.high_pass for entry in scene.targets},
+            pulse={entry.geom: entry.pulse for entry in scene.targets},
+            modulus={entry.geom: entry.modulus for entry in scene.targets},
         )
         for entry in scene.targets:
             apply_maps(self.ripples, entry)

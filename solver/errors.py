@@ -102,7 +102,7 @@ def instance(kind: type, hint: str = "", *, optional: bool = False) -> Valid:
 
 
 def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
-    """Check the fields of a dataclass by their annotations, and those of these names by more.
+    """Check the fields of a dataclass by their annotations, and those of these names, where they are not None, by more.
 
     Raises `RippleError` of the given kind, for the first that is not valid.
     """
@@ -112,7 +112,7 @@ def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
             msgspec.convert(value, hint)
         except msgspec.ValidationError:
             raise error(f"{name.replace('_', ' ')} is {shown(value)}; valid is {_words(hint)}") from None
-        if name in valid and not valid[name].holds(value):
+        if name in valid and value is not None and not valid[name].holds(value):
             raise error(f"{name.replace('_', ' ')} is {shown(value)}; valid is {valid[name].words}")
 
 

@@ -10,7 +10,6 @@ import contextlib
 import errno
 import math
 import os
-import resource
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,6 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+
+try:
+    import resource
+except ImportError:  # on Windows
+    resource = None  # type: ignore[assignment]
 
 from .errors import RippleError, shown
 
@@ -101,9 +105,8 @@ def rooms(root: Path = Path("/")) -> Iterator[tuple[float, str]]:
     free = _table(root / "proc/meminfo")
     if "MemAvailable" in free:
         yield free["MemAvailable"] + free.get("SwapFree", 0.0), "the machine's free memory"
-    most = resource.getrlimit(resource.RLIMIT_AS)[0]
-    used = _table(root / "proc/self/status")
-    if most != resource.RLIM_INFINITY:
+    if resource is not None and (most := resource.getrlimit(resource.RLIMIT_AS)[0]) != resource.RLIM_INFINITY:
+        used = _table(root / "proc/self/status")
         yield most - used.get("VmSize", 0.0), f"the limit of the address space (ulimit -v, {_shown(most)})"
     for line in _text(root / "proc/self/cgroup").splitlines():
         _, controllers, name = line.split(":", 2)

@@ -18,6 +18,7 @@ import functools
 import gc
 import hashlib
 import importlib.util
+import logging
 import os
 import pickle
 import re
@@ -39,6 +40,12 @@ from numpy.typing import NDArray
 
 from .cache import cache_folder
 
+# What takes long without anything to see is told here: on standard error, unless the user's program says otherwise.
+log = logging.getLogger("ripple_sim")
+
+# How long kernels are compiled in silence [s].
+_SILENT = 2.0
+
 
 class _CompileListener(event.Listener):
     """Seconds of compilation by module, and in this thread; a kernel that is compiled for another is part of it.
@@ -51,6 +58,7 @@ class _CompileListener(event.Listener):
         self.seconds: dict[str, float] = {}
         self.running: tuple[str, float] | None = None  # module, and when it began; numba compiles one at a time
         self.own = threading.local()
+        self.told = False
 
     def on_start(self, event: Any) -> None:
         """A kernel begins to be compiled."""
@@ -59,6 +67,9 @@ class _CompileListener(event.Listener):
             self.collects = gc.isenabled()
             gc.disable()
             self.running = event.data["dispatcher"].py_func.__module__, time.perf_counter()
+            if not self.told and sum(self.seconds.values()) > _SILENT:
+                self.told = True
+                log.warning("compiling for this machine, once; it may take a minute, and later runs load what is made")
 
     def on_end(self, event: Any) -> None:
         """A kernel has been compiled."""

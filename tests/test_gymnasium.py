@@ -193,6 +193,36 @@ def test_frames_and_limits_of_gymnasiums_wrappers_go_around_it(path: Path) -> No
     env.close()
 
 
+def test_record_video_gets_every_frame_with_its_ripples(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stand-in for moviepy, which writes the files and is no dependency."""
+    written: dict[str, tuple[list[np.ndarray], int]] = {}
+
+    class Clip:
+        def __init__(self, frames: list[np.ndarray], fps: int) -> None:
+            self.made = list(frames), fps
+
+        def write_videofile(self, file: str, logger: object) -> None:
+            written[Path(file).name] = self.made
+
+    for name in ("moviepy", "moviepy.video", "moviepy.video.io", "moviepy.video.io.ImageSequenceClip"):
+        module = types.ModuleType(name)
+        module.ImageSequenceClip = Clip  # type: ignore[attr-defined]
+        monkeypatch.setitem(sys.modules, name, module)
+    rippling = RippleWrapper(BallEnv(path, render_mode="rgb_array"), MATERIALS, **OPTIONS)
+    env = gymnasium.wrappers.RecordVideo(rippling, str(path.parent), episode_trigger=lambda episode: episode < 2)
+    for _ in range(3):
+        env.reset(seed=0)
+        for _ in range(3):
+            env.step(np.zeros(1, np.float32))
+        last = rippling.render()
+    env.close()
+    assert list(written) == ["rl-video-episode-0.mp4", "rl-video-episode-1.mp4"]
+    for frames, fps in written.values():
+        assert (np.shape(frames), fps) == ((4, 48, 64, 3), 100)
+        np.testing.assert_array_equal(frames[-1], last)
+        assert (frames[0] != last).any()
+
+
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_gymnasium_finds_no_fault_with_its_own_ant() -> None:
     env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS)

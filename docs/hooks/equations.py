@@ -18,4 +18,5 @@ def _with_equations(text: str) -> str:
     text = re.sub(
         r"\$\$(.+?)\$\$", lambda m: latex2mathml.converter.convert(m[1].strip(), "block"), text, flags=re.DOTALL
     )
-    return re.sub(r"\$([^$\n]+)\$", lambda m: latex2mathml.converter.convert(m[1]), text)
+    # in a span: at the beginning of a line Markdown takes <math> for a block, and ends the list that it is in
+    return re.sub(r"\$([^$\n]+)\$", lambda m: f"<span>{latex2mathml.converter.convert(m[1])}</span>", text)

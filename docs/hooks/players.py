@@ -14,6 +14,12 @@ PLAYED = {
     scene: ExportOptions(fps=30, duration=duration, resolution=48)
     for scene, duration in {"sphere": 2.0, "pretzel": 2.0, "duck": 3.0, "jelly": 1.5, "arm": 2.0}.items()
 }
+# The theme would frame what opens as a note, with a pencil beside the picture.
+_STYLE = (
+    "<style>details.player{border:0;box-shadow:none;padding:0;font-size:inherit}"
+    "details.player>summary{padding:0;margin:0;background:none;cursor:pointer}"
+    "details.player>summary::before,details.player>summary::after{display:none}</style>\n\n"
+)
 _PICTURE = re.compile(rf"!\[(.*?)\]\(pictures/({'|'.join(PLAYED)})\.webp\)")
 
 
@@ -21,7 +27,8 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put a player where one is asked for, and behind the pictures of its scene, which open it."""
     for scene in PLAYED:
         markdown = markdown.replace(f"<!-- player: {scene} -->", _frame(scene))
-    return _PICTURE.sub(lambda found: _opening(html.escape(found[1]), found[2]), markdown)
+    opening, count = _PICTURE.subn(lambda found: _opening(html.escape(found[1]), found[2]), markdown)
+    return f"{opening}\n\n{_STYLE}" if count else markdown
 
 
 def on_post_build(config: Any, **_: Any) -> None:
@@ -41,4 +48,4 @@ def _frame(scene: str) -> str:
 
 def _opening(text: str, scene: str) -> str:
     picture = f'<img src="pictures/{scene}.webp" alt="{text}" title="{text}: open the player">'
-    return f"<details><summary>{picture}</summary>{_frame(scene)}</details>"
+    return f"<details class='player'><summary>{picture}</summary>{_frame(scene)}</details>"

@@ -21,7 +21,7 @@ from ripple_sim.scene.material_entry import LAWS
 from ripple_sim.scene.scene import NAMES as OVERLAYS
 from ripple_sim.solver import Material
 from ripple_sim.solver.layouts.build import LAYOUTS
-from ripple_sim.solver.operator.assembly import RIMS
+from ripple_sim.solver.operator.plate_rim import RIMS
 from ripple_sim.solver.operator.presets import PRESETS
 from ripple_sim.solver.texels.maps import CHANNELS
 

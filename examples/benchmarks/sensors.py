@@ -1,5 +1,7 @@
 """What sensors at eight points add to a physics step, and what the sound of the drums takes beside their waves.
 
+And what an accelerometer hears of a hit, by MuJoCo's contact and by Hertz's law.
+
     python examples/benchmarks/sensors.py
 
 Processor time, runs with and without taking turns; medians over frames.
@@ -7,8 +9,10 @@ Processor time, runs with and without taking turns; medians over frames.
 
 import time
 
+import mujoco
 import numpy as np
 
+from ripple_sim import Material, Ripples
 from ripple_sim.scene import load_scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.sound import Microphone
@@ -21,6 +25,33 @@ def add_sensors(simulation: Simulation) -> None:
     waves, rng = simulation.ripples["skin"], np.random.default_rng(0)
     chosen = rng.choice(waves.atlas.areas.size, 8, replace=False)
     simulation.sensors["skin"] = waves.sensor(waves.atlas.positions.reshape(-1, 3)[chosen], rate=2000)
+
+
+BOARD = """
+<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <geom name="board" type="box" size="0.15 0.1 0.01"/>
+    <body pos="0 0 0.116"><freejoint/><geom size="0.0055" mass="0.005"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+BANDS = (100, 500, 1000, 5000)  # [Hz]
+
+
+def levels(pulse: str) -> list[float]:
+    """Levels of an accelerometer's signal in these bands [dB re 1 m/s^2], of a steel ball on a wooden board."""
+    model = mujoco.MjModel.from_xml_string(BOARD)
+    data, board = mujoco.MjData(model), Material(speed=200.0, density=5.0, damping=100.0)
+    ripples = Ripples(model, {"board": board}, resolution=24, backend="cpu", pulse=pulse, modulus=1e9)
+    sensor = ripples["board"].sensor([0.1, 0.05, 0.01], rate=16_000)
+    ripples.mj_step(data, nstep=400)
+    samples = sensor.read().values[:, 0]
+    energy = 2 * np.abs(np.fft.rfft(samples) / len(samples)) ** 2
+    which = np.digitize(np.fft.rfftfreq(len(samples), 1 / sensor.rate), BANDS)
+    return [10 * np.log10(energy[which == band].sum()) for band in range(1, len(BANDS))]
 
 
 def main() -> None:
@@ -53,6 +84,13 @@ def main() -> None:
             microphone.pressure(SOUND)
         taken.append((time.process_time() - begun) / SOUND)
     print(f"drums: {taken[0]:.1f} s of processor time a second of the scene, {taken[1]:.1f} s with sound")
+
+    for pulse in ("contact", "hertz"):
+        told = (
+            f"{low} to {high} Hz {level:.0f}"
+            for low, high, level in zip(BANDS[:-1], BANDS[1:], levels(pulse), strict=True)
+        )
+        print(f"pulse {pulse!r} [dB re 1 m/s^2]: {', '.join(told)}")
 
 
 if __name__ == "__main__":

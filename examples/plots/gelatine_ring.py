@@ -1,4 +1,4 @@
-"""A ring that a drop sends over gelatine: its crest against the shear wave speed that was measured in such gelatine.
+"""A ring that a drop sends over gelatine: its leading crest against that of the exact waves, and the measured speed.
 
     python examples/plots/gelatine_ring.py [--texels 192]
 
@@ -8,38 +8,68 @@ waves much shorter than the depth run at 0.955 of the shear wave speed (Rayleigh
 """
 
 import argparse
+import functools
 from pathlib import Path
 
 import numpy as np
 from figure import COLORS, FOLDER, TEXT, plain, save, sheet
+from layer_mode import lowest_square, moving_mass
 from matplotlib.axes import Axes
+from scipy.special import j0, jv
 from standing_wave import flat_torus
 
 from ripple_sim.solver import Material, WaveSolver
 
 MEASURED = {"gelatine-3": (2010.0, 260.0), "gelatine-5": (4180.0, 840.0), "gelatine-7": (10240.0, 1800.0)}  # Pa
-DENSITY, RAYLEIGH = 1000.0, 0.9553
-SIDE, DEPTH, RADIUS = 0.4, 0.05, 0.006  # m: of the pool, its depth, of the drop
+VISCOSITY, DENSITY, RAYLEIGH = 0.6, 1000.0, 0.9553
+SIDE, DEPTH, RADIUS, IMPULSE = 0.4, 0.05, 0.006, 1e-3  # m: of the pool, its depth, of the drop; N s
 
 
-def spread(name: str, texels: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights over distance [m] and time [s] along a line from where the drop fell, [t, r]; the distances [m]."""
+def spread(name: str, texels: int, times: np.ndarray, short: bool) -> np.ndarray:
+    """Heights over time [s] and distance along a line from where the drop fell, [t, r], r of half the texels."""
     atlas = flat_torus(texels, SIDE)
-    waves = WaveSolver(atlas, Material.preset(name, thickness=DEPTH), backend="cpu")
+    waves = WaveSolver(atlas, Material.preset(name, thickness=DEPTH, short=short), backend="cpu")
     place = atlas.positions[0, texels // 2, texels // 2]
-    waves.add_impulse(place, 1e-3, RADIUS)
+    waves.add_impulse(place, IMPULSE, RADIUS)
     rows = []
     for dt in np.diff(times, prepend=0.0):
         waves.step(dt)
         rows.append(waves.height[0, texels // 2, texels // 2 :])
-    return np.array(rows), SIDE / texels * np.arange(texels - texels // 2)
+    return np.array(rows)
 
 
-def front(heights: np.ndarray, distances: np.ndarray, times: np.ndarray) -> float:
-    """Speed [m/s] of the first high crest or trough: a line through its places at the distances of the ring."""
-    ring = np.flatnonzero((distances > 0.35 * SIDE / 2) & (distances < 0.8 * SIDE / 2))
-    arrival = [times[np.abs(heights[:, each]).argmax()] for each in ring]
-    return float(1 / np.polyfit(distances[ring], arrival, 1)[0])
+@functools.cache
+def modes() -> np.ndarray:
+    """Wave numbers [1/depth], squared frequencies and masses of the exact mode, widths of the wave numbers; [4, k]."""
+    q = np.concatenate([np.linspace(1.0, 8.0, 71), np.linspace(8.3, 40.0, 100)])
+    return np.array([q, [lowest_square(each) for each in q], [moving_mass(each) for each in q], np.gradient(q)])
+
+
+def exact_ring(modulus: float, distances: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """The same heights [t, r] on an endless layer, of its lowest mode alone: a sum of round waves."""
+    q, square, mass, width = modes()
+    square = square * modulus / DENSITY / DEPTH**2
+    across = q * RADIUS / DEPTH
+    load = 384 * jv(4, across) / across**4  # of a footprint (1 - (d / r)^2)^3
+    rate = square * VISCOSITY / modulus / 2
+    swing = np.sqrt(square - rate**2)
+    parts = -IMPULSE * load * q * width / (2 * np.pi * DENSITY * DEPTH**3 * mass * swing)
+    swings = np.sin(np.outer(times, swing)) * np.exp(-np.outer(times, rate))
+    return (swings * parts) @ j0(np.outer(q, distances / DEPTH))
+
+
+def leading_crest(
+    heights: np.ndarray, distances: np.ndarray, times: np.ndarray, speed: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] at which the crest that leads the ring passes, and the distances [m] of the ring, [k].
+
+    It is the greatest height on the side to which the drop pressed, of what runs with 0.84 to 1.1 of a speed [m/s]:
+    farther out some of what follows is higher, and long low waves run ahead.
+    """
+    ring = distances[(distances > 0.35 * SIDE / 2) & (distances < 0.8 * SIDE / 2)]
+    pressed = -heights[:, np.isin(distances, ring)]
+    near = np.abs(np.log(ring / (times[:, None] * speed) / 0.96)) < 0.135
+    return times[np.where(near, pressed, -np.inf).argmax(axis=0)], ring
 
 
 def make(folder: Path, texels: int = 192) -> Path:
@@ -49,10 +79,22 @@ def make(folder: Path, texels: int = 192) -> Path:
     for k, (name, (modulus, spread_of_it)) in enumerate(MEASURED.items()):
         speed = RAYLEIGH * np.sqrt(modulus / DENSITY)
         ends = [RAYLEIGH * np.sqrt((modulus + sign * spread_of_it) / DENSITY) for sign in (-1, 1)]
-        times = np.linspace(0, SIDE / 2 / speed, 241)[1:]
-        heights, distances = spread(name, texels, times)
-        crest = front(heights, distances, times)
-        print(f"{name}: crest {crest:.2f} m/s, measured {speed:.2f} m/s ({ends[0]:.2f} to {ends[1]:.2f})")
+        times = np.linspace(0, SIDE / 2 / speed, 301)[1:]
+        distances = SIDE / texels * np.arange(texels - texels // 2)
+        exact = exact_ring(modulus, distances, times)
+        due, ring = leading_crest(exact, distances, times, speed)
+        print(f"{name}: measured {speed:.2f} m/s ({ends[0]:.2f} to {ends[1]:.2f})")
+        print(f"  exact mode:  crest {1 / np.polyfit(ring, due, 1)[0]:.2f} m/s")
+        for short in (False, True):
+            heights = spread(name, texels, times, short)
+            arrival = leading_crest(heights, distances, times, speed)[0]
+            late, crest = arrival / due - 1, 1 / np.polyfit(ring, arrival, 1)[0]
+            both = [each[:, np.isin(distances, ring)] for each in (heights, exact)]
+            like, high = np.corrcoef(both[0].ravel(), both[1].ravel())[0, 1], np.divide(*np.abs(both).max(axis=1))
+            print(
+                f"  short={short!s:5}: crest {crest:.2f} m/s, late by {late.min():.1%} to {late.max():.1%} of the "
+                f"time; all waves {high.min():.2f} to {high.max():.2f} as high, correlation {like:.2f}"
+            )
         axes = figure.add_axes((0.06 + 0.32 * k, 0.14, 0.27, 0.60))
         panel(axes, heights, distances, times)
         axes.plot([0, SIDE / 2], [0, SIDE / 2 / speed], color=COLORS["paper"], linewidth=1.4)

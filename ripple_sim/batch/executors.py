@@ -174,6 +174,7 @@ def _begin(cores: list[int]) -> None:
     for variable in ("LP_NUM_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, str(len(cores)))
     os.environ.setdefault("MUJOCO_GL", "disable")
+    logging.getLogger("ripple_sim").setLevel(logging.ERROR)  # the parent tells how far the batch is
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

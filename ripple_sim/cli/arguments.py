@@ -14,7 +14,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from ripple_sim.solver.errors import shown
 
 # Written out, since the modules that have these names take seconds to import; a test compares them.
-UP_AXES, RIMS = ("y", "z"), ("free", "fixed")
+UP_AXES, RIMS = ("y", "z"), ("free", "supported", "clamped", "fixed")
 LAYOUTS, BASELINES = ("auto", "cube", "patches"), ("paper", "uncorrected", "dynamic-paint")
 
 
@@ -79,6 +79,15 @@ def parse_overlay(word: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in word.split(",")) if word.strip() else ()
 
 
+def parse_material(word: str) -> tuple[str, dict[str, float]]:
+    """Read a material's name, and parameters of its own, from a word such as "steel-plate,thickness=0.002"."""
+    name, *pairs = (part.strip() for part in word.split(","))
+    found = [re.fullmatch(r"(\w+) *= *(.+)", pair) for pair in pairs]
+    with contextlib.suppress(ValueError, TypeError):
+        return name, {match[1]: float(match[2]) for match in found}  # type: ignore[index]
+    raise ValueError(f"{shown(word)} is not valid; it must be a name, as steel-plate, or steel-plate,thickness=0.002")
+
+
 def _one_word(
     parse: Callable[[str], Any], metavar: str, show: Callable[[Any], str] = str
 ) -> PrimitiveConstructorSpec[Any]:
@@ -125,4 +134,7 @@ LayoutName = Annotated[str, _one_word(parse_layout, "{auto,cube,patches}")]
 SceneLayout = Annotated[
     str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
 ]
-Rim = Annotated[str | None, _one_word(parse_rim, "{free,fixed}"), arg(help_behavior_hint="(default: the scene's)")]
+_RIM_NAMES = "{free,supported,clamped,fixed}"
+RimName = Annotated[str, _one_word(parse_rim, _RIM_NAMES)]
+NamedMaterial = Annotated[tuple[str, dict[str, float]], _one_word(parse_material, "NAME[,PARAMETER=VALUE ...]")]
+Rim = Annotated[str | None, _one_word(parse_rim, _RIM_NAMES), arg(help_behavior_hint="(default: the scene's)")]

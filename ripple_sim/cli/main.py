@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import io
+import logging
 import os
 import re
 import resource
@@ -23,9 +24,13 @@ import tyro.conf
 import tyro.extras
 from tyro.conf import Positional, arg
 
+from ripple_sim import __version__
+from ripple_sim.solver.errors import RippleError
+
 from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
-from .reports import AtlasCommand, BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
+from .reports import BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
+from .surfaces import AtlasCommand, ModesCommand
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -36,6 +41,7 @@ _LONGEST = 800  # of a message [characters]
 _ADDRESS_SPACE = {
     InfoCommand: 1.3,
     AtlasCommand: 1.2,
+    ModesCommand: 1.2,
     BenchCommand: 2.4,
     RenderCommand: 2.4,
     DropCommand: 2.4,
@@ -65,9 +71,12 @@ def _run(command: Any) -> int:
         text = f"this needs {need} GB of address space, but the limit (ulimit -v) is {most / 1e9:.2f} GB; allow more"
         return _fail(text, FAILED)
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
+    log = logging.getLogger("ripple_sim")
+    if not log.handlers:
+        log.addHandler(_Log())
 
     from ripple_sim.errors import DisplayError, EncodingError
-    from ripple_sim.solver.errors import GLError, RippleError, shown
+    from ripple_sim.solver.errors import GLError, shown
     from ripple_sim.solver.files import OF_THE_DISK, OF_THE_NAME
 
     end_in_good_order()
@@ -123,6 +132,14 @@ def _say(message: str) -> None:
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
 
 
+class _Log(logging.Handler):
+    """Prints what is logged, that something takes long, as the program's lines."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it."""
+        _say(record.getMessage())
+
+
 def _open_standard_streams() -> None:
     """Where the caller has closed one of them, open the null device: an output file would take its number."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
@@ -140,8 +157,8 @@ def _parse(argv: list[str]) -> Any:
         return _fail("a word of the command line holds a NUL; no name can", BAD_INPUT)
     try:
         command = parse(argv)
-        sys.stdout.flush()  # of the help or a completion script
-    except UsageError as error:
+        sys.stdout.flush()  # of the help, the version or a completion script
+    except (UsageError, RippleError) as error:
         return _fail(error, BAD_INPUT)
     except OSError as error:
         return _give_up_output(error)
@@ -162,6 +179,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "export": ExportCommand,
     "batch": BatchCommand,
     "atlas": AtlasCommand,
+    "modes": ModesCommand,
     "info": InfoCommand,
     "bench": BenchCommand,
     "view": ViewCommand,
@@ -170,7 +188,9 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "completion": CompletionCommand,
 }
 
-_DESCRIPTION = "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation."
+_DESCRIPTION = (
+    "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation. --version tells which."
+)
 
 
 class UsageError(Exception):
@@ -178,10 +198,13 @@ class UsageError(Exception):
 
 
 def parse(argv: Sequence[str]) -> Any:
-    """Return the command to run, or None if the help or a completion script was printed instead.
+    """Return the command to run, or None if the help, the version or a completion script was printed instead.
 
-    Raises `UsageError`.
+    Raises `UsageError`, and `RippleError` where the options of a command are out of range.
     """
+    if list(argv) == ["--version"]:
+        print(f"ripple-sim {__version__}")
+        return None
     command = _read(argv)
     if isinstance(command, CompletionCommand):  # which tyro makes from all the commands
         command = _read(["--tyro-print-completion", command.shell])

@@ -1,6 +1,7 @@
 """Commands that show a scene or write it to a file: `render`, `drop`, `export` and `view`.
 
-On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log stays silent.
+On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log gets a line
+where that takes long.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 from tyro.conf import Positional, arg
 
+from ripple_sim.errors import VideoError
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.video.options import VideoOptions
 
@@ -95,8 +97,9 @@ class ExportCommand(ExportOptions):
             scene = through_camera(scene, self.camera)
         with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
             summary = export_scene(scene, self.output, options, progress=progress)
+        size = summary.output.stat().st_size if summary.output.is_file() else 0
         print(
-            f"{summary.output}: {summary.frames} frames\n"
+            f"{summary.output}: {summary.frames} frames{f', {size / 1e6:.1f} MB' if size else ''}\n"
             f"stages    simulation {summary.simulate_seconds:.1f} s, writing {summary.write_seconds:.1f} s"
         )
 
@@ -275,7 +278,7 @@ class DropCommand(_VideoCommand):
     seed: Seed = 0
     """Seed for the bodies' places and sizes; the same seed gives the same video."""
     up: UpAxis = None
-    """Axis of the mesh that points up; a flat sheet lies down."""
+    """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
     repair: bool = False
@@ -340,7 +343,7 @@ class ViewCommand:
     seed: Seed = 0
     """Seed for the bodies' places and sizes."""
     up: UpAxis = None
-    """Axis of the mesh that points up; a flat sheet lies down."""
+    """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
     wrap: bool = False
@@ -366,6 +369,8 @@ class ViewCommand:
         # refuse what cannot work before anything that takes time: first what is asked for, then what this machine lacks
         is_scene(self.scene)
         check_size(*self.size)
+        if not self.folder.is_dir():
+            raise VideoError(f"there is no folder {str(self.folder)!r} for screenshots and videos; make it first")
         if self.benchmark:
             from ripple_sim.viewer.window import benchmark
 

@@ -1,7 +1,6 @@
-"""Commands that print a report, `atlas`, `bench`, `cache`, `info` and `materials`, and `batch`, which ends with one.
+"""Commands that print a report, `bench`, `cache`, `info` and `materials`, and `batch`, which ends with one.
 
-That of an atlas tells of the mesh, what was done to it, the quality of the atlas, and the time of each stage. A batch
-shows how far it is by a bar on a terminal, and by a line a minute in a log.
+A batch shows how far it is by a bar on a terminal, and by a line a minute in a log.
 """
 
 from __future__ import annotations
@@ -12,196 +11,19 @@ import json as json_format
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, TextColumn
 from tyro.conf import Positional, arg
 
-from .arguments import Count, Gigabytes, LayoutName, Limit, Shard, UpAxis
+from .arguments import Gigabytes, Limit, Shard
 
 if TYPE_CHECKING:
     from ripple_sim.batch.plan import Plan
     from ripple_sim.batch.run import Progress
-    from ripple_sim.solver import Atlas
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class AtlasCommand:
-    """Map a mesh to an atlas of charts and report its quality."""
-
-    mesh: Annotated[Positional[Path], arg(metavar="MESH")]
-    """Mesh file (OBJ, OFF, PLY, STL, GLB ...)."""
-    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE", help_behavior_hint="(optional)")] = None
-    """Save the atlas to this file (NPZ)."""
-    resolution: Count = 128
-    """Texels along the edge of a cube's chart, N: about 6 N^2 in all, in every layout."""
-    layout: LayoutName = "auto"
-    """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube where it fits."""
-    method: Annotated[str, arg(metavar="{progressive,conformal}")] = "progressive"
-    """Sphere map of the cube: progressive (fold-free, even area) or conformal (preserves angles; starves limbs)."""
-    plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
-    """Write an image of the mesh with its charts, and of the charts, coloured by stretch; with --inside, of the
-    thickness."""
-    inside: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
-    """Tell how thick the layer is over what lies inside, a mesh or a volume (NIfTI, NRRD, DICOM folder, .npy)."""
-    threshold: Annotated[float | None, arg(metavar="VALUE", help_behavior_hint="(optional)")] = None
-    """Value of the volume inside at its surface."""
-    spacing: Annotated[float | None, arg(metavar="M", help_behavior_hint="(optional)")] = None
-    """Between the voxels of a .npy inside [m]."""
-    up: UpAxis = None
-    """Axis of the mesh that points up in the image."""
-    repair: bool = False
-    """Close the mesh's holes (needs the package pymeshfix)."""
-    wrap: bool = False
-    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
-    json: bool = False
-    """Print JSON."""
-    overwrite: bool = False
-    """Replace files that ripple-sim has not made; the mesh itself never."""
-
-    def run(self) -> None:
-        """Build the atlas, save and plot it if asked to, and print its figures."""
-        from ripple_sim.solver import build_atlas, load_mesh, thickness_map
-
-        self._check()
-        inside = None
-        if self.inside is not None:
-            from ripple_sim.scene.target_maps import load_inside
-
-            inside = load_inside(self.inside, self.threshold, self.spacing)
-        start = time.perf_counter()
-        mesh = load_mesh(self.mesh, repair=self.repair, wrap=self.wrap)
-        loaded = time.perf_counter()
-        atlas = build_atlas(mesh, resolution=self.resolution, method=self.method, layout=self.layout)
-        seconds = {"load": loaded - start, **atlas.timings}
-        thickness = None
-        if inside is not None:
-            begun = time.perf_counter()
-            thickness = thickness_map(atlas, inside)
-            seconds["thickness"] = time.perf_counter() - begun
-        if self.output is not None:
-            atlas.save(self.output, self.overwrite)
-        if self.plot is not None:
-            begun = time.perf_counter()
-            self._plot(self.plot, atlas, thickness)
-            seconds["plot"] = time.perf_counter() - begun
-        report = atlas_report(self.mesh, atlas, self.method, seconds, thickness)
-        print(json_format.dumps(report, indent=2) if self.json else report_text(report))
-
-    def _check(self) -> None:
-        """Refuse, before anything that takes time, what cannot be written or makes no sense."""
-        from ripple_sim.solver import AtlasError
-        from ripple_sim.solver.mesh.files import check_mesh_file
-        from ripple_sim.solver.texels.atlas import check_atlas_place
-
-        check_mesh_file(self.mesh)
-        for path in (self.output, self.plot):
-            for read in filter(None, (self.mesh, self.inside)):
-                if path is not None and path.exists() and read.exists() and path.samefile(read):
-                    what = "the mesh itself" if read == self.mesh else "what is inside itself"
-                    raise AtlasError(f"cannot write {path}: it is {what}; name another file")
-        if self.inside is None and (self.threshold is not None or self.spacing is not None):
-            raise AtlasError("--threshold and --spacing belong to the volume that --inside names; name one")
-        if self.output is not None:
-            check_atlas_place(self.output, self.overwrite)
-        if self.plot is not None:
-            from ripple_sim.figures.atlas_plot import check_plot_path
-
-            check_plot_path(self.plot, self.overwrite)
-
-    def _plot(self, path: Path, atlas: Atlas, thickness: NDArray[np.float64] | None) -> None:
-        from ripple_sim.figures.atlas_plot import plot_atlas, plot_thickness
-        from ripple_sim.scene.drop import usual_up
-
-        mesh, up = atlas.mesh, self.up or usual_up(self.mesh)
-        method = self.method if atlas.layout == "cube" else None
-        subtitle = f"{len(mesh.V):,} vertices, {len(mesh.F):,} triangles; {charts_text(atlas.texels.shape, method)}"
-        if thickness is None:
-            plot_atlas(atlas, path, title=self.mesh.stem, subtitle=subtitle, up=up)
-        else:
-            subtitle = f"thickness over {self.inside.name if self.inside else ''}; {subtitle}"
-            plot_thickness(atlas, thickness, path, title=self.mesh.stem, subtitle=subtitle, up=up)
-
-
-# By figure of `Atlas.quality`: what it is called in the text, and its unit.
-_FIGURES = {
-    "solid_angle": ("solid angle of the map", "sr"),
-    "flipped": ("folded triangles", ""),
-    "q001": ("stretch, 0.1 % of the area", ""),
-    "q01": ("stretch, 1 %", ""),
-    "q50": ("stretch, median", ""),
-    "q99": ("stretch, 99 %", ""),
-    "q999": ("stretch, 99.9 %", ""),
-    "starved": ("area starved (stretch over 4)", ""),
-    "edge_min": ("shortest texel edge", "m"),
-    "edge_max": ("longest texel edge", "m"),
-    "folded": ("folded texels", ""),
-    "coverage": ("texel area / mesh area", ""),
-    "spanned": ("area between texels / mesh area", ""),
-    "timestep": ("time step / even grid's", ""),
-}
-
-
-def atlas_report(
-    path: Path, atlas: Atlas, method: str, seconds: dict[str, float], thickness: NDArray[np.float64] | None = None
-) -> dict[str, Any]:
-    """Figures of an atlas, as JSON can hold them.
-
-    They are of the mesh in the file at a path (`size` of the bounding box [m], `area` [m^2], `volume` [m^3], `notes` on
-    what was done to it), of its charts (C, n, n), the `method` of the cube's sphere map, `quality` (see
-    `Atlas.quality`), quantiles of the `thickness` [m] of a layer, and wall time of each stage [s].
-    """
-    mesh = atlas.mesh
-    known: dict[str, Any] = {}
-    if thickness is not None:
-        names, shares = ("least", "q01", "median", "q99", "greatest"), (0, 0.01, 0.5, 0.99, 1)
-        known = {"thickness": dict(zip(names, np.quantile(thickness, shares).tolist(), strict=True))}
-    return {
-        "mesh": str(path),
-        "vertices": len(mesh.V),
-        "triangles": len(mesh.F),
-        "size": np.ptp(mesh.V, axis=0).tolist(),
-        "area": mesh.area,
-        "volume": mesh.volume,
-        "notes": list(mesh.notes),
-        "resolution": atlas.resolution,
-        "layout": atlas.layout,
-        "method": method if atlas.layout == "cube" else None,
-        "charts": list(atlas.texels.shape),
-        "quality": atlas.quality(),
-        **known,
-        "seconds": seconds,
-    }
-
-
-def charts_text(shape: Sequence[int], method: str | None) -> str:
-    """Number and size of charts of a shape (C, n, n), and the sphere map that the cube layout has, as text."""
-    return f"{' x '.join(map(str, shape))} texels, {'patches' if method is None else f'{method} sphere map'}"
-
-
-def report_text(report: dict[str, Any]) -> str:
-    """Format a report as text."""
-    rows = [
-        ("mesh", f"{report['vertices']} vertices, {report['triangles']} triangles"),
-        ("size", f"{' x '.join(f'{x:.4g}' for x in report['size'])} m"),
-        ("area", f"{report['area']:.6g} m^2"),
-        ("volume", f"{report['volume']:.6g} m^3"),
-        *(("note", note) for note in report["notes"]),
-        ("atlas", charts_text(report["charts"], report["method"])),
-        *(
-            (_FIGURES[name][0], f"{value:.6g} {_FIGURES[name][1]}".rstrip())
-            for name, value in report["quality"].items()
-        ),
-        *((f"thickness, {name}", f"{metres:.6g} m") for name, metres in report.get("thickness", {}).items()),
-        *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),
-    ]
-    width = max(len(name) for name, _ in rows)
-    return "\n".join([report["mesh"], *(f"{name:<{width}}  {value}" for name, value in rows)])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -116,15 +116,22 @@ def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) ->
     return PairRows(rows >> 1, rows & 1, targets[order], others[order])
 
 
-def normal_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
-    """Normal forces of some contacts [N], as `mj_contactForce` gives them; 0 without a row in the constraint solver."""
+def normal_rows(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> tuple[Ints, Ints]:
+    """Rows of the constraint solver that share the normal forces of some contacts, and the contact of each, [m] both.
+
+    Those of a contact are the edges of its friction pyramid, or one; its normal motion is their mean.
+    """
     address, dim = data.contact.efc_address[contacts], data.contact.dim[contacts]
-    # the edges of a friction pyramid share the normal force among them
     edges = np.maximum(2 * dim - 2, 1) if is_pyramidal(model) else np.ones_like(dim)
     edges = np.where(address >= 0, edges, 0)
     ends = edges.cumsum()
-    rows = np.repeat(address - ends + edges, edges) + np.arange(edges.sum())
-    return np.bincount(np.repeat(np.arange(len(edges)), edges), data.efc_force[rows], len(edges)).astype(np.float64)
+    return np.repeat(address - ends + edges, edges) + np.arange(edges.sum()), np.repeat(np.arange(len(edges)), edges)
+
+
+def normal_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
+    """Normal forces of some contacts [N], as `mj_contactForce` gives them; 0 without a row in the constraint solver."""
+    rows, of = normal_rows(model, data, contacts)
+    return np.bincount(of, data.efc_force[rows], len(contacts)).astype(np.float64)
 
 
 def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:

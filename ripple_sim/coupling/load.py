@@ -21,6 +21,7 @@ from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
 from .contacts import ContactReader, Contacts, first_rows
+from .hertz import Hits
 from .model import CoupledModel
 from .patches import Footprints, corners, load_points
 from .rest_filter import DEFAULT_TIME_CONSTANT, NO_FORCES, RestFilter, TexelForces
@@ -244,12 +245,15 @@ class TargetLoad:
         Whether what touches at two points touches between them too.
     time_constant : float
         Of contacts with it [s].
+    hits : Hits, optional
+        What gives hits the pulse of Hertz's law.
     """
 
     def __init__(
         self, waves: WaveSolver, target: int, radii: NDArray[np.float64], convex: NDArray[np.bool_],
-        time_constant: float = DEFAULT_TIME_CONSTANT,
+        time_constant: float = DEFAULT_TIME_CONSTANT, hits: Hits | None = None,
     ) -> None:  # fmt: skip
+        self._hits = hits
         self._target, self._radii, self._convex = target, np.minimum(radii, radii[target]), convex
         self._is_open = not waves.atlas.mesh.closed
         self._filter = RestFilter(len(radii), waves.atlas.areas.size, time_constant)
@@ -268,7 +272,12 @@ class TargetLoad:
             self._footprints.follow(atlas)
 
     def touched(
-        self, contacts: Contacts, pose: tuple[Floats, Floats], timestep: float, elapsed: float
+        self,
+        contacts: Contacts,
+        pose: tuple[Floats, Floats],
+        timestep: float,
+        elapsed: float,
+        data: mujoco.MjData | None = None,
     ) -> tuple[Load, StepContacts]:
         """Load over a time in which geoms touch, and what they did.
 
@@ -279,6 +288,8 @@ class TargetLoad:
             Position of the target in the world [m], and rotation from its frame to the world.
         timestep, elapsed : float
             How long the contacts' forces were held, and over which time their impulse is given [s].
+        data : mujoco.MjData, optional
+            Whose contacts they are, for hits.
         """
         starts, (position, rotation) = first_rows(contacts.others), pose
         geoms, points = contacts.others[starts], (contacts.points - position) @ rotation
@@ -304,11 +315,23 @@ class TargetLoad:
         )
         done = StepContacts(self._target, *pose, contacts, starts, places, at, forces, inner, on_texels)
         self._filter.set_timestep(timestep)
-        return self._filter(on_texels, elapsed), done
+        if self._hits is not None and data is not None:
+            arrived, pairs = self._filter.arrived(geoms, elapsed), contacts.by_other()
+            for row in arrived:
+                mine = slice(begins[row], begins[row + 1])
+                # what a unit of the contact's impulse gives each texel
+                shares = on_texels.forces[mine] * (elapsed / (timestep * forces[row]))
+                prepaid = self._hits.begin(data, self._atlas, pairs[row], texels[mine], shares)
+                self._filter.prepay(int(geoms[row]), prepaid)
+        return self._over(self._filter(on_texels, elapsed), elapsed), done
 
     def untouched(self, elapsed: float) -> Load:
         """Load over a time [s] in which no geom touches."""
-        return self._filter(NO_FORCES, elapsed)
+        return self._over(self._filter(NO_FORCES, elapsed), elapsed)
+
+    def _over(self, load: Load, elapsed: float) -> Load:
+        """A load with the pulses of hits over a time [s]."""
+        return load if self._hits is None else self._hits.over(load, elapsed)
 
 
 def time_constant(coupled: CoupledModel, target: int) -> float:
@@ -330,10 +353,14 @@ class ContactLoads:
     coupled : CoupledModel
     waves : mapping
         Geom id of every target to its waves. Looked at again by `waves_changed` and `clear`.
+    hits : mapping, optional
+        Geom id of targets whose hits have the pulse of Hertz's law.
     """
 
-    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
-        self._coupled, self._waves = coupled, waves
+    def __init__(
+        self, coupled: CoupledModel, waves: Mapping[int, WaveSolver], hits: Mapping[int, Hits] | None = None
+    ) -> None:
+        self._coupled, self._waves, self._hits = coupled, waves, hits or {}
         self._contacts = ContactReader(coupled, {geom: each.atlas for geom, each in waves.items()})
         self.clear()
 
@@ -343,9 +370,18 @@ class ContactLoads:
         radii, convex, soft = self._coupled.footprint_radii, self._coupled.convex, self._coupled.soft
         # a flex has a contact at each of its vertices: nothing touches between them
         self._targets = {
-            geom: TargetLoad(waves, geom, radii, convex & (geom not in soft), time_constant(self._coupled, geom))
+            geom: TargetLoad(
+                waves,
+                geom,
+                radii,
+                convex & (geom not in soft),
+                time_constant(self._coupled, geom),
+                self._hits.get(geom),
+            )
             for geom, waves in self._waves.items()
         }
+        for hits in self._hits.values():
+            hits.clear()
         self.skip()
 
     def skip(self) -> None:
@@ -377,7 +413,8 @@ class ContactLoads:
         for geom, target in self._targets.items():
             if geom in contacts:
                 target.follow(self._waves[geom].atlas)
-                loads[geom], done = target.touched(contacts[geom], target_pose(data, geom), self._timestep, elapsed)
+                pose = target_pose(data, geom)
+                loads[geom], done = target.touched(contacts[geom], pose, self._timestep, elapsed, data)
                 self._since_skip.append(done)
                 self._latest.append(done)
             else:

@@ -5,7 +5,8 @@ every step. The sum of its contact forces is smooth, and passes as it is; the pl
 while nothing changes, and is short where force or place do.
 
 A contact that chatters is the exception: its force is averaged over some periods too. The deficit [N s] is what the
-surface has yet to receive, so that nothing is lost.
+surface has yet to receive, so that nothing is lost. What is prepaid the surface has got before MuJoCo's contact gives
+it, in the pulse of a hit: the contact's first impulses pay for it.
 
 A geom on stiff, springy contacts chatters: contact opens for a step and closes again, at the natural frequency of the
 contact's spring, and the force jumps between nothing and twice the weight.
@@ -20,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ripple_sim.solver import Load
-from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel, shared
 
 # A first hit is over within this time [s]; until then nothing is averaged.
 _ONSET = 0.1
@@ -57,6 +58,7 @@ _FIELDS = [
     ("side", np.float64),  # 1 where it pushes inwards, -1 outwards; forces are amounts along that
     ("level", np.float64),  # its force, averaged over chatter [N]
     ("deficit", np.float64),  # impulse that the target has not received yet [N s]
+    ("prepaid", np.float64),  # impulse that the target has received before [N s]
     ("memory", np.float64),  # time over which means are taken, short where something changes [s]
     ("mean_force", np.float64),  # mean force [N]
     ("place", np.float64, 3),  # where it is [m]
@@ -131,8 +133,21 @@ class RestFilter:
         """Scale all times for physics steps of this length [s]."""
         unit = max(timestep / _TIME_STEP, self._time_constant / DEFAULT_TIME_CONSTANT)
         if unit != self._unit:
-            self._states["deficit"] *= self._unit / unit
+            for name in ("deficit", "prepaid"):
+                self._states[name] *= self._unit / unit
             self._unit = unit
+
+    def arrived(self, geoms: Ints, dt: float) -> list[int]:
+        """Which rows of geoms that touch over a time [s] did not before."""
+        states, dt = list(self._states[geoms]), dt / self._unit
+        return [i for i, each in enumerate(states) if not each.active or _has_left(each, dt)]
+
+    def prepay(self, geom: int, impulse: float) -> None:
+        """What a geom will give next, so much of it [N s], positive inwards, the target has already."""
+        state, side = self._states[geom], np.sign(impulse)
+        if impulse:
+            state.side, state.deficit = side, side * state.side * state.deficit
+            state.prepaid += abs(impulse) / self._unit
 
     def __call__(self, present: TexelForces, dt: float) -> Load:
         """Load over a time [s] in which these forces act."""
@@ -180,7 +195,7 @@ def _filter(
             side = 1.0 if force > 0 else -1.0
             if state.side != side:
                 # what the target has not received yet stays as it is
-                state.side, state.deficit = side, -state.deficit
+                state.side, state.deficit, state.prepaid = side, state.prepaid - state.deficit, 0.0
             total = side * _touch(state, abs(force), present.middles[row - 1], present.place_radii[row - 1], dt)
             weight = dt / (dt + state.memory) if state.first < state.last else 1.0
             if weight < 1:
@@ -229,7 +244,7 @@ def _faded(
     return end
 
 
-@kernel(no_cpython_wrapper=True)
+@shared
 def _has_left(state: Any, dt: float) -> bool:
     """Whether a geom is gone, and not open for a moment only."""
     return state.absent > max(_LEFT, 1.5 * dt)
@@ -280,6 +295,8 @@ def _miss(state: Any, dt: float) -> float:
     state.level -= dt / (dt + _AVERAGED) * state.level
     # that of a springy contact does from its first opening on
     state.chatters = state.springy and not _has_left(state, dt)
+    if _has_left(state, dt):  # nothing comes that would pay for it
+        state.deficit, state.prepaid = state.deficit - state.prepaid, 0.0
     given = _given(state, 0.0, 0.0, dt)
     state.active = state.deficit != 0 or not _has_left(state, dt)
     return given
@@ -287,7 +304,13 @@ def _miss(state: Any, dt: float) -> float:
 
 @kernel(no_cpython_wrapper=True)
 def _given(state: Any, force: float, hit: float, dt: float) -> float:
-    """Force that the target gets [N]; the difference goes to the deficit, of which a part is paid."""
+    """Force that the target gets [N]; the difference goes to the deficit, of which a part is paid.
+
+    What is prepaid it does not get again.
+    """
+    repaid = min(state.prepaid / dt, force)
+    state.prepaid -= dt * repaid
+    force -= repaid
     given = state.level + hit if state.chatters else force
     state.deficit += dt * (force - given)
     if state.deficit != 0:

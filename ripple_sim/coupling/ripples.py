@@ -25,6 +25,7 @@ from .geoms import (
     own_model,
     target_name,
 )
+from .hertz import Hits, hertz_moduli
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .soft import HighPass
@@ -70,7 +71,7 @@ class Ripples(Targets):
     layout : str or mapping
         How surfaces get their charts: "auto", "cube" or "patches", for all targets or by geom; see `build_atlas`.
     rim : str or mapping
-        "free" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
+        "free", "supported", "clamped" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
     two_way : bool
         Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
         Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects
@@ -85,6 +86,11 @@ class Ripples(Targets):
         Whether a flex keeps to itself the coarse motion that contacts give it, for all targets or by name: its waves
         then get what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in the flex
         and in its waves, which take theirs from nothing.
+    pulse : str or mapping
+        How long a hit takes, for all targets or by geom: "contact", as MuJoCo's soft contact holds it, some
+        milliseconds, or "hertz", as two elastic bodies touch, with the same impulse; see `Hits`.
+    modulus : float or mapping, optional
+        For "hertz": E* of the two materials, 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2 [Pa].
     backend : str
         As for `WaveSolver`; so are the next two.
     operator : str
@@ -109,6 +115,8 @@ class Ripples(Targets):
         two_way: bool = False,
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
         high_pass: bool | ByGeom[bool] = False,
+        pulse: str | ByGeom[str] = "contact",
+        modulus: float | ByGeom[float | None] | None = None,
         backend: str = "auto",
         operator: str = "fem",
         conserve_volume: bool = True,
@@ -121,6 +129,11 @@ class Ripples(Targets):
         for geom, waves in rigid.items():
             for message in collision_warnings(coupled, geom, waves.atlas):
                 _warn(message)
+        moduli = hertz_moduli(self.model, self, pulse, modulus)
+        if two_way and moduli:
+            raise SceneError(
+                "with two_way the surface itself says how long a hit takes; take two_way=False, or pulse='contact'"
+            )
         if two_way and coupled.soft:
             raise SceneError(
                 "flexes and skins cannot push back: their waves have the masses that their nodes and bones have "
@@ -134,7 +147,8 @@ class Ripples(Targets):
             if surface.flex >= 0 and fine[target_name(self.model, target)]
         }
         _warn(integrator_warning(self.model))
-        self._loads = ContactLoads(coupled, self._waves)
+        hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in moduli.items()}
+        self._loads = ContactLoads(coupled, self._waves, hits)
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._two_way = TwoWay(coupled, self._waves) if two_way else None

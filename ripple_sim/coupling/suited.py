@@ -9,16 +9,17 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.operator.presets import (
     BOUNCE,
+    FOOTPRINT,
     damping_for,
     density_after,
     density_under,
@@ -45,9 +46,6 @@ _HIT, _REST = 0.085, 0.05
 
 # How long most of a contact's impulse takes, over the time constant of its `solref`.
 _PULSE = 0.4
-
-# Footprints smaller than this share of the target's size count as of this size.
-_FOOTPRINT = 0.025
 
 # Wave number of the longest wave on a ball, times its size: sqrt(8).
 _LONGEST = 8**0.5
@@ -175,7 +173,7 @@ def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
         weight=_resting(coupled, geom) * float(np.linalg.norm(model.opt.gravity)),
         impulse=BOUNCE * mass * fall,
         duration=max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep),
-        radius=max(footprint, _FOOTPRINT * extent.size),
+        radius=max(footprint, FOOTPRINT * extent.size),
         rest_depth=_REST * extent.radius,
         hit_depth=_HIT * extent.radius,
     )
@@ -250,15 +248,54 @@ def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
     Of two bodies that both move it is the reduced mass, and a body stands for all that it is joined to. Where nothing
     moves, the mass is 0.
     """
+    reduced = _reduced_masses(coupled, geom)
+    return _hitting(coupled, geom, reduced, int(reduced.argmax()))
+
+
+def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
+    """Reduced mass of each geom's body and a target's [kg]; 0 where they cannot touch, or neither moves."""
     model = coupled.model
     masses = model.body_subtreemass[model.body_rootid]
     inverse = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)[model.geom_bodyid]
     total = np.where(coupled.can_collide(geom), inverse + inverse[geom], 0.0)
-    reduced = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)
-    other = int(reduced.argmax())
+    return np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)
+
+
+def _hitting(coupled: CoupledModel, geom: int, reduced: NDArray[np.float64], other: int) -> tuple[float, float]:
     radii = coupled.footprint_radii
     return float(reduced[other]), float(min(radii[geom], radii[other]))
 
+
+def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
+    """What `Material.suited` asks for, of a target in its model: size, hit, radius and amplitude.
+
+    The hit is that of the body of median mass that can touch it, after a fall from the target's size, or from where
+    bodies are above it as the model begins, up to twice the size: higher, they wait to be dropped. The dent is a
+    twentieth of the size, or less on what is thin. Raises `SceneError` if nothing that moves can touch the target, or
+    it is soft.
+    """
+    geom = find_target(model, name)
+    needs = f'the preset "suited" of {name!r} needs a size [m] and a hit [kg, m/s], as size = 1.0, hit = [0.5, 4.4]'
+    if is_soft(model, geom):
+        raise SceneError(f"{needs}: what may hit a flex or a skin is not known")
+    coupled = CoupledModel(model, [geom])
+    extent, reduced = Extent.of(target_mesh(model, geom)), _reduced_masses(coupled, geom)
+    touching = np.flatnonzero(reduced)
+    if not len(touching):
+        raise SceneError(f"{needs}: nothing that moves can touch it in the model")
+    middle = int(touching[np.argsort(reduced[touching])[len(touching) // 2]])
+    mass, footprint = _hitting(coupled, geom, reduced, middle)
+    fall = _fall(model, min(max(extent.size, _height(coupled, geom)), 2 * extent.size))
+    return {
+        "size": extent.size,
+        "hit": (mass, fall),
+        "radius": footprint,
+        "amplitude": min(_DENT, _THIN * extent.radius / extent.size),
+    }
+
+
+# Of a typical hit: its dent over the target's size, and at most over half its usual thickness.
+_DENT, _THIN = 0.05, 0.5
 
 LEAST, USUAL, MOST = 32, 96, 256
 _STEP = 16

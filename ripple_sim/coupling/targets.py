@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -11,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.errors import SceneError
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.assembly import hold
 from ripple_sim.solver.texels.atlas import check_points
@@ -21,6 +22,9 @@ from .geoms import ByGeom, GeomKey, checked_materials, find_any, find_target, fo
 from .soft import is_soft
 from .suited import suited_targets
 from .target_mesh import target_atlas
+
+# How far off the surface a poke may be without a word, over the object's size.
+_FAR = 0.1
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -161,7 +165,8 @@ class Targets:
         name : str or int
             Geom.
         point : [3]
-            In the frame of the geom's body, as places in an MJCF are [m]; the nearest surface point is taken.
+            In the frame of the geom's body, as places in an MJCF are [m]; the nearest surface point is taken, with a
+            warning where that is far.
         impulse : float
             [N s]; positive presses inwards.
         radius : float
@@ -179,7 +184,17 @@ class Targets:
         SolverError
             If the impulse, the point or the radius is not finite, or the radius negative.
         """
-        return self._target(name).waves.add_impulse(self.to_geom(name, point), impulse, radius)
+        waves, place = self._target(name).waves, self.to_geom(name, point)
+        where = waves.add_impulse(place, impulse, radius)
+        off, size = float(np.linalg.norm(place - where.point)), float(np.ptp(waves.atlas.mesh.V, axis=0).max())
+        if off > _FAR * size:
+            warnings.warn(
+                f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its size); the nearest point "
+                f"is poked. Points are in the frame of the geom's body [m]",
+                RippleWarning,
+                stacklevel=2,
+            )
+        return where
 
     def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
         """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.

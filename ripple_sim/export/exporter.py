@@ -17,7 +17,7 @@ from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, 
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.errors import EncodingError, ExportError
-from ripple_sim.render.visuals.visual import find_look
+from ripple_sim.render.visuals.visual import find_look, paint_of
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import CameraEntry, check_camera
 from ripple_sim.simulation import Simulation
@@ -47,7 +47,7 @@ class Exporter:
     camera : str or CameraEntry, optional
         Name of a camera in the MJCF, or what `[camera]` of a scene file says; by default MuJoCo's free camera.
     looks : mapping, optional
-        Geom, by its name or id, to the look of its surface, one of `LOOKS`; rubber by default.
+        Geom, by its name or id, to the look of its surface, one of `LOOKS`; rubber by default, see `RippleRenderer`.
     lighting : str
         "model", "studio" or "auto", see `Renderer`.
     **options
@@ -100,7 +100,7 @@ class Exporter:
             camera=camera_entry(model, camera),
             size=written["size"],
             lighting=lighting,
-            paints={name: (named.get(name, "rubber"), None) for name in ripples},
+            paints={name: paint_of(model, geom, named.get(name)) for name, geom in ripples.geom_ids.items()},
             limited=dict.fromkeys(ripples, written["limit"]),
             tessellation=written["tessellation"],
             triangles=written["triangles"],

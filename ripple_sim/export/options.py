@@ -9,8 +9,8 @@ import dataclasses
 from typing import Literal, TypedDict
 
 from ripple_sim.errors import ExportError
-from ripple_sim.solver.errors import check_fields
-from ripple_sim.video.options import Backend
+from ripple_sim.solver.errors import check_fields, whole
+from ripple_sim.video.options import IN_ANY_CASE, Backend
 
 TESSELLATIONS = ("refined", "own")
 MOST_TRIANGLES = 100_000
@@ -40,7 +40,7 @@ class ExportOptions:
     layout: str | None = None
     """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
     rim: str | None = None
-    """What the rims of open surfaces do: free, or fixed as that of a drum's skin."""
+    """What the rims of open surfaces do: free, supported, clamped, or fixed as that of a drum's skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     signals: bool = False
@@ -55,7 +55,7 @@ class ExportOptions:
     """Replace an output that ripple-sim has not made."""
 
     def __post_init__(self) -> None:
-        check_fields(ExportError, self)
+        check_fields(ExportError, self, triangles=whole(1), chunk=whole(1), **IN_ANY_CASE)
 
     @property
     def rate(self) -> float:

@@ -19,6 +19,7 @@ from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RenderError, RippleWarning, SceneError
 from ripple_sim.render import AnyHeightMap, Camera, FixedCamera, Renderer
 from ripple_sim.render.camera import Viewpoint, find_viewpoint
+from ripple_sim.render.visuals.visual import paint_of
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.solver.errors import GLError, checked, instance, whole
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -50,7 +51,8 @@ class RippleRenderer:
         Without effect: no text is drawn.
     looks : mapping
         Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default), jelly, clay and so
-        on. Its colour is the geom's, where the model gives it a texture or a colour, as in a scene file.
+        on. Its colour is the geom's, where the model gives it a texture or a colour, as in a scene file; one without
+        either is grey, as in MuJoCo, unless it is named here.
     gl : GLContext, optional
         By default the process's shared one.
     limit : bool
@@ -100,7 +102,8 @@ class RippleRenderer:
         self._height_maps = {name: drawn_heights(ripples, name, limit) for name in ripples}
         named = by_name(self.model, looks or {}, "looks")
         surfaces = {
-            geom: surface_of(ripples[name], named.get(name, "rubber")) for name, geom in ripples.geom_ids.items()
+            geom: surface_of(ripples[name], *paint_of(self.model, geom, named.get(name)))
+            for name, geom in ripples.geom_ids.items()
         }
         self.height, self.width, self._looks, self._limit = int(height), int(width), named, limit
         self.scene = mujoco.MjvScene(self.model, max_geom)

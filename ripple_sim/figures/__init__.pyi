@@ -9,3 +9,4 @@ from .atlas_plot import (
     squares as squares,
     texel_stretch as texel_stretch,
 )
+from .mode_plot import ModePainter as ModePainter, plot_modes as plot_modes

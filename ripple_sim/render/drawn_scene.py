@@ -294,7 +294,7 @@ class DrawnScene:
         of_geoms = [visual for visual, _ in visuals if visual.index >= 0 and not visual.site]
         plane = mujoco.mjtGeom.mjGEOM_PLANE
         self._planes = [visual for visual in of_geoms if visual.kind == plane]
-        self._others = [visual for visual, _ in visuals if (visual.site or visual.index < 0) and visual.casts]
+        self._others = [visual for visual, _ in visuals if visual.site or visual.index < 0]
         self._occluders.hold(np.array([visual.index for visual in of_geoms if visual.kind != plane], dtype=np.int64))
         self._assets.objects.keep(len(self.targets))
         self._instances = instances_of(self._assets, visuals, self._made)
@@ -333,19 +333,16 @@ class DrawnScene:
 
     def balls(self, data: Any) -> NDArray[np.float64]:
         """Balls [k, 4] that contain everything."""
-        planes = [ball_of(self._model, data, visual) for visual in self._planes]
-        return np.concatenate([*self._geom_balls(data), *planes, *(target.bounds() for target in self.targets)])
+        others = [ball_of(self._model, data, visual) for visual in (*self._others, *self._planes)]
+        return np.concatenate([self._occluders.balls(data), *others, *(target.bounds() for target in self.targets)])
 
     def casters(self, data: Any) -> NDArray[np.float64]:
         """Balls that contain everything that may cast a shadow.
 
         They do not change their size as a target turns, so that shadow maps stay as they are.
         """
-        return np.concatenate([*self._geom_balls(data), *(target.ball() for target in self.targets)])
-
-    def _geom_balls(self, data: Any) -> list[NDArray[np.float64]]:
-        """Bounding balls of everything but the targets that may cast a shadow."""
-        return [self._occluders.balls(data), *(ball_of(self._model, data, each) for each in self._others)]
+        others = [ball_of(self._model, data, visual) for visual in self._others if visual.casts]
+        return np.concatenate([self._occluders.balls(data), *others, *(target.ball() for target in self.targets)])
 
     def draw(self) -> None:
         """Draw everything opaque into the G-buffer."""

@@ -9,9 +9,6 @@ from .drop import (
     drop_scene as drop_scene,
     find_scene as find_scene,
     is_scene as is_scene,
-    load_image as load_image,
-    mesh_image as mesh_image,
-    paint_target as paint_target,
     usual_up as usual_up,
 )
 from .events import (
@@ -37,6 +34,7 @@ from .material_entry import (
     MaterialEntry as MaterialEntry,
     PresetEntry as PresetEntry,
 )
+from .paint import load_image as load_image, mesh_image as mesh_image, paint_target as paint_target
 from .scene import (
     HEATMAPS as HEATMAPS,
     MAX_DURATION as MAX_DURATION,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.mesh.rays import downward_hits
+from ripple_sim.solver.mesh.rays import RayScene, downward_hits
 
 from .events import DropEntry
 
@@ -35,6 +35,9 @@ _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 _RADII, _DENSITY, _HEIGHTS = (0.05, 0.085), 400.0, (0.8, 1.2)
 
 _FEWEST_VERTICES = 4
+_UPWARD, _ROOM = 0.6, 0.05  # least upward part of the normal, and room on all sides [m], of a good landing point
+_STEPS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+_TRIED = 1000  # points, among which there may be no good one
 _MOST_ROUNDS = 200  # of landing points that are tried: next to nothing of an upright sheet is seen from above
 
 # Mass [kg] and speed [m/s] with which a ball of mean radius falls on the target, and its footprint's radius [m].
@@ -44,7 +47,12 @@ TYPICAL_FOOTPRINT = _MEAN_RADIUS / 2
 
 
 def drop_model(
-    V: NDArray[np.float64], F: NDArray[np.int64], shapes: list[str], rng: np.random.Generator
+    V: NDArray[np.float64],
+    F: NDArray[np.int64],
+    shapes: list[str],
+    rng: np.random.Generator,
+    eye: NDArray[np.float64] | None = None,
+    scale: float = 1.0,
 ) -> tuple[mujoco.MjSpec, list[DropEntry]]:
     """Model of a mesh on a floor, with bodies, and when and where these drop.
 
@@ -57,6 +65,10 @@ def drop_model(
         Of the bodies; see `BODY_SHAPES`.
     rng : numpy.random.Generator
         Of the bodies' sizes, places and colours.
+    eye : float64 [3], optional
+        Whence the hits are to be seen [m].
+    scale : float
+        Of the bodies' sizes.
     """
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.002
@@ -81,17 +93,23 @@ def drop_model(
         condim=6,
         friction=[0.8, 0.01, 0.02],
     )
-    landing = _landing_points(V, F, len(shapes), rng)
+    landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
     times = 0.1 + 3.4 * np.arange(len(shapes)) / max(len(shapes), 1)
-    return spec, [_add_body(spec, i, shape, float(times[i]), landing[i], rng) for i, shape in enumerate(shapes)]
+    return spec, [_add_body(spec, i, shape, float(times[i]), landing[i], rng, scale) for i, shape in enumerate(shapes)]
 
 
 def _add_body(
-    spec: mujoco.MjSpec, number: int, shape: str, time: float, landing: NDArray[np.float64], rng: np.random.Generator
+    spec: mujoco.MjSpec,
+    number: int,
+    shape: str,
+    time: float,
+    landing: NDArray[np.float64],
+    rng: np.random.Generator,
+    scale: float,
 ) -> DropEntry:
     """Add a body of a shape that drops at a time [s] on a landing point [m]."""
     kind, proportions = BODY_SHAPES[shape]
-    radius = rng.uniform(*_RADII)
+    radius = scale * rng.uniform(*_RADII)
     name = f"body_{number}"
     # parked high above until it drops, out of sight and out of reach of the others
     body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 20.0 + number], quat=rng.standard_normal(4))
@@ -104,19 +122,35 @@ def _add_body(
 
 
 def _landing_points(
-    V: NDArray[np.float64], F: NDArray[np.int64], count: int, rng: np.random.Generator
+    V: NDArray[np.float64],
+    F: NDArray[np.int64],
+    count: int,
+    rng: np.random.Generator,
+    eye: NDArray[np.float64] | None,
+    room: float,
 ) -> NDArray[np.float64]:
-    """Random points of the surface with nothing above them, or vertices where there are none, shape [count, 3] [m]."""
-    found: list[NDArray] = []
-    low, high = V.min(axis=0), V.max(axis=0)
+    """Random points of the surface with nothing above them, or vertices where there are none, shape [count, 3] [m].
+
+    First those that face upwards, have room about them [m], and are seen from the eye.
+    """
+    scene, low, high = RayScene(V, F), V.min(axis=0), V.max(axis=0)
+    points, good = np.empty((0, 3)), np.empty(0)
     for _ in range(_MOST_ROUNDS):
-        if len(found) >= count:
+        if (good == 3).sum() >= count or len(points) >= max(count, _TRIED):
             break
         xy = rng.uniform(low[:2], high[:2], size=(64, 2))
-        z = downward_hits(V, F, xy)
-        found.extend(np.column_stack([xy, z])[np.isfinite(z)])
-    found.extend(V[rng.integers(len(V), size=max(count - len(found), 0))])
-    return np.array(found[:count])
+        face, z = downward_hits(scene, xy, high[2])
+        hit = face >= 0
+        found, (a, b, c) = np.column_stack([xy, z])[hit], np.moveaxis(V[F[face[hit]]], 1, 0)
+        normals = np.cross(b - a, c - a)
+        upward = np.abs(normals[:, 2]) > _UPWARD * np.linalg.norm(normals, axis=1)
+        around = [downward_hits(scene, found[:, :2] + step, high[2])[1] - found[:, 2] for step in room * _STEPS]
+        roomy = (np.abs(around) < room).all(axis=0)
+        rays = np.zeros_like(found) if eye is None else eye - found
+        seen = scene.distances(found + np.array([0.0, 0.0, 1e-3]), rays) > 1
+        points, good = np.vstack([points, found]), np.append(good, 1.0 * upward + roomy + seen)
+    points = points[np.argsort(-good, kind="stable")[:count]]
+    return np.vstack([points, V[rng.integers(len(V), size=count - len(points))]])
 
 
 class RandomEntry(msgspec.Struct, forbid_unknown_fields=True):

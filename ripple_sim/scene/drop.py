@@ -1,160 +1,31 @@
 """A default scene around any mesh: the target on a floor, and bodies that drop on it.
 
-The target has the image of its file, and the side up that its format has.
+The target shows most of itself, and stands as its format has it, or as it stands best.
 """
 
 from __future__ import annotations
 
-import logging
 import numbers
-import warnings
 from pathlib import Path
-from typing import Any
 
-import mujoco
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
-from PIL import Image
 
 from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.coupling.suited import Extent
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
+from ripple_sim.render.camera import Camera
 from ripple_sim.solver import Material, Mesh, load_mesh
 from ripple_sim.solver.errors import shown
-from ripple_sim.solver.files import read_image
+from ripple_sim.solver.mesh.rays import RayScene
 
 from .bodies import BODY_SHAPES, TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
 from .events import Events
 from .loading import Edit, load_scene, refusal_of
 from .material_entry import COEFFICIENTS, MaterialEntry
+from .paint import paint_target
 from .scene import Scene, scene_path, shipped_scenes
 from .scene_file import CameraEntry, RippleEntry
-
-_SUFFIXES = (".png", ".jpg", ".jpeg")
-_SCENES = (".glb", ".gltf")
-
-
-def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
-    """Image of a mesh file, or None: named in an OBJ's material library or in a GLB, or NAME_texture.png beside it.
-
-    If several images colour one mesh, none is used, with a warning.
-
-    Returns
-    -------
-    uint8 [height, width, 3], top row first, or None
-    """
-    mesh_path = Path(mesh_path)
-    if mesh_path.suffix.lower() in _SCENES:
-        found: list[Any] = _embedded(mesh_path)
-    else:
-        named = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
-        beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in _SUFFIXES]
-        found = named or [path for path in beside if path.is_file()][:1]
-    if len(found) > 1:
-        warnings.warn(
-            f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: none is used; join "
-            "them into one image, or choose one with --texture",
-            RippleWarning,
-            stacklevel=3,
-        )
-    return load_image(found[0]) if len(found) == 1 else None
-
-
-def load_image(source: Any) -> NDArray[np.uint8]:
-    """Pixels of an image file or of a PIL image, uint8 [height, width, 3], top row first.
-
-    Raises `SceneError` if the file cannot be read as an image, or is too large.
-    """
-    return read_image(SceneError, source, "texture", lambda mode: "RGB")
-
-
-def _of_materials(mesh_path: Path) -> list[Path]:
-    """Existing images (map_Kd) of the materials that an OBJ file uses."""
-    libraries, used = [], set()
-    for words in _statements(mesh_path):
-        if words[0] == "mtllib":
-            libraries.append(mesh_path.parent / words[1])
-        elif words[0] == "usemtl":
-            used.add(words[1])
-    images: dict[Path, None] = {}
-    for library in filter(Path.is_file, libraries):
-        material = ""
-        for words in _statements(library):
-            if words[0] == "newmtl":
-                material = words[1]
-            elif words[0] == "map_Kd" and (material in used or not used):
-                # options come first, and the file's name may have spaces and backslashes
-                name = words[1].replace("\\", "/")
-                path = library.parent / (name if not name.startswith("-") else name.split()[-1])
-                if path.is_file():
-                    images[path] = None
-    return list(images)
-
-
-def _statements(path: Path) -> list[tuple[str, str]]:
-    """Keyword and rest of every line that has both."""
-    text = path.read_text(encoding="utf-8", errors="replace")
-    pairs = (line.strip().split(maxsplit=1) for line in text.splitlines() if line[:1] not in "vf#")
-    return [(pair[0], pair[1].strip()) for pair in pairs if len(pair) == 2]
-
-
-def _embedded(mesh_path: Path) -> list[Image.Image]:
-    """Base colour images in a GLB or glTF file."""
-    log, handler = logging.getLogger("trimesh"), logging.Handler()
-    logged: list[Any] = []
-
-    def hear(record: logging.LogRecord) -> bool:
-        logged.append(record.exc_info and record.exc_info[1])
-        return False
-
-    # an image beyond pillow's limit is logged, at the lowest level, and left out
-    level = log.level
-    handler.addFilter(hear)
-    log.addHandler(handler)
-    log.setLevel(logging.DEBUG)
-    try:
-        parts = trimesh.load_scene(mesh_path).geometry.values()
-    finally:
-        log.removeHandler(handler)
-        log.setLevel(level)
-    for error in logged:
-        if isinstance(error, Image.DecompressionBombError):
-            raise SceneError(f"an image in {mesh_path.name} cannot be read: {error} Scale it down")
-    materials = {
-        id(material): material for part in parts if (material := getattr(part.visual, "material", None)) is not None
-    }
-    images = (getattr(material, "baseColorTexture", None) for material in materials.values())
-    return list({id(image): image for image in images if image is not None}.values())
-
-
-def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None) -> None:
-    """Give the geom "target" the image that is asked for or that the mesh names, if the mesh can show it.
-
-    Raises `SceneError` if an image that is asked for cannot be read, or the mesh has no texture coordinates.
-    """
-    if mesh.corner_uv is None:
-        if texture is not None:
-            raise SceneError(
-                f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no texture coordinates: "
-                "choose a mesh that has them (a wrap has none)"
-            )
-        return
-    pixels = mesh_image(mesh_path) if texture is None else load_image(texture)
-    if pixels is None:
-        return
-    asset = spec.mesh("target")
-    # MuJoCo counts v from the image's upper edge
-    asset.usertexcoord = (mesh.corner_uv * [1.0, -1.0] + [0.0, 1.0]).ravel()
-    asset.userfacetexcoord = np.arange(mesh.F.size)
-    height, width, channels = pixels.shape
-    image = spec.add_texture(
-        name="target", type=mujoco.mjtTexture.mjTEXTURE_2D, height=height, width=width, nchannel=channels
-    )
-    image.data = pixels.tobytes()
-    spec.add_material(name="target").textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "target"
-    spec.geom("target").material = "target"
-
 
 UP_AXES = ("y", "z")
 
@@ -167,9 +38,17 @@ def usual_up(path: str | Path) -> str:
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
 DURATION = 5.0
 
-# Depth of a typical hit over half the usual thickness of the target, and at most over its size.
-_AMPLITUDE, _DEEPEST = 0.9, 0.2
+# Depth of a typical hit, over half the usual thickness of the target, over the radius of a tube that is as slender, and
+# at most over its size.
+_THICK, _SLIM, _DEEPEST = 5.6, 2.8, 0.2
 
+# Stiff enough for crest behind crest [1/s^2].
+_STIFFNESS = 1000.0
+
+# Tubes of this radius, over the size, get bodies of the usual size, and more slender ones smaller bodies.
+_SLENDER, _SMALLEST = 0.05, 0.5
+
+_FOOT = 0.02  # how high over the floor what touches it may be, over the size
 _FLAT, _LIFTED = 1e-6, 0.25  # thickness over size of what lies down; how high, so that waves have room below [m]
 
 
@@ -197,7 +76,8 @@ def drop_scene(
     seed : int
         Of their sizes, places and colours.
     up : str, optional
-        Axis of the file that points up, "y" or "z". By default a flat sheet lies down; else see `usual_up`.
+        Axis of the file that points up, "y" or "z". By default a flat sheet lies down; else see `usual_up`,
+        unless the mesh would fall over on that axis, and stands on the other.
     look : str
         Of the target.
     texture : path, optional
@@ -219,11 +99,18 @@ def drop_scene(
     if up is not None and up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, **reading)
-    up = up or _flat_along(mesh) or usual_up(mesh_path)
-    V = _standing(mesh, up)
+    V = _standing(mesh, up or _flat_along(mesh) or _up(mesh, usual_up(mesh_path)))
+    camera, eye = _camera(V, mesh.F, mesh.closed)
     # MuJoCo may throw boxes and cylinders aside from a sheet
     shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape not in ("box", "cylinder")]
-    spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], np.random.default_rng(seed))
+    extent = Extent.of(mesh)
+    # a tube has as much surface a length as a strip, which is what a hit can set in motion
+    rim = sum(float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum()) for rim in mesh.rims)
+    slender = extent.area / (np.pi * max(rim, 2 * extent.size) * extent.size)
+    scale = float(np.clip(slender / _SLENDER, _SMALLEST, 1.0))
+    amplitude = min(_THICK * extent.radius / extent.size, _SLIM * slender, _DEEPEST)
+    rng = np.random.default_rng(seed)
+    spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], rng, eye, scale)
     if not mesh.closed:
         make_collidable(spec, "target", "flex")
     paint_target(spec, mesh, mesh_path, texture)
@@ -234,33 +121,121 @@ def drop_scene(
     return Scene(
         name=Path(mesh_path).stem,
         model=model,
-        targets=(RippleEntry(geom="target", look=look, material=_material(mesh), warn=False),),
-        camera=CameraEntry(
-            lookat=(0.0, 0.0, 0.95 * float(V[:, 2].max()) / 2),
-            distance=3.6,
-            azimuth=125.0,
-            elevation=-17.0,
-            fovy=28.0,
-            orbit=5.0,
-        ),
+        targets=(RippleEntry(geom="target", look=look, material=_material(amplitude, scale), warn=False),),
+        camera=camera,
         duration=DURATION,
         events=Events(drop=tuple(drops)),
         notes=mesh.notes,
     )
 
 
-def _material(mesh: Mesh) -> MaterialEntry:
-    """Waves slow and high enough to watch under typical bodies, and lower on a thin target."""
-    extent = Extent.of(mesh)
-    amplitude = min(_AMPLITUDE * extent.radius / extent.size, _DEEPEST)
-    suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, amplitude=amplitude, crossing=1.5, decay=3.0)
-    return MaterialEntry(**{name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))})
+def _material(amplitude: float, scale: float) -> MaterialEntry:
+    """Waves slow and high enough to watch under typical bodies of a scale, crest behind crest."""
+    mass, speed = TYPICAL_HIT
+    suited = Material.suited(
+        SIZE, (mass * scale**3, speed), radius=TYPICAL_FOOTPRINT * scale, amplitude=amplitude, crossing=1.5, decay=2.5
+    )
+    given = {name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))}
+    return MaterialEntry(**given | {"stiffness": max(_STIFFNESS, given["stiffness"])})
+
+
+# Candidates of the camera: three-quarter views, first those of what faces -y, as most files have it [degrees].
+_AZIMUTHS = (125.0, 55.0, 145.0, 35.0, 215.0, 325.0, 235.0, 305.0)
+
+# Elevation on what lies flat and on what is as high as it is wide, or higher; the lens, and the orbit [degrees], [1/s].
+_FLAT_VIEW, _HIGH_VIEW, _FOVY, _ORBIT = -50.0, -26.0, 28.0, 5.0
+
+# Of the frame: height and width that the target may fill, at an aspect of 16:9, and how far below the middle it is, for
+# the falls above it.
+_FILLED, _BELOW, _ASPECT = (0.62, 0.8), 0.06, 16 / 9
+
+_SEEN_AT = 1500  # points of the surface
+_TOP = 0.4  # least upward part of the normal of what bodies fall on
+
+
+def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple[CameraEntry, NDArray[np.float64]]:
+    """The three-quarter view that shows most of a target, and the eye half-way of the orbit [m].
+
+    It fills the frame, shows the upper side, the head, which is what is uppermost where that is not over the middle,
+    and the details: many vertices, and normals in many directions. Their variety is the entropy of those that are seen
+    (as in Page et al. 2003, "Shape analysis algorithm based on information theory").
+    """
+    width, depth, height = np.ptp(V, axis=0)
+    elevation = _FLAT_VIEW + (_HIGH_VIEW - _FLAT_VIEW) * min(height / max(width, depth), 1.0)
+    points, normals = _sampled(V, F)
+    corners = V[:: -(-len(V) // _SEEN_AT)]
+    upper = points[points[:, 2] >= np.quantile(points[:, 2], 0.9)]
+    head = (upper.mean(axis=0) - points.mean(axis=0))[:2] / SIZE
+    bins = np.rint(1.5 * normals).astype(int) @ [25, 5, 1] + 62
+    scene, best = RayScene(V, F), -np.inf
+    for azimuth in _AZIMUTHS:
+        lookat, distance, eye = _fitted(V, azimuth, elevation)
+        rays = eye - points
+        cosine = np.einsum("ij,ij->i", rays, normals) / np.linalg.norm(rays, axis=1)
+        outer = normals * np.sign(cosine)[:, None]
+        seen = (scene.distances(points + 1e-4 * SIZE * outer, rays) > 1) & ((cosine > 0) | (not closed))
+        shown = np.where(seen, np.abs(cosine), 0.0) / distance**2
+        shares = np.bincount(bins, weights=shown) / max(shown.sum(), 1e-300)
+        variety = -(shares * np.log(np.maximum(shares, 1e-300))).sum()
+        top = seen[normals[:, 2] > _TOP].mean() if (normals[:, 2] > _TOP).any() else 0.0
+        towards = (eye - lookat)[:2] / distance
+        detail = (scene.distances(corners + 1e-3 * (eye - corners), eye - corners) > 1).mean()
+        score = variety + top + 2 * head @ towards + np.log(max(shown.sum() * detail, 1e-300))
+        if score > best:
+            best, chosen, eye_of_best = score, (azimuth, lookat, distance), eye
+    azimuth, lookat, distance = chosen
+    x, y, z = (float(each) for each in lookat)
+    start = azimuth - _ORBIT * DURATION / 2
+    entry = CameraEntry(
+        lookat=(x, y, z), distance=float(distance), azimuth=start, elevation=float(elevation), fovy=_FOVY, orbit=_ORBIT
+    )
+    return entry, eye_of_best
+
+
+def _sampled(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points spread evenly over a surface, [k, 3], and its unit normals there, [k, 3]."""
+    a, b, c = np.moveaxis(V[F], 1, 0)
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    rng = np.random.default_rng(0)
+    picked = rng.choice(len(F), _SEEN_AT, p=areas / areas.sum())
+    weights = rng.dirichlet((1.0, 1.0, 1.0), _SEEN_AT)
+    return np.einsum("ij,ijk->ik", weights, V[F[picked]]), normals[picked] / areas[picked, None]
+
+
+def _fitted(
+    V: NDArray[np.float64], azimuth: float, elevation: float
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    """Point to look at [m], distance from there [m] and eye [m] with which a target fills its share of the frame."""
+    lookat, distance = (V.min(axis=0) + V.max(axis=0)) / 2, 3 * SIZE
+    tangent = np.tan(np.radians(_FOVY) / 2)
+    spans = 2 * tangent * np.array([_ASPECT * _FILLED[1], _FILLED[0]])
+    for _ in range(8):  # by then it changes by less than a pixel
+        pose = Camera(tuple(lookat.tolist()), distance, azimuth, elevation, _FOVY).pose()
+        local = (V - pose.position) @ pose.rotation
+        seen = local[:, :2] / -local[:, 2:]
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        lookat = lookat + pose.rotation[:, :2] @ ((low + high) / 2 + [0.0, 2 * tangent * _BELOW]) * distance
+        distance *= float(((high - low) / spans).max())
+    return lookat, distance, pose.position
 
 
 def _flat_along(mesh: Mesh) -> str | None:
     """Axis along which a mesh has no extent, if it is one that can point up."""
     extents = np.ptp(mesh.V, axis=0)
     return next((axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()), None)
+
+
+def _up(mesh: Mesh, usual: str) -> str:
+    """Axis along which a mesh stands: the usual one, unless it would fall over on that and not on the other."""
+    return min(UP_AXES, key=lambda axis: (not _stands(_standing(mesh, axis), mesh.F), axis != usual))
+
+
+def _stands(V: NDArray[np.float64], F: NDArray[np.int64]) -> bool:
+    """Whether the middle of a surface is above what touches the floor, give or take."""
+    below = V[V[:, 2] <= _FOOT * SIZE][:, :2] - _sampled(V, F)[0].mean(axis=0)[:2]
+    angles = np.sort(np.arctan2(below[:, 1], below[:, 0]))
+    return bool(np.diff(angles, append=angles[0] + 2 * np.pi).max() < np.pi)
 
 
 def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:

@@ -23,14 +23,16 @@ import numpy as np
 
 from ripple_sim.coupling.geoms import find_target, named_collision_geoms, own_model, target_name
 from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.coupling.suited import typical_hit
 from ripple_sim.coupling.targets import site_on
-from ripple_sim.errors import SceneError
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver.errors import FUNCTION, PATH, checked
 from ripple_sim.solver.files import open_image
 from ripple_sim.solver.layouts.build import LAYOUTS
 
 from .bodies import RandomEntry, randomize
 from .events import DropEntry, Events, Script, ThrowEntry
+from .material_entry import PresetEntry, given_fields
 from .scene import Scene, check_duration, parse_request, read_toml, scene_path
 from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
 
@@ -62,6 +64,14 @@ def check_scene(scene: Scene) -> None:
     if scene.lighting not in LIGHTING:
         raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
     Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
+    for each in dataclasses.fields(scene.events):
+        if late := [event.time for event in getattr(scene.events, each.name) if event.time >= scene.duration]:
+            warnings.warn(
+                f"a [[{each.name}]] at {late[0]:g} s is not before the scene's end, {scene.duration:g} s; give the "
+                "scene a longer duration, or the event an earlier time",
+                RippleWarning,
+                stacklevel=4,
+            )
     check_camera(scene.model, scene.camera)
 
 
@@ -84,7 +94,7 @@ def _check_sensors(scene: Scene) -> None:
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     from ripple_sim.render import LOOKS
-    from ripple_sim.solver.operator.assembly import RIMS
+    from ripple_sim.solver.operator.plate_rim import RIMS
 
     find_target(model, entry.geom)
     for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):
@@ -262,7 +272,7 @@ def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[
     scene = Scene(
         name,
         model,
-        tuple(content.ripple),
+        tuple(_suited(model, entry) for entry in content.ripple),
         content.camera,
         content.duration,
         events,
@@ -272,6 +282,18 @@ def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[
     )
     check_scene(scene)
     return scene
+
+
+def _suited(model: mujoco.MjModel, entry: RippleEntry) -> RippleEntry:
+    """The entry with what its preset "suited" leaves out, if it has that, found from the model."""
+    preset = entry.material.preset
+    if (preset if preset is None or isinstance(preset, str) else preset.name) != "suited":
+        return entry
+    given = {} if preset is None or isinstance(preset, str) else given_fields(preset, without="name")
+    if not {"size", "hit"} <= set(given):
+        given = typical_hit(model, entry.geom) | given
+    material = msgspec.structs.replace(entry.material, preset=PresetEntry(name="suited", **given))
+    return msgspec.structs.replace(entry, material=material)
 
 
 def load_model(

@@ -19,7 +19,7 @@ from ripple_sim.solver import Material
 from ripple_sim.solver.operator.presets import PRESETS
 
 # Constructors of `Material`; the presets of a scene file are these and the real materials by name.
-LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water")
+LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water", "suited")
 _LAYERED = ("layer", "jelly")
 
 
@@ -44,8 +44,9 @@ _LAYER = "write preset = {name = 'layer', modulus = ...} or another of a layer u
 class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     """A preset by name, with its parameters in their units.
 
-    The name is a constructor of `Material`, membrane, layer, jelly, plate, dent or water, or that of a real material,
-    see `PRESETS`. The other fields are parameters of these constructors; each takes some of them.
+    The name is a constructor of `Material`, membrane, layer, jelly, plate, dent, water or suited, or that of a real
+    material, see `PRESETS`. The other fields are parameters of these constructors; each takes some of them. What is
+    left out of "suited", waves that are to be seen, is found from the target and from the bodies that can touch it.
     """
 
     name: str
@@ -60,45 +61,61 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     stiffness: float | None = None
     speed: float | None = None
     gravity: float | None = None
+    short: bool | None = None
+    size: float | None = None
+    hit: float | tuple[float, float] | None = None
+    radius: float | None = None
+    amplitude: float | None = None
+    crossing: float | None = None
+    decay: float | None = None
 
     def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
         """The preset's material; its layer's thickness may be one at every texel [m], [C, n, n].
 
         Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing one.
         """
-        if self.name not in (*LAWS, *PRESETS):
-            raise SceneError(
-                f"ripple.material.preset {self.name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}"
-            )
-        given, real = given_fields(self, without="name"), self.name in PRESETS
-        law = PRESETS[self.name].law if real else self.name
-        parameters = inspect.signature(getattr(Material, law)).parameters
+        given = given_fields(self, without="name")
         if thickness is not None:
-            if law not in _LAYERED:
+            if _law(self.name) not in _LAYERED:
                 raise SceneError(
                     f"[[ripple.inside]] needs a material with a layer, not the preset {self.name!r}; {_LAYER}"
                 )
             given["thickness"] = thickness
-        for key in given:
-            if key not in parameters:
-                raise SceneError(
-                    f"the preset {self.name!r} has no parameter {key!r}; valid are {', '.join(parameters)}"
-                )
-        if real:
-            return Material.preset(self.name, **given)
-        for key, parameter in parameters.items():
-            if parameter.default is inspect.Parameter.empty and key not in given:
-                raise SceneError(
-                    f"the preset {self.name!r} needs {key}: write preset = {{name = {self.name!r}, {key} = ...}}"
-                )
-        return getattr(Material, self.name)(**given)
+        return preset_material(self.name, given)
+
+
+def _law(name: str) -> str:
+    """Constructor of `Material` that makes a preset; raises `SceneError` for an unknown one."""
+    if name not in (*LAWS, *PRESETS):
+        raise SceneError(f"the preset {name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}")
+    return PRESETS[name].law if name in PRESETS else name
+
+
+def preset_material(name: str, given: dict[str, Any]) -> Material:
+    """Material of a preset, with parameters that are given.
+
+    Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing one.
+    """
+    parameters = inspect.signature(getattr(Material, _law(name))).parameters
+    for key in given:
+        if key not in parameters:
+            raise SceneError(f"the preset {name!r} has no parameter {key!r}; valid are {', '.join(parameters)}")
+    if name in PRESETS:
+        return Material.preset(name, **given)
+    for key, parameter in parameters.items():
+        if parameter.default is inspect.Parameter.empty and key not in given:
+            raise SceneError(
+                f"the preset {name!r} needs {key}: write {name},{key}=..., or in a scene file "
+                f"preset = {{name = {name!r}, {key} = ...}}"
+            )
+    return getattr(Material, name)(**given)
 
 
 class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
     Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a preset, those that
-    are left out are those of `Material()`. Two are the same everywhere: no map gives them.
+    are left out are those of `Material()`. The last three are the same everywhere: no map gives them.
     """
 
     speed: Coefficient | None = None
@@ -110,6 +127,7 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
     yield_height: Coefficient | None = None
     deep: float | None = None
     tightening: float | None = None
+    poisson: float | None = None
     preset: str | PresetEntry | None = None
     """Gives the coefficients that are left out; by its name, or as a table with its parameters."""
 
@@ -162,6 +180,7 @@ class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
     yield_height: float | None = None
     deep: float | None = None
     tightening: float | None = None
+    poisson: float | None = None
 
 
 COEFFICIENTS = MaterialChange.__struct_fields__

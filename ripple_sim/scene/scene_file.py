@@ -10,6 +10,7 @@ import dataclasses
 import functools
 import math
 import re
+import typing
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     layout: str = "auto"
     """How the surface gets its charts, see `build_atlas`."""
     rim: str = "free"
-    """Rims of an open surface: waves come back upright from a free one, inverted from a fixed one."""
+    """Rims of an open surface: waves come back upright from a free one, inverted from one that is held."""
     look: str = "rubber"
     """What the surface looks made of; `model` as the MJCF's material says."""
     color: Color | None = None
@@ -134,6 +135,10 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     """Geoms that collide for a geom that is only visible; by default those of its body."""
     high_pass: bool = False
     """Whether a flex keeps to itself the coarse motion that contacts give it; its waves get the fine rest."""
+    pulse: str = "contact"
+    """How long a hit takes: `contact`, as MuJoCo holds it, or `hertz`, as two elastic bodies touch."""
+    modulus: float | None = None
+    """For `hertz`: E* of the two materials [Pa], 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2."""
     limit: bool = True
     """Bend heights that are too large for the object where they are drawn, and warn of them."""
     warn: bool = True
@@ -268,6 +273,11 @@ def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: st
         inner_place = f"{place}.{key}" if place else key
         inner = _TABLES.get(inner_place)
         if inner is not None:
+            if isinstance(value, dict) and typing.get_origin(fields[key]) is list:
+                raise SceneError(
+                    f"scene file {origin!r}: [{inner_place}] is one table, where there may be several; write "
+                    f"[[{inner_place}]]"
+                )
             for item in value if isinstance(value, list) else [value]:
                 _check_keys(item, inner, inner_place, origin)
 

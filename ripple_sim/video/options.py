@@ -10,9 +10,18 @@ from collections.abc import Sequence
 from typing import Literal
 
 from ripple_sim.errors import VideoError
-from ripple_sim.solver.errors import check_fields, whole
+from ripple_sim.solver.errors import POSITIVE, Valid, check_fields, is_finite, whole
 
 Backend = Literal["auto", "gl", "cpu"]
+
+# What holds for every output; what an output or a scene allows beyond that is checked when it is known.
+IN_ANY_CASE = {
+    "size": Valid(lambda size: min(size) > 0, "(width, height) in pixels, two whole numbers greater than 0"),
+    "fps": whole(1),
+    "duration": POSITIVE,
+    "slow_motion": POSITIVE,
+    "resolution": whole(1),
+}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -62,7 +71,7 @@ class VideoOptions:
     layout: str | None = None
     """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
     rim: str | None = None
-    """What the rims of open surfaces do: free, or fixed as that of a drum's skin."""
+    """What the rims of open surfaces do: free, supported, clamped, or fixed as that of a drum's skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     resume: bool = False
@@ -71,7 +80,15 @@ class VideoOptions:
     """Replace an output that ripple-sim has not made."""
 
     def __post_init__(self) -> None:
-        check_fields(VideoError, self, supersample=whole(1))
+        check_fields(
+            VideoError,
+            self,
+            supersample=whole(1),
+            shutter=Valid(lambda angle: 0 <= angle <= 360, "0 to 360 degrees"),
+            aperture=Valid(lambda metres: is_finite(metres) and metres >= 0, "0 m or more"),
+            exposures=whole(1),
+            **IN_ANY_CASE,
+        )
 
     @property
     def rate(self) -> float:

@@ -186,6 +186,11 @@ class Film:
         self._submitted.append(shot)
         self.seconds += work_clock() - start
 
+    def warn_of_unseen(self) -> None:
+        """Warn of waves that no frame shows, neither by their height nor by colours."""
+        if not self._request.heatmap:
+            self._sources[0].warn_of_unseen()
+
     def _see(self, seen: tuple[int, Sighting] | None) -> None:
         """Write the passes of the last frame, whose pixels flow to what is seen now, if anything."""
         if self._pass_files is not None and self._last_seen is not None:
@@ -389,6 +394,8 @@ def render_video(
         if options.passes:
             film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)
+        if not resumed_at:  # the frames before were not looked at
+            film.warn_of_unseen()
         if microphone is not None:
             pressure = microphone.pressure(frames / options.rate)
             writer.sound = pressure * gain(pressure)

@@ -17,6 +17,7 @@ import msgspec
 import mujoco
 import numpy as np
 
+from ripple_sim import __version__
 from ripple_sim.encode import check_output, default_fps
 from ripple_sim.encode.images import check_passes
 from ripple_sim.encode.output import video_format
@@ -28,7 +29,7 @@ from ripple_sim.solver.gl import GLContext
 
 from .options import Backend, VideoOptions
 
-_PACKAGES = ("ripple-sim", "numpy", "numba", "moderngl", "av", "pillow")
+_PACKAGES = ("numpy", "numba", "moderngl", "av", "pillow")
 
 
 def origin(scene: Scene, options: Any) -> dict[str, str | int]:
@@ -47,7 +48,11 @@ def origin(scene: Scene, options: Any) -> dict[str, str | int]:
 def versions() -> dict[str, str]:
     """Versions of the packages on which frames depend, by name."""
     # MuJoCo is installed as `mujoco` or as `mujoco-core`
-    return {"mujoco": mujoco.__version__, **{package: version(package) for package in _PACKAGES}}
+    return {
+        "ripple-sim": __version__,
+        "mujoco": mujoco.__version__,
+        **{package: version(package) for package in _PACKAGES},
+    }
 
 
 def scene_digest(scene: Scene) -> str:

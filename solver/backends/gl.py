@@ -64,7 +64,8 @@ class DeviceStiffness:
         """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
         V, (quads, _) = stencil.places.V, stencil.coefficient
         self._around[:, stencil.cells.special_places] = self._special.at(V)
-        values, irregular = stencil.cells.special(self._around, stencil.coefficient)
+        values, of_cells = stencil.cells.special(self._around, stencil.coefficient)
+        irregular = stencil.with_added(of_cells)
         with self._gl:
             self._vertices.write(V.tobytes())
             self._values.write(values.astype(np.float32).tobytes() or bytes(4))

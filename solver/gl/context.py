@@ -16,6 +16,7 @@ import importlib.resources
 import os
 import re
 import shutil
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -87,13 +88,11 @@ _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
 
 def is_software(renderer: str) -> bool:
     """Whether a driver renders on the processor, by its GL_RENDERER."""
-    name = renderer.lower()
-    return any(word in name for word in _SOFTWARE)
+    return any(word in renderer.lower() for word in _SOFTWARE)
 
 
 # The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
 _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
-
 
 # What Mesa's shader cache may come to need while a process runs [bytes].
 _SHADER_CACHE = 64e6
@@ -114,26 +113,43 @@ def _spare_full_disks() -> None:
 
 def create_context(device: int | None) -> moderngl.Context:
     """Create a headless OpenGL 4.3 context on a device, or on the first that yields one; raises GLError."""
+    if not sys.platform.startswith("linux"):  # macOS ends at OpenGL 4.1, without compute shaders
+        raise GLError(
+            f"no OpenGL 4.3 over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'"
+        )
     _spare_full_disks()
     devices = range(8) if device is None else [device]
-    reasons = []
+    reason, older = "no device", ""
     for libraries in _LIBRARIES:
         for index in devices:
             try:
-                # moderngl's hints lack the keywords of its backends
-                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
+                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}  # not in its hints
                 return moderngl.create_context(require=430, standalone=True, **settings)
             except Exception as error:  # moderngl raises bare Exception here
-                reasons.append(str(error))
-                if "not loaded" in str(error):
+                reason = str(error)
+                if not older and "eglCreateContext failed" in reason:
+                    older = _older(settings)
+                if "not loaded" in reason:
                     break
-    reason = reasons[-1] if reasons else "no device"
+    if older:
+        raise GLError(
+            f"{older}; rendering and backend 'gl' need 4.3 or later, for its compute shaders: update the driver, or "
+            "take Mesa's llvmpipe (LIBGL_ALWAYS_SOFTWARE=1); waves alone run with backend 'cpu'"
+        )
     if device is not None:
         raise GLError(f"no OpenGL 4.3 context on EGL device {device} ({reason}); devices are counted from 0")
-    raise GLError(
-        f"no OpenGL 4.3 context on any EGL device ({reason}); "
-        "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
-    )
+    advice = "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
+    raise GLError(f"no OpenGL 4.3 context on any EGL device ({reason}); {advice}")
+
+
+def _older(settings: dict[str, Any]) -> str:
+    """What there is with these settings of an earlier version, "NAME has OpenGL 4.1"; empty without any."""
+    with contextlib.suppress(Exception):
+        ctx = moderngl.create_context(require=330, standalone=True, **settings)
+        found = f"{ctx.info['GL_RENDERER']} has OpenGL {ctx.version_code / 100:.1f}"
+        ctx.release()
+        return found
+    return ""
 
 
 def current_context() -> int | None:
@@ -170,7 +186,6 @@ def bind_buffers(*buffers: moderngl.Buffer | None) -> None:
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
 _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
-
 
 _MOST = 64  # idle at a time
 

@@ -47,9 +47,12 @@ def _float32(vectors: NDArray) -> Floats32:
     return np.ascontiguousarray(vectors, dtype=np.float32)
 
 
-def downward_hits(V: NDArray[np.float64], F: NDArray[np.int64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Height [m] at which vertical rays from above at xy [k, 2] first meet a mesh; NaN where they miss. Shape [k]."""
-    top = V[:, 2].max() + np.ptp(V, axis=0).max()
-    starts, down = np.column_stack([xy, np.full(len(xy), top)]), np.tile([0.0, 0.0, -1.0], (len(xy), 1))
-    triangle, distance, _, _ = RayScene(V, F).cast(starts, down)
-    return np.where(triangle >= 0, top - distance, np.nan)
+def downward_hits(scene: RayScene, xy: NDArray[np.float64], top: float) -> tuple[Ints, NDArray[np.float64]]:
+    """What vertical rays from above at xy [k, 2] first meet, each [k]: the triangle, and its height [m]; -1 and NaN.
+
+    Nothing is higher than `top` [m].
+    """
+    start = top + 0.1 * (1 + abs(top))
+    starts, down = np.column_stack([xy, np.full(len(xy), start)]), np.tile([0.0, 0.0, -1.0], (len(xy), 1))
+    triangle, distance, _, _ = scene.cast(starts, down)
+    return triangle, np.where(triangle >= 0, start - distance, np.nan)

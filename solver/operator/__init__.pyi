@@ -1,6 +1,5 @@
 from .assembly import (
     OPERATORS as OPERATORS,
-    RIMS as RIMS,
     MovingOperator as MovingOperator,
     absorbing_damping as absorbing_damping,
     build_operator as build_operator,
@@ -24,6 +23,7 @@ from .material import (
     warn_of_wavelengths as warn_of_wavelengths,
 )
 from .modes import Modes as Modes, elastic_matrix as elastic_matrix
+from .plate_rim import RIMS as RIMS, Rim as Rim
 from .presets import (
     BOUNCE as BOUNCE,
     PRESETS as PRESETS,

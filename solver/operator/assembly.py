@@ -17,16 +17,13 @@ from ..errors import SolverError
 from ..texels.atlas import Atlas
 from ..texels.distance import depth_in_region
 from ..texels.moving import MovedPlaces, MovedStencil
-from ..texels.stencil import EAST, LINK_ENDS, NORTH, Stencil, crossing_links, link_lengths
+from ..texels.stencil import EAST, LINK_ENDS, NORTH, IrregularLinks, Stencil, crossing_links, link_lengths
 from ..texels.texel_mesh import TexelMesh, smoothed, softening
 from .coefficients import LIMITS
 from .deep_water import FluidOperator, over_fluid
 from .material import Material
+from .plate_rim import FREE, RIMS, Rim, links_and_springs, plate_matrix, rim_conditions, rim_places, tension_springs
 from .wave_operator import WaveOperator
-
-# Waves come back upright from a free rim, inverted from a fixed one.
-RIMS = ("free", "fixed")
-
 
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
@@ -34,7 +31,7 @@ OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 _FAINT = 1e-3
 
 
-def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free") -> WaveOperator:
+def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free") -> WaveOperator:
     """Assemble the operator of a material on an atlas.
 
     Parameters
@@ -47,19 +44,23 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free
         (d/s)^2 put right); "uncorrected": the same with one mean distance everywhere (their figure 6a);
         "dynamic-paint": the same sum at real distances over 8 neighbours, as Blender's Dynamic Paint takes it.
 
-    rim : str
-        "free", or "fixed": heights are 0 at rims, and so are a plate's moments.
+    rim : str or callable
+        "free", "supported", "clamped" or "fixed", see `WaveSolver`. To surfaces that do not bend the last three are the
+        same. Rims of a plate that are free, supported or clamped are those of `plate_matrix`, where it is of kind
+        "fem"; elsewhere, and where it is "fixed", heights are 0 at rims that are not free, and so is L h.
 
     Raises
     ------
     SolverError
-        For an unknown kind or rim, or a material of another resolution.
+        For an unknown kind or rim, rims by region for a baseline, or a material of another resolution.
     """
-    if rim not in RIMS:
-        raise SolverError(f"rim {rim!r} does not exist; valid are {', '.join(map(repr, RIMS))}")
+    conditions = rim_conditions(atlas.texels, rim)
     if kind not in OPERATORS:
         raise SolverError(f"operator {kind!r} does not exist; valid are {', '.join(map(repr, OPERATORS))}")
-    texels, field = texel_fields(atlas, material, rim)
+    if kind != "fem" and not isinstance(rim, str):
+        raise SolverError(f"the operator {kind!r} has no rims by region; valid is one name for all of the rim")
+    bends = bool(np.any(material.bending))
+    texels, field = texel_fields(atlas, material, rim == "fixed" or (rim in RIMS[1:] and (not bends or kind != "fem")))
     density, area = field["density"], atlas.areas
     if kind == "fem":
         assemble = functools.partial(texels.stencil, softening=softening(texels))
@@ -67,28 +68,46 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
         assemble = functools.partial(_difference_stencil, texels, kind, area[0, 0, 0])
-    drags, bends, yields = field["viscosity"].any(), field["bending"].any(), np.isfinite(field["yield_height"]).any()
+    drags, yields = field["viscosity"].any(), np.isfinite(field["yield_height"]).any()
+    grip = source_grip(field["speed"] ** 2, field["stiffness"], field["bending"])
+    tension = density * field["speed"] ** 2
+    stencil, laplace = assemble(tension), assemble(np.ones_like(area)) if bends else None
+    rigidity, links = density * field["bending"] / area if bends else None, None
+    if kind == "fem" and not texels.topology.fixed_rim and (conditions > (0 if bends else FREE)).any():
+        places = rim_places(texels, conditions)
+        springs, held = tension_springs(places, texels, tension.ravel()), places.texels[places.conditions != FREE]
+        field["fixed"].reshape(-1)[held] |= texels.bare_rim.reshape(-1)[held]
+        if laplace is not None and rigidity is not None:
+            matrix, inner = plate_matrix(
+                texels, conditions, softening(texels), density * field["bending"], material.poisson, laplace
+            )
+            rigidity *= inner
+            links, beside = links_and_springs(matrix)
+            springs += beside
+            stencil.irregular = IrregularLinks.joined(stencil.irregular, links)
+        field["stiffness"] += (springs / (density * area).ravel()).reshape(area.shape)
     operator = WaveOperator(
-        stencil=assemble(density * field["speed"] ** 2),
+        stencil=stencil,
         mass=density * area,
         damping=field["damping"],
         stiffness=field["stiffness"],
         viscosity_stencil=assemble(density * field["viscosity"]) if drags else None,
-        laplace_stencil=assemble(np.ones_like(area)) if bends else None,
-        rigidity=density * field["bending"] / area if bends else None,
+        laplace_stencil=laplace,
+        rigidity=rigidity,
         yield_height=field["yield_height"] if yields else None,
         fixed=field["fixed"] if field["fixed"].any() else None,
         density=density if np.ptp(density) else None,
-        grip=source_grip(field["speed"] ** 2, field["stiffness"], field["bending"]),
+        rim_links=links,
+        grip=grip,
     )
     return over_fluid(operator, material.deep, assemble(np.ones_like(area)), area) if material.deep else operator
 
 
-def texel_fields(atlas: Atlas, material: Material, rim: str) -> tuple[TexelMesh, dict[str, NDArray]]:
-    """Texel mesh with its rim, and the coefficients of a material at each of its texels, [C, n, n]."""
+def texel_fields(atlas: Atlas, material: Material, fixed_rim: bool) -> tuple[TexelMesh, dict[str, NDArray]]:
+    """Texel mesh with its rim, fixed or free, and the coefficients of a material at each of its texels, [C, n, n]."""
     field = {name: material.texels(name, atlas.areas.shape) for name in (*LIMITS, "fixed")}
     texels = atlas.texels
-    if rim == "fixed":
+    if fixed_rim:
         texels = texels.with_fixed_rim()
         field["fixed"] |= texels.bare_rim
     # rigid texels are not dragged along by their neighbours either
@@ -135,7 +154,8 @@ class MovingOperator:
 
     The mass sigma A of each texel is that at rest, so that its density falls as its area grows, and with it tension
     sigma c^2 and viscous resistance sigma nu. Rates and speeds are the material's own, but that c^2 goes with a power
-    of the area, `Material.tightening`; so does the square of a plate's frequency with b.
+    of the area, `Material.tightening`; so does the square of a plate's frequency with b. A plate with rims of its own
+    bends everywhere as it does at rest.
 
     Parameters
     ----------
@@ -153,8 +173,7 @@ class MovingOperator:
     def __init__(self, atlas: Atlas, material: Material, operator: WaveOperator) -> None:
         if isinstance(operator, FluidOperator):
             raise SolverError("a surface with deep fluid below cannot move; take a material without `deep`")
-        rim = "fixed" if operator.topology.fixed_rim else "free"
-        texels, field = texel_fields(atlas, material, rim)
+        texels, field = texel_fields(atlas, material, operator.topology.fixed_rim)
         self._rest, self._cells = operator, texels.cells
         soft, density = softening(texels), field["density"]
         self._tension = self._cells.coefficient(density * field["speed"] ** 2, soft, material.tightening - 1.0)
@@ -163,7 +182,7 @@ class MovingOperator:
         if operator.viscosity_stencil is not None:
             self._viscosity_share = _share(field["viscosity"], field["speed"] ** 2, material.tightening)
             self._viscosity = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
-        if operator.laplace_stencil is not None:
+        if operator.laplace_stencil is not None and operator.rim_links is None:
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
         around = np.ascontiguousarray(np.moveaxis(texels.halo_positions, -1, 0))
         self._level = atlas.areas / self._cells.moved(around, self._tension)[1]
@@ -171,8 +190,8 @@ class MovingOperator:
 
     def at(self, places: MovedPlaces) -> WaveOperator:
         """Operator where the places are."""
-        tension, rigidity = MovedStencil(self._cells, self._tension, places), self._rest.rigidity
-        viscosity = laplace = None
+        tension = MovedStencil(self._cells, self._tension, places, added=self._rest.rim_links)
+        viscosity, laplace, rigidity = None, self._rest.laplace_stencil, self._rest.rigidity
         if self._viscosity is not None:
             like = None if self._viscosity_share is None else (tension, self._viscosity_share)
             viscosity = MovedStencil(self._cells, self._viscosity, places, like)

@@ -17,6 +17,7 @@ from ..texels.stencil import stiffness_matrix
 from .assembly import build_operator
 from .deep_water import FluidOperator, factorised
 from .material import SHORTEST_TEXELS, Material, warn_of_wavelengths
+from .plate_rim import Rim
 from .wave_operator import WaveOperator
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -54,12 +55,12 @@ class Modes(NamedTuple):
     atlas=instance(Atlas, ", from build_atlas or sphere_atlas"),
     material=instance(Material, ", for instance Material(speed=1.0)"),
 )
-def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: str = "free") -> Modes:
+def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free") -> Modes:
     """Find the lowest modes of a surface: how it swings by itself under the operator that `WaveSolver` steps with.
 
-    Motions that nothing pulls back, as of a free membrane on the whole, are left out. A solver that conserves volume
-    does not excite modes that change it. Heights are small: there are no dents. Damping that varies over the surface
-    counts to first order. Modes of one frequency, as symmetric shapes and equal parts have them, are all there.
+    Motions that nothing pulls back, as of a free membrane or plate on the whole, are left out. A solver that conserves
+    volume does not excite modes that change it. Heights are small: there are no dents. Damping that varies over the
+    surface counts to first order. Modes of one frequency, as symmetric shapes and equal parts have them, are all there.
 
     Parameters
     ----------
@@ -79,7 +80,8 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: str = "free
     """
     warn_of_wavelengths(atlas, material)
     operator = build_operator(atlas, material, "fem", rim)
-    matrix, weight, least = elastic_matrix(operator), operator.mass.ravel(), float(operator.stiffness.min())
+    # not of the operator's stiffness, which links outweigh beside the rims of a plate
+    matrix, weight, least = elastic_matrix(operator), operator.mass.ravel(), float(np.min(material.stiffness))
     moving = np.flatnonzero(operator.free.ravel() & (matrix.diagonal() > 0))
     most = int(np.pi * len(moving) / SHORTEST_TEXELS**2)  # by Weyl's law
     if not (isinstance(count, numbers.Integral) and 1 <= count <= most):
@@ -89,13 +91,16 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: str = "free
         )
     if isinstance(operator, FluidOperator):
         # where all is even, water has the modes of the Laplacian, which keep its volume
-        uneven = np.ptp(material.speed) or np.ptp(material.stiffness)
+        uneven = np.ptp(material.speed) or np.ptp(operator.stiffness)
         if operator.topology.fixed_rim or not operator.free.all() or uneven:
             raise SolverError("modes of deep fluid are known with a free rim, no clamp, one speed and stiffness alone")
         matrix, weight, least = stiffness_matrix(operator.geometry), operator.areas.ravel(), 0.0
-    vectors = _lowest(matrix[moving][:, moving], weight[moving], least, int(count))
-    heights = np.zeros((int(count), operator.mass.size))
+    tilts = 0 if operator.laplace_stencil is None else 2
+    vectors = _lowest(matrix[moving][:, moving], weight[moving], least, int(count) + tilts)
+    heights = np.zeros((vectors.shape[1], operator.mass.size))
     heights[:, moving] = vectors.T
+    if tilts:
+        heights = heights[~_are_tilts(atlas, material, operator, heights)][: int(count)]
     return _ringing(operator, heights)
 
 
@@ -106,6 +111,25 @@ def elastic_matrix(operator: WaveOperator) -> csr_array:
         laplace = stiffness_matrix(operator.laplace_stencil)
         matrix = matrix + laplace @ diags_array(operator.rigidity.ravel()) @ laplace
     return csr_array(matrix)
+
+
+def _are_tilts(atlas: Atlas, material: Material, operator: WaveOperator, heights: Floats) -> NDArray[np.bool_]:
+    """Which of some heights [m, T] move a flat plate as if it were rigid, [m].
+
+    They are linear in the place, and pulled back by no more than a hundredth of what bends waves of their length: the
+    operator is as good as blind to them, but for its errors at rims. Membranes, and plates that are curved or held, do
+    pull back what is linear.
+    """
+    areas, mass = atlas.areas.ravel(), operator.mass.ravel()
+    linear = np.column_stack([np.ones(areas.size), atlas.positions.reshape(-1, 3)])
+    left = heights.T - linear @ np.linalg.lstsq(linear, heights.T)[0]
+    squares, numbers = (
+        np.einsum("mt,tm->m", heights, matrix @ heights.T) / (heights**2 @ weight)
+        for matrix, weight in ((elastic_matrix(operator), mass), (atlas.stiffness(), areas))
+    )
+    is_linear = np.linalg.norm(left, axis=0) < 0.1 * np.linalg.norm(heights, axis=1)
+    bending = material.texels("bending", atlas.areas.shape).mean()
+    return is_linear & (squares < 0.01 * bending * numbers**2)
 
 
 def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Floats:

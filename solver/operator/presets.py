@@ -224,6 +224,7 @@ NARROW = 16.0
 BOUNCE = 1.5
 
 _RADIUS = 0.05  # footprint over size
+FOOTPRINT = 0.025  # smaller ones count as of this size: texels resolve none that are, and their rings would not be seen
 _VISCOSITY = 1e-3  # over speed times size
 _GRAVITY = 9.81
 
@@ -244,7 +245,7 @@ def suited_coefficients(
         size=(size, "m"), radius=(radius, "m"), amplitude=(amplitude, "of the size"), crossing=(crossing, "s"),
         decay=(decay, "s"),
     )  # fmt: skip
-    speed, depth = size / crossing, amplitude * size
+    speed, depth, radius = size / crossing, amplitude * size, max(radius, FOOTPRINT * size)
     density = density_for(impulse, depth, radius=radius, speed=speed)
     resting = stiffness_under(_GRAVITY * mass, depth / 2, radius=radius, density=density, speed=speed)
     return {

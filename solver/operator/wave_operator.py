@@ -16,7 +16,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SolverError
-from ..texels.stencil import EAST, NORTH, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
+from ..texels.stencil import EAST, NORTH, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
 from ..texels.topology import TexelTopology
 
 # What joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours.
@@ -105,7 +105,7 @@ class WaveOperator:
     mass : float64 [C, n, n]
         sigma A [kg].
     damping, stiffness : float64 [C, n, n]
-        zeta [1/s] and k [1/s^2].
+        zeta [1/s] and k [1/s^2]; beside the rims of a plate k may be below 0.
     viscosity_stencil : Stencil or None
         Link weights of D [kg/s]; None without viscosity.
     laplace_stencil : Stencil or None
@@ -116,6 +116,8 @@ class WaveOperator:
         [m]; None where everything is elastic.
     fixed : bool [C, n, n] or None
         Texels that are clamped.
+    rim_links : IrregularLinks or None
+        What a plate's rims give to `stencil`; they and L B L stay as they are at rest where the surface moves.
     grip : float64 [C, n, n] or None
         Share of a source that sets a texel in motion, where it is movable; None: 1 everywhere.
     density : float64 [C, n, n] or None
@@ -133,6 +135,7 @@ class WaveOperator:
     rigidity: NDArray[np.float64] | None = None
     yield_height: NDArray[np.float64] | None = None
     fixed: NDArray[np.bool_] | None = None
+    rim_links: IrregularLinks | None = None
     grip: NDArray[np.float64] | None = None
     density: NDArray[np.float64] | None = None
     bounded: bool = False
@@ -234,7 +237,10 @@ class WaveOperator:
         if self.laplace_stencil is not None and self.rigidity is not None:
             bending = self.laplace_stencil.fastest(self.mass)
             bound += bending * float((self.rigidity * self.mass).max()) * bending
-        wave = self._lightened(self._rate(self.link_force, bound) + self.stiffness.max())
+        if self.stiffness.min() < 0:  # as plates have them beside rims, with links that outweigh them
+            wave = self._rate(self.elastic_force, bound + max(self.stiffness.max(), 0.0))
+        else:
+            wave = self._lightened(self._rate(self.link_force, bound) + self.stiffness.max())
         viscous = 0.0
         if self.viscosity_stencil is not None:
             bound = self.viscosity_stencil.fastest(self.mass)

@@ -131,6 +131,8 @@ class MovedStencil(Stencil):
     ----------
     multiple : (MovedStencil, float), optional
         One of which this is a multiple, and by how much.
+    added : IrregularLinks, optional
+        Links that stay as they are wherever the places are; no part of a multiple.
 
     Attributes
     ----------
@@ -144,16 +146,17 @@ class MovedStencil(Stencil):
         coefficient: CellCoefficient,
         places: MovedPlaces,
         multiple: tuple[MovedStencil, float] | None = None,
+        added: IrregularLinks | None = None,
     ) -> None:
         self.topology, self.cells, self.coefficient, self.places = cells.topology, cells, coefficient, places
-        self._multiple = multiple
+        self._multiple, self._added = multiple, added
         self.known_fastest: float | None = None
 
     @functools.cached_property
     def _made(self) -> tuple[Stencil, NDArray[np.float64]]:
         if self._multiple is not None:
             stencil, factor = self._multiple
-            return stencil.scaled(factor), stencil.areas
+            return stencil._made[0].scaled(factor), stencil.areas
         return self.cells.moved(self.places.around, self.coefficient)
 
     @functools.cached_property
@@ -164,7 +167,11 @@ class MovedStencil(Stencil):
     @functools.cached_property
     def irregular(self) -> IrregularLinks | None:  # type: ignore[override]
         """The links beyond the nine points."""
-        return self._made[0].irregular
+        return self.with_added(self._made[0].irregular)
+
+    def with_added(self, links: IrregularLinks | None) -> IrregularLinks | None:
+        """Irregular links of the cells, and those that stay."""
+        return IrregularLinks.joined(links, self._added)
 
     @property
     def areas(self) -> NDArray[np.float64]:

@@ -53,6 +53,17 @@ class IrregularLinks(NamedTuple):
         texels, begins = np.unique(both[order, 0], return_index=True)
         return cls(texels, np.append(begins, len(both)), both[order, 1], twice[order])
 
+    @classmethod
+    def joined(cls, first: IrregularLinks | None, second: IrregularLinks | None) -> IrregularLinks | None:
+        """Those of both."""
+        if first is None or second is None:
+            return first or second
+        ends = np.concatenate([np.repeat(each.texels, np.diff(each.begins)) for each in (first, second)])
+        order = np.argsort(ends, kind="stable")
+        texels, begins = np.unique(ends[order], return_index=True)
+        others, weights = (np.concatenate(each)[order] for each in zip(first[2:], second[2:], strict=True))
+        return cls(texels, np.append(begins, len(ends)), others, weights)
+
 
 NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,13 @@ class Load:
         if len(loads) == 1:
             return loads[0]
         return cls(np.concatenate([each.texels for each in loads]), np.concatenate([each.forces for each in loads]))
+
+    def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
+        """What acts over a step of dt [s]: numbers of its substeps, one after the other, and the load over each.
+
+        A load that changes within a step gives several.
+        """
+        yield substeps, self
 
     def merged(self, size: int) -> Load:
         """The same with every texel once, on an atlas of so many texels.

@@ -13,6 +13,7 @@ from ..errors import SolverError, checked, instance
 from ..files import require_memory
 from ..operator.assembly import build_operator
 from ..operator.material import Material, warn_of_wavelengths
+from ..operator.plate_rim import Rim
 from ..operator.volume import VolumeBalance
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
@@ -40,9 +41,12 @@ class WaveSolver:
         "gl" (compute shaders), "cpu" (numba), or "auto": the faster one, measured once on each machine.
     operator : str
         "fem", or a baseline: "paper", "uncorrected", "dynamic-paint" (see `build_operator`).
-    rim : str
-        At the rims of an open surface waves come back upright from a "free" one, inverted from a "fixed" one, as on a
-        drum skin: there the height is 0, and the moment of a surface that bends. A closed surface has none.
+    rim : str or callable
+        At the rims of an open surface waves come back upright from a "free" one, inverted from a "supported" one, where
+        the height is 0 as on a drum skin, or a "clamped" one, where the slope of a surface that bends is 0 as well. By
+        region: a function of points on the rim [k, 3] that gives a name for each, or whether it is clamped (else it is
+        free). "fixed": as "supported", but that a plate is held there as if Poisson's ratio were 1: a straight edge is
+        the same. A closed surface has no rims.
     conserve_volume : bool
         Remove the mean of every source, so that a net push does not move the surface as a whole. On a closed surface
         without stiffness nothing else would stop it; there, the mean is the volume. On an open surface it is the mean
@@ -81,7 +85,7 @@ class WaveSolver:
         *,
         backend: str = "auto",
         operator: str = "fem",
-        rim: str = "free",
+        rim: Rim = "free",
         conserve_volume: bool = True,
     ) -> None:
         self.material = material if material is not None else Material()
@@ -133,7 +137,7 @@ class WaveSolver:
         substeps : int, optional
             How many, instead of the fewest.
         load : Load, optional
-            Forces that act over this step alone, beside those that are held.
+            Forces that act over this step alone, beside those that are held; see `Load.parts`.
 
         Raises
         ------
@@ -146,15 +150,17 @@ class WaveSolver:
         if dt == 0:
             return
         substeps = count_substeps(dt, self.stable_timestep, substeps)
-        self._substep = dt / substeps
-        # values too large for float32 become infinite here; the next look reports them
-        with np.errstate(over="ignore", invalid="ignore"):
-            force = self._held.upload(load)
-            self._backend.advance(substeps, self._substep)
-        if force is not None:
-            self._guard.note("forces", force, "N", self.time, abs(force) * dt / self._least_mass)
-        if self.listeners.all:
-            self.listeners.hear(self.time, self._substep)
+        self._substep, begin = dt / substeps, self.time
+        for count, part in [(substeps, None)] if load is None else load.parts(dt, substeps):
+            # values too large for float32 become infinite here; the next look reports them
+            with np.errstate(over="ignore", invalid="ignore"):
+                force = self._held.upload(part)
+                self._backend.advance(count, self._substep)
+            if force is not None:
+                self._guard.note("forces", force, "N", begin, abs(force) * dt / self._least_mass)
+            if self.listeners.all:
+                self.listeners.hear(begin, self._substep)
+            begin += count * self._substep
         self.time += dt
         self.substeps_taken += substeps
         if self._guard.due(substeps) and not self._backend.finite():

@@ -212,7 +212,7 @@ def test_a_drop_scene_takes_keys_of_scene_files_too(tmp_path):
     assert 2 <= values["bodies"] <= 4
     assert len(scene.events.drop) == values["bodies"]
     assert scene.camera.azimuth == 7
-    assert scene.camera.distance == 3.6
+    assert scene.camera.orbit == 5
     assert scene.model.geom("floor").rgba[0] == 0.5
     assert scene.targets[0].material.density > 0
 

@@ -12,7 +12,7 @@ from ripple_sim.cli import DropCommand, RenderCommand, ViewCommand, arguments, p
 from ripple_sim.overlay import notes
 from ripple_sim.scene import drop
 from ripple_sim.solver.layouts import build
-from ripple_sim.solver.operator import assembly
+from ripple_sim.solver.operator import plate_rim
 from ripple_sim.video import VideoOptions
 
 
@@ -62,7 +62,7 @@ def test_what_is_not_valid_is_quoted_with_what_would_be(parse: str, words: list[
 
 def test_names_are_those_of_the_rooms_that_have_them() -> None:
     assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, notes.BASELINES)
-    assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, assembly.RIMS)
+    assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, plate_rim.RIMS)
 
 
 WORDS = {

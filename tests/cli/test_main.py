@@ -13,6 +13,7 @@ import warnings
 import pytest
 from programs import ended
 
+import ripple_sim
 from ripple_sim import bench
 from ripple_sim.cli import main as cli, reports
 from ripple_sim.errors import EncodingError, RippleWarning, SceneError
@@ -27,10 +28,15 @@ def test_help_is_given(capsys, command):
     assert err == ""
 
 
+def test_the_version_is_that_of_the_package(capsys):
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr() == (f"ripple-sim {ripple_sim.__version__}\n", "")
+
+
 @pytest.mark.parametrize(
     ("argv", "named"),
     [
-        ([], "render, drop, export, batch, atlas, info"),
+        ([], "render, drop, export, batch, atlas, modes, info"),
         (["fly"], "fly"),
         (["render", "duck"], "--output"),
         (["render", "-o", "x.mp4"], "SCENE"),
@@ -68,6 +74,7 @@ def test_a_usage_error_reads_the_same_in_every_locale():
         (["-o", "x."], r"x\. ends in \.; valid is"),
         (["-o", "clip.mp4", "--size", "641x360"], "641x360.*even"),
         (["-o", "clip.gif", "--fps", "60"], "60.*1 to 50"),
+        (["-o", "clip.mp4", "--size", "0x0"], r"size is \(0, 0\); valid is"),
     ],
 )
 def test_a_bad_output_is_refused_before_the_scene_is_read(tmp_path, monkeypatch, refusal, command, options, said):
@@ -75,6 +82,10 @@ def test_a_bad_output_is_refused_before_the_scene_is_read(tmp_path, monkeypatch,
     (tmp_path / "broken").touch()
     assert re.search(said, refusal(command, "broken", *options))
     assert list(tmp_path.iterdir()) == [tmp_path / "broken"]
+
+
+def test_a_folder_that_is_not_there_is_told_before_the_viewer_opens(refusal):
+    assert "there is no folder 'nowhere' for screenshots" in refusal("view", "sphere", "--folder", "nowhere")
 
 
 def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypatch, capsys):

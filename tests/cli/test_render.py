@@ -9,9 +9,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
-from ripple_sim.cli import frame_progress, main as cli
+from ripple_sim.cli import frame_progress, main as cli, reports
+from ripple_sim.solver import kernel
+from ripple_sim.solver.layouts.cube.convention import check_memory
 from ripple_sim.solver.operator import PRESETS
 
 
@@ -57,6 +60,25 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     text = sys.stderr.getvalue()
     assert "compiling the wave step (once): 12 s" in text
     assert "0/120" in text
+
+
+def test_what_takes_long_is_logged_and_printed_as_a_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(kernel._watch, "seconds", {"ripple_sim.solver": 2.1})
+    monkeypatch.setattr(kernel._watch, "told", False)
+
+    def run(self: object) -> None:
+        check_memory(1000)
+        for i in range(2):
+            numba.njit(lambda x, i=i: x + i)(1)  # which is not kept
+
+    monkeypatch.setattr(reports.InfoCommand, "run", run)
+    assert cli.main(["info"]) == 0
+    atlas, compiling = capsys.readouterr().err.splitlines()
+    assert atlas == "ripple-sim: an atlas of resolution 1000 has about 6 million texels, which take 30 s or more"
+    assert compiling.startswith("ripple-sim: compiling for this machine, once")
+    assert [record.levelname for record in caplog.records] == ["WARNING"] * 2
 
 
 def test_an_error_goes_on_through_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -154,6 +154,21 @@ def test_where_the_time_step_will_do_a_solref_is_named_and_no_longer_step() -> N
     assert shoot(10.0, solref, 0.002) == (True, [])
 
 
+def test_one_warning_serves_all_pairs_but_those_that_are_much_worse() -> None:
+    ball = '<body name="{}" pos="{} 0 {}"><freejoint/><geom size="0.03"/></body>'
+    balls = [("first", 0.0, 0.2, 10), ("as bad", 0.1, 0.9, 15), ("worse", 0.2, 2.0, 40)]
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><worldbody>{PLATE}{''.join(ball.format(*each[:3]) for each in balls)}</worldbody></mujoco>"
+    )
+    data, check = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
+    data.qvel[2::6] = [-speed for *_, speed in balls]
+    with warnings.catch_warnings(record=True, action="always") as caught:
+        for _ in range(60):
+            mujoco.mj_step(model, data)
+            check(data)
+    assert [str(each.message).split("'")[1] for each in caught] == ["first", "worse"]
+
+
 def test_moving_target_counts_with_its_own_speed() -> None:
     body = '<body name="plate" pos="0 0 {}"><freejoint/><geom name="plate" type="box" size="0.3 0.3 0.02"/></body>'
     model = mujoco.MjModel.from_xml_string(

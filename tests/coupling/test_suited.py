@@ -19,13 +19,39 @@ import pytest
 from mujoco_models import limbed_asset
 
 from ripple_sim import Material, Ripples, Simulation, load_scene
-from ripple_sim.errors import RippleWarning
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import MaterialEntry
 from ripple_sim.solver.texels import half_thickness
 
 BOX = """<mujoco><option timestep="0.002"/><worldbody><geom name="target" type="box" size="0.5 0.5 0.25"/>
     <body pos="0 0 0.36"><freejoint/><geom type="box" size="0.15 0.15 0.1" mass="{mass}"/></body>
     </worldbody></mujoco>"""
+
+RAIN = """<mujoco><worldbody><geom name="target" size="0.5"/>{}</worldbody></mujoco>"""
+FALLING = '<body pos="0 0 1.6"><freejoint/><geom size="{}" mass="{}"/></body>'
+
+
+def test_the_preset_suited_takes_its_size_and_a_typical_hit_from_the_model(tmp_path: Path) -> None:
+    bodies = "".join(FALLING.format(radius, mass) for radius, mass in ((0.05, 0.2), (0.08, 0.5), (0.2, 9.0)))
+    (tmp_path / "rain.xml").write_text(RAIN.format(bodies))
+    (tmp_path / "nothing.xml").write_text(RAIN.format(""))
+    scene = tmp_path / "scene.toml"
+
+    def chosen(model: str, preset: str) -> Material:
+        scene.write_text(f'model = "{model}"\n[[ripple]]\ngeom = "target"\nmaterial = {{preset = {preset}}}')
+        return load_scene(scene).targets[0].material.material()
+
+    # the body of median mass, 1.6 m - 0.5 m - 0.08 m above the target, or a fall of its size
+    expected = Material.suited(1.0, (0.5, (2 * 9.81 * 1.02) ** 0.5), radius=0.04)
+    for name in ("density", "stiffness", "speed", "damping", "viscosity"):
+        assert getattr(chosen("rain.xml", '"suited"'), name) == pytest.approx(getattr(expected, name), rel=0.03)
+    lower = chosen("rain.xml", '{name = "suited", amplitude = 0.02}')
+    assert lower.density == pytest.approx(2.5 * expected.density, rel=0.03)
+    with pytest.raises(SceneError, match=r"needs a size .* and a hit .*: nothing that moves can touch it"):
+        chosen("nothing.xml", '"suited"')
+    given = chosen("nothing.xml", '{name = "suited", size = 1.0, hit = 3.0}')
+    assert given.density == Material.suited(1.0, 3.0).density
+
 
 # a ball of 0.14 times the target's size, from a height of half the size
 FALL = """<mujoco><option timestep="{dt}"/><worldbody><geom name="target" type="sphere" size="{half}"/>

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mujoco_models import BALL, model_of
 
-from ripple_sim import Material, RippleError, Ripples
+from ripple_sim import Material, RippleError, Ripples, RippleWarning
 
 
 def test_material_may_change_under_a_body_at_rest() -> None:
@@ -39,6 +39,8 @@ def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None
     ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
     geom, end = data.geom("target"), model.site("end").pos
     if place == "poke":
+        with pytest.warns(RippleWarning, match=r"a poke of 'target' is 2\.7 m off its surface \(450% of its size\)"):
+            ripples.poke("target", [1.0, 0.0, -3.0], 0.0)
         ripples.poke("target", end, 0.01, 0.1)
         ripples["target"].step(1e-3)
         chosen = ripples["target"].height < 0.5 * ripples["target"].height.min()

@@ -1,10 +1,14 @@
 """What is installed is the source tree: pyproject.toml names packages one by one, and one is soon forgotten."""
 
+import re
+import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
 from programs import ended
+
+import ripple_sim
 
 ROOT = Path(__file__).parents[2]
 SUFFIXES = {".py", ".glsl", ".toml", ".xml", ".obj", ".png", ".npy", ".typed"}
@@ -38,6 +42,35 @@ def test_every_source_file_is_in_the_wheel(wheel):
     assert "ripple_sim/py.typed" in wheel
 
 
+def test_the_version_is_the_same_wherever_it_stands():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)[1]
+    assert project == cited == ripple_sim.__version__
+
+
 def test_nothing_else_becomes_a_top_level_name(wheel):
     tops = {name.split("/")[0] for name in wheel}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"ripple_sim"}
+
+
+def test_waves_need_nothing_of_posix_and_videos_no_viewer(tmp_path):
+    """So contacts make waves on Windows, too."""
+    words = ["render", "sphere", "-o", str(tmp_path / "a.mp4"), "--size", "32x24", "--duration", "0.02"]
+    code = f"""if True:
+        import sys, mujoco
+        posix = ("fcntl", "grp", "resource")
+        sys.modules.update(dict.fromkeys(posix))
+        from ripple_sim import Material, Ripples
+        model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom name="egg" size="0.3"/>'
+            '<body pos="0 0 0.36"><freejoint/><geom size="0.06"/></body></worldbody></mujoco>')
+        data, ripples = mujoco.MjData(model), Ripples(model, {{"egg": Material()}}, resolution=8, backend="cpu")
+        for _ in range(50):
+            ripples.mj_step(data)
+        assert abs(ripples["egg"].height).max() > 0
+        for name in posix:
+            del sys.modules[name]
+        from ripple_sim.cli.main import main
+        assert main({[*words, "--resolution", "8"]}) == 0
+        print(sorted({{"vtkmodules", "pyvista", "trame", "matplotlib"}} & set(sys.modules)))
+        """
+    assert ended("-c", code, check=True).stdout.splitlines()[-1] == "[]"

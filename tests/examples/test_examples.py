@@ -123,6 +123,18 @@ def test_an_example_makes_its_picture(name: str, arguments: str, folder: Path, i
         assert np.asarray(picture.convert("L")).std() > 10
 
 
+def test_a_ring_on_gelatine_comes_when_the_exact_one_does(imported) -> None:
+    plot = imported("plots/gelatine_ring.py")
+    texels, (modulus, _) = 96, plot.MEASURED["gelatine-5"]
+    speed = plot.RAYLEIGH * np.sqrt(modulus / plot.DENSITY)
+    times, distances = np.linspace(0, 0.2 / speed, 151)[1:], plot.SIDE / texels * np.arange(texels // 2)
+    exact = plot.exact_ring(modulus, distances, times)
+    ours, long = (plot.spread("gelatine-5", texels, times, short) for short in (True, False))
+    due, came, late = (plot.leading_crest(each, distances, times, speed)[0] for each in (exact, ours, long))
+    np.testing.assert_allclose(came, due, rtol=0.04)
+    assert np.abs(came / due - 1).mean() < 0.5 * np.abs(late / due - 1).mean()
+
+
 @pytest.mark.usefixtures("opengl")
 def test_mujocos_renderer_ours_and_a_plotter_end_without_a_crash() -> None:
     result = ended(EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista", timeout=300)

@@ -96,6 +96,18 @@ def test_a_copy_of_the_model_in_other_colours_is_drawn_in_them(egg):
     assert blue_light > 1.5 * red
 
 
+def test_what_has_no_colour_is_grey_as_in_mujoco_unless_a_look_is_named(egg):
+    model, data, ripples, _ = egg
+    plain = copy.copy(model)
+    plain.geom_rgba[0] = [0.5, 0.5, 0.5, 1.0]
+    spreads = [
+        np.ptp(RippleRenderer(plain, ripples, 72, 96, looks=looks).render(data)[30:42, 42:54].mean(axis=(0, 1)))
+        for looks in ({}, {"egg": "rubber"})
+    ]
+    assert spreads[0] < 15
+    assert spreads[1] > 60
+
+
 @pytest.fixture(scope="module")
 def mujocos(tmp_path_factory):
     """What `mujoco.Renderer` draws; it takes over the context of its process."""
@@ -217,11 +229,11 @@ def test_geoms_that_are_added_to_the_scene_are_seen(egg):
     arrow, rgba = scene.geoms[scene.ngeom], np.array([0, 0, 1, 1], np.float32)
     kind, zero = mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3)
     mujoco.mjv_initGeom(arrow, kind, zero, zero, np.eye(3).ravel(), rgba)
-    mujoco.mjv_connector(arrow, kind, 0.05, np.array([0, -0.5, -0.3]), np.array([0, -0.5, 0.5]))
+    mujoco.mjv_connector(arrow, kind, 0.05, np.array([0, -0.5, -0.3]), np.array([0, -0.5, 3.9]))
     scene.ngeom += 1
     added = renderer.render().astype(int)
     changed = np.abs(added - plain).max(axis=2) > 40
-    assert changed[57:70, 47:49].all()
+    assert changed[:70, 47:49].all(), "also where nothing else is, up to the frame's edge"
     assert (added[changed][:, 2] > added[changed][:, 0] + 30).mean() > 0.8
     renderer.update_scene(data, "side")
     assert np.array_equal(renderer.render(), plain)

@@ -25,6 +25,7 @@ def material_of(table: dict) -> Material:
         ({"speed": 2, "density": 5.0}, Material(speed=2.0, density=5.0)),
         ({"tightening": 1.0}, Material(tightening=1.0)),
         ({"preset": "jelly"}, Material.jelly()),
+        ({"preset": {"name": "suited", "size": 2.0, "hit": [0.5, 4.0]}}, Material.suited(2.0, (0.5, 4.0))),
         ({"preset": {"name": "layer", "modulus": 2e3, "thickness": 0.02}}, Material.layer(2e3, thickness=0.02)),
         ({"preset": "gelatine-7"}, Material.preset("gelatine-7")),
         ({"preset": {"name": "drum-skin", "tension": 4500.0}}, Material.preset("drum-skin", tension=4500.0)),
@@ -49,12 +50,15 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"preset": "foam"}, "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, gelatine-3"),
+        (
+            {"preset": "foam"},
+            "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, suited, g",
+        ),
         (
             {"preset": {"name": "membrane", "modulus": 1.0}},
             "no parameter 'modulus'; valid are tension, density, damping",
         ),
-        ({"preset": "dent"}, "needs yield_height: write preset = "),
+        ({"preset": "dent"}, "needs yield_height: write dent,yield_height="),
         ({"preset": {"name": "jelly", "modulus": -1.0}}, "modulus is -1.0 Pa"),
         (
             {"preset": {"name": "jelly", "elasticity": 1.0}},

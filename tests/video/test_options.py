@@ -5,7 +5,6 @@ from pathlib import Path
 
 import msgspec
 import mujoco
-import numpy as np
 import pytest
 
 from ripple_sim.errors import RippleError, SceneError
@@ -41,8 +40,8 @@ def test_frames_fill_the_duration_and_there_is_at_least_one(
     assert options.rate == fps * slow_motion
 
 
-WRONG_DURATIONS = [("duration", "less than 86400", each) for each in (0.0, -1.0, np.nan, np.inf, MAX_DURATION)]
-WRONG_FACTORS = [("slow_motion", "up to 1000", each) for each in (0.0, -2.0, np.nan, MAX_SLOW_MOTION + 1)]
+WRONG_DURATIONS = [("duration", "less than 86400", each) for each in (MAX_DURATION, 1e9)]
+WRONG_FACTORS = [("slow_motion", "up to 1000", each) for each in (MAX_SLOW_MOTION + 1, 1e6)]
 
 
 @pytest.mark.parametrize(("name", "valid", "value"), WRONG_DURATIONS + WRONG_FACTORS)

@@ -184,6 +184,16 @@ def geom_visual(model: Any, geom: int) -> Visual:
     return Visual(False, geom, kind, size, asset, *paint, identity=(geom, _GEOM_OBJECT))
 
 
+def paint_of(model: Any, geom: int, look: str | None) -> tuple[str, tuple[float, float, float] | None]:
+    """Look of a target in a model of the user's, and its sRGB colour, None where the model or the look says it.
+
+    Without a look it is rubber in the grey that MuJoCo draws what has no colour in: nobody has asked for another.
+    """
+    visual = geom_visual(model, geom)
+    red, green, blue = visual.rgba[:3].tolist()
+    return look or "rubber", (red, green, blue) if look is None and not visual.colored else None
+
+
 def site_visual(model: Any, site: int) -> Visual:
     """Site of a model."""
     kind, size = int(model.site_type[site]), np.array(model.site_size[site], dtype=np.float64)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ...errors import AtlasError
 from ...files import require_memory
+from ...kernel import log
 from ...mesh.mesh import Mesh
 from ...texels.chart_map import Parts
 from ...texels.topology import TexelTopology, glue
@@ -59,6 +60,9 @@ MAX_RESOLUTION = 4096
 # Memory for each texel while an atlas is built, at least [bytes].
 _TEXEL = 200
 
+# Texels that are set up in silence, and what one takes [s]: measured with `Ripples` of an ellipsoid at resolution 512.
+_MANY, _SECONDS = 1e6, 5e-6
+
 
 def check_resolution(resolution: int) -> int:
     """Return the resolution N as an int, or raise `AtlasError` if it is not a whole number in the valid range."""
@@ -72,9 +76,11 @@ def check_resolution(resolution: int) -> int:
 
 
 def check_memory(resolution: int) -> None:
-    """Raise `AtlasError` if an atlas of about 6 N^2 texels cannot fit into memory."""
-    what = f"an atlas of resolution {resolution}"
-    require_memory(AtlasError, _TEXEL * 6 * resolution**2, what, "take a lower resolution")
+    """Raise `AtlasError` if an atlas of about 6 N^2 texels cannot fit into memory, and tell of one that takes long."""
+    what, texels = f"an atlas of resolution {resolution}", 6 * resolution**2
+    require_memory(AtlasError, _TEXEL * texels, what, "take a lower resolution")
+    if texels > _MANY:
+        log.warning("%s has about %d million texels, which take %.0f s or more", what, texels / 1e6, _SECONDS * texels)
 
 
 def texel_directions(resolution: int) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ includes and defines put in.
 """
 
 import os
+import re
 import sys
 import textwrap
 import threading
@@ -184,6 +185,19 @@ def test_without_any_device_the_error_says_what_to_install(
     assert {name for _, name in asked} == {None, "libEGL.so.1"}
     assert {index for index, _ in asked} == set(range(devices))
     assert len(asked) == 2 * devices
+
+
+def test_a_driver_that_is_too_old_is_named_with_its_version_and_the_one_needed(opengl: None) -> None:
+    code = "from ripple_sim.solver.gl import create_context; create_context(None)"
+    result = ended("-c", code, env={**os.environ, "MESA_GL_VERSION_OVERRIDE": "4.1"})
+    assert re.search(r"GLError: .+ has OpenGL 4\.1; rendering and backend 'gl' need 4\.3 or later", result.stderr)
+
+
+@pytest.mark.parametrize("system", ["darwin", "win32"])
+def test_a_system_without_egl_is_named(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", system)
+    with pytest.raises(GLError, match=rf"no OpenGL 4\.3 over EGL on {system}.*backend 'cpu'"):
+        create_context(None)
 
 
 def test_the_context_that_is_entered_is_the_current_one(opengl: None) -> None:

@@ -213,5 +213,7 @@ def test_a_closed_surface_knows_no_rim_and_a_bad_name_is_refused() -> None:
         waves.step(0.2)
         heights.append(waves.height)
     np.testing.assert_array_equal(*heights)
-    with pytest.raises(SolverError, match="rim 'clamped' does not exist; valid are 'free', 'fixed'"):
-        WaveSolver(atlas, backend="cpu", rim="clamped")
+    with pytest.raises(
+        SolverError, match="rim 'bent' does not exist; valid are 'free', 'supported', 'clamped', 'fixed'"
+    ):
+        WaveSolver(atlas, backend="cpu", rim="bent")

@@ -11,7 +11,7 @@ from modes import swing
 
 from ripple_sim import RippleWarning
 from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas, texel_atlas
-from ripple_sim.solver.operator import LIMITS, check_mask, check_numbers
+from ripple_sim.solver.operator import LIMITS, check_mask, check_numbers, frequency
 
 STRICT = ("density", "yield_height")
 
@@ -65,22 +65,33 @@ def test_arrays_that_are_no_charts_are_named_by_their_shape(shape: tuple[int, ..
 
 
 # which the plots compare with as well
-lowest_square = runpy.run_path(str(Path(__file__).parents[3] / "examples" / "plots" / "layer_mode.py"))["lowest_square"]
+EXACT = runpy.run_path(str(Path(__file__).parents[3] / "examples" / "plots" / "layer_mode.py"))
+lowest_square, group_speed = EXACT["lowest_square"], EXACT["group_speed"]
 MODULUS, VISCOSITY, DENSITY = 3000.0, 0.5, 1100.0
 SQUARE, RELAXATION = MODULUS / DENSITY, VISCOSITY / MODULUS  # c_T^2 [m^2/s^2], eta / G [s]
 
 
-@pytest.mark.parametrize("depth", [1.3, 1.8, 2.5, 4.0, 6.0, 8.0])
-def test_frequency_and_decay_of_a_standing_wave_are_those_of_the_exact_mode(depth: float) -> None:
+@pytest.mark.parametrize(
+    ("depth", "short"), [*((depth, False) for depth in (1.3, 1.8, 2.5, 4.0, 6.0, 8.0)), (5.0, True), (12.0, True)]
+)
+def test_frequency_and_decay_of_a_standing_wave_are_those_of_the_exact_mode(depth: float, short: bool) -> None:
     q = 4 * np.pi
     atlas = texel_atlas(flat_torus(32))
-    waves = WaveSolver(atlas, Material.layer(MODULUS, VISCOSITY, DENSITY, depth / q), backend="cpu")
+    waves = WaveSolver(atlas, Material.layer(MODULUS, VISCOSITY, DENSITY, depth / q, short), backend="cpu")
     dt = 2 * 2 * np.pi / np.sqrt(SQUARE * lowest_square(depth) * (q / depth) ** 2) / 400
     frequency, rate = swing(waves, np.cos(q * atlas.positions[..., 0]), dt, 400)
     square = SQUARE * q**2 / depth**2 * lowest_square(depth)
     # the grid itself makes such a wave slower by half a per cent
     assert np.hypot(frequency, rate) == pytest.approx(np.sqrt(square), rel=0.035)
     assert rate == pytest.approx(square * RELAXATION / 2, rel=0.07)
+
+
+def test_short_waves_have_the_phase_and_group_speed_of_the_exact_mode() -> None:
+    material, step = Material.layer(1.0, 0.0, 1.0, 1.0, short=True), 1e-3
+    for q in (5.0, 6.5, 9.0, 14.0, 25.0, 40.0):
+        below, here, above = (frequency(material, q + d) for d in (-step, 0, step))
+        assert here == pytest.approx(np.sqrt(lowest_square(q)), rel=0.03)
+        assert (above - below) / (2 * step) == pytest.approx(group_speed(q), rel=0.04)
 
 
 def test_a_thin_layer_is_stiffer_and_sooner_still_than_a_thick_one() -> None:

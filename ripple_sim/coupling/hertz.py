@@ -1,0 +1,330 @@
+"""The pulse of a hit by Hertz's law, in place of MuJoCo's soft contact.
+
+Two elastic bodies press each other with a force that grows as the power 3/2 of their approach (Hertz 1882; Johnson,
+Contact Mechanics, 1985, sections 4.2 and 11.4). A ball that hits leaves after microseconds to milliseconds, where
+MuJoCo's contact holds it for tens of milliseconds. When a hit begins, its impulse is foreseen from MuJoCo's own
+contact law, and given over Hertz's time. What MuJoCo's contact then gives, the surface has already, and the rest comes
+as it comes: nothing is lost.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaincinv
+
+from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.solver import Atlas, Load
+from ripple_sim.solver.errors import POSITIVE, shown
+from ripple_sim.solver.kernel import Floats, Ints
+
+from .contacts import ColliderIds, Contacts, normal_rows
+from .geoms import ByGeom, find_any, for_each
+from .model import CoupledModel
+
+PULSES = ("contact", "hertz")
+
+# A body is put down, and does not hit, where its speed is what it gains within this time as it falls [s].
+_PUT_DOWN = 0.005
+# Steps of MuJoCo's contact until it is at rest, at most.
+_STEPS = 1000
+# Product over squared sum of the principal curvatures of a gap that counts as round: 1/4 for a ball, 0.08 where one is
+# ten times the other. Hertz's time is off by 4 % there if both count by their mean.
+_ROUND = 0.08
+# Cosine to the axis of a capsule or a cylinder, up to which its side touches.
+_SIDE = 0.02
+# Mean of the normals under a footprint, below which it lies over an edge.
+_EDGE = 0.9
+# A pulse is given in so many parts, or as many as it has substeps.
+_PARTS = 32
+# Shares beyond this are all.
+_WHOLE = 1 - 1e-9
+
+
+def hertz_moduli(
+    model: mujoco.MjModel, names: Iterable[str], pulse: str | ByGeom[str], modulus: float | ByGeom[float | None] | None
+) -> dict[int, float]:
+    """E* [Pa] of the targets whose hits have Hertz's pulse, by geom id; raises `SceneError` for what is not valid."""
+    pulses, found = for_each(model, names, "pulse", pulse), {}
+    for name, each in pulses.items():
+        if each not in PULSES:
+            raise SceneError(f"pulse is {shown(each)} for geom {name!r}; valid are {', '.join(map(repr, PULSES))}")
+    wanted = [name for name, each in pulses.items() if each == "hertz"]
+    given = for_each(model, wanted, "modulus", modulus)
+    for name in wanted:
+        if not POSITIVE.holds(given[name]):
+            raise SceneError(
+                f"modulus is {shown(given[name])} Pa for geom {name!r}, whose pulse is 'hertz'; valid is "
+                f"{POSITIVE.words}: E* of the two materials, 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2, about 1e11 "
+                "for steel on steel, 1e9 for wood, 1e6 for a rubber ball on anything hard"
+            )
+        found[find_any(model, name)] = float(given[name] or 0.0)
+    return found
+
+
+def hertz_time(mass: float, radius: float, modulus: float, speed: float) -> float:
+    """How long two elastic bodies touch [s]; Johnson, equation 11.24, whose factor is 2.87.
+
+    Parameters
+    ----------
+    mass : float
+        1 / m = 1 / m1 + 1 / m2 [kg].
+    radius : float
+        1 / R = 1 / R1 + 1 / R2 [m].
+    modulus : float
+        E* [Pa].
+    speed : float
+        At which they meet [m/s].
+    """
+    return 2.868 * (mass**2 / (radius * modulus**2 * speed)) ** 0.2
+
+
+def given_share(age: float) -> float:
+    """Share of a Hertz pulse's impulse that is given when a share `age` of its time has passed.
+
+    With x the approach over the greatest one, x' = sqrt(1 - x^(5/2)) in its own time: time is an incomplete beta
+    function of x^(5/2), and the impulse is (1 - x') / 2 while they approach.
+    """
+    if age >= _WHOLE:
+        return 1.0
+    early = min(age, 1 - age)
+    share = (1 - math.sqrt(1 - float(betaincinv(0.4, 0.5, 2 * early)))) / 2
+    return share if age < 0.5 else 1 - share
+
+
+class Pulse(NamedTuple):
+    """What a hit gives: impulses [N s] on texels [k], over how long, and how long ago it began [s]."""
+
+    texels: Ints
+    impulses: Floats
+    duration: float
+    age: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PulsedLoad(Load):
+    """A load with pulses, which change within a step."""
+
+    pulses: tuple[Pulse, ...]
+
+    def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
+        """Each part is a substep, or the 32nd of the shortest pulse; then what is held alone."""
+        held, substep = Load(self.texels, self.forces), dt / substeps
+        size = max(1, int(min(each.duration for each in self.pulses) / (_PARTS * substep)))
+        last = min(substeps, math.ceil(max(each.duration - each.age for each in self.pulses) / substep * _WHOLE))
+        for first in range(0, last, size):
+            count = min(size, last - first)
+            loads = [held]
+            for each in self.pulses:
+                begin, end = ((each.age + at * substep) / each.duration for at in (first, first + count))
+                share = given_share(end) - given_share(begin)
+                if share:
+                    loads.append(Load(each.texels, each.impulses * (share / (count * substep))))
+            yield count, Load.together(loads)
+        if last < substeps:
+            yield substeps - last, held
+
+
+def decided(solimp: Floats, depth: float) -> float:
+    """Share of an acceleration that MuJoCo's contact decides at a depth [m]: its impedance, by its documentation."""
+    least, most, width, middle, power = solimp.tolist()
+    x = min(max(depth, 0.0) / max(width, 1e-15), 1.0)
+    y = x**power / middle ** (power - 1) if x <= middle else 1 - (1 - x) ** power / (1 - middle) ** (power - 1)
+    return least + y * (most - least)
+
+
+class Approach(NamedTuple):
+    """How two bodies meet: effective mass [kg], speed [m/s], what pulls them together [m/s^2], and MuJoCo's contact.
+
+    That is a spring [1/s^2] and a damper [1/s] at a depth [m], and `solimp`, see `decided`.
+    """
+
+    mass: float
+    speed: float
+    pull: float
+    stiffness: float
+    damping: float
+    depth: float
+    solimp: Floats
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Approach | None:
+        """That of a pair at the beginning of a step; None where nothing pushes, or not against a mass.
+
+        The mass is the contacts' force over the acceleration that all constraints give the pair: where a body hits at
+        several places at once, each has its share.
+        """
+        rows, of = normal_rows(model, data, contacts)
+        force = float(data.efc_force[rows].sum())
+        if not force > 0:
+            return None
+        # what is across the normal cancels in a mean over the edges of a pyramid, whatever their forces
+        shares, along = (np.bincount(of, data.efc_force[rows]) / np.bincount(of))[of] / force, np.zeros((2, data.nefc))
+        mujoco.mj_mulJacVec(model, data, along[0], data.qacc_smooth)
+        mujoco.mj_mulJacVec(model, data, along[1], data.qacc)
+        free, solved = along[:, rows] @ shares
+        if not solved > free:
+            return None
+        spring, damper, *_ = shares @ data.efc_KBIP[rows]
+        depth, solimp = shares @ (data.efc_margin - data.efc_pos)[rows], data.contact.solimp[contacts[0]]
+        return cls(force / (solved - free), -shares @ data.efc_vel[rows], -free, spring, damper, depth, solimp)
+
+    def impulse(self, dt: float) -> float:
+        """What it takes to turn the bodies round as MuJoCo's contact does in steps of dt [s], but for what pulls."""
+        speed, depth = self.speed, self.depth
+        for _ in range(_STEPS):
+            decides = decided(self.solimp, depth)
+            push = decides * (self.damping * speed + self.stiffness * decides * depth + self.pull)
+            if push <= max(self.pull, 0.0):
+                break
+            speed -= (push - self.pull) * dt
+            depth += speed * dt
+        return self.mass * (self.speed + max(-speed, 0.0))
+
+
+def surface_bend(model: mujoco.MjModel, geom: int, normal: Floats) -> NDArray[np.float64] | None:
+    """How the normal of a round geom turns along its surface, where it is the given one, in its frame: [3, 3] [1/m].
+
+    Of spheres, ellipsoids, capsules and the sides of cylinders; None for all others.
+    """
+    size, on_side = model.geom_size[geom], abs(normal[2]) < _SIDE
+    match mujoco.mjtGeom(model.geom_type[geom]):
+        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            return np.diag(size**-2.0) * np.linalg.norm(size * normal)
+        case mujoco.mjtGeom.mjGEOM_CAPSULE | mujoco.mjtGeom.mjGEOM_CYLINDER if on_side:
+            return np.diag([1.0, 1.0, 0.0]) / size[0]
+        case mujoco.mjtGeom.mjGEOM_SPHERE | mujoco.mjtGeom.mjGEOM_CAPSULE:
+            return np.eye(3) / size[0]
+    return None
+
+
+def atlas_bend(atlas: Atlas, texels: Ints, normal: Floats) -> NDArray[np.float64] | None:
+    """The same of a target, by least squares over some texels; None over an edge.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    texels : int64 [k]
+    normal : float64 [3]
+        On the side that is touched.
+    """
+    points, normals = (each.reshape(-1, 3)[texels] for each in (atlas.positions, atlas.normals))
+    mean = normals.mean(axis=0)
+    if np.linalg.norm(mean) < _EDGE:
+        return None
+    away, turned = points - points.mean(axis=0), normals - mean
+    bend = turned.T @ away @ np.linalg.pinv(away.T @ away, rcond=1e-6) * np.sign(mean @ normal)
+    return (bend + bend.T) / 2
+
+
+class Hits:
+    """Gives the hits on a target the pulse of Hertz's law.
+
+    It is that of two smooth round bodies: the other geom is a sphere, an ellipsoid, a capsule or the side of a
+    cylinder, and the gap is about as round along one axis as along the other. Other hits keep MuJoCo's pulse, and a
+    warning says so, once a reason. So do bodies that are put down, and all that a body does after it has hit.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    target : int
+        Geom id.
+    modulus : float
+        E* [Pa].
+    """
+
+    def __init__(self, coupled: CoupledModel, target: int, modulus: float) -> None:
+        self._coupled, self._target, self._modulus = coupled, target, modulus
+        self._colliders = ColliderIds(coupled)
+        self._pulses: list[Pulse] = []
+        self._told: set[str] = set()
+
+    def clear(self) -> None:
+        """End all pulses."""
+        self._pulses = []
+
+    def begin(self, data: mujoco.MjData, atlas: Atlas, pair: Contacts, texels: Ints, shares: Floats) -> float:
+        """Begin the pulse of a geom that touches for the first time, if that is a hit.
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+        atlas : Atlas
+        pair : Contacts
+            Of that geom.
+        texels : int64 [k]
+            That carry them.
+        shares : float64 [k]
+            What a unit of the contacts' impulse gives these.
+
+        Returns
+        -------
+        float
+            Impulse that the target gets by the pulse [N s], positive inwards.
+        """
+        model, other = self._coupled.model, int(pair.others[0])
+        colliders = self._colliders(data)
+        ours = np.isin(colliders, [self._target, *self._coupled.collision_geoms(self._target)])
+        touching = (ours[:, ::-1] & (colliders == other)).any(axis=1) & (data.contact.efc_address >= 0)
+        meet = Approach.of(model, data, touching.nonzero()[0])
+        if meet is None or not shares.any() or meet.speed <= max(meet.pull, 0.0) * _PUT_DOWN:
+            return 0.0
+        radius = self._radius(data, atlas, pair, texels, other)
+        if isinstance(radius, str):
+            self._refuse(other, radius)
+            return 0.0
+        duration = hertz_time(meet.mass, radius, self._modulus, meet.speed)
+        impulses = meet.impulse(model.opt.timestep) * shares
+        self._pulses.append(Pulse(texels, impulses, duration, 0.0))
+        return float(impulses.sum())
+
+    def over(self, load: Load, elapsed: float) -> Load:
+        """A load with the pulses of a time [s], which then has passed."""
+        if not self._pulses:
+            return load
+        pulses = tuple(self._pulses)
+        older = (each._replace(age=each.age + elapsed) for each in pulses)
+        self._pulses = [each for each in older if each.age < _WHOLE * each.duration]
+        return PulsedLoad(load.texels, load.forces, pulses)
+
+    def _radius(self, data: mujoco.MjData, atlas: Atlas, pair: Contacts, texels: Ints, other: int) -> float | str:
+        """Radius of the ball on a plane whose gap is like that of a pair [m], or why there is none."""
+        coupled = self._coupled
+        if self._target in coupled.soft or other >= coupled.model.ngeom:
+            return "Hertz's law is one of rigid geoms, not of flexes and skins"
+        shares = pair.forces / pair.forces.sum()
+        normal = shares @ pair.normals
+        normal /= np.linalg.norm(normal)
+        turn, own = data.geom_xmat[other].reshape(3, 3), data.geom_xmat[self._target].reshape(3, 3)
+        theirs = surface_bend(coupled.model, other, -normal @ turn)
+        if theirs is None:
+            return "only spheres, ellipsoids, capsules and sides of cylinders are round"
+        ours = atlas_bend(atlas, texels, normal @ own)
+        if ours is None:
+            return "an edge is hit"
+        across = np.eye(3) - np.outer(normal, normal)
+        gap = across @ (turn @ theirs @ turn.T + own @ ours @ own.T) @ across
+        total = float(np.trace(gap))
+        product = (total**2 - float((gap * gap).sum())) / 2
+        if total <= 0 or product < _ROUND * total**2:
+            return "they touch along a line, or over an area, not at a point"
+        return product**-0.5
+
+    def _refuse(self, other: int, reason: str) -> None:
+        """Say once why hits keep MuJoCo's pulse."""
+        if reason not in self._told:
+            self._told.add(reason)
+            names, owners = self._coupled.names, self._coupled.owners
+            hit, hits = names[owners[self._target]], names[owners[other]]
+            warnings.warn(
+                f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {reason}",
+                RippleWarning,
+                stacklevel=8,
+            )

@@ -1,0 +1,126 @@
+"""A sheet with a picture of each mode of a surface: bent as it swings, out in red and in in blue."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.visuals.corners import corner_normals
+from ripple_sim.solver import Atlas, Modes, texel_atlas
+from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.texels.topology import sampling_matrix
+
+from .atlas_plot import STRETCH_COLORS, TEXT, AtlasPainter, View, check_plot_path, dressed, save_plot, show
+
+# Height of a mode where it is largest, at most: of the radius of a sheet, or of a body, which must not pass through
+# itself, and of the mode's wave length.
+_SHEET, _BODY, _OF_WAVE = 0.3, 0.05, 0.12
+
+# Thickness over size of what is a sheet, which is looked at from higher up.
+_FLAT, _HIGH = 0.2, 32.0
+
+# Place of all pictures, left, bottom, width and height in shares of the figure; how much of the width they fill; the
+# height of a caption, and the largest picture [pixels].
+_PLACE, _FILLED, _CAPTION, _LARGEST = (0.03, 0.02, 0.94, 0.85), 0.92, 54, 640
+
+
+class ModePainter(AtlasPainter):
+    """Paints the shapes of modes on the surface that the texels themselves span, which is fine enough to bend."""
+
+    def __init__(self, atlas: Atlas) -> None:
+        fine = texel_atlas(atlas.texels)
+        super().__init__(fine, np.ones((*atlas.areas.shape, 3)), with_grid=False)
+        self._rest, self._normals = self._vertices, fine.mesh.vertex_normals
+        self._at_vertices = fine.sampling_matrix(fine.mesh.V)
+        self._wave_matrix = atlas.stiffness()
+        # as a share of the radius, in which the painter's vertices are
+        self._radius = np.linalg.norm(np.ptp(fine.mesh.V, axis=0)) / np.linalg.norm(np.ptp(self._rest, axis=0))
+        self._highest = _SHEET if _is_sheet(atlas) else _BODY
+        self._shape = np.zeros(atlas.areas.size)
+
+    def mode(self, shape: NDArray[np.float64], view: View, size: int) -> NDArray[np.float64]:
+        """RGBA image [size, size, 4] of a shape [C, n, n], of at most 1."""
+        flat = self._shape = shape.ravel()
+        wave_number = np.sqrt(flat @ (self._wave_matrix @ flat) / (flat @ (self._atlas.areas.ravel() * flat)))
+        wave = 2 * np.pi / max(wave_number * self._radius, 1e-9)
+        height = min(self._highest, _OF_WAVE * wave) * (self._at_vertices @ flat)
+        self._vertices = self._rest + height[:, None] * self._normals
+        F = self._atlas.mesh.F
+        self._scene, self._corner_normals = RayScene(self._vertices, F), corner_normals(self._vertices, F)
+        return self.mesh(view, size)
+
+    def paint(
+        self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Colours [k, 3] of the shape at places on the charts, each [k]."""
+        value = sampling_matrix(self._atlas.texels.topology, chart, row, column) @ self._shape
+        return STRETCH_COLORS(0.5 + 0.5 * value)[:, :3]
+
+
+def plot_modes(atlas: Atlas, found: Modes, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
+    """Write a figure with a picture of each mode, its frequency and its decay time.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    found : Modes
+        Of that atlas.
+    path : path
+        Ends in .png, .jpg, .pdf or .svg.
+    up : str
+        Axis of the mesh that points up, "y" or "z"; a flat sheet in the plane of the other two lies down in any case.
+
+    Raises
+    ------
+    AtlasError
+        If the ending is unknown or the file cannot be written.
+    """
+    check_plot_path(path)
+    view, painter, figure = _view(atlas, up), ModePainter(atlas), dressed(title, subtitle)
+    left, bottom, width, height = _PLACE
+    across, along = figure.get_size_inches() * figure.dpi
+    count = len(found.shapes)
+    size = round(min(_LARGEST, 1.2 * np.sqrt(width * across * height * along / count)))
+    images = _cropped(np.stack([painter.mode(shape, view, size) for shape in found.shapes]))
+    aspect = images.shape[1] / images.shape[2]
+
+    def scale(columns: int) -> float:
+        """Width of the pictures [pixels]."""
+        rows = -(-count // columns)
+        return min(_FILLED * width * across / columns, (height * along / rows - _CAPTION) / aspect)
+
+    columns = max(range(1, count + 1), key=scale)
+    pitch, box = width / columns, scale(columns) / across
+    for k, image in enumerate(images):
+        row, column = divmod(k, columns)
+        x, y = left + (column + 0.5) * pitch, bottom + height * (1 - row / -(-count // columns))
+        tall = aspect * box * across / along
+        show(figure, (x - box / 2, y - tall, box, tall), image)
+        caption = f"{k + 1}:  {_number(found.frequencies[k])} Hz"
+        figure.text(x, y - tall - _CAPTION / 3 / along, caption, fontsize=12, color=TEXT, ha="center", va="center")
+    save_plot(figure, path)
+
+
+def _cropped(images: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Images [k, h, w, 4] without the margin that all of them have."""
+    seen = images[..., 3].max(axis=0)
+    rows, columns = np.flatnonzero(seen.max(axis=1)), np.flatnonzero(seen.max(axis=0))
+    return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+def _is_sheet(atlas: Atlas) -> bool:
+    extents = np.ptp(atlas.mesh.V, axis=0)
+    return bool(extents.min() < _FLAT * extents.max())
+
+
+def _view(atlas: Atlas, up: str) -> View:
+    """From where a surface is looked at: a sheet lies down."""
+    thin = "xyz"[np.ptp(atlas.mesh.V, axis=0).argmin()]
+    return View(up=thin, elevation=_HIGH) if _is_sheet(atlas) and thin != "x" else View(up=up)
+
+
+def _number(value: float) -> str:
+    """Four digits."""
+    return f"{value:.{max(0, 3 - int(np.floor(np.log10(value))))}f}" if value else "0"

@@ -1,0 +1,212 @@
+"""What a mesh file says of its colours, on a target: an image, or a colour at each vertex."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.spatial import cKDTree
+
+from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.solver import Mesh
+from ripple_sim.solver.files import read_image
+
+_SUFFIXES = (".png", ".jpg", ".jpeg")
+_SCENES = (".glb", ".gltf")
+
+
+def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
+    """Image of a mesh file, or None: named in an OBJ's material library or in a GLB, or NAME_texture.png beside it.
+
+    If several images colour one mesh, none is used, with a warning.
+
+    Returns
+    -------
+    uint8 [height, width, 3], top row first, or None
+    """
+    mesh_path = Path(mesh_path)
+    if mesh_path.suffix.lower() in _SCENES:
+        found: list[Any] = _embedded(mesh_path)
+    else:
+        named = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
+        beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in _SUFFIXES]
+        found = named or [path for path in beside if path.is_file()][:1]
+    if len(found) > 1:
+        warnings.warn(
+            f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: none is used; join "
+            "them into one image, or choose one with --texture",
+            RippleWarning,
+            stacklevel=3,
+        )
+    return load_image(found[0]) if len(found) == 1 else None
+
+
+def load_image(source: Any) -> NDArray[np.uint8]:
+    """Pixels of an image file or of a PIL image, uint8 [height, width, 3], top row first.
+
+    Raises `SceneError` if the file cannot be read as an image, or is too large.
+    """
+    return read_image(SceneError, source, "texture", lambda mode: "RGB")
+
+
+def _of_materials(mesh_path: Path) -> list[Path]:
+    """Existing images (map_Kd) of the materials that an OBJ file uses."""
+    libraries, used = [], set()
+    for words in _statements(mesh_path):
+        if words[0] == "mtllib":
+            libraries.append(mesh_path.parent / words[1])
+        elif words[0] == "usemtl":
+            used.add(words[1])
+    images: dict[Path, None] = {}
+    for library in filter(Path.is_file, libraries):
+        material = ""
+        for words in _statements(library):
+            if words[0] == "newmtl":
+                material = words[1]
+            elif words[0] == "map_Kd" and (material in used or not used):
+                # options come first, and the file's name may have spaces and backslashes
+                name = words[1].replace("\\", "/")
+                path = library.parent / (name if not name.startswith("-") else name.split()[-1])
+                if path.is_file():
+                    images[path] = None
+    return list(images)
+
+
+def _statements(path: Path, skipped: str = "vf#") -> Iterator[tuple[str, str]]:
+    """Keyword and rest of every line that has both, without those that begin with some letters."""
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        pairs = (line.split(maxsplit=1) for line in lines if line[:1] not in skipped)
+        yield from ((pair[0], pair[1].strip()) for pair in pairs if len(pair) == 2)
+
+
+def _embedded(mesh_path: Path) -> list[Image.Image]:
+    """Base colour images in a GLB or glTF file."""
+    log, handler = logging.getLogger("trimesh"), logging.Handler()
+    logged: list[Any] = []
+
+    def hear(record: logging.LogRecord) -> bool:
+        logged.append(record.exc_info and record.exc_info[1])
+        return False
+
+    # an image beyond pillow's limit is logged, at the lowest level, and left out
+    level = log.level
+    handler.addFilter(hear)
+    log.addHandler(handler)
+    log.setLevel(logging.DEBUG)
+    try:
+        parts = trimesh.load_scene(mesh_path).geometry.values()
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(level)
+    for error in logged:
+        if isinstance(error, Image.DecompressionBombError):
+            raise SceneError(f"an image in {mesh_path.name} cannot be read: {error} Scale it down")
+    materials = {
+        id(material): material for part in parts if (material := getattr(part.visual, "material", None)) is not None
+    }
+    images = (getattr(material, "baseColorTexture", None) for material in materials.values())
+    return list({id(image): image for image in images if image is not None}.values())
+
+
+def vertex_colors(mesh_path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.uint8]] | None:
+    """Vertices of a PLY, OBJ, GLB or glTF file [n, 3] and their colours, sRGB [n, 3], or None if it has none.
+
+    A colour of a face counts as one of its corners. What has none in a file that has some is white.
+    """
+    mesh_path = Path(mesh_path)
+    if not _may_be_coloured(mesh_path):
+        return None
+    scene, points, colors, coloured = trimesh.load_scene(mesh_path, process=False), [], [], False
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        part = scene.geometry[name]
+        visual = part.visual
+        found = visual.vertex_attributes.get("color") if hasattr(visual, "material") else None
+        if found is None and visual.kind in ("vertex", "face"):
+            found = visual.vertex_colors
+        coloured |= found is not None
+        points.append(trimesh.transform_points(part.vertices, transform))
+        colors.append(_bytes(np.ones((len(part.vertices), 3)) if found is None else np.asarray(found)[:, :3]))
+    if not coloured:
+        return None
+    together = np.concatenate(colors)
+    if mesh_path.suffix.lower() in _SCENES:  # their colours are linear light (glTF 2.0, section 3.7.2.1)
+        together = _bytes(np.interp(together / 255, _LINEAR, np.linspace(0, 1, 256)))
+    return np.concatenate(points), together
+
+
+# Linear light of the 256 values of sRGB (IEC 61966-2-1).
+_LINEAR = np.where(np.arange(256) <= 10, np.arange(256) / 255 / 12.92, ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4)
+
+
+def _bytes(colors: NDArray) -> NDArray[np.uint8]:
+    """Colours as bytes; integers have their type's range, and floats that from 0 to 1."""
+    most = np.iinfo(colors.dtype).max if colors.dtype.kind == "u" else 1
+    return np.rint(255 * np.clip(colors / most, 0, 1)).astype(np.uint8)
+
+
+def _may_be_coloured(mesh_path: Path) -> bool:
+    """Whether a file's beginning, or its format, leaves room for colours."""
+    kind = mesh_path.suffix.lower()
+    if kind == ".obj":
+        vertices = (words for words in _statements(mesh_path, skipped="f#") if words[0] == "v")
+        return len(next(vertices, ("", ""))[1].split()) >= 6
+    with mesh_path.open("rb") as file:
+        return kind in _SCENES or (kind == ".ply" and b"red" in file.read(4096))
+
+
+def _baked(F: NDArray[np.int64], colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """An image of colours at vertices [n, 3], and texture coordinates of the corners, [m, 3, 2].
+
+    Each triangle has four pixels, between whose middles it lies, so that the texture unit blends its corners.
+    """
+    side = int(np.ceil(np.sqrt(len(F))))
+    row, column = np.divmod(np.arange(len(F)), side)
+    a, b, c = np.moveaxis(colors[F].astype(np.float64), 1, 0)
+    pixels = np.zeros((side, 2, side, 2, 3))
+    for (down, right), color in zip(np.ndindex(2, 2), (a, b, c, b + c - a), strict=True):
+        pixels[row, down, column, right] = color
+    corners = np.stack([column, row], axis=1)[:, None] + [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75]]
+    image = np.clip(pixels, 0, 255).astype(np.uint8).reshape(2 * side, 2 * side, 3)
+    return image, corners / side * [1.0, -1.0] + [0.0, 1.0]
+
+
+def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None) -> None:
+    """Give the geom "target" the image that is asked for or that the mesh names, or else its vertices' colours.
+
+    Raises `SceneError` if an image that is asked for cannot be read, or the mesh has no texture coordinates.
+    """
+    pixels, corner_uv = None, mesh.corner_uv
+    if texture is not None:
+        if corner_uv is None:
+            raise SceneError(
+                f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no texture coordinates: "
+                "choose a mesh that has them (a wrap has none)"
+            )
+        pixels = load_image(texture)
+    elif corner_uv is not None:
+        pixels = mesh_image(mesh_path)
+    if pixels is None or corner_uv is None:
+        if (coloured := vertex_colors(mesh_path)) is None:
+            return
+        points, colors = coloured
+        pixels, corner_uv = _baked(mesh.F, colors[cKDTree(points).query(mesh.V)[1]])
+    asset = spec.mesh("target")
+    # MuJoCo counts v from the image's upper edge
+    asset.usertexcoord = (corner_uv * [1.0, -1.0] + [0.0, 1.0]).ravel()
+    asset.userfacetexcoord = np.arange(mesh.F.size)
+    height, width, channels = pixels.shape
+    image = spec.add_texture(
+        name="target", type=mujoco.mjtTexture.mjTEXTURE_2D, height=height, width=width, nchannel=channels
+    )
+    image.data = pixels.tobytes()
+    spec.add_material(name="target").textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "target"
+    spec.geom("target").material = "target"

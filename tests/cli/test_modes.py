@@ -1,0 +1,52 @@
+"""`ripple-sim modes`: its table, its picture, its refusals."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ripple_sim.cli import main as cli
+from ripple_sim.figures import atlas_plot, mode_plot
+
+SHEET = "v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0 0 1\nv 0.5 0 1\nv 1 0 1\nf 1 4 5 2\nf 2 5 6 3\n"
+
+
+def test_a_sheet_fixed_at_its_rim_is_told_and_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(atlas_plot, "OVERSAMPLING", 1)
+    monkeypatch.setattr(mode_plot, "_LARGEST", 64)
+    mesh, plot = tmp_path / "sheet.obj", tmp_path / "modes.png"
+    mesh.write_text(SHEET)
+    argv = ["modes", str(mesh), "--material", "membrane,tension=9,damping=0.5", "-n", "6", "--resolution", "8"]
+    assert cli.main([*argv, "--rim", "fixed", "--plot", str(plot), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    exact = np.sqrt([2, 5, 5, 8, 10, 10])
+    np.testing.assert_allclose([mode["ratio"] for mode in told], exact / exact[0], rtol=0.05)
+    np.testing.assert_allclose([mode["frequency"] for mode in told], 1.5 * exact, rtol=0.07)
+    np.testing.assert_allclose([mode["decay_time"] for mode in told], 4.0)
+    pixels = np.asarray(Image.open(plot).convert("RGB"), dtype=float)
+    assert pixels.shape == (1080, 1920, 3)
+    redness = pixels[..., 0] - pixels[..., 2]
+    assert (redness[200:500, 100:600] > 100).any() and (redness[200:, :] < -80).any()
+    assert cli.main([*argv, "--rim", "free"]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert len(rows) == 7
+    assert re.fullmatch(r" +1 +1\.\d+ +1 +4", rows[1])
+
+
+@pytest.mark.parametrize(
+    ("material", "said"),
+    [
+        ("foam", "'foam' does not exist; valid are membrane"),
+        ("plate,width=2", "no parameter 'width'; valid are modulus, thickness"),
+        ("plate,thickness", "steel-plate,thickness=0.002"),
+        ("layer,modulus=-1", "modulus is -1.0 Pa"),
+        ("membrane,density=1 --count=99", "valid is a whole number from 1 to"),
+    ],
+)
+def test_what_is_wrong_is_told(refusal, tetrahedron, material, said):
+    material, *more = material.split(" ")
+    argv = ("modes", str(tetrahedron), "--material", material, "--resolution", "4", *more)
+    assert said in refusal(*argv)
+    assert "the mesh itself" in refusal("modes", str(tetrahedron), "--material", "plate", "--plot", str(tetrahedron))
