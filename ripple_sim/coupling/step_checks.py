@@ -261,7 +261,7 @@ def wrap_check(coupled: CoupledModel) -> Callable[[Mapping[int, Any]], None]:
                 mine = owners == owner
                 amount, together = forces[mine].sum(), np.linalg.norm(forces[mine] @ normals[mine])
                 found = sums.setdefault((target, owner), np.zeros(3))
-                found += 1, amount, together
+                found += np.array([1.0, amount, together])
                 steps, whole, moving = found
                 if steps >= _TOUCHED and whole > _WRAPPED * moving:
                     flexes.discard(target)
