@@ -218,7 +218,7 @@ class ModesCommand:
     layout: LayoutName = "auto"
     """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube where it fits."""
     rim: RimName = "free"
-    """Rim of an open mesh: free, or fixed as that of a drum."""
+    """Rim of an open mesh: free, fixed as that of a drum, or supported or clamped as that of a plate."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
     """Write an image with a picture of each mode."""
     up: UpAxis = None

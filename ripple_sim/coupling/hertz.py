@@ -192,7 +192,7 @@ class Approach(NamedTuple):
 def surface_bend(model: mujoco.MjModel, geom: int, normal: Floats) -> NDArray[np.float64] | None:
     """How the normal of a round geom turns along its surface, where it is the given one, in its frame: [3, 3] [1/m].
 
-    Of spheres, ellipsoids, capsules and the sides of cylinders; None for all others.
+    Of spheres, ellipsoids, capsules, the sides of cylinders, and planes; None for all others.
     """
     size, on_side = model.geom_size[geom], abs(normal[2]) < _SIDE
     match mujoco.mjtGeom(model.geom_type[geom]):
@@ -202,6 +202,8 @@ def surface_bend(model: mujoco.MjModel, geom: int, normal: Floats) -> NDArray[np
             return np.diag([1.0, 1.0, 0.0]) / size[0]
         case mujoco.mjtGeom.mjGEOM_SPHERE | mujoco.mjtGeom.mjGEOM_CAPSULE:
             return np.eye(3) / size[0]
+        case mujoco.mjtGeom.mjGEOM_PLANE:
+            return np.zeros((3, 3))
     return None
 
 
@@ -227,9 +229,9 @@ def atlas_bend(atlas: Atlas, texels: Ints, normal: Floats) -> NDArray[np.float64
 class Hits:
     """Gives the hits on a target the pulse of Hertz's law.
 
-    It is that of two smooth round bodies: the other geom is a sphere, an ellipsoid, a capsule or the side of a
-    cylinder, and the gap is about as round along one axis as along the other. Other hits keep MuJoCo's pulse, and a
-    warning says so, once a reason. So do bodies that are put down, and all that a body does after it has hit.
+    It is that of two smooth round bodies: the other geom is a sphere, an ellipsoid, a capsule, the side of a cylinder
+    or a plane, and the gap is about as round along one axis as along the other. Other hits keep MuJoCo's pulse, and a
+    warning says so, once a reason. Bodies that are put down keep it without a word, and all that comes after a hit.
 
     Parameters
     ----------
@@ -305,7 +307,7 @@ class Hits:
         turn, own = data.geom_xmat[other].reshape(3, 3), data.geom_xmat[self._target].reshape(3, 3)
         theirs = surface_bend(coupled.model, other, -normal @ turn)
         if theirs is None:
-            return "only spheres, ellipsoids, capsules and sides of cylinders are round"
+            return "valid are spheres, ellipsoids, capsules, sides of cylinders, and planes"
         ours = atlas_bend(atlas, texels, normal @ own)
         if ours is None:
             return "an edge is hit"

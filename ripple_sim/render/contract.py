@@ -143,7 +143,7 @@ LIGHT = Struct(
     position="vec4",  # xyz [m]; w: 1 for a light at a position, 0 for one far away
     direction="vec4",  # towards the light, or against the beam of a spotlight; w: cosine of the beam's half angle
     radiance="vec4",  # of a white surface facing the light; w: exponent of the beam
-    falloff="vec4",  # attenuation: constant, linear [1/m], quadratic [1/m^2]
+    falloff="vec4",  # attenuation: constant, linear [1/m], quadratic [1/m^2]; share of the radiance in highlights
 )
 SHADOW = Struct(
     "Shadow",

@@ -34,6 +34,7 @@ _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 # Of the bodies [m], [kg/m^3], and how high above the target they start [m].
 _RADII, _DENSITY, _HEIGHTS = (0.05, 0.085), 400.0, (0.8, 1.2)
 
+_CLEAR = 0.2  # between the middles of bodies that fall one after the other [m]
 _FEWEST_VERTICES = 4
 _UPWARD, _ROOM = 0.6, 0.05  # least upward part of the normal, and room on all sides [m], of a good landing point
 _STEPS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
@@ -94,8 +95,15 @@ def drop_model(
         friction=[0.8, 0.01, 0.02],
     )
     landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
-    times = 0.1 + 3.4 * np.arange(len(shapes)) / max(len(shapes), 1)
-    return spec, [_add_body(spec, i, shape, float(times[i]), landing[i], rng, scale) for i, shape in enumerate(shapes)]
+    interval = 3.4 / max(len(shapes), 1)
+    drops = [_add_body(spec, i, shape, 0.1 + interval * i, landing[i], rng, scale) for i, shape in enumerate(shapes)]
+    for before, drop, (x, y, z) in zip(drops, drops[1:], landing[1:].tolist(), strict=False):
+        # not into the one before, which has fallen for a while
+        assert before.position is not None and drop.position is not None
+        clear = before.position[2] - 9.81 / 2 * interval**2 + _CLEAR
+        if np.hypot(before.position[0] - x, before.position[1] - y) < _CLEAR and drop.position[2] < clear:
+            drop.position = x, y, min(clear, z + _HEIGHTS[1])
+    return spec, drops
 
 
 def _add_body(

@@ -58,9 +58,9 @@ class Modes(NamedTuple):
 def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free") -> Modes:
     """Find the lowest modes of a surface: how it swings by itself under the operator that `WaveSolver` steps with.
 
-    Motions that nothing pulls back, as of a free membrane on the whole, are left out. A solver that conserves volume
-    does not excite modes that change it. Heights are small: there are no dents. Damping that varies over the surface
-    counts to first order. Modes of one frequency, as symmetric shapes and equal parts have them, are all there.
+    Motions that nothing pulls back, as of a free membrane or plate on the whole, are left out. A solver that conserves
+    volume does not excite modes that change it. Heights are small: there are no dents. Damping that varies over the
+    surface counts to first order. Modes of one frequency, as symmetric shapes and equal parts have them, are all there.
 
     Parameters
     ----------
@@ -95,9 +95,12 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
         if operator.topology.fixed_rim or not operator.free.all() or uneven:
             raise SolverError("modes of deep fluid are known with a free rim, no clamp, one speed and stiffness alone")
         matrix, weight, least = stiffness_matrix(operator.geometry), operator.areas.ravel(), 0.0
-    vectors = _lowest(matrix[moving][:, moving], weight[moving], least, int(count))
-    heights = np.zeros((int(count), operator.mass.size))
+    tilts = 0 if operator.laplace_stencil is None else 2
+    vectors = _lowest(matrix[moving][:, moving], weight[moving], least, int(count) + tilts)
+    heights = np.zeros((vectors.shape[1], operator.mass.size))
     heights[:, moving] = vectors.T
+    if tilts:
+        heights = heights[~_are_tilts(atlas, material, operator, heights)][: int(count)]
     return _ringing(operator, heights)
 
 
@@ -108,6 +111,25 @@ def elastic_matrix(operator: WaveOperator) -> csr_array:
         laplace = stiffness_matrix(operator.laplace_stencil)
         matrix = matrix + laplace @ diags_array(operator.rigidity.ravel()) @ laplace
     return csr_array(matrix)
+
+
+def _are_tilts(atlas: Atlas, material: Material, operator: WaveOperator, heights: Floats) -> NDArray[np.bool_]:
+    """Which of some heights [m, T] move a flat plate as if it were rigid, [m].
+
+    They are linear in the place, and pulled back by no more than a hundredth of what bends waves of their length: the
+    operator is as good as blind to them, but for its errors at rims. Membranes, and plates that are curved or held, do
+    pull back what is linear.
+    """
+    areas, mass = atlas.areas.ravel(), operator.mass.ravel()
+    linear = np.column_stack([np.ones(areas.size), atlas.positions.reshape(-1, 3)])
+    left = heights.T - linear @ np.linalg.lstsq(linear, heights.T)[0]
+    squares, numbers = (
+        np.einsum("mt,tm->m", heights, matrix @ heights.T) / (heights**2 @ weight)
+        for matrix, weight in ((elastic_matrix(operator), mass), (atlas.stiffness(), areas))
+    )
+    is_linear = np.linalg.norm(left, axis=0) < 0.1 * np.linalg.norm(heights, axis=1)
+    bending = material.texels("bending", atlas.areas.shape).mean()
+    return is_linear & (squares < 0.01 * bending * numbers**2)
 
 
 def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Floats:

@@ -36,6 +36,7 @@ Rim: TypeAlias = str | Callable[[NDArray[np.float64]], ArrayLike]
 _MISFIT = 8.0  # stiffness against what a fit misses, and against leaving a clamp, in D / A
 _HEAVY = 30.0  # weight of a support in a fit; a texel's is 1 at most
 _REACH = 1.5  # spacings up to which supports count
+_RIDGE = 0.03  # weight with which second derivatives are 0; all of a fit's texels have about 0.5
 _TINY = 1e-9
 
 
@@ -203,7 +204,7 @@ def fitted_rows(
     -------
     rows : csr [r, T]
     owners : int64 [r]
-        To which of the texels each row belongs.
+        To which of the texels a row of bending belongs; -1 for those of the misfit.
     """
     count, size, index = len(rigidity), len(outer), np.arange(len(outer))
     points, areas = texels.positions.reshape(-1, 3), texels.areas.reshape(-1)
@@ -237,7 +238,9 @@ def fitted_rows(
     terms[owner, slot] = np.stack([np.ones_like(u), u, v, u * u / 2, u * v, v * v / 2], axis=1)
     weights[owner, slot], column[owner, slot] = weight, np.where(support, -1, other)
     weighed = weights[..., None] * terms
-    inverse = np.linalg.pinv(weighed, rcond=1e-9)  # [o, 6, width], of weighed heights
+    # of weighed heights, [o, 6, width]; what hardly tells a second derivative leaves it at 0
+    ridge = np.broadcast_to(_RIDGE * np.eye(6)[3:], (size, 3, 6))
+    inverse = np.linalg.pinv(np.concatenate([weighed, ridge], axis=1), rcond=_TINY)[..., :width]
     missed = np.eye(width) - weighed @ inverse
     bent = inverse[:, 3:] * np.sqrt(areas[outer] / spacing**4)[:, None, None]
     total = np.linalg.norm(np.where(column >= 0, weights, 0.0), axis=1)[:, None, None] * spacing[:, None, None]
@@ -249,7 +252,8 @@ def fitted_rows(
     rows = np.concatenate(energies, axis=1) * weights[:, None] * np.sqrt(rigidity[outer])[:, None, None]
     o, row, k = np.nonzero((rows != 0) & (column >= 0)[:, None])
     matrix = csr_array((rows[o, row, k], (o * (width + 4) + row, column[o, k])), shape=(size * (width + 4), count))
-    return matrix, np.repeat(index, width + 4)
+    owners = np.where(np.arange(width + 4) < 4, index[:, None], -1)
+    return matrix, owners.ravel()
 
 
 def tension_springs(places: RimPlaces, texels: TexelMesh, tension: Floats) -> Floats:
@@ -314,14 +318,15 @@ def plate_matrix(
 
 
 def _evened(rows: csr_array, owners: Ints, laplace: csr_array, rigidity: Floats, areas: Floats) -> Floats:
-    """Factors up to 1 of rows: those of tiny texels must not set the time step for all."""
+    """Factors up to 1 of rows with owners: those of tiny texels must not set the time step for all."""
     size = abs(laplace)
     usual = (size @ (rigidity / areas * (size @ np.ones(len(areas)))) / areas).max()
     pull = abs(rows)
     rate = pull.T @ (pull @ np.ones(len(areas))) / areas
     entry = pull.tocoo()
-    factor = np.ones(int(owners.max(initial=-1)) + 1)
+    factor = np.ones(int(owners.max(initial=-1)) + 2)
     np.minimum.at(factor, owners[entry.row], (usual / np.maximum(rate, usual))[entry.col])
+    factor[-1] = 1.0  # of what has no owner
     return factor[owners]
 
 

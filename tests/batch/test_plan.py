@@ -187,7 +187,7 @@ def test_places_of_one_key_may_have_one_value(tmp_path):
         ('"camera.zoom" = 2', "", "unknown key 'zoom'"),
         ('"camera.distance" = {uniform = [1, 2], apply = "add"}', "", "is None in the scene"),
         ('"ripple.look" = 3', "", "Expected `str`"),
-        ('"poke.time" = 3', "", "Expected `array`"),
+        ('"poke.time" = 3', "", r"write \[\[poke"),
         ("", '"geom[duck].size" = 1', r"no geom\[duck\]; there is egg, stone, grain"),
         ("", '"geom[stone].weight" = 1', "'weight'; valid are .*mass"),
         ("", '"ball.size" = 1', "no attribute of a model; valid"),

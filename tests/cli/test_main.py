@@ -36,7 +36,7 @@ def test_the_version_is_that_of_the_package(capsys):
 @pytest.mark.parametrize(
     ("argv", "named"),
     [
-        ([], "render, drop, export, batch, atlas, info"),
+        ([], "render, drop, export, batch, atlas, modes, info"),
         (["fly"], "fly"),
         (["render", "duck"], "--output"),
         (["render", "-o", "x.mp4"], "SCENE"),

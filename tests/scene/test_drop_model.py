@@ -38,6 +38,15 @@ def test_bodies_drop_from_above_the_open_surface_one_after_the_other() -> None:
     np.testing.assert_allclose(np.diff(times), 3.4 / 30)
 
 
+def test_no_body_drops_into_the_one_before_on_a_narrow_post() -> None:
+    post = trimesh.creation.box((0.06, 0.06, 1.0))
+    for seed in range(5):
+        _, drops = drop_model(post.vertices + 0.5, post.faces, ["sphere"] * 12, np.random.default_rng(seed))
+        times, heights = np.array([(drop.time, drop.position[2]) for drop in drops]).T
+        assert (np.diff(heights) + 9.81 / 2 * np.diff(times) ** 2 > 0.19).all(), "it has fallen by more than its size"
+        assert heights.max() <= 2.2
+
+
 def test_bodies_take_turns_in_shape_and_wait_where_none_touches_another() -> None:
     model, drops = compiled(12, 3)
     data = mujoco.MjData(model)

@@ -111,7 +111,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
         vec3 diffuse = max(facing + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
         vec3 lit = clamp((visible - 0.5) * sharpness + 0.5, 0.0, 1.0);
         direct += radiance * diffuse * mix(lit, vec3(1.0), 0.35 * m.translucency);
-        vec3 arrives = 0.25 * radiance * visible * clamp(n_l * 4.0, 0.0, 1.0);
+        vec3 arrives = 0.25 * light_at(i).falloff.w * radiance * visible * clamp(n_l * 4.0, 0.0, 1.0);
         float n_h = max(dot(normal, halfway), 0.0), v_h = max(dot(view, halfway), 0.0);
         highlight += arrives * fresnel(f0, v_h) * ggx(n_h, m.roughness, spread);
         coated += arrives * fresnel(vec3(0.04), v_h) * ggx(n_h, COAT_ROUGHNESS, spread);

@@ -12,7 +12,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.render.camera import Pose
 from ripple_sim.render.contract import MAX_LIGHTS, MAX_SHADOWS, Unit
@@ -48,6 +48,8 @@ class Light:
         Of the cosine with which the beam falls off.
     falloff : array, shape [3]
         Constant, linear [1/m] and quadratic [1/m^2] attenuation.
+    gloss : float
+        Share of its radiance that highlights have.
     shadow : bool
     """
 
@@ -58,6 +60,7 @@ class Light:
     cutoff: float = np.pi
     exponent: float = 0.0
     falloff: NDArray[np.float64] = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    gloss: float = 1.0
     shadow: bool = False
 
     def at(self, point: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -110,7 +113,8 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     lights = []
     if head.active:
         towards = pose.rotation[:, 2]
-        lights.append(Light(direction=towards, radiance=np.array(head.diffuse, dtype=np.float64)))
+        radiance = np.array(head.diffuse, dtype=np.float64)
+        lights.append(Light(direction=towards, radiance=radiance, gloss=_gloss(head.specular)))
     for index in range(model.nlight):
         if model.light_active[index] and model.light_type[index] != _KIND.mjLIGHT_IMAGE:
             ambient += model.light_ambient[index]
@@ -129,6 +133,11 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     )
 
 
+def _gloss(specular: ArrayLike) -> float:
+    """Share of a light's highlights, by MuJoCo's specular colour: from a lamp's default, 0.3, on they are physical."""
+    return min(float(srgb_to_linear(np.max(specular)) / srgb_to_linear(0.3)), 1.0)
+
+
 def _light(model: Any, data: Any, index: int) -> Light:
     """A light of the MJCF, with its radiance in sRGB."""
     directional = model.light_type[index] == _KIND.mjLIGHT_DIRECTIONAL
@@ -141,6 +150,7 @@ def _light(model: Any, data: Any, index: int) -> Light:
         cutoff=np.radians(min(float(model.light_cutoff[index]), 180.0)) if spot else np.pi,
         exponent=_GAMMA * float(model.light_exponent[index]) if spot else 0.0,
         falloff=np.array(model.light_attenuation[index], dtype=np.float64),
+        gloss=_gloss(model.light_specular[index]),
         shadow=bool(model.light_castshadow[index]),
     )
 
@@ -199,7 +209,7 @@ def set_lighting(
         record["position"] = [0, 0, 0, 0] if light.position is None else [*light.position, 1]
         record["direction"] = [*light.direction, np.cos(light.cutoff)]
         record["radiance"] = [*light.radiance, light.exponent]
-        record["falloff"] = [*light.falloff, 0]
+        record["falloff"] = [*light.falloff, light.gloss]
     # the soft boxes turn with the camera
     for index, (azimuth, elevation, half_width, half_height, brightness) in enumerate(SOFT_BOX_LIGHTS):
         normal = _direction(pose, azimuth, elevation)

@@ -5,7 +5,7 @@ The studio: its lights turn with the camera, and the background takes on the flo
 
 import numpy as np
 import pytest
-from drawn import ABOVE, SUN, posed
+from drawn import ABOVE, SUN, frame_of, posed
 from scipy.spatial.transform import Rotation
 from shader_functions import evaluated
 
@@ -34,6 +34,18 @@ def test_the_beam_of_a_spot_falls_off_in_srgb_as_in_mujoco():
     towards = np.array([-np.sqrt(3.0), 0.0, 1.0]) / 2
     under, aside = lighting.on(np.zeros(3), np.array([0.0, 0.0, 1.0])), lighting.on(beside, towards)
     np.testing.assert_allclose((aside / under) ** (1 / 2.2), 0.25, rtol=1e-6)
+
+
+def test_a_light_without_mujocos_specular_makes_no_glare(gl):
+    """The middle of a dark wall, where the headlight is mirrored, over its edge."""
+    wall = '<geom type="box" size="3 3 .1" material="dark"/>'
+    dark, head = '<material name="dark" rgba=".15 .15 .2 1"/>', '<headlight diffuse=".8 .8 .8" specular="{0} {0} {0}"/>'
+    glare = []
+    for specular in (0.0, 0.1, 0.3, 0.5):
+        frame = frame_of(gl, wall, asset=dark, visual=head.format(specular), lighting="model").sum(axis=-1)
+        glare.append(frame[58:62, 78:82].mean() / frame[:8, :8].mean())
+    assert glare[0] < 1.1
+    assert glare[1] < 1.6 < 2 < glare[2] == glare[3]
 
 
 POSES = [

@@ -21,10 +21,10 @@ def on_one_side(points: np.ndarray) -> np.ndarray:
 # Angular frequencies over sqrt(b) / side^2. Supported: pi^2 (m^2 + n^2). The others to four digits: free and cantilever
 # after Leissa (1973), whose values are upper bounds, and clamped ones after Birger.
 TABLES = {
-    "supported": ("supported", np.pi**2 * np.array([2, 5, 5, 8, 10, 10]), 0),
-    "free": ("free", [13.468, 19.596, 24.270, 34.801, 34.801, 61.09], 2),
-    "clamped": ("clamped", [35.99, 73.41, 73.41, 108.3, 131.6, 132.2], 0),
-    "cantilever": (on_one_side, [3.4711, 8.5067, 21.285, 27.199, 30.955, 54.187], 0),
+    "supported": ("supported", np.pi**2 * np.array([2, 5, 5, 8, 10, 10])),
+    "free": ("free", [13.468, 19.596, 24.270, 34.801, 34.801, 61.09]),
+    "clamped": ("clamped", [35.99, 73.41, 73.41, 108.3, 131.6, 132.2]),
+    "cantilever": (on_one_side, [3.4711, 8.5067, 21.285, 27.199, 30.955, 54.187]),
 }
 
 
@@ -40,16 +40,15 @@ def sheet():
 
 @pytest.mark.parametrize("name", TABLES)
 def test_a_square_plate_has_the_frequencies_of_the_tables(name: str, sheet) -> None:
-    rim, expected, tilts = TABLES[name]
-    found = 2 * np.pi * modes(sheet, PLATE, len(expected) + tilts, rim=rim).frequencies
-    assert (found[:tilts] < 0.01 * expected[0]).all()
-    np.testing.assert_allclose(found[tilts:], expected, rtol=0.01)
+    rim, expected = TABLES[name]
+    found = 2 * np.pi * modes(sheet, PLATE, len(expected), rim=rim).frequencies
+    np.testing.assert_allclose(found, expected, rtol=0.01)
 
 
 @pytest.mark.parametrize(("rim", "expected"), [("supported", 4.935), ("clamped", 10.216), ("free", 5.358)])
 def test_a_round_plate_has_them_too(rim: str, expected: float) -> None:
-    found = 2 * np.pi * modes(texel_atlas(disk(20)), PLATE, 3, rim=rim).frequencies
-    assert found[found > 1][0] == pytest.approx(expected, rel=0.01)
+    found = 2 * np.pi * modes(texel_atlas(disk(20)), PLATE, 1, rim=rim).frequencies
+    assert found[0] == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize("rim", ["free", "supported", "clamped", on_one_side])
