@@ -27,18 +27,7 @@ with tempfile.TemporaryDirectory() as folder:
     for arguments in (
         ["info"],
         ["atlas", str(files / "scenes" / "meshes" / "limbed.obj"), "--resolution", "32", "-o", f"{folder}/atlas.npz"],
-        [
-            "render",
-            "sphere",
-            "-o",
-            f"{folder}/sphere.mp4",
-            "--size",
-            "320x180",
-            "--duration",
-            "0.2",
-            "--resolution",
-            "32",
-        ],
+        ["render", "sphere", "-o", f"{folder}/sphere.mp4", *small],
     ):
         subprocess.run([program, *arguments], check=True, stdout=subprocess.DEVNULL)
 

@@ -39,8 +39,8 @@ SIZE = 1.0  # the target's longest edge of its bounding box [m]
 DURATION = 5.0
 
 # Depth of a typical hit, over half the usual thickness of the target, over the radius of a tube that is as slender, and
-# at most over its size.
-_THICK, _SLIM, _DEEPEST = 5.6, 2.8, 0.2
+# at most over its size, of a closed target and of one with rims, at which waves are twice as high.
+_THICK, _SLIM, _DEEPEST, _DEEPEST_OPEN = 5.6, 2.8, 0.2, 0.12
 
 # Stiff enough for crest behind crest [1/s^2].
 _STIFFNESS = 1000.0
@@ -108,7 +108,7 @@ def drop_scene(
     rim = sum(float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum()) for rim in mesh.rims)
     slender = extent.area / (np.pi * max(rim, 2 * extent.size) * extent.size)
     scale = float(np.clip(slender / _SLENDER, _SMALLEST, 1.0))
-    amplitude = min(_THICK * extent.radius / extent.size, _SLIM * slender, _DEEPEST)
+    amplitude = min(_THICK * extent.radius / extent.size, _SLIM * slender, _DEEPEST if mesh.closed else _DEEPEST_OPEN)
     rng = np.random.default_rng(seed)
     spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], rng, eye, scale)
     if not mesh.closed:

@@ -3,6 +3,8 @@
 The rest filter: forces pass as they are, places and chatter are averaged, and no impulse is lost.
 """
 
+import functools
+
 import mujoco
 import numpy as np
 import pytest
@@ -187,13 +189,19 @@ def test_a_body_that_rolls_slowly_leaves_a_calm_surface() -> None:
     assert np.linalg.norm(deepest[:2] - data.qpos[:2]) < 0.05
 
 
+# a slab without symmetries: round-off does not choose its layout
+UNEVEN = "-.5 -.41 -.1 .52 -.4 -.1 .5 .43 -.1 -.48 .4 -.1 -.4 -.31 .1 .42 -.3 .1 .4 .33 .1 -.43 .3 .1"
+
+
+@functools.cache
 def dropped(scale: float) -> np.ndarray:
     """Heights over the scale under a box and a ball that chatter: lengths by the scale, times by its square root."""
     s, t = scale, np.sqrt(scale)
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{0.002 * t}" tolerance="1e-14" iterations="200"/>
-        <default><geom solref="{0.01 * t} 0.2" solimp="0.9 0.95 {0.001 * s} 0.5 2"/></default><worldbody>
-        <geom name="target" type="box" size="{0.5 * s} {0.5 * s} {0.1 * s}"/>
+        <default><geom solref="{0.01 * t} 0.2" solimp="0.9 0.95 {0.001 * s} 0.5 2"/></default>
+        <asset><mesh name="uneven" vertex="{UNEVEN}" scale="{s} {s} {s}"/></asset><worldbody>
+        <geom name="target" type="mesh" mesh="uneven"/>
         <body pos="{0.05 * s} {0.02 * s} {0.3 * s}"><freejoint/>
         <geom type="box" size="{0.06 * s} {0.05 * s} {0.04 * s}" mass="{0.5 * s**3}"/></body>
         <body pos="{-0.25 * s} {0.1 * s} {0.25 * s}"><freejoint/><geom size="{0.06 * s}" mass="{0.3 * s**3}"/></body>
@@ -209,10 +217,11 @@ def dropped(scale: float) -> np.ndarray:
     return np.array(heights)
 
 
-@pytest.mark.parametrize("scale", [1 / 64, 64.0])  # powers of 4: round-off is the same
-def test_scaled_scenes_have_scaled_waves(scale: float) -> None:
-    heights = dropped(1.0)
-    np.testing.assert_allclose(dropped(scale), heights, atol=1e-3 * np.abs(heights).max())
+@pytest.mark.parametrize(("scale", "frames"), [(1 / 64, 50), (64.0, 50), (0.01, 20), (100.0, 20)])
+def test_scaled_scenes_have_scaled_waves(scale: float, frames: int) -> None:
+    """Powers of 4 have the same round-off; that of other factors grows while bodies chatter."""
+    heights = dropped(1.0)[:frames]
+    np.testing.assert_allclose(dropped(scale)[:frames], heights, atol=1e-3 * np.abs(heights).max())
 
 
 class LoadedSphere:

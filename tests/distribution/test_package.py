@@ -46,6 +46,7 @@ def test_the_version_is_the_same_wherever_it_stands():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)[1]
     assert project == cited == ripple_sim.__version__
+    assert f"\n## {project} - " in (ROOT / "CHANGELOG.md").read_text()
 
 
 def test_nothing_else_becomes_a_top_level_name(wheel):

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from eigenvalues import cases, mean_error
+from eigenvalues import cases, mean_error, of_polyhedron
 
 from ripple_sim.solver import build_atlas
 
@@ -23,3 +24,8 @@ def test_the_stored_run_is_of_todays_operator(name: str) -> None:
     atlas = build_atlas(case.mesh(), 32, layout="patches")
     assert f"{atlas.areas.size:,}" == texels
     assert mean_error(atlas, case) == pytest.approx(float(error), rel=0.01)
+
+
+def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
+    case = cases()["square, free"]
+    np.testing.assert_allclose(of_polyhedron(case.mesh(), 0)[1:], np.sort(case.exact)[1:20], rtol=5e-5)

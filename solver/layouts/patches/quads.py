@@ -380,7 +380,7 @@ _CORNERS = 6  # of a cell
 _RADIUS = 0.75  # of a cell, over the root of its share of the area
 _REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
 _SMALLEST = 0.85  # of the radius of cells elsewhere
-_FARTHEST = 300  # a surface reaches, in units of the root of a cell's area: beyond, the work takes minutes
+_FARTHEST = 100  # a surface reaches, in units of the root of a cell's area: at 88 charts take a minute
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 

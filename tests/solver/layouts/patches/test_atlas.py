@@ -178,7 +178,7 @@ def assert_waves_are_stable(atlas: Atlas) -> None:
     assert waves.energy() < 1.5 * before
 
 
-@pytest.mark.parametrize("stretch", [1e4, 1e6])
+@pytest.mark.parametrize("stretch", [1e3, 1e6])
 def test_a_surface_too_long_for_its_width_is_refused_at_once(stretch: float) -> None:
     """It would be cut into a row of thousands of cells, for minutes."""
     long = Mesh.from_arrays(sphere(1).V * [1, 1, stretch], sphere(1).F)
