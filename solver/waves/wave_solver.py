@@ -42,11 +42,10 @@ class WaveSolver:
     operator : str
         "fem", or a baseline: "paper", "uncorrected", "dynamic-paint" (see `build_operator`).
     rim : str or callable
-        At the rims of an open surface waves come back upright from a "free" one, inverted from a "supported" one, where
-        the height is 0 as on a drum skin, or a "clamped" one, where the slope of a surface that bends is 0 as well. By
-        region: a function of points on the rim [k, 3] that gives a name for each, or whether it is clamped (else it is
-        free). "fixed": as "supported", but that a plate is held there as if Poisson's ratio were 1: a straight edge is
-        the same. A closed surface has no rims.
+        At the rims of an open surface waves come back upright from a "free" one, inverted from a "supported" one (its
+        height is 0, as on a drum skin) and a "clamped" one (nor does a surface that bends have a slope). A function of
+        points on the rim [k, 3] gives a name for each, or whether it is clamped, else free. "fixed": as "supported",
+        but plates are held as if Poisson's ratio were 1, which is the same at straight edges.
     conserve_volume : bool
         Remove the mean of every source, so that a net push does not move the surface as a whole. On a closed surface
         without stiffness nothing else would stop it; there, the mean is the volume. On an open surface it is the mean
@@ -191,9 +190,8 @@ class WaveSolver:
             Of the sheet [m], for "strain" alone.
         """
         points = self.listeners.find(at) if isinstance(at, str) else at
-        return self.listeners.add(
-            Sensor(self.atlas, self.material, self.operator, points, kind, rate, thickness), self.time
-        )
+        sensor = Sensor(self.atlas, self.material, self.operator, points, kind, rate, thickness)
+        return self.listeners.add(sensor, self.time)
 
     def move(self, V: ArrayLike) -> None:
         """Move the surface: the texels ride on their triangles, at their barycentric coordinates.
