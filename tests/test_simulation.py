@@ -66,8 +66,8 @@ def test_slow_motion_shows_the_same_simulation_more_often(scene: Scene, tmp_path
     heights = [state.data.qpos[2] for state in snapshots(Simulation(scene, fps=10 * 2.5, backend="cpu"), 3)]
     # it falls freely: at frame k, k / 25 s have gone by
     np.testing.assert_allclose(heights[0] - heights, 9.81 / 2 * (np.arange(3) / 25) ** 2, rtol=0.06)
-    with pytest.raises(SceneError, match=r"slow motion is 0.*up to 1000"):
-        render_video(scene, tmp_path / "none.mp4", VideoOptions(slow_motion=0))
+    with pytest.raises(SceneError, match=r"slow motion is 2000.*up to 1000"):
+        render_video(scene, tmp_path / "none.mp4", VideoOptions(slow_motion=2000))
 
 
 def test_supersampled_frames_have_softer_edges_of_the_same_brightness(scene: Scene) -> None:

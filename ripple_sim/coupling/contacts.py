@@ -17,7 +17,7 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
 from .model import CoupledModel, FlexContacts
-from .step_checks import SolverBalance, wrap_check
+from .step_checks import SolverBalance, WrapCheck
 from .target_mesh import target_mesh
 
 
@@ -377,7 +377,7 @@ class ContactReader:
         self._is_read, self._has_flex = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
         self._is_read[[*meshes, *self._targets_of, *coupled.soft]] = True
         self._has_flex[list(coupled.flex_colliders)] = True
-        self._check_solver, self._check_wraps = SolverBalance(coupled), wrap_check(coupled)
+        self._check_solver, self._check_wraps = SolverBalance(coupled), WrapCheck(coupled)
         self._flexes = FlexContacts(coupled, meshes) if coupled.flex_colliders else None
         if self._flexes is not None:
             self._is_read[self._flexes.is_target] = False

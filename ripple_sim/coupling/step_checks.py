@@ -2,13 +2,13 @@
 
 `TunnellingCheck` reports geoms so fast that they would pass through a target or get stuck in it, before they touch.
 `SolverBalance` asks whether the contact forces that MuJoCo's constraint solver reports move bodies as they should.
-`wrap_check` looks for flexes that are pressed by more than their impulses move.
+`WrapCheck` looks for flexes that are pressed by more than their impulses move.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -243,29 +243,33 @@ class SolverBalance:
 _WRAPPED, _TOUCHED = 1.1, 50
 
 
-def wrap_check(coupled: CoupledModel) -> Callable[[Mapping[int, Any]], None]:
-    """Make a check, called with the `Contacts` of each step by target: it warns of flexes that wrap round something.
+class WrapCheck:
+    """Warns of flexes that wrap round something. Called with the `Contacts` of each step by target.
 
     Round a ball the forces on a cloth's slopes point against one another: the surface is pressed by their amounts, as
     by a string round a pole, and the ball is moved by their sum.
     """
-    flexes = {target for target, surface in coupled.soft.items() if surface.flex >= 0}
-    # by target and what touches it: steps, amounts and sums as vectors [N]
-    sums: dict[tuple[int, int], Floats] = {}
 
-    def check(contacts: Mapping[int, Any]) -> None:
-        for target in contacts.keys() & flexes:
+    def __init__(self, coupled: CoupledModel) -> None:
+        self._names, self._owners = coupled.names, coupled.owners
+        self._flexes = {target for target, surface in coupled.soft.items() if surface.flex >= 0}
+        # by target and what touches it: steps, amounts and sums as vectors [N]
+        self._sums: dict[tuple[int, int], Floats] = {}
+
+    def __call__(self, contacts: Mapping[int, Any]) -> None:
+        """Add up a step."""
+        for target in contacts.keys() & self._flexes:
             others, _, forces, normals = contacts[target]
-            owners = coupled.owners[others]
+            owners = self._owners[others]
             for owner in np.unique(owners).tolist():
                 mine = owners == owner
                 amount, together = forces[mine].sum(), np.linalg.norm(forces[mine] @ normals[mine])
-                found = sums.setdefault((target, owner), np.zeros(3))
+                found = self._sums.setdefault((target, owner), np.zeros(3))
                 found += np.array([1.0, amount, together])
                 steps, whole, moving = found
                 if steps >= _TOUCHED and whole > _WRAPPED * moving:
-                    flexes.discard(target)
-                    flex, other = (repr(coupled.names[each]) for each in (coupled.owners[target], owner))
+                    self._flexes.discard(target)
+                    flex, other = (repr(self._names[each]) for each in (self._owners[target], owner))
                     warnings.warn(
                         f"flex {flex} wraps round {other}: its impulses are {whole / moving:.2f} times what that "
                         "loses, for forces on its slopes press it, but cancel as vectors; mj_contactForce has these",
@@ -273,5 +277,3 @@ def wrap_check(coupled: CoupledModel) -> Callable[[Mapping[int, Any]], None]:
                         stacklevel=5,
                     )
                     break
-
-    return check
