@@ -169,8 +169,12 @@ class _KernelCache(FunctionCache):
         return None
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep what was compiled, unless the disk is full or cannot be written."""
-        path, content = self._path(key), dumps((key, fingerprint(self._py_func.__module__), data))
+        """Keep what was compiled, unless the disk is full or cannot be written, or the sources are newer by now."""
+        path = self._path(key)
+        try:
+            content = dumps((key, fingerprint(self._py_func.__module__), data))
+        except (KeyError, OSError):  # a newer source imports what was not there, or is gone
+            return
         unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
         with contextlib.suppress(OSError):
             try:

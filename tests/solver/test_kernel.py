@@ -123,6 +123,13 @@ def is_loaded(kernel: Any) -> bool:
     return bool(kernel.stats.cache_hits) and not kernel.stats.cache_misses
 
 
+def test_a_kernel_works_while_a_newer_version_is_installed_under_it(library, tmp_path: Path) -> None:
+    kernel = library().sum_of
+    (tmp_path / "library_of_kernels.py").write_text("from ripple_sim.later import more\n" + LIBRARY)
+    assert not is_loaded(kernel)
+    assert not list(tmp_path.glob("kernels/*"))
+
+
 def test_a_kernel_is_compiled_once_and_again_when_its_source_changes(library, tmp_path: Path) -> None:
     assert not is_loaded(library().sum_of)
     assert is_loaded(library().sum_of)
