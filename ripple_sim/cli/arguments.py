@@ -134,7 +134,7 @@ LayoutName = Annotated[str, _one_word(parse_layout, "{auto,cube,patches}")]
 SceneLayout = Annotated[
     str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
 ]
-_RIM_NAMES = "{free,supported,clamped,fixed}"
+_RIM_NAMES = f"{{{','.join(RIMS)}}}"
 RimName = Annotated[str, _one_word(parse_rim, _RIM_NAMES)]
 NamedMaterial = Annotated[tuple[str, dict[str, float]], _one_word(parse_material, "NAME[,PARAMETER=VALUE ...]")]
 Rim = Annotated[str | None, _one_word(parse_rim, _RIM_NAMES), arg(help_behavior_hint="(default: the scene's)")]

@@ -79,7 +79,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
         field["fixed"].reshape(-1)[held] |= texels.bare_rim.reshape(-1)[held]
         if laplace is not None and rigidity is not None:
             matrix, inner = plate_matrix(
-                texels, conditions, softening(texels), density * field["bending"], material.poisson, laplace
+                texels, places, softening(texels), density * field["bending"], material.poisson, laplace
             )
             rigidity *= inner
             links, beside = links_and_springs(matrix)

@@ -82,6 +82,7 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
     operator = build_operator(atlas, material, "fem", rim)
     # not of the operator's stiffness, which links outweigh beside the rims of a plate
     matrix, weight, least = elastic_matrix(operator), operator.mass.ravel(), float(np.min(material.stiffness))
+    elastic = matrix
     moving = np.flatnonzero(operator.free.ravel() & (matrix.diagonal() > 0))
     most = int(np.pi * len(moving) / SHORTEST_TEXELS**2)  # by Weyl's law
     if not (isinstance(count, numbers.Integral) and 1 <= count <= most):
@@ -100,8 +101,8 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
     heights = np.zeros((vectors.shape[1], operator.mass.size))
     heights[:, moving] = vectors.T
     if tilts:
-        heights = heights[~_are_tilts(atlas, material, operator, heights)][: int(count)]
-    return _ringing(operator, heights)
+        heights = heights[~_are_tilts(atlas, material, elastic, operator.mass.ravel(), heights)][: int(count)]
+    return _ringing(operator, elastic, heights)
 
 
 def elastic_matrix(operator: WaveOperator) -> csr_array:
@@ -113,19 +114,21 @@ def elastic_matrix(operator: WaveOperator) -> csr_array:
     return csr_array(matrix)
 
 
-def _are_tilts(atlas: Atlas, material: Material, operator: WaveOperator, heights: Floats) -> NDArray[np.bool_]:
-    """Which of some heights [m, T] move a flat plate as if it were rigid, [m].
+def _are_tilts(
+    atlas: Atlas, material: Material, elastic: csr_array, mass: Floats, heights: Floats
+) -> NDArray[np.bool_]:
+    """Which of some heights [m, T] move a flat plate as if it were rigid, [m]; see `elastic_matrix`.
 
     They are linear in the place, and pulled back by no more than a hundredth of what bends waves of their length: the
     operator is as good as blind to them, but for its errors at rims. Membranes, and plates that are curved or held, do
     pull back what is linear.
     """
-    areas, mass = atlas.areas.ravel(), operator.mass.ravel()
+    areas = atlas.areas.ravel()
     linear = np.column_stack([np.ones(areas.size), atlas.positions.reshape(-1, 3)])
     left = heights.T - linear @ np.linalg.lstsq(linear, heights.T)[0]
     squares, numbers = (
         np.einsum("mt,tm->m", heights, matrix @ heights.T) / (heights**2 @ weight)
-        for matrix, weight in ((elastic_matrix(operator), mass), (atlas.stiffness(), areas))
+        for matrix, weight in ((elastic, mass), (atlas.stiffness(), areas))
     )
     is_linear = np.linalg.norm(left, axis=0) < 0.1 * np.linalg.norm(heights, axis=1)
     bending = material.texels("bending", atlas.areas.shape).mean()
@@ -162,8 +165,8 @@ def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Flo
         found, asked = basis @ mixed, 2 + count // 4
 
 
-def _ringing(operator: WaveOperator, heights: Floats) -> Modes:
-    """Modes of heights [count, T] that swing by themselves."""
+def _ringing(operator: WaveOperator, elastic: csr_array, heights: Floats) -> Modes:
+    """Modes of heights [count, T] that swing by themselves; see `elastic_matrix`."""
     shape = (len(heights), *operator.mass.shape)
     momenta, drag = np.empty(shape), np.empty(shape)
     for k, height in enumerate(heights.reshape(shape)):
@@ -171,7 +174,7 @@ def _ringing(operator: WaveOperator, heights: Floats) -> Modes:
         if operator.viscosity_stencil is not None:
             drag[k] -= operator.viscosity_stencil(height) / operator.mass
     momenta = momenta.reshape(heights.shape)
-    pull, inertia = heights @ (elastic_matrix(operator) @ heights.T), momenta @ heights.T
+    pull, inertia = heights @ (elastic @ heights.T), momenta @ heights.T
     loss = momenta @ drag.reshape(heights.shape).T
     # of those of one frequency the ones that the damping does not mix
     told_apart = pull + (_PART * np.trace(pull) / np.trace(loss) * loss if loss.any() else 0.0)

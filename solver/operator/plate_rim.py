@@ -266,7 +266,7 @@ def tension_springs(places: RimPlaces, texels: TexelMesh, tension: Floats) -> Fl
 
 def plate_matrix(
     texels: TexelMesh,
-    conditions: NDArray[np.int8],
+    places: RimPlaces,
     softening: Floats,
     rigidity: Floats,
     poisson: float,
@@ -277,8 +277,7 @@ def plate_matrix(
     Parameters
     ----------
     texels : TexelMesh
-    conditions : int8 [C, n + 2, n + 2]
-        See `rim_conditions`.
+    places : RimPlaces
     softening : float64 [C, n, n]
         That of `laplace`.
     rigidity : float64 [C, n, n]
@@ -297,7 +296,7 @@ def plate_matrix(
     count = texels.topology.texel_count
     D, areas, soft = rigidity.reshape(-1), texels.areas.reshape(-1), softening.reshape(-1) < 1
     L = -stiffness_matrix(laplace)
-    places, cells = rim_places(texels, conditions), plate_cells(texels)
+    cells = plate_cells(texels)
     clamped = places.conditions == CLAMPED
     outer = np.zeros(count, bool)
     outer[places.texels[~clamped]] = True
