@@ -229,6 +229,15 @@ def test_passes_of_another_video_are_not_replaced(scene: Scene, tmp_path: Path) 
         render_video(scene, tmp_path / "clip.webm", options)
     assert not (tmp_path / "clip.webm").exists()
     render_video(scene, tmp_path / "clip.mp4", options)
+    before = contents(tmp_path)
+
+    def fail(simulation: object) -> None:
+        raise KeyboardInterrupt
+
+    for name in ("clip.mp4", "other.mp4"):  # a render that fails without a frame leaves all as it was
+        with pytest.raises(KeyboardInterrupt):
+            render_video(scene, tmp_path / name, options, on_frame=fail)
+    assert contents(tmp_path) == before
     render_video(scene, tmp_path / "clip.webm", dataclasses.replace(options, overwrite=True))
 
 
