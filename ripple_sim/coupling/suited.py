@@ -324,20 +324,19 @@ def _substeps(material: Material, spacing: float, timestep: float) -> float:
     return timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
 
 
-# A surface so many times as heavy as its body hardly moves under what is light.
-_HEAVY = 1000.0
+# Rings of a body so many times as light as what the surface is to bear are not seen.
+_HEAVY = 100.0
 
 
-def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> None:
-    """Warn of a target that is made so heavy for a heavy body that other hits will not be seen."""
-    body = float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]])
-    times = float(np.max(material.density)) / _density(body, extent)
-    if times > _HEAVY:
-        mass = max(_resting(coupled, geom), heaviest(coupled, geom)[0])
+def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent) -> None:
+    """Warn of a target that is made so heavy for a heavy body that hits of a light one will not be seen."""
+    reduced = _reduced_masses(coupled, geom)
+    heavy, light = max(_resting(coupled, geom), float(reduced.max())), float(reduced[reduced > 0].min(initial=np.inf))
+    if heavy > _HEAVY * light:
         warnings.warn(
-            f"the surface of geom {coupled.names[geom]!r} is to bear {mass:.2g} kg, and gets {times:,.0f} times the"
-            " mass of its body: hits of light bodies will not be seen; "
-            f"Material.suited(size={extent.size:.2g}, hit=(kg, m/s)) suits it to a hit",
+            f"the surface of geom {coupled.names[geom]!r} is to bear {heavy:.2g} kg: hits of bodies as light as"
+            f" {light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) suits it"
+            " to them",
             RippleWarning,
             stacklevel=7,
         )
@@ -368,7 +367,7 @@ def suited_targets(
         extent = Extent.of(target_mesh(model, geoms[name]))
         suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
         if "density" in materials[name].unset:
-            _tell_heavy(coupled, geoms[name], extent, suited[name])
+            _tell_heavy(coupled, geoms[name], extent)
         if name not in texels:
             texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
     return suited, texels
