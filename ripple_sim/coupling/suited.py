@@ -24,8 +24,6 @@ from ripple_sim.solver.operator.presets import (
     density_after,
     density_under,
     narrow_stiffness,
-    stiffness_after,
-    stiffness_under,
 )
 from ripple_sim.solver.texels.thickness import half_thickness_at
 
@@ -86,13 +84,13 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     - speed: waves cross the target in a quarter of a second, or as fast as a body is that has fallen from a height of
       the target's size, which is faster on targets smaller than 1 m;
     - damping: they fall to a tenth in 1.5 s;
-    - stiffness: (16 c / size)^2, or more: under the heaviest body that can touch the target, at rest, the surface sinks
-      by a twentieth of the target's radius at most, and a fall leaves a dent of less than a quarter; but no more than
-      (0.5 / dt)^2, which the time step dt resolves. The fall is from a height of the target's size, or from where
-      bodies are above the target, or it above them, in the model as it begins;
-    - density: the mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3 times
-      its volume over its area. More where the stiffness is not all that this would take: what can touch the target
-      then sinks and dents no deeper.
+    - stiffness: (16 c / size)^2, so that dents are narrow and rings run from them; but no more than (0.5 / dt)^2, which
+      the time step dt resolves;
+    - density: a fall of the heaviest body that can touch the target leaves a dent of less than a quarter of the
+      target's radius, and at rest that body sinks by a twentieth at most: rings of some hundredth of the size. The fall
+      is from a height of the target's size, or from where bodies are above the target, or it above them, in the model
+      as it begins. Where nothing can touch it, it is the mass of the target's body over the area of the target; of a
+      geom without a mass, 1000 kg/m^3 times its volume over its area.
 
     Parameters
     ----------
@@ -105,18 +103,19 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     """
     if not material.unset:
         return material
-    burden = _burden(coupled, geom, extent)
     speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
     if "stiffness" in material.unset:
-        stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
+        stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(coupled.model))
     else:
         stiffness = float(np.min(material.stiffness))
+    density = _density_under(_burden(coupled, geom, extent), extent, speed, stiffness)
+    if density == 0:
+        density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
         "stiffness": stiffness,
-        "density": float(np.clip(max(density, _density_under(burden, extent, speed, stiffness)), 1e-12, 1e12)),
+        "density": float(np.clip(density, 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
@@ -179,17 +178,8 @@ def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
     )
 
 
-def _stiffness(burden: _Burden, extent: Extent, speed: float, density: float) -> float:
-    of = {"radius": burden.radius, "density": density, "speed": speed}
-    return max(
-        narrow_stiffness(extent.size, speed),
-        stiffness_under(burden.weight, burden.rest_depth, **of),
-        stiffness_after(burden.impulse, burden.hit_depth, duration=burden.duration, **of),
-    )
-
-
 def _density_under(burden: _Burden, extent: Extent, speed: float, stiffness: float) -> float:
-    """The least with which the surface bears it: that of the body alone, if the stiffness may be what it takes."""
+    """The least with which the surface bears it; 0 where there is nothing to bear."""
     # the whole target gives way no further than its longest wave
     of = {"radius": burden.radius, "speed": speed, "stiffness": max(stiffness, (_LONGEST * speed / extent.size) ** 2)}
     return max(
@@ -335,7 +325,7 @@ def _substeps(material: Material, spacing: float, timestep: float) -> float:
 
 
 # A surface so many times as heavy as its body hardly moves under what is light.
-_HEAVY = 300.0
+_HEAVY = 1000.0
 
 
 def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> None:
