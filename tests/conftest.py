@@ -21,7 +21,9 @@ if "RIPPLE_SIM_TESTS" not in os.environ:
     _cache = tempfile.TemporaryDirectory(prefix="ripple-sim-tests-")
     os.environ |= dict.fromkeys(("RIPPLE_SIM_TESTS", "XDG_CACHE_HOME"), _cache.name)
     # what a software driver has compiled, under a hash of the shaders, is good for the next tests too
-    os.environ["MESA_SHADER_CACHE_DIR"] = str(Path(__file__).parents[1] / ".pytest_cache" / "shaders")
+    _shaders = Path(__file__).parents[1] / ".pytest_cache" / "shaders"
+    _shaders.mkdir(parents=True, exist_ok=True)  # the driver makes one folder and not two, and complains
+    os.environ["MESA_SHADER_CACHE_DIR"] = str(_shaders)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

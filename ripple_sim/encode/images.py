@@ -237,7 +237,8 @@ def _check_folder(video: Path, overwrite: bool) -> None:
     folder = passes_folder(video)
 
     def own(file: Path) -> bool:
-        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (overwrite or made_here(file))
+        unfinished = file.name.startswith(".")  # a kill left it, perhaps without its mark
+        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (unfinished or overwrite or made_here(file))
 
     check_folder(VideoError, "passes", folder, own)
     owner = _owner(folder)

@@ -253,6 +253,16 @@ def test_exr_files_hold_the_passes_as_channels(tmp_path: Path) -> None:
     check_passes(tmp_path / "frames", ("depth",), "exr", overwrite=False)
 
 
+def test_what_a_kill_left_half_written_is_no_obstacle(tmp_path: Path) -> None:
+    files = pass_files(tmp_path / "clip.mp4")
+    files.write(0, PASSES)
+    for name in ("passes_00000.npz", "segmentation.json"):
+        (files.folder / f".{name}").write_bytes((files.folder / name).read_bytes()[:20])
+    check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=False)
+    pass_files(tmp_path / "clip.mp4")
+    assert [each.name for each in files.folder.iterdir()] == ["segmentation.json"]
+
+
 def test_unknown_passes_and_foreign_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(VideoError, match="depth, normal, segmentation, flow, position, height"):
         check_passes(tmp_path / "clip.mp4", ("colour",), "npz", overwrite=False)
