@@ -334,9 +334,9 @@ def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent) -> None:
     heavy, light = max(_resting(coupled, geom), float(reduced.max())), float(reduced[reduced > 0].min(initial=np.inf))
     if heavy > _HEAVY * light:
         warnings.warn(
-            f"the surface of geom {coupled.names[geom]!r} is to bear {heavy:.2g} kg: hits of bodies as light as"
-            f" {light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) suits it"
-            " to them",
+            f"the surface of geom {coupled.names[geom]!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
+            f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is "
+            "suited to them",
             RippleWarning,
             stacklevel=7,
         )
