@@ -20,7 +20,7 @@ import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -35,14 +35,6 @@ _MEGABYTE = 1_000_000
 
 # what is ours: files of `cache_path`, and those that a killed process left unfinished
 _OURS = re.compile(r"[0-9a-f]{32}\.npz|\.[0-9a-f]{32}\.npz\.[0-9]+\.part")
-
-
-class CachedFile(NamedTuple):
-    """A file in the cache: where, how large [bytes], and when it was last used [s since 1970]."""
-
-    path: Path
-    size: int
-    used: float
 
 
 def cache_folder() -> Path:
@@ -108,16 +100,16 @@ def cache_limit() -> int:
     return int(limit * _MEGABYTE)
 
 
-def cached_files() -> list[CachedFile]:
-    """The files in the cache that are ours, the one used longest ago first."""
-    files = []
+def cached_files() -> dict[Path, int]:
+    """Sizes [bytes] of the files in the cache that are ours, the one used longest ago first."""
+    files = {}
     with contextlib.suppress(OSError):  # no folder, or one that cannot be read
         for path in cache_folder().iterdir():
             with contextlib.suppress(OSError):  # another process has removed it
                 if _OURS.fullmatch(path.name) and path.is_file():
                     status = path.stat()
-                    files.append(CachedFile(path, status.st_size, status.st_mtime))
-    return sorted(files, key=lambda file: (file.used, file.path.name))
+                    files[path] = status.st_mtime, status.st_size
+    return {path: size for path, (_, size) in sorted(files.items(), key=lambda file: (file[1][0], file[0].name))}
 
 
 def mark_used(path: Path) -> None:
@@ -129,21 +121,21 @@ def mark_used(path: Path) -> None:
 def make_room(newest: Path) -> None:
     """Remove what was used longest ago until the cache is under its limit; the newest file stays, unless that is 0."""
     files, limit = cached_files(), cache_limit()
-    total = sum(file.size for file in files)
-    for file in files:
+    total = sum(files.values())
+    for path, size in files.items():
         if total <= limit:
             break
-        if limit == 0 or file.path.name != newest.name:
-            total -= remove(file)
+        if limit == 0 or path.name != newest.name:
+            total -= size * removed(path)
 
 
-def remove(file: CachedFile) -> int:
-    """Remove a file from the cache; return how much room that made [bytes]."""
+def removed(path: Path) -> bool:
+    """Remove a file from the cache; return whether it is gone."""
     try:
-        file.path.unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
     except OSError:
-        return 0
-    return file.size
+        return False
+    return True
 
 
 Owner = TypeVar("Owner")

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from PIL.JpegImagePlugin import JpegImageFile
 
 try:
     import resource
@@ -186,11 +187,32 @@ def open_image(error: type[RippleError], source: str | Path | Image.Image, what:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # that half of the limit is reached
-            image = source if isinstance(source, Image.Image) else Image.open(source)
+            image = source if isinstance(source, Image.Image) else _opened(source)
     except Image.DecompressionBombError as bomb:
-        raise error(f"{name} cannot be read: {bomb} Scale it down") from bomb
+        raise error(f"{name} cannot be read: {bomb} Scale it down, or save it as a JPEG (baseline)") from bomb
     except (OSError, ValueError, SyntaxError) as problem:
         raise error(f"{name} cannot be read: {problem}") from problem
     width, height = image.size
     require_memory(error, _PIXEL * width * height, f"{name} of {width}x{height} pixels", "scale it down")
     return image
+
+
+def _opened(path: str | Path) -> Image.Image:
+    """An image file; a JPEG beyond pillow's limit at the half, quarter or eighth of its size at which it is below.
+
+    It is decoded at that size, row by row. A progressive one, or a PNG, would be held whole meanwhile.
+    """
+    try:
+        return Image.open(path)
+    except Image.DecompressionBombError as bomb:
+        try:
+            image = JpegImageFile(path)
+        except SyntaxError:  # it is no JPEG
+            raise bomb from None
+        width, height = image.size
+        scales = [k for k in (2, 4, 8) if width * height <= k * k * 2 * (Image.MAX_IMAGE_PIXELS or 0)]
+        if not scales or image.info.get("progressive"):
+            image.close()
+            raise
+        image.draft(None, (width // scales[0], height // scales[0]))
+        return image

@@ -4,6 +4,7 @@ import os
 import signal
 import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -15,10 +16,14 @@ if TYPE_CHECKING:
 # is not shipped
 _ALLOWED_SKIPS = ("pymeshfix", "bpy", "known meshes")
 
-# of the first process: those that it starts find atlases there, and shaders that a software driver has compiled
+# of the first process: those that it starts find atlases there
 if "RIPPLE_SIM_TESTS" not in os.environ:
     _cache = tempfile.TemporaryDirectory(prefix="ripple-sim-tests-")
-    os.environ |= dict.fromkeys(("RIPPLE_SIM_TESTS", "XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR"), _cache.name)
+    os.environ |= dict.fromkeys(("RIPPLE_SIM_TESTS", "XDG_CACHE_HOME"), _cache.name)
+    # what a software driver has compiled, under a hash of the shaders, is good for the next tests too
+    _shaders = Path(__file__).parents[1] / ".pytest_cache" / "shaders"
+    _shaders.mkdir(parents=True, exist_ok=True)  # the driver makes one folder and not two, and complains
+    os.environ["MESA_SHADER_CACHE_DIR"] = str(_shaders)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -47,7 +47,7 @@ def main() -> None:
     for shot in islice(source.shots(), first, None):
         for kind, (film, book) in enumerate(zip(films, books, strict=True)):
             frame = shot.number - first
-            drawing[kind, frame] = seconds(lambda film=film, shot=shot: film.render(shot))
+            drawing[kind, frame] = seconds(lambda film=film, shot=shot: list(film.render_all([shot])))
             noting[kind, frame] = seconds(book.follow)
     print(shared_context().renderer)
     print(f"{options.scene}, {width}x{height}; processor time, least of {options.frames} frames")

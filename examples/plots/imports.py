@@ -17,22 +17,20 @@ FOLDERS = {"ripple_sim": "ripple_sim", "solver": "ripple_sim.solver", "scenes": 
 
 @dataclasses.dataclass(frozen=True)
 class Module:
-    """A Python file: its dotted name, where it lies, its text, and the names of the project's modules it imports."""
+    """A Python file: name with dots, place, text, syntax tree, and the names of the project's modules it imports."""
 
     name: str
     path: Path
     text: str
+    tree: ast.Module
     imports: frozenset[str]
-
-    @functools.cached_property
-    def tree(self) -> ast.Module:
-        return ast.parse(self.text)
 
     @property
     def package(self) -> str:
         return self.name.rpartition(".")[0]
 
 
+@functools.cache
 def read(root: Path = ROOT) -> dict[str, Module]:
     """All modules of the project, by name."""
     paths = {}
@@ -40,7 +38,8 @@ def read(root: Path = ROOT) -> dict[str, Module]:
         for path in sorted((root / folder).rglob("*.py")):
             inside = path.relative_to(root / folder).with_suffix("")
             paths[".".join((package, *inside.parts))] = path
-    trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in paths.items()}
+    texts = {name: path.read_text(encoding="utf-8") for name, path in paths.items()}
+    trees = {name: ast.parse(text) for name, text in texts.items()}
     stubs = {name: path.with_suffix(".pyi") for name, path in paths.items()}
     offers = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in stubs.items() if path.is_file()}
     public = {
@@ -54,7 +53,7 @@ def read(root: Path = ROOT) -> dict[str, Module]:
             continue
         targets = (_home(f"{module}.{imported}", trees, public) for module, imported, _ in _imported(name, tree))
         imports = frozenset(target for target in targets if target not in (None, name))
-        modules[name] = Module(name, paths[name], paths[name].read_text(encoding="utf-8"), imports)
+        modules[name] = Module(name, paths[name], texts[name], tree, imports)
     return modules
 
 

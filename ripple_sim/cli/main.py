@@ -8,7 +8,6 @@ Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number af
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import io
 import logging
 import os
@@ -158,19 +157,20 @@ def _parse(argv: list[str]) -> Any:
     try:
         command = parse(argv)
         sys.stdout.flush()  # of the help, the version or a completion script
-    except (UsageError, RippleError) as error:
+    except RippleError as error:
         return _fail(error, BAD_INPUT)
     except OSError as error:
         return _give_up_output(error)
     return DONE if command is None else command
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class CompletionCommand:
+def completion(
+    shell: Annotated[
+        Positional[Literal["bash", "zsh"]], arg(metavar="SHELL", help="Shell to complete in: bash or zsh.")
+    ],
+) -> None:
     """Print a shell completion script. To use it: source <(ripple-sim completion bash)."""
-
-    shell: Annotated[Positional[Literal["bash", "zsh"]], arg(metavar="SHELL")]
-    """Shell to complete in: bash or zsh."""
+    parse(["--tyro-print-completion", shell])
 
 
 COMMANDS: dict[str, Callable[..., Any]] = {
@@ -185,7 +185,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "view": ViewCommand,
     "materials": MaterialsCommand,
     "cache": CacheCommand,
-    "completion": CompletionCommand,
+    "completion": completion,
 }
 
 _DESCRIPTION = (
@@ -193,25 +193,14 @@ _DESCRIPTION = (
 )
 
 
-class UsageError(Exception):
-    """The command line is invalid; the message says where, and names the help."""
-
-
 def parse(argv: Sequence[str]) -> Any:
     """Return the command to run, or None if the help, the version or a completion script was printed instead.
 
-    Raises `UsageError`, and `RippleError` where the options of a command are out of range.
+    Raises `RippleError` where it is invalid, which says where, and names the help.
     """
     if list(argv) == ["--version"]:
         print(f"ripple-sim {__version__}")
         return None
-    command = _read(argv)
-    if isinstance(command, CompletionCommand):  # which tyro makes from all the commands
-        command = _read(["--tyro-print-completion", command.shell])
-    return command
-
-
-def _read(argv: Sequence[str]) -> Any:
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
@@ -225,7 +214,7 @@ def _read(argv: Sequence[str]) -> Any:
     except SystemExit as ending:
         if ending.code:
             command = f" {argv[0]}" if argv and argv[0] in COMMANDS else ""
-            raise UsageError(f"{_first_part(complaint.getvalue())}; see ripple-sim{command} --help") from None
+            raise RippleError(f"{_first_part(complaint.getvalue())}; see ripple-sim{command} --help") from None
         return None
 
 

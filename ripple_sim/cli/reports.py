@@ -52,14 +52,14 @@ class CacheCommand:
 
     def run(self) -> None:
         """Clear the cache if asked to, and print what is in it."""
-        from ripple_sim.solver.cache import cache_folder, cache_limit, cached_files, remove
+        from ripple_sim.solver.cache import cache_folder, cache_limit, cached_files, removed
 
         limit, files = cache_limit(), cached_files()
         if self.clear:
-            freed = sum(remove(file) for file in files)
+            freed = sum(size * removed(path) for path, size in files.items())
             print(f"removed {len(files)} files, {freed / 1e6:.0f} MB")
             files = cached_files()
-        size = sum(file.size for file in files)
+        size = sum(files.values())
         print(f"{cache_folder()}: {len(files)} files, {size / 1e6:.0f} of {limit / 1e6:.0f} MB")
 
 

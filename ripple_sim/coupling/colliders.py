@@ -22,6 +22,7 @@ from ripple_sim.solver import Mesh
 from ripple_sim.solver.cache import cache_path, make_room, mark_used
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.mesh.topology import corner_angles
 from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 
 from .model import SPECULATIVE, part_name
@@ -346,9 +347,7 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     squares, sums, weights = np.zeros((len(V), 3, 3)), np.zeros((len(V), 3)), np.zeros(len(V))
-    for k in range(3):
-        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
-        angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+    for k, angle in enumerate(corner_angles(V, F).T):
         np.add.at(squares, F[:, k], angle[:, None, None] * normals[:, :, None] * normals[:, None, :])
         np.add.at(sums, F[:, k], angle[:, None] * normals)
         np.add.at(weights, F[:, k], angle)

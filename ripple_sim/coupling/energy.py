@@ -174,15 +174,6 @@ class Pair(NamedTuple):
         return min(self.key), max(self.key)
 
 
-class _ContactRows(NamedTuple):
-    """A contact: which of MuJoCo's, its rows that carry the normal force, all its rows, and its pairs, one a target."""
-
-    which: int
-    rows: slice
-    whole: slice
-    pairs: Sequence[Pair]
-
-
 class ContactProblem:
     """MuJoCo's rows with gaps and velocities counted from surfaces that move as under the last force.
 
@@ -200,12 +191,14 @@ class ContactProblem:
         contact, pulls = data.contact, adhesion(model, data)
         self._pulls = np.zeros(data.ncon) if pulls is None else pulls
         self._pairs = {pair.key: pair for mine in pairs_at.values() for pair in mine}
-        self._contacts, rows_of = [], dict.fromkeys(self._pairs, 0)
+        rows_of = dict.fromkeys(self._pairs, 0)
+        # of each contact: which of MuJoCo's, its rows that carry the normal force, all its rows, a pair for each target
+        self._contacts: list[tuple[int, slice, slice, Sequence[Pair]]] = []
         for i, mine in pairs_at.items():
             first, dim = int(contact.efc_address[i]), int(contact.dim[i])
             count = 2 * (dim - 1) if is_pyramidal(model) and dim > 1 else 1
             rows = slice(first, first + count)
-            self._contacts.append(_ContactRows(i, rows, rows if count > 1 else slice(first, first + dim), mine))
+            self._contacts.append((i, rows, rows if count > 1 else slice(first, first + dim), mine))
             for pair in mine:
                 rows_of[pair.key] += count
         # as they are without mobility, and what each row would add if all rows of its pairs bore alike [1/kg]
@@ -237,16 +230,15 @@ class ContactProblem:
             if not shares:
                 break
             gained, total = self._along(data.qacc) - self._smooth, self._total(force)
-            for contact in self._contacts:
-                share = shares.get(contact.pairs[0].purse)
+            for _, rows, _, mine in self._contacts:
+                share = shares.get(mine[0].purse)
                 if share is None:
                     continue
                 # with this much added to R, and all else as it is, a row bears that share of its force
                 share = max(share * (_LESS if attempt else 1), _LEAST_SHARE)
                 share = share if attempt < _ATTEMPTS - 2 else _LEAST_SHARE
-                rows = contact.rows
                 less = (1 - share) / share
-                yields = sum(pair.mobility * total[pair.key] for pair in contact.pairs)
+                yields = sum(pair.mobility * total[pair.key] for pair in mine)
                 lost = np.maximum(gained[rows] + yields, 0) / np.where(force[rows] > 0, force[rows], np.inf)
                 soft[rows] += less * (self._R[rows] + soft[rows] + lost)
         return self._total(force)
@@ -255,22 +247,22 @@ class ContactProblem:
         """Work that each pair's contacts do on bodies [J], and the force on the surface [N]."""
         force, work = self._data.efc_force, dict[Key, float]()
         means = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
-        for contact, normal in zip(self._contacts, self._normal(force), strict=True):
-            along, whole = normal * self._dt * float(means[contact.rows].mean()), contact.whole
+        for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
+            along = normal * self._dt * float(means[rows].mean())
             aside = self._dt * float(force[whole] @ means[whole]) - along
-            _add(work, contact.pairs[0].key, along + max(aside, 0.0))
+            _add(work, mine[0].key, along + max(aside, 0.0))
         total = self._total(force)
         return [(pair, work.get(key, 0.0), total[key]) for key, pair in self._pairs.items()]
 
     def _normal(self, force: Floats) -> list[float]:
         """Normal force of each contact on its bodies, without what adhesion takes of it [N]."""
-        return [float(force[each.rows].sum() - self._pulls[each.which]) for each in self._contacts]
+        return [float(force[rows].sum() - self._pulls[i]) for i, rows, _, _ in self._contacts]
 
     def _total(self, force: Floats) -> dict[Key, float]:
         """Force on each target in a pair [N]."""
         total: dict[Key, float] = {}
-        for contact, normal in zip(self._contacts, self._normal(force), strict=True):
-            for pair in contact.pairs:
+        for (*_, mine), normal in zip(self._contacts, self._normal(force), strict=True):
+            for pair in mine:
                 _add(total, pair.key, normal)
         return total
 
@@ -300,18 +292,18 @@ class ContactProblem:
         data = self._data
         for _ in range(_ROUNDS):
             total, aref = self._total(force), self._aref + self._mobility * force
-            for contact in self._contacts:
-                aref[contact.rows] -= sum(pair.mobility * total[pair.key] for pair in contact.pairs)
+            for _, rows, _, mine in self._contacts:
+                aref[rows] -= sum(pair.mobility * total[pair.key] for pair in mine)
             data.efc_aref[:] = aref
             mujoco.mj_fwdConstraint(self._model, data)
             last, force = force, data.efc_force.copy()
             found, least = self._total(force), 0.0
             left = 0.0
-            for contact in self._contacts:
-                for pair in contact.pairs:
+            for _, rows, _, mine in self._contacts:
+                moved = self._mobility[rows] * (force[rows] - last[rows])
+                for pair in mine:
                     change = found[pair.key] - total[pair.key]
-                    rows = self._mobility[contact.rows] * (force[contact.rows] - last[contact.rows])
-                    left = max(left, float(np.abs(rows - pair.mobility * change).max()))
+                    left = max(left, float(np.abs(moved - pair.mobility * change).max()))
                     least = max(least, pair.mobility * abs(found[pair.key]))
             if left <= _LEFT * least:
                 break
@@ -330,8 +322,8 @@ class ContactProblem:
             _add(linear, pair.purse, -given * dt * (pair.mean + added * pair.held))
             _add(square, pair.purse, given * dt * added * given)
         gained = self._along(data.qacc) - self._smooth
-        for contact, normal in zip(self._contacts, self._normal(force), strict=True):
-            rows, whole, purse = contact.rows, contact.whole, contact.pairs[0].purse
+        for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
+            purse = mine[0].purse
             at_first, later = data.efc_vel + dt / 2 * self._smooth, dt / 2 * gained
             works = [normal * dt * float(each[rows].mean()) for each in (at_first, later)]
             aside = [

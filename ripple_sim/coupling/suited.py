@@ -24,8 +24,6 @@ from ripple_sim.solver.operator.presets import (
     density_after,
     density_under,
     narrow_stiffness,
-    stiffness_after,
-    stiffness_under,
 )
 from ripple_sim.solver.texels.thickness import half_thickness_at
 
@@ -86,13 +84,13 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     - speed: waves cross the target in a quarter of a second, or as fast as a body is that has fallen from a height of
       the target's size, which is faster on targets smaller than 1 m;
     - damping: they fall to a tenth in 1.5 s;
-    - stiffness: (16 c / size)^2, or more: under the heaviest body that can touch the target, at rest, the surface sinks
-      by a twentieth of the target's radius at most, and a fall leaves a dent of less than a quarter; but no more than
-      (0.5 / dt)^2, which the time step dt resolves. The fall is from a height of the target's size, or from where
-      bodies are above the target, or it above them, in the model as it begins;
-    - density: the mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3 times
-      its volume over its area. More where the stiffness is not all that this would take: what can touch the target
-      then sinks and dents no deeper.
+    - stiffness: (16 c / size)^2, so that dents are narrow and rings run from them; but no more than (0.5 / dt)^2, which
+      the time step dt resolves;
+    - density: a fall of the heaviest body that can touch the target leaves a dent of less than a quarter of the
+      target's radius, and at rest that body sinks by a twentieth at most: rings of some hundredth of the size. The fall
+      is from a height of the target's size, or from where bodies are above the target, or it above them, in the model
+      as it begins. Where nothing can touch it, it is the mass of the target's body over the area of the target; of a
+      geom without a mass, 1000 kg/m^3 times its volume over its area.
 
     Parameters
     ----------
@@ -105,18 +103,19 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     """
     if not material.unset:
         return material
-    burden = _burden(coupled, geom, extent)
     speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
     if "stiffness" in material.unset:
-        stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
+        stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(coupled.model))
     else:
         stiffness = float(np.min(material.stiffness))
+    density = _density_under(_burden(coupled, geom, extent), extent, speed, stiffness)
+    if density == 0:
+        density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
         "stiffness": stiffness,
-        "density": float(np.clip(max(density, _density_under(burden, extent, speed, stiffness)), 1e-12, 1e12)),
+        "density": float(np.clip(density, 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
@@ -179,17 +178,8 @@ def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
     )
 
 
-def _stiffness(burden: _Burden, extent: Extent, speed: float, density: float) -> float:
-    of = {"radius": burden.radius, "density": density, "speed": speed}
-    return max(
-        narrow_stiffness(extent.size, speed),
-        stiffness_under(burden.weight, burden.rest_depth, **of),
-        stiffness_after(burden.impulse, burden.hit_depth, duration=burden.duration, **of),
-    )
-
-
 def _density_under(burden: _Burden, extent: Extent, speed: float, stiffness: float) -> float:
-    """The least with which the surface bears it: that of the body alone, if the stiffness may be what it takes."""
+    """The least with which the surface bears it; 0 where there is nothing to bear."""
     # the whole target gives way no further than its longest wave
     of = {"radius": burden.radius, "speed": speed, "stiffness": max(stiffness, (_LONGEST * speed / extent.size) ** 2)}
     return max(
@@ -334,20 +324,19 @@ def _substeps(material: Material, spacing: float, timestep: float) -> float:
     return timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
 
 
-# A surface so many times as heavy as its body hardly moves under what is light.
-_HEAVY = 300.0
+# Rings of a body so many times as light as what the surface is to bear are not seen.
+_HEAVY = 100.0
 
 
-def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> None:
-    """Warn of a target that is made so heavy for a heavy body that other hits will not be seen."""
-    body = float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]])
-    times = float(np.max(material.density)) / _density(body, extent)
-    if times > _HEAVY:
-        mass = max(_resting(coupled, geom), heaviest(coupled, geom)[0])
+def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent) -> None:
+    """Warn of a target that is made so heavy for a heavy body that hits of a light one will not be seen."""
+    reduced = _reduced_masses(coupled, geom)
+    heavy, light = max(_resting(coupled, geom), float(reduced.max())), float(reduced[reduced > 0].min(initial=np.inf))
+    if heavy > _HEAVY * light:
         warnings.warn(
-            f"the surface of geom {coupled.names[geom]!r} is to bear {mass:.2g} kg, and gets {times:,.0f} times the"
-            " mass of its body: hits of light bodies will not be seen; "
-            f"Material.suited(size={extent.size:.2g}, hit=(kg, m/s)) suits it to a hit",
+            f"the surface of geom {coupled.names[geom]!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
+            f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is "
+            "suited to them",
             RippleWarning,
             stacklevel=7,
         )
@@ -378,7 +367,7 @@ def suited_targets(
         extent = Extent.of(target_mesh(model, geoms[name]))
         suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
         if "density" in materials[name].unset:
-            _tell_heavy(coupled, geoms[name], extent, suited[name])
+            _tell_heavy(coupled, geoms[name], extent)
         if name not in texels:
             texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
     return suited, texels

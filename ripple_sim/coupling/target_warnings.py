@@ -10,7 +10,6 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
 
 import igl
 import mujoco
@@ -227,33 +226,19 @@ _THINNEST = 0.99
 _ROWS = 4
 
 
-class Scales(NamedTuple):
-    """What heights are compared with; fields are [C, n, n].
+def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
+    """What the heights on an atlas are compared with.
 
-    Attributes
-    ----------
-    per_limit
-        1 over the greatest height allowed [1/m].
-    per_row, per_column
-        1 over the distance to the next texel in the next row and column [1/m]; 0 beyond the chart.
-    share
-        Of the surface's area.
+    Returns
+    -------
+    fields : float32 [4, C, n, n]
+        1 over the greatest height allowed [1/m]; 1 over the distance to the next texel in the next row and column
+        [1/m], 0 beyond the chart; share of the surface's area.
     per_thinnest : float
         1 over the greatest height allowed where the object is thinnest [1/m].
     calm : float
         Waves that are no higher are neither too high nor too steep anywhere [m].
     """
-
-    per_limit: Floats32
-    per_row: Floats32
-    per_column: Floats32
-    share: Floats32
-    per_thinnest: float
-    calm: float
-
-
-def scales_of(atlas: Atlas) -> Scales:
-    """What the heights on an atlas are compared with."""
     fields = np.zeros((4, *atlas.areas.shape))
     fields[0] = 1 / (HIGH * half_thickness(atlas))
     for axis in (1, 2):
@@ -265,17 +250,16 @@ def scales_of(atlas: Atlas) -> Scales:
     thinnest = float(np.quantile(fields[0], _THINNEST))
     # no slope can reach 1 where neighbours differ by twice this height at most
     calm = min(1 / fields[0].max(), 1 / (8**0.5 * fields[1:3].max()))
-    per_limit, per_row, per_column, share = fields.astype(np.float32)
-    return Scales(per_limit, per_row, per_column, share, thinnest, float(calm))
+    return fields.astype(np.float32), thinnest, float(calm)
 
 
-def steep_area(height: Floats32, scales: Scales) -> float:
+def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
     """Share of the surface that is steeper than 1, seen on every fourth row."""
     here, below, beside = np.s_[:, :-1:_ROWS, :-1], np.s_[:, 1::_ROWS, :-1], np.s_[:, :-1:_ROWS, 1:]
-    down = (height[below] - height[here]) * scales.per_row[here]
-    right = (height[beside] - height[here]) * scales.per_column[here]
-    share = scales.share[here].astype(np.float64)
-    return float(share[down**2 + right**2 > 1].sum() / share.sum())
+    down = (height[below] - height[here]) * per_row[here]
+    right = (height[beside] - height[here]) * per_column[here]
+    seen = share[here].astype(np.float64)
+    return float(seen[down**2 + right**2 > 1].sum() / seen.sum())
 
 
 # Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard body is steep, but
@@ -386,7 +370,7 @@ class _WatchedTarget:
         self.waves = waves
         # lower waves are right anywhere, or too small to matter
         self._calm = 1e-3 * float(np.ptp(waves.rest.mesh.V, axis=0).max())
-        self._scales: Scales | None = None
+        self._scales: tuple[Floats32, float] | None = None
         self.excess, self.needed, self.what = 0.0, 0.0, ""
         self._looks = 0
 
@@ -402,31 +386,31 @@ class _WatchedTarget:
 
     def _measure(self, crests: NDArray[np.float32], height: NDArray[np.float32]) -> float:
         if self._scales is None:
-            self._scales = scales_of(self.waves.rest)
-            self._calm = self._scales.calm
-        scales = self._scales
+            fields, thinnest, self._calm = scales_of(self.waves.rest)
+            self._scales = fields, thinnest
+        (per_limit, per_row, per_column, share), per_thinnest = self._scales
         # the greatest crest over what is allowed there
-        over = (crests * scales.per_limit).reshape(-1)
+        over = (crests * per_limit).reshape(-1)
         texel = int(over.argmax())
         high = float(over[texel])
-        steep_share = steep_area(height, scales)
+        steep_share = steep_area(height, per_row, per_column, share)
         excess, what = high, ""
         if steep_share > _STEEP_AREA:
-            down = np.diff(height, axis=1, append=0) * scales.per_row
-            slope = np.hypot(down, np.diff(height, axis=2, append=0) * scales.per_column).ravel()
+            down = np.diff(height, axis=1, append=0) * per_row
+            slope = np.hypot(down, np.diff(height, axis=2, append=0) * per_column).ravel()
             order = np.argsort(-slope)
             # the slope that this share of the surface exceeds
-            steep = float(slope[order[np.searchsorted(np.cumsum(scales.share.ravel()[order]), _STEEP_AREA)]])
+            steep = float(slope[order[np.searchsorted(np.cumsum(share.ravel()[order]), _STEEP_AREA)]])
             excess, what = max(excess, steep), f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
         if excess > max(self.excess, 1.0):
             if high == excess:
                 where = ", ".join(f"{x:.3g}" for x in self.waves.rest.positions.reshape(-1, 3)[texel])
-                radius = 1 / (HIGH * float(scales.per_limit.reshape(-1)[texel]))
+                radius = 1 / (HIGH * float(per_limit.reshape(-1)[texel]))
                 here = float(crests.reshape(-1)[texel])
                 what = f"too high: {here:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
             self.what = what
         self.excess = max(self.excess, excess)
-        spread = _SPREAD * float(crests.max()) * scales.per_thinnest
+        spread = _SPREAD * float(crests.max()) * per_thinnest
         self.needed = max(self.needed, excess, spread)
         return excess
 

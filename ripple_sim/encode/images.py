@@ -150,6 +150,8 @@ class PassFiles:
         Name of what each number of the segmentation stands for.
     frames : int
         Frames that the video has already, where its render is resumed: their passes stay.
+    overwrite : bool
+        Replace what `check_passes` would refuse.
 
     Attributes
     ----------
@@ -157,18 +159,28 @@ class PassFiles:
         The first so many frames have their passes.
     """
 
-    def __init__(self, video: Path, form: str, geoms: Mapping[int, str], frames: int = 0) -> None:
-        self._form = form
+    def __init__(
+        self, video: Path, form: str, geoms: Mapping[int, str], frames: int = 0, overwrite: bool = False
+    ) -> None:
+        self._video, self._form, self._geoms, self._overwrite = video, form, geoms, overwrite
         self.folder = passes_folder(video)
         self.complete = 0
         while self.complete < frames and self._path(self.complete).exists():
             self.complete += 1
+
+    def begin(self) -> None:
+        """Remove the passes of an earlier run, and say whose come now: before the first frame that has passes.
+
+        Raises `VideoError` if the folder has become another's since `check_passes`, and `EncodingError` if it cannot
+        be written.
+        """
+        _check_folder(self._video, self._overwrite)  # again: to set up a scene takes long
         kept = {self._path(frame) for frame in range(self.complete)}
-        owner = {"software": MARK, "video": final_path(video).name}
-        text = json.dumps({**owner, "geoms": {str(k): name for k, name in geoms.items()}}, indent=1)
+        owner = {"software": MARK, "video": final_path(self._video).name}
+        text = json.dumps({**owner, "geoms": {str(k): name for k, name in self._geoms.items()}}, indent=1)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            for each in self.folder.iterdir():  # of an earlier run; they were looked at
+            for each in self.folder.iterdir():
                 if each not in kept:
                     each.unlink()
         except OSError as error:
@@ -217,10 +229,16 @@ def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: boo
         raise VideoError(f"pass format is {form!r}; valid is {' or '.join(map(repr, PASS_FORMATS))}")
     if form == "exr":
         check_exr()
+    _check_folder(video, overwrite)
+
+
+def _check_folder(video: Path, overwrite: bool) -> None:
+    """Raise `VideoError` if a video's folder of passes holds another's, or anything that was not made here."""
     folder = passes_folder(video)
 
     def own(file: Path) -> bool:
-        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (overwrite or made_here(file))
+        unfinished = file.name.startswith(".")  # a kill left it, perhaps without its mark
+        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (unfinished or overwrite or made_here(file))
 
     check_folder(VideoError, "passes", folder, own)
     owner = _owner(folder)

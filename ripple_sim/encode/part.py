@@ -79,7 +79,8 @@ class Part:
         self._lock = os.open(self.folder, os.O_RDONLY | os.O_NOFOLLOW)
         try:
             self._claim()
-            if resume and (self.folder / SETTINGS).exists():
+            # a kill while all is removed may have left the settings alone
+            if resume and (self.folder / SETTINGS).exists() and self._segments.is_dir():
                 self._compare({MARK: True, **settings})
                 self._drop_unfinished()
             else:

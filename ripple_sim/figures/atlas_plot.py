@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ripple_sim.encode.replace import MARK, made_here
 from ripple_sim.render.visuals.corners import bake, corner_normals
 from ripple_sim.solver import Atlas, AtlasError, TexelTopology, sphere_atlas
-from ripple_sim.solver.files import final_path
+from ripple_sim.solver.files import atomic_write, final_path
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 from ripple_sim.solver.mesh.rays import RayScene
 
@@ -265,14 +265,15 @@ def show(figure: Figure, place: tuple[float, float, float, float], image: NDArra
 
 
 def save_plot(figure: Figure, path: str | Path) -> None:
-    """Write a figure with the mark of files that were made here; raise `AtlasError` if that fails."""
+    """Write a figure, whole or not at all, with the mark of files made here; raise `AtlasError` if that fails."""
     ending = Path(path).suffix.lower()
     told: dict[str, Any] = {"Software" if ending == ".png" else "Creator": MARK}
     mark: dict[str, Any] = {"metadata": told | ({"Date": None} if ending == ".svg" else {})}
     if ending == ".jpg":
         mark = {"pil_kwargs": {"comment": MARK.encode()}}
     try:
-        figure.savefig(path, dpi=_DPI, **mark)
+        with atomic_write(Path(path)) as unfinished:
+            figure.savefig(unfinished, format=ending[1:], dpi=_DPI, **mark)
     except OSError as error:
         raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
 

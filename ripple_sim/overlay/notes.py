@@ -124,30 +124,13 @@ COLUMNS = 512  # of a trace
 MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
 
 
-class History:
-    """One value per frame, thinned to at most `MOST_POINTS`: of several frames the largest is kept.
+def curve(values: Sequence[float], frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Frame numbers and values of a curve of a value a frame so far, of so many frames in all.
 
-    Parameters
-    ----------
-    frames : int
-        How many will come.
+    It has at most `MOST_POINTS`: of several frames the largest value is kept.
     """
-
-    def __init__(self, frames: int) -> None:
-        self._stride = -(-frames // MOST_POINTS)
-        self._values = np.zeros(-(-frames // self._stride))
-        self._frames = 0
-
-    def add(self, value: float) -> None:
-        """Take in the value of the next frame."""
-        point, late = divmod(self._frames, self._stride)
-        self._values[point] = max(self._values[point], value) if late else value
-        self._frames += 1
-
-    def curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Frame numbers and values of the points so far: copies."""
-        points = -(-self._frames // self._stride)
-        return np.arange(points, dtype=np.float64) * self._stride, self._values[:points].copy()
+    begins = np.arange(0, len(values), -(-frames // MOST_POINTS))
+    return begins.astype(np.float64), np.maximum.reduceat(values, begins) if len(values) else np.zeros(0)
 
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -282,7 +265,7 @@ class Notebook:
         self._heatmap_limit = Limit(self._least_limit(), request.limit, _MEMORY)
         self._mark_limit, self._energy_limit = Limit(), Limit()
         self._marks = [ContactMarks(simulation, self._dt) for simulation in simulations]
-        self._energies = [History(frames) for _ in simulations]
+        self._frames, self._energies = frames, [list[float]() for _ in simulations]
 
     def follow(self) -> Notes:
         """Take in the simulations' present frame. Call it for every frame, rendered or not."""
@@ -290,10 +273,10 @@ class Notebook:
         heatmaps = [self._heatmaps(each.ripples, request.heatmap) for each in self._simulations if request.heatmap]
         marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []
         ledgers = [simulation.energy for simulation in self._simulations] if request.energy else []
-        for history, ledger in zip(self._energies, ledgers, strict=False):
-            history.add(ledger.waves)
+        for energies, ledger in zip(self._energies, ledgers, strict=False):
+            energies.append(ledger.waves)
         magnitudes = [magnitude(heatmap) for run in heatmaps for heatmap in run.values()]
-        curves = [history.curve() for history in self._energies]
+        curves = [curve(energies, self._frames) for energies in self._energies]
         return Notes(
             time=float(self._simulations[0].data.time),
             heatmaps=heatmaps,

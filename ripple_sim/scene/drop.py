@@ -157,15 +157,16 @@ def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple
     """The three-quarter view that shows most of a target, and the eye half-way of the orbit [m].
 
     It fills the frame, shows the upper side, the head, which is what is uppermost where that is not over the middle,
-    and the details: many vertices, and normals in many directions. Their variety is the entropy of those that are seen
-    (as in Page et al. 2003, "Shape analysis algorithm based on information theory").
+    or what leans out over the base, and the details: many vertices, and normals in many directions. Their variety is
+    the entropy of those that are seen (as in Page et al. 2003, "Shape analysis algorithm based on information theory").
     """
     width, depth, height = np.ptp(V, axis=0)
     elevation = _FLAT_VIEW + (_HIGH_VIEW - _FLAT_VIEW) * min(height / max(width, depth), 1.0)
     points, normals = _sampled(V, F)
     corners = V[:: -(-len(V) // _SEEN_AT)]
     upper = points[points[:, 2] >= np.quantile(points[:, 2], 0.9)]
-    head = (upper.mean(axis=0) - points.mean(axis=0))[:2] / SIZE
+    base = points[points[:, 2] <= np.quantile(points[:, 2], 0.1)]
+    head = (upper.mean(axis=0) - base.mean(axis=0))[:2] / SIZE
     bins = np.rint(1.5 * normals).astype(int) @ [25, 5, 1] + 62
     scene, best = RayScene(V, F), -np.inf
     for azimuth in _AZIMUTHS:

@@ -140,9 +140,9 @@ _BAD_CHARACTER = expat.errors.codes[expat.errors.XML_ERROR_BAD_CHAR_REF]
 # Elements whose PNG files MuJoCo reads whole, however large.
 _IMAGES = ("texture", "hfield")
 
-# A flexcomp's bodies, one for each point of its grid, from which MuJoCo's time is told: it grows with about their
-# number to the power 2.8, since each one added has it list all again. [s] is that of so many bodies.
-_MANY_BODIES, _THEIR_SECONDS, _GROWTH = 15_000, 13.0, 2.8
+# Time in which MuJoCo sets up a flexcomp of so many bodies [s], one for each point of its grid: it grows with about
+# their number to the power 2.6, since each one added has it list all again. A shorter silence needs no words.
+_BODIES, _THEIR_SECONDS, _GROWTH, _LONG = 15_000, 30.0, 2.6, 10.0
 
 
 def check_files(path: Path) -> None:
@@ -191,11 +191,11 @@ def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
         bodies = math.prod(int(count) for count in flex.get("count", "").split())
     except ValueError:
         return  # MuJoCo says what is wrong
-    if bodies >= _MANY_BODIES:
-        seconds = _THEIR_SECONDS * (bodies / _MANY_BODIES) ** _GROWTH
+    if (seconds := _THEIR_SECONDS * (bodies / _BODIES) ** _GROWTH) > _LONG:
         warnings.warn(
             f"flexcomp {flex.get('name', '')!r} has {bodies} points, each a body of its own, which MuJoCo takes about "
             f'{seconds:.0f} s to set up; dof="trilinear", or a count of at most 20 20 20, takes seconds',
+            RippleWarning,
             stacklevel=4,
         )
 

@@ -16,6 +16,7 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.render.tone_mapping import linear_to_srgb
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.files import read_image
 
@@ -139,12 +140,8 @@ def vertex_colors(mesh_path: str | Path) -> tuple[NDArray[np.float64], NDArray[n
         return None
     together = np.concatenate(colors)
     if mesh_path.suffix.lower() in _SCENES:  # their colours are linear light (glTF 2.0, section 3.7.2.1)
-        together = _bytes(np.interp(together / 255, _LINEAR, np.linspace(0, 1, 256)))
+        together = _bytes(linear_to_srgb(together / 255))
     return np.concatenate(points), together
-
-
-# Linear light of the 256 values of sRGB (IEC 61966-2-1).
-_LINEAR = np.where(np.arange(256) <= 10, np.arange(256) / 255 / 12.92, ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4)
 
 
 def _bytes(colors: NDArray) -> NDArray[np.uint8]:

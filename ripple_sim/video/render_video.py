@@ -111,7 +111,7 @@ class Film:
         soft = {target + 1: name for name, target in geoms.items() if target >= model.ngeom}
         # what each number of the segmentation stands for
         segments = {0: "background", **{geom + 1: geom_name(model, geom) for geom in range(model.ngeom)}, **soft}
-        self._pass_files = PassFiles(output, self._options.pass_format, segments, frames)
+        self._pass_files = PassFiles(output, self._options.pass_format, segments, frames, self._options.overwrite)
 
     def see(self, shot: Shot) -> None:
         """Look at a shot whose frame is there already, for its passes, if they are not."""
@@ -163,11 +163,6 @@ class Film:
                 yield frame
         self._see(None)
 
-    def render(self, shot: Shot) -> NDArray | None:
-        """Render an exposure; return the frame after its last, [height, width, 3], or 4 if it is transparent."""
-        self.submit(shot)
-        return self.fetch()
-
     def submit(self, shot: Shot) -> None:
         """Draw an exposure without waiting for it: `fetch` returns it, after those submitted before.
 
@@ -193,7 +188,11 @@ class Film:
 
     def _see(self, seen: tuple[int, Sighting] | None) -> None:
         """Write the passes of the last frame, whose pixels flow to what is seen now, if anything."""
-        if self._pass_files is not None and self._last_seen is not None:
+        if self._pass_files is None:
+            return
+        if self._last_seen is None:  # not before: a render that fails without a frame leaves all as it was
+            self._pass_files.begin()
+        else:
             number, sighting = self._last_seen
             passes = passes_of(sighting, None if seen is None else seen[1], tuple(self._options.passes))
             self._pass_files.write(number, passes)

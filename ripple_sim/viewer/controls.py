@@ -16,6 +16,7 @@ from PIL import Image
 
 from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.errors import VideoError
+from ripple_sim.solver.files import atomic_write
 
 from .session import SLIDERS, Session
 
@@ -90,7 +91,8 @@ class Recorder:
         """
         path = self._free(".png")
         try:
-            Image.fromarray(frame).save(path)
+            with atomic_write(path) as unfinished:
+                Image.fromarray(frame).save(unfinished, format="PNG")
         except OSError as error:
             raise VideoError(f"cannot write {path}: {error.strerror or error}") from error
         return path

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 
@@ -105,11 +106,14 @@ class Window:
         iren.clear_key_event_callbacks()
         # keys are ours: the style's own ones end the program, draw wire frames and the like
         iren.style.AddObserver("CharEvent", lambda *_: None)
-        iren.add_observer("KeyPressEvent", lambda *_: self.key(iren.interactor.GetKeySym()))
-        iren.add_observer("LeftButtonPressEvent", lambda *_: self._press())
-        iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release())
-        iren.add_observer("RenderEvent", lambda *_: self.mark_stale())
-        iren.add_observer("ExitEvent", lambda *_: self.quit())
+        # weakly, for PyVista keeps each plotter until it is closed: so the plotter of a dropped window is closed
+        me = weakref.proxy(self)
+        iren.add_observer("KeyPressEvent", lambda *_: me.key(me.plotter.iren.interactor.GetKeySym()))
+        iren.add_observer("LeftButtonPressEvent", lambda *_: me._press())
+        iren.add_observer("LeftButtonReleaseEvent", lambda *_: me._release())
+        iren.add_observer("RenderEvent", lambda *_: me.mark_stale())
+        iren.add_observer("ExitEvent", lambda *_: me.quit())
+        self._closed_with = weakref.finalize(self, self.plotter.close)
 
     def pause(self) -> None:
         """Pause, or resume."""
@@ -257,7 +261,7 @@ class Window:
         try:
             self.recorder.stop()
         finally:
-            self.plotter.close()
+            self._closed_with()
 
     def tick(self, draw: bool = True) -> bool:
         """Advance by one frame, and draw it if asked to; return whether there was anything new and it was drawn."""

@@ -18,7 +18,7 @@ from ..texels.moving import MovedStencil, Ride
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
-from .gl_dispatch import DeviceProbes, Dispatch, Pressure, VolumeKeeper
+from .gl_dispatch import DeviceProbes, Dispatch, Pressure
 from .gl_fields import DeviceField, FieldLayout, TexelList, link_buffers
 from .kernels import Amplitude, Probes
 
@@ -233,8 +233,9 @@ class GLBackend:
         self._stencil = StencilBuffer(self._gl, fields, self._dispatch, operator.stencil)
         self._response = fields.upload(operator.response)
         # a number for each part, where there are several: held by the load, and given at once
-        self._held = None if operator.parts is None else Pressure(self._gl, fields, operator)
-        self._given = None if operator.parts is None else Pressure(self._gl, fields, operator)
+        self._held, self._given = (
+            None if operator.parts is None else Pressure(self._gl, fields, operator, self._dispatch) for _ in range(2)
+        )
         self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
         self._extra = ExtraForces(self._gl, fields, self._dispatch, operator)
         if operator.yield_height is not None:
@@ -328,7 +329,7 @@ class GLBackend:
                 drift = dt if step < substeps - 1 else dt / 2
                 self._dispatch.fill_halo(self._h)
                 self._extra.gather(self._h, self._v)
-                if isinstance(self._held, VolumeKeeper):
+                if self._held is not None and self._held.follows:
                     self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
@@ -435,10 +436,9 @@ class GLBackend:
     def _keep_volume(self, dt: float) -> None:
         operator = self._operator
         rate = volume_rate(operator, dt) if self.keeps_volume else None
-        if rate is not None:
-            self._held = VolumeKeeper(self._gl, self._fields, operator, self._dispatch, rate)
-        elif isinstance(self._held, VolumeKeeper):
-            self._held = None if operator.parts is None else Pressure(self._gl, self._fields, operator)
+        if rate is not None or (self._held is not None and self._held.follows):
+            needed = rate is not None or operator.parts is not None
+            self._held = Pressure(self._gl, self._fields, operator, self._dispatch, rate) if needed else None
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:

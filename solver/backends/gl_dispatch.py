@@ -1,6 +1,6 @@
 """Compute shaders of the waves: compiled for a layout of fields, bound to buffers, and run over texels or lists.
 
-`Pressure` and `VolumeKeeper` hold the pressure on each part of the surface in storage buffers; see `VolumeRate`.
+`Pressure` holds the pressure on each part of the surface in storage buffers; see `VolumeRate`.
 """
 
 from __future__ import annotations
@@ -62,28 +62,23 @@ _CHUNK = 2048
 
 
 class Pressure:
-    """Amplitudes of the operator's response, one for each part, of which the field `parts` has the numbers."""
+    """Amplitudes of the operator's response, one for each part, of which the field `parts` has the numbers.
 
-    def __init__(self, gl: GLContext, fields: FieldLayout, operator: WaveOperator) -> None:
+    With a `rate` they follow height and velocity, so that the volume stays.
+    """
+
+    def __init__(
+        self, gl: GLContext, fields: FieldLayout, operator: WaveOperator, dispatch: Dispatch,
+        rate: VolumeRate | None = None,
+    ) -> None:  # fmt: skip
         numbers = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
         self._gl, self._fields, self._count = gl, fields, int(numbers.max()) + 1
         self.parts = fields.upload(numbers)
         with gl as ctx:
-            self.amplitudes = ctx.buffer(reserve=4 * self._count)
-
-    def set(self, amplitude: Amplitude) -> None:
-        """Write the amplitudes: a number, or one for each part."""
-        with self._gl:
-            self.amplitudes.write(np.full(self._count, amplitude, np.float32).tobytes())
-
-
-class VolumeKeeper(Pressure):
-    """Amplitudes that follow height and velocity, so that the volume stays."""
-
-    def __init__(
-        self, gl: GLContext, fields: FieldLayout, operator: WaveOperator, dispatch: Dispatch, rate: VolumeRate
-    ) -> None:
-        super().__init__(gl, fields, operator)
+            self._asked = self.amplitudes = ctx.buffer(reserve=4 * self._count)
+        self.follows = rate is not None
+        if rate is None:
+            return
         self._dispatch = dispatch
         velocities = rate.velocities if len(rate.velocities) else np.zeros_like(rate.heights)
         chunks, begins = _chunks(rate.begins)
@@ -93,20 +88,20 @@ class VolumeKeeper(Pressure):
             self._factors = ctx.buffer(np.stack([rate.heights, velocities], axis=1).tobytes())
             self._chunks = ctx.buffer(chunks.astype(np.int32).tobytes())
             self._begins = ctx.buffer(begins.astype(np.int32).tobytes())
-            self._sums, self._loaded = ctx.buffer(reserve=4 * len(chunks)), ctx.buffer(reserve=4 * self._count)
+            self._sums, self._asked = ctx.buffer(reserve=4 * len(chunks)), ctx.buffer(reserve=4 * self._count)
         self._weigh, self._balance = dispatch.shader("volume"), dispatch.shader("volume", PARTS=1)
 
     def set(self, amplitude: Amplitude) -> None:
-        """Write what the load asks for."""
+        """Write what the load asks for: a number, or one for each part."""
         with self._gl:
-            self._loaded.write(np.full(self._count, amplitude, np.float32).tobytes())
+            self._asked.write(np.full(self._count, amplitude, np.float32).tobytes())
 
     def follow(self, height: moderngl.Buffer, velocity: moderngl.Buffer) -> None:
         """Set the amplitudes of the coming substep."""
         bind_buffers(height, velocity, self._addresses, self._factors, self._chunks, self._sums)
         self._weigh.run(self._chunk_count)
         self._gl.barrier()
-        bind_buffers(self._loaded, self._sums, self._begins, self.amplitudes)
+        bind_buffers(self._asked, self._sums, self._begins, self.amplitudes)
         self._dispatch.run_list(self._balance, self._count)
 
 

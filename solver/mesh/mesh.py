@@ -24,7 +24,7 @@ from .clean import (
     without_slivers,
 )
 from .sheets import cut_apart
-from .topology import distinct, genera, labels, rims_of, sides_of, triangle_areas
+from .topology import corner_angles, distinct, genera, labels, rims_of, sides_of, triangle_areas
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
 _STEPS = 300
@@ -37,10 +37,8 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     farthest of the triangles' normals (Aubry and Loehner 2008), if it is better.
     """
     normal = _unit(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
-    corners, total = V[F], np.zeros_like(V)
-    for k in range(3):
-        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
-        angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+    total = np.zeros_like(V)
+    for k, angle in enumerate(corner_angles(V, F).T):
         for axis in range(3):
             total[:, axis] += np.bincount(F[:, k], weights=angle * normal[:, axis], minlength=len(V))
     length = np.linalg.norm(total, axis=1, keepdims=True)

@@ -59,6 +59,15 @@ def triangle_areas(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
+def corner_angles(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Angles of triangles at their corners [rad], [m, 3]."""
+    corners, angles = V[F], np.empty(F.shape)
+    for k in range(3):
+        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
+        angles[:, k] = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+    return angles
+
+
 def counting_sort(key: Ints, order: Ints, size: int) -> tuple[Ints, Ints]:
     """Sort numbers [k] stably by their keys [k], below `size`: where those of each key begin [size + 1], and all [k].
 

@@ -12,7 +12,6 @@ import dataclasses
 import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import label
 
 from ..errors import MeshError
 from .clean import counted
@@ -64,6 +63,8 @@ def distance_grid(
 
 def filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Values on a grid with what is positive, but shut off from the first node, made negative."""
+    from scipy.ndimage import label  # takes long to import, for what few meshes need
+
     region, _ = label(values > 0)
     return np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
 

@@ -32,7 +32,6 @@ from .presets import (
     density_for as density_for,
     density_under as density_under,
     narrow_stiffness as narrow_stiffness,
-    stiffness_after as stiffness_after,
     stiffness_under as stiffness_under,
 )
 from .volume import VolumeBalance as VolumeBalance, VolumeRate as VolumeRate, volume_rate as volume_rate

@@ -158,29 +158,6 @@ def stiffness_under(force: float, depth: float, *, radius: float, density: float
     return 2 * speed**2 / spread**2 / math.expm1(ratio) if ratio < 100 else 0.0
 
 
-def stiffness_after(
-    impulse: float, depth: float, *, duration: float, radius: float, density: float, speed: float
-) -> float:
-    """Stiffness with which a hit dents the surface by about a depth at most [1/s^2].
-
-    The hit counts as a load impulse / T for a time T, its duration or, if that is longer, the time that a wave takes
-    across the footprint's standard deviation. In this time the surface's own inertia holds it back as a stiffness of
-    1 / T^2 would.
-
-    Parameters
-    ----------
-    impulse : float
-        [N s].
-    duration : float
-        [s].
-    depth, radius, density, speed : float
-        As for `stiffness_under`.
-    """
-    time = _time(duration, radius, speed)
-    whole = stiffness_under(impulse / time, depth, radius=radius, density=density, speed=speed)
-    return max(whole - 1 / time**2, 0.0)
-
-
 def density_under(force: float, depth: float, *, radius: float, speed: float, stiffness: float) -> float:
     """Density with which a resting load sinks by a depth at most [kg/m^2]; infinite without speed and stiffness.
 
@@ -198,14 +175,14 @@ def density_under(force: float, depth: float, *, radius: float, speed: float, st
 def density_after(
     impulse: float, depth: float, *, duration: float, radius: float, speed: float, stiffness: float
 ) -> float:
-    """Density with which a hit dents the surface by about a depth at most [kg/m^2]; see `stiffness_after`."""
-    time = _time(duration, radius, speed)
+    """Density with which a hit [N s] dents the surface by about a depth at most [kg/m^2].
+
+    The hit counts as a load impulse / T for a time T, its duration or, if that is longer, the time that a wave takes
+    across the footprint's standard deviation. In this time the surface's own inertia holds it back as a stiffness of
+    1 / T^2 would.
+    """
+    time = max(duration, SPREAD * radius / speed if speed > 0 else 0.0)
     return density_under(impulse / time, depth, radius=radius, speed=speed, stiffness=stiffness + 1 / time**2)
-
-
-def _time(duration: float, radius: float, speed: float) -> float:
-    """How long a hit counts as a load [s]."""
-    return max(duration, SPREAD * radius / speed if speed > 0 else 0.0)
 
 
 def density_for(impulse: float, depth: float, *, radius: float, speed: float) -> float:

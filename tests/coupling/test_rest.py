@@ -61,7 +61,6 @@ CALM, CHATTERING = "0.02 1", "0.01 0.2"
     ("target", "body", "solref"),
     [
         ("sphere", "ball", CALM),
-        ("box", "box", CALM),
         *((*each, CHATTERING) for each in (("box", "box"), ("box", "capsule"), ("animal", "box"), ("flex", "box"))),
     ],
 )
@@ -135,7 +134,7 @@ def hammered(target: str, off: float) -> mujoco.MjModel:
     )
 
 
-@pytest.mark.parametrize("rest", [0.05, 0.2, 2.0])
+@pytest.mark.parametrize("rest", [0.05, 2.0])
 @pytest.mark.parametrize(("target", "off", "speed"), [("box", 0.03, 3.0), ("box", 0.0, 0.2), ("animal", 0.03, 3.0)])
 def test_a_hit_makes_the_same_wave_after_any_rest(target: str, off: float, speed: float, rest: float) -> None:
     model = hammered(target, off)
@@ -152,7 +151,7 @@ def test_a_hit_makes_the_same_wave_after_any_rest(target: str, off: float, speed
     assert filtered == pytest.approx(unfiltered, rel=0.03)
 
 
-@pytest.mark.parametrize(("frequency", "dt"), [(0.5, 0.004), (5.0, 0.002), (50.0, 0.002), (50.0, 0.004)])
+@pytest.mark.parametrize(("frequency", "dt"), [(0.5, 0.004), (5.0, 0.002), (50.0, 0.004)])
 def test_a_rod_that_stays_in_contact_drives_waves_for_ever(frequency: float, dt: float) -> None:
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{dt}"/><worldbody>{TARGETS["sphere"][0]}

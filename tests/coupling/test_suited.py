@@ -85,8 +85,8 @@ def test_waves_suit_the_target_at_every_scale(size: float) -> None:
     assert 1e-4 * size < top < 0.1 * size
 
 
-def test_density_is_the_bodys_mass_over_the_targets_area_if_steps_are_short() -> None:
-    xml = """<mujoco><option timestep="1e-5"/><worldbody><geom name="still" type="sphere" size="0.3"/>
+def test_density_is_the_bodys_mass_over_the_targets_area_where_nothing_can_touch_it() -> None:
+    xml = """<mujoco><worldbody><geom name="still" type="sphere" size="0.3" contype="2" conaffinity="2"/>
     <body pos="0 0 2"><freejoint/><geom name="free" type="sphere" size="0.5" mass="7"/></body></worldbody></mujoco>"""
     ripples = Ripples(
         mujoco.MjModel.from_xml_string(xml), {"still": Material(), "free": Material()}, resolution=8, backend="cpu"
@@ -104,13 +104,11 @@ def in_box(material: Material, mass: float = 20, **options: object) -> Material:
     return Ripples(model, {"target": material}, resolution=8, backend="cpu")["target"].material
 
 
-def test_long_steps_have_less_stiffness_and_more_density() -> None:
+def test_long_steps_have_less_stiffness() -> None:
     free, short, long = (in_box(Material(), timestep=dt) for dt in (1e-5, 1e-3, 1e-2))
     for material, dt in ((free, 1e-5), (short, 1e-3), (long, 1e-2)):
         assert math.sqrt(material.stiffness) * dt < 0.5001
-    assert free.density == pytest.approx(1000 * 0.5 / 4, rel=0.01)
-    assert free.stiffness > short.stiffness > long.stiffness
-    assert short.density < long.density
+    assert free.stiffness == short.stiffness > long.stiffness
 
 
 def test_a_given_stiffness_is_made_up_for_by_the_density() -> None:
@@ -176,19 +174,21 @@ def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so()
     """As torsos of robots are, whose limbs may touch them: they bear the whole robot."""
     link = BOX.format(mass=3e4).replace('"target"', '"target" mass="1"').replace("<geom", "<body><freejoint/><geom", 1)
     model = mujoco.MjModel.from_xml_string(link.replace('0.25"/>', '0.25"/></body>', 1))
-    with pytest.warns(RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit"):
+    with pytest.warns(RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit=\(1, m/s"):
         Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         Ripples(model, {"target": Material.suited(1.0, (1.0, 2.0))}, resolution=8, backend="cpu")
 
 
-def test_a_heavier_body_is_met_by_a_stiffer_surface_and_no_body_by_the_least_stiffness() -> None:
-    light, middle, heavy = (in_box(Material(), mass, timestep=1e-4).stiffness for mass in (1e-6, 20.0, 1000.0))
-    assert light == pytest.approx((16 * 4.43 / 1.0) ** 2, rel=0.01)
-    assert light < middle < heavy
-    weightless = in_box(Material(), 1000.0, timestep=1e-4, gravity=(0.0, 0.0, 0.0)).stiffness
-    assert np.isfinite(weightless) and weightless > light / 2
+def test_a_heavier_body_is_met_by_a_heavier_surface() -> None:
+    light, middle, heavy = (in_box(Material(), mass) for mass in (1e-6, 20.0, 200.0))
+    for material in (light, middle, heavy):
+        assert material.stiffness == pytest.approx((16 * 4.43 / 1.0) ** 2, rel=0.01)
+    assert light.density < middle.density < heavy.density
+    assert heavy.density == pytest.approx(10 * middle.density)
+    # without gravity it is there, too: the hit of a fall of a size a second
+    assert middle.density / 100 < in_box(Material(), gravity=(0.0, 0.0, 0.0)).density < middle.density
 
 
 EGG = """<mujoco><option timestep="{dt}"/><worldbody><geom name="egg" type="ellipsoid" size="{a} {a} {b}"/>
@@ -231,8 +231,8 @@ def test_a_resolution_that_is_given_is_the_one_that_is_taken() -> None:
     assert Simulation(load_scene("sphere"), resolution=16).ripples["sphere"].atlas.resolution == 16
 
 
-@pytest.mark.parametrize(("share", "lower"), [(0.1, (2.0, 4.0)), (0.4, (9.0, 16.0))])
-def test_dents_stay_small_and_rings_are_lower(share: float, lower: tuple[float, float]) -> None:
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.4])
+def test_dents_stay_small_and_rings_are_seen(share: float) -> None:
     """A ball of a share of a sphere's size falls on it from the height of its size."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><worldbody><geom name="target" type="sphere" size="0.5"/>
@@ -246,7 +246,7 @@ def test_dents_stay_small_and_rings_are_lower(share: float, lower: tuple[float, 
         ripples.mj_step(data)
         dent, ring = max(dent, -float(waves.height.min())), max(ring, float(np.abs(waves.height[around]).max()))
     assert 0.01 < dent / 0.5 < 0.25
-    assert lower[0] < dent / ring < lower[1]
+    assert 0.005 < ring < 0.02
 
 
 BALL = """<mujoco><option timestep="0.002"/><worldbody>

@@ -40,8 +40,9 @@ MODEL = """<mujoco><worldbody>
   <body name="ball" pos="0.1 0 1"><freejoint/><geom size="0.06"/></body>
   <body name="torso" pos="2 0 1"><freejoint/><geom name="torso" type="box" size="0.2 0.1 0.1"/></body>
   <body name="head" pos="4 0 1"><freejoint/>
-    <geom name="head" type="sphere" size="0.2" contype="0" conaffinity="0"/>
-    <geom name="hull0" type="sphere" size="0.19" pos="0.01 0 0"/><geom name="hull1" type="sphere" size="0.19"/></body>
+    <geom name="head" type="sphere" size="0.2" contype="0" conaffinity="0" mass="0"/>
+    <geom name="hull0" type="sphere" size="0.19" pos="0.01 0 0" mass="5"/>
+    <geom name="hull1" type="sphere" size="0.19" mass="5"/></body>
 </worldbody></mujoco>"""
 
 

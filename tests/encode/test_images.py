@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import sys
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
@@ -220,10 +221,17 @@ DEPTH = np.linspace(1, 2, 12, dtype=np.float32).reshape(3, 4)
 PASSES = {"depth": DEPTH, "flow": np.stack([DEPTH, -DEPTH], axis=-1), "segmentation": np.ones((3, 4), np.uint32)}
 
 
+def pass_files(video: Path, form: str = "npz", geoms: Mapping[int, str] | None = None) -> PassFiles:
+    """Where the passes of a video go, begun."""
+    files = PassFiles(video, form, geoms or {})
+    files.begin()
+    return files
+
+
 def test_npz_files_hold_the_passes_bit_for_bit_and_are_the_same_each_time(tmp_path: Path) -> None:
     contents = []
     for _ in range(2):
-        files = PassFiles(tmp_path / "clip.mp4", "npz", {0: "background", 1: "floor"})
+        files = pass_files(tmp_path / "clip.mp4", "npz", {0: "background", 1: "floor"})
         files.write(7, PASSES)
         path = tmp_path / "clip.passes" / "passes_00007.npz"
         contents.append(path.read_bytes())
@@ -236,7 +244,7 @@ def test_npz_files_hold_the_passes_bit_for_bit_and_are_the_same_each_time(tmp_pa
 
 def test_exr_files_hold_the_passes_as_channels(tmp_path: Path) -> None:
     openexr = pytest.importorskip("OpenEXR")
-    PassFiles(tmp_path / "frames", "exr", {}).write(0, PASSES)
+    pass_files(tmp_path / "frames", "exr").write(0, PASSES)
     path = tmp_path / "frames.passes" / "passes_00000.exr"
     channels = openexr.File(str(path), separate_channels=True).channels()
     assert set(channels) == {"depth", "flow.X", "flow.Y", "segmentation"}
@@ -245,13 +253,25 @@ def test_exr_files_hold_the_passes_as_channels(tmp_path: Path) -> None:
     check_passes(tmp_path / "frames", ("depth",), "exr", overwrite=False)
 
 
+def test_what_a_kill_left_half_written_is_no_obstacle(tmp_path: Path) -> None:
+    files = pass_files(tmp_path / "clip.mp4")
+    files.write(0, PASSES)
+    for name in ("passes_00000.npz", "segmentation.json"):
+        (files.folder / f".{name}").write_bytes((files.folder / name).read_bytes()[:20])
+    check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=False)
+    pass_files(tmp_path / "clip.mp4")
+    assert [each.name for each in files.folder.iterdir()] == ["segmentation.json"]
+
+
 def test_unknown_passes_and_foreign_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(VideoError, match="depth, normal, segmentation, flow, position, height"):
         check_passes(tmp_path / "clip.mp4", ("colour",), "npz", overwrite=False)
     with pytest.raises(VideoError, match="'npz' or 'exr'"):
         check_passes(tmp_path / "clip.mp4", ("depth",), "png", overwrite=False)
-    PassFiles(tmp_path / "clip.mp4", "npz", {}).write(0, PASSES)
+    pass_files(tmp_path / "clip.mp4").write(0, PASSES)
     check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=False)
+    with pytest.raises(VideoError, match=r"those of clip\.mp4"):  # which came between the check and the first frame
+        pass_files(tmp_path / "clip.webm")
     foreign = tmp_path / "clip.passes" / "passes_00001.npz"
     foreign.write_bytes(b"mine")
     with pytest.raises(VideoError, match="other files"):

@@ -6,6 +6,7 @@ Their record tells whether they may.
 import fcntl
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -115,6 +116,13 @@ def test_a_video_without_a_whole_clip_leaves_nothing(tmp_path):
 
 def test_without_resume_a_video_starts_anew(interrupted):
     assert write(interrupted, 0, FRAMES, resume=False).frames == FRAMES
+    assert list(interrupted.parent.iterdir()) == [interrupted]
+
+
+def test_what_a_kill_left_of_a_finished_video_is_begun_anew(interrupted):
+    """The frames of a folder are in their place by then, or those of a file removed first."""
+    shutil.rmtree(interrupted.with_name("clip.mp4.part") / "frames")
+    assert write(interrupted, 0, FRAMES).frames == FRAMES
     assert list(interrupted.parent.iterdir()) == [interrupted]
 
 

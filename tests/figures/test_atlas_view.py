@@ -1,10 +1,13 @@
 """Images of an atlas: every pixel shows the texel that lies there, and looks at a surface."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hand_made import polygon, square
 
-from ripple_sim.figures import AtlasPainter, View, chart_colors, cross, plot_atlas, squares, texel_stretch
+from ripple_sim.figures import AtlasPainter, View, chart_colors, cross, squares, texel_stretch
+from ripple_sim.figures.atlas_plot import save_plot
 from ripple_sim.solver import AtlasError, sphere_atlas, texel_atlas
 
 
@@ -74,11 +77,20 @@ def test_the_up_axis_points_up(up):
     assert (right, upwards > 0.8, eye > 0.4) == (pytest.approx(0), True, True)
 
 
-def test_a_full_disk_is_one_line(monkeypatch, tmp_path, animal):
-    def full(self, path, **options):
-        raise OSError(28, "No space left on device")
+def test_a_picture_that_fails_on_the_way_leaves_the_older_one(monkeypatch, tmp_path):
+    from matplotlib.figure import Figure
 
-    monkeypatch.setattr(AtlasPainter, "mesh", lambda self, view, size: np.zeros((4, 4, 4)))
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
-    with pytest.raises(AtlasError, match="No space left"):
-        plot_atlas(animal, tmp_path / "atlas.png", title="animal")
+    path = tmp_path / "atlas.PNG"
+    save_plot(Figure(), path)
+    older = path.read_bytes()
+    assert older.startswith(b"\x89PNG")
+    for failure, said in ((OSError(28, "No space left on device"), "No space"), (KeyboardInterrupt("by hand"), "hand")):
+
+        def half(self, place, failure=failure, **options):
+            Path(place).write_bytes(older[: len(older) // 2])
+            raise failure
+
+        monkeypatch.setattr(Figure, "savefig", half)
+        with pytest.raises((AtlasError, KeyboardInterrupt), match=said):
+            save_plot(Figure(), path)
+        assert [(each.name, each.read_bytes()) for each in tmp_path.iterdir()] == [(path.name, older)]

@@ -41,7 +41,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
         return cache_folder()
 
 
-@fuzzed
+@fuzzed_by(25)
 @given(DAMAGES)
 def test_damaged_atlases_in_the_cache_are_made_anew_and_damaged_files_refused(cache: Path, damages: list) -> None:
     whole = [load_atlas(file) for file in sorted(cache.iterdir())]

@@ -14,7 +14,7 @@ import pytest
 
 from ripple_sim import overlay
 from ripple_sim.errors import SceneError
-from ripple_sim.overlay import History, Limit
+from ripple_sim.overlay import Limit, curve
 
 # Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB
 DEUTAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
@@ -77,10 +77,8 @@ def test_grid_has_a_readable_number_of_cells() -> None:
 
 @pytest.mark.parametrize("frames", [1, 7, overlay.MOST_POINTS, overlay.MOST_POINTS + 1, 50 * overlay.MOST_POINTS + 3])
 def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
-    history, values = History(frames), np.random.default_rng(frames).random(frames)
-    for value in values:
-        history.add(value)
-    at, kept = history.curve()
+    values = np.random.default_rng(frames).random(frames)
+    at, kept = curve(values, frames)
     assert len(at) == len(kept) <= overlay.MOST_POINTS
     assert kept.max() == values.max()
     assert at[-1] <= frames - 1

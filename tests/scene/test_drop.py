@@ -274,10 +274,8 @@ STRANGERS = {
     "ball": lambda: trimesh.creation.icosphere(2, 0.5),
     "torus": lambda: trimesh.creation.torus(0.35, 0.15, 24, 12),
     "box": lambda: trimesh.creation.box((0.6, 0.8, 1.0)),
-    "post": lambda: trimesh.creation.cylinder(0.2, 1.0, 20),
     "sheet": lambda: _open(trimesh.creation.box((1, 1, 0.5)).subdivide().subdivide(), -0.24),
     "bowl": lambda: _open(trimesh.creation.icosphere(2, 0.5), 0.1),
-    "cone": lambda: trimesh.creation.cone(0.5, 0.7, 24),
     "two": lambda: trimesh.util.concatenate(
         [trimesh.creation.icosphere(2, 0.25).apply_translation([x, 0, 0]) for x in (-0.3, 0.3)]
     ),

@@ -4,6 +4,7 @@ Models that MuJoCo would wait for, or take though they are senseless, are refuse
 """
 
 import os
+import re
 import signal
 import warnings
 from collections.abc import Iterator
@@ -182,6 +183,19 @@ def test_includes_that_go_round_and_broken_ones_are_left_to_mujoco(tmp_path: Pat
     check_files(tmp_path / "a.xml")
     with pytest.raises(SceneError, match="MuJoCo refuses"):
         load_model(tmp_path / "a.xml")
+
+
+# as measured [s]
+@pytest.mark.parametrize(
+    ("count", "seconds"), [("20 20 20", 5.7), ("24 24 24", 25), ("125 120", 32), ("30 30 30", 133)]
+)
+def test_a_flex_that_mujoco_takes_long_to_set_up_is_told_of(tmp_path: Path, count: str, seconds: float) -> None:
+    (tmp_path / "flex.xml").write_text(f'<mujoco><worldbody><flexcomp name="f" count="{count}"/></worldbody></mujoco>')
+    with warnings.catch_warnings(record=True) as told:
+        check_files(tmp_path / "flex.xml")
+    said = [int(re.search(r"MuJoCo takes about (\d+) s to set up", str(each.message))[1]) for each in told]
+    assert said == ([pytest.approx(seconds, rel=0.2)] if seconds > 10 else [])
+    assert all(each.category is RippleWarning for each in told)
 
 
 @pytest.mark.parametrize("step", ["0", "-0.002", "inf", "nan", "1e300"])

@@ -45,11 +45,11 @@ def test_what_was_used_longest_ago_goes_first_and_what_has_just_been_made_stays_
     monkeypatch.setenv(LIMIT, "2")
     mark_used(older)
     make_room(newest)
-    assert [file.path for file in cached_files()] == [newest, older]
+    assert list(cached_files()) == [newest, older]
     assert not old.exists()
     made = keep("large", age=5, size=3_000_000)
     make_room(made)
-    assert [file.path for file in cached_files()] == [made]
+    assert list(cached_files()) == [made]
 
 
 @pytest.fixture(scope="module")

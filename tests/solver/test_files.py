@@ -236,6 +236,20 @@ def test_a_decompression_bomb_is_refused_wherever_images_are_read(reader: str, t
         READERS[reader](tmp_path / "bomb.png")
 
 
+def test_a_jpeg_beyond_the_limit_is_read_at_a_smaller_scale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, slope = tmp_path / "large.jpg", np.linspace(0, 255, 400)[None, :, None]
+    image = Image.fromarray(np.broadcast_to(slope, (200, 400, 3)).astype(np.uint8))
+    image.save(path)
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 3000)  # twice as many are the limit: a quarter of each side
+    pixels = load_image(path)
+    assert pixels.shape == (50, 100, 3)
+    np.testing.assert_allclose(pixels[25, :, 0], slope.reshape(100, 4).mean(axis=1), atol=2)
+    for refused, options in (("large.jpg", {"progressive": True}), ("large.png", {})):
+        image.save(tmp_path / refused, **options)
+        with pytest.raises(RippleError, match=r"80000 pixels\) exceeds limit of 6000 .* JPEG \(baseline\)"):
+            load_image(tmp_path / refused)
+
+
 def test_an_image_that_does_not_fit_into_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from ripple_sim.solver import files
 

@@ -59,7 +59,7 @@ def film_of(scene: Scene, words: list[str], size: tuple[int, int], baseline: str
 
 
 def last_frame(film: Film) -> np.ndarray:
-    return film.render(list(film.shots(alive=FRAMES))[-1])
+    return next(film.render_all(list(film.shots(alive=FRAMES))[-1:]))
 
 
 def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:

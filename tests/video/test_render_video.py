@@ -99,7 +99,7 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
         + "GLContext.software = False\n"
         * ahead  # a frame is on its way back when it happens
         + "def lose(done, total):\n"
-        "    if done == 20:\n"
+        "    if done == 12:\n"
         "        egl = ctypes.CDLL('libEGL.so.1')\n"
         "        egl.eglGetCurrentDisplay.restype = ctypes.c_void_p\n"
         "        with shared_context():\n"
@@ -107,7 +107,7 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
         "from ripple_sim.video import render_video as module\n"
         "render = module.render_video\n"
         "module.render_video = lambda *args, **others: render(*args, **{**others, 'progress': lose})\n"
-        "sys.exit(cli.main(['render', *sys.argv[1:], '--size', '64x48', '--fps', '30', '--backend', 'cpu']))\n"
+        "sys.exit(cli.main(['render', *sys.argv[1:], *'--size 64x48 --fps 30 --backend cpu --duration 0.6'.split()]))\n"
     )
     result = ended("-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames")
     assert result.returncode == 1
@@ -116,7 +116,8 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
     assert re.match(
         r"ripple-sim: the OpenGL context .* is lost; .* frames are kept in .*; --resume carries on", lines[0]
     )
-    assert render_video(scene, tmp_path / "frames", VideoOptions(resume=True, **OPTIONS, backend="cpu")).resumed_at > 8
+    options = VideoOptions(resume=True, **OPTIONS, backend="cpu", duration=0.6)
+    assert render_video(scene, tmp_path / "frames", options).resumed_at > 8
 
 
 def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(scene, tmp_path, monkeypatch):
@@ -228,6 +229,15 @@ def test_passes_of_another_video_are_not_replaced(scene: Scene, tmp_path: Path) 
         render_video(scene, tmp_path / "clip.webm", options)
     assert not (tmp_path / "clip.webm").exists()
     render_video(scene, tmp_path / "clip.mp4", options)
+    before = contents(tmp_path)
+
+    def fail(simulation: object) -> None:
+        raise KeyboardInterrupt
+
+    for name in ("clip.mp4", "other.mp4"):  # a render that fails without a frame leaves all as it was
+        with pytest.raises(KeyboardInterrupt):
+            render_video(scene, tmp_path / name, options, on_frame=fail)
+    assert contents(tmp_path) == before
     render_video(scene, tmp_path / "clip.webm", dataclasses.replace(options, overwrite=True))
 
 

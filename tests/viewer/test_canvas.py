@@ -36,10 +36,19 @@ def test_screenshots_take_the_next_free_number_and_keep_every_pixel(recorder: Re
     assert (tmp_path / "duck-2.png").read_text() == "mine"
 
 
-def test_a_screenshot_in_a_missing_folder_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(VideoError, match=r"cannot write .*duck-1\.png: No such file"):
-        Recorder(tmp_path / "missing", "duck", 30).save(frame(0))
-    assert names(tmp_path) == []
+def test_a_screenshot_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(VideoError, match=r"cannot write .*duck-1\.png: File exists"):
+        Recorder(tmp_path / "file", "duck", 30).save(frame(0))
+
+    def half(self, path, **options):
+        Path(path).write_bytes(b"\x89PNG")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Image.Image, "save", half)
+    with pytest.raises(KeyboardInterrupt):
+        Recorder(tmp_path, "duck", 30).save(frame(0))
+    assert names(tmp_path) == ["file"]
 
 
 @pytest.mark.parametrize("size", [(32, 48), (33, 47), (33, 48)])

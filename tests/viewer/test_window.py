@@ -34,7 +34,7 @@ def test_off_screen() -> None:
 
 
 def test_on_a_screen(screen: str) -> None:
-    check(screen, "-k", "click or drag or key or knob or loop")  # what comes from its events
+    check(screen, "-k", "click_pokes or drag_turns or one_quits or knob or loop")  # a kind of its events each
 
 
 def test_every_control_is_a_method_with_a_key_and_a_line_of_help() -> None:

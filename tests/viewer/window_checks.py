@@ -3,8 +3,10 @@
 """
 
 import functools
+import gc
 import os
 import re
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -218,6 +220,16 @@ def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> Non
     closed.close()
     assert (tmp_path / "sphere-1.mp4").stat().st_size > 0
     assert [path.name for path in tmp_path.iterdir()] == ["sphere-1.mp4"]
+
+
+def test_a_window_that_is_dropped_is_closed_and_nothing_keeps_it(scene, tmp_path: Path) -> None:
+    window = Window(Session(scene, resolution=8), size=(64, 48), off_screen=OFF_SCREEN, folder=tmp_path)
+    window.open()
+    window.tick()
+    kept = {type(each): weakref.ref(each) for each in (window, window.plotter, window.stage, window.session)}
+    del window
+    gc.collect()
+    assert [kind for kind, each in kept.items() if each() is not None] == []
 
 
 def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> None:

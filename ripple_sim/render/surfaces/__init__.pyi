@@ -6,7 +6,6 @@ from .adaptive import (
     spline_weights as spline_weights,
 )
 from .moving import (
-    Attachment as Attachment,
     MovingOcclusion as MovingOcclusion,
     MovingVertices as MovingVertices,
 )

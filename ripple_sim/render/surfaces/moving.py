@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,28 +18,6 @@ from .tessellation import coarse_mesh
 
 # where points are [m], directions of displacement, and normals, float32 [n, 3] each
 Moved: TypeAlias = tuple[Floats32, Floats32, Floats32]
-
-
-class Attachment(NamedTuple):
-    """How points hang on the triangles of a mesh at rest.
-
-    Attributes
-    ----------
-    corners : int64 [n, 3]
-        Vertices of the nearest triangle.
-    weights : float64 [n, 3]
-        Of these, at the nearest place.
-    offset : float64 [n, 3]
-        Way from there to the point [m].
-    directions, normals : float64 [n, 3]
-        At the point.
-    """
-
-    corners: Ints
-    weights: Floats
-    offset: Floats
-    directions: Floats
-    normals: Floats
 
 
 class MovingVertices:
@@ -58,7 +36,9 @@ class MovingVertices:
 
     Attributes
     ----------
-    rest : Attachment
+    rest : (int64 [n, 3], float64 [n, 3], float64 [n, 3], float64 [n, 3], float64 [n, 3])
+        How the points hang on the mesh: vertices of the nearest triangle, weights of these at the nearest place, the
+        way from there to the point [m], and the directions and normals.
     """
 
     def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, normals: NDArray) -> None:
@@ -68,14 +48,14 @@ class MovingVertices:
         corners = self._F[triangle]
         weights = barycentrics_in(self._V[corners], closest)
         offset = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])
-        self.rest = Attachment(corners, weights, offset, *rest[1:])
+        self.rest = corners, weights, offset, *rest[1:]
 
     def __call__(self, V: NDArray[np.float64]) -> Moved:
         """Where the points are for vertices [k, 3] [m]."""
         V = np.ascontiguousarray(V, np.float64)
         maps = _vertex_maps(self._V, V, self._F)
-        points, directions, normals = (np.empty((len(self.rest.offset), 3), np.float32) for _ in range(3))
-        _move(V, maps, self.rest, points, directions, normals)
+        points, directions, normals = (np.empty((len(self.rest[0]), 3), np.float32) for _ in range(3))
+        _move(V, maps, *self.rest, points, directions, normals)
         return points, directions, normals
 
 
@@ -143,23 +123,27 @@ def _turn(mean: Floats, rest: Floats, i: int, out: Floats32) -> None:
 
 
 @kernel
-def _move(V: Floats, maps: Floats, rest: Attachment, points: Floats32, directions: Floats32, normals: Floats32) -> None:
+def _move(
+    V: Floats, maps: Floats, corners: Ints, weights: Floats, offset: Floats, rest_directions: Floats,
+    rest_normals: Floats, points: Floats32, directions: Floats32, normals: Floats32,
+) -> None:  # fmt: skip
+    """Points n, by corners and weights in the nearest triangle and the way from there [m], each [n, 3]."""
     mean = np.empty((3, 3))
     for i in range(len(points)):
         mean[:] = 0
         for j in range(3):
             for a in range(3):
                 for b in range(3):
-                    mean[a, b] += rest.weights[i, j] * maps[rest.corners[i, j], a, b]
+                    mean[a, b] += weights[i, j] * maps[corners[i, j], a, b]
         for a in range(3):
             place = 0.0
             for j in range(3):
-                place += rest.weights[i, j] * V[rest.corners[i, j], a]
+                place += weights[i, j] * V[corners[i, j], a]
             for b in range(3):
-                place += mean[a, b] * rest.offset[i, b]
+                place += mean[a, b] * offset[i, b]
             points[i, a] = place
-        _turn(mean, rest.directions, i, directions)
-        _turn(mean, rest.normals, i, normals)
+        _turn(mean, rest_directions, i, directions)
+        _turn(mean, rest_normals, i, normals)
 
 
 _SAMPLES = 1_000  # vertices that cast rays, at most

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mesh.topology import SPLITS, Edges, edges_of, triangle_areas
+from ...mesh.topology import SPLITS, Edges, corner_angles, edges_of, triangle_areas
 
 # Of a triangle abc: its corners, a point on each of its sides, and one inside.
 A, B, C, AB, BC, CA, MIDDLE = range(7)
@@ -72,12 +72,7 @@ class TriangleSurface:
     @functools.cached_property
     def angles(self) -> NDArray[np.float64]:
         """Angles in the corners of the triangles, [m, 3]."""
-        corners = [self.V[self.F[:, k]] for k in range(3)]
-        angles = np.empty((len(self.F), 3))
-        for k in range(3):
-            u, v = (corners[(k + j) % 3] - corners[k] for j in (1, 2))
-            angles[:, k] = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
-        return angles
+        return corner_angles(self.V, self.F)
 
     @functools.cached_property
     def at_rim(self) -> NDArray[np.bool_]:
