@@ -4,8 +4,7 @@
 
 Square plates on patches with each kind of rim, in the units of the tables that they are compared with, and a round one
 whose texels lie on the true disk. lambda^2 is the angular frequency times side^2 (radius^2) over sqrt(D / sigma).
-Tilts of a free plate, which nothing should pull back, are left out. With --cost: time of a step beside that of the same
-plate without rims of its own, which is "fixed".
+With --cost: time of a step beside that of the same plate without rims of its own, which is "fixed".
 """
 
 import argparse
@@ -66,9 +65,7 @@ def atlas_of(plate: Plate, resolution: int) -> Atlas:
 
 def frequencies(plate: Plate, atlas: Atlas) -> np.ndarray:
     """The lowest modes, in the table's unit."""
-    tilts = 2 if plate.rim == "free" else 0
-    found = modes(atlas, plate.material, len(plate.table) + tilts, rim=plate.rim).frequencies
-    return found[tilts:] * 2 * np.pi / plate.unit
+    return modes(atlas, plate.material, len(plate.table), rim=plate.rim).frequencies * 2 * np.pi / plate.unit
 
 
 def row(name: str, values: np.ndarray, digits: int) -> str:

@@ -61,7 +61,6 @@ from .texel_mesh import (
     TexelGrid as TexelGrid,
     TexelMesh as TexelMesh,
     folded_texels as folded_texels,
-    levelled_areas as levelled_areas,
     smoothed as smoothed,
     softening as softening,
     texel_quality as texel_quality,

@@ -56,7 +56,7 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
 
 
 # Raise it when a layout's map or the file's contents change: older files are rebuilt.
-FORMAT = 13
+FORMAT = 14
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 
 _NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}

@@ -215,6 +215,112 @@ def _texels_on_charts(triangles: Floats, charts: Ints, corners: Floats, n: int, 
     return texels
 
 
+MOST_CORNERS = 12  # of a part of a triangle that a few lines have cut
+
+
+@kernel
+def clip(corners: Floats, count: int, ox: float, oy: float, nx: float, ny: float, axis: int, result: Floats) -> int:
+    """Keep what lies on the side n of a line through o of a convex polygon (Sutherland and Hodgman 1974).
+
+    Returns the number of corners of the `result`. A line across an axis, 0 or 1 (else -1), is met to the last bit.
+    """
+    kept = 0
+    for i in range(count):
+        j = (i + 1) % count
+        a = nx * (corners[i, 0] - ox) + ny * (corners[i, 1] - oy)
+        b = nx * (corners[j, 0] - ox) + ny * (corners[j, 1] - oy)
+        if a >= 0.0:
+            result[kept] = corners[i]
+            kept += 1
+        if (a > 0.0 and b < 0.0) or (a < 0.0 and b > 0.0):
+            # from the same end for both triangles at an edge
+            t = a / (a - b)
+            result[kept] = (1.0 - t) * corners[i] + t * corners[j]
+            if axis >= 0:
+                result[kept, axis] = oy if axis else ox
+            kept += 1
+    return kept
+
+
+def texel_areas(mesh: Mesh, parts: Parts, corners: Floats, lines: Floats, charts: int) -> Floats:
+    """Area of a mesh that each of the n x n texels of some charts covers [m^2], [C, n, n]: its triangles, cut exactly.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    parts : Parts
+        Parts of its triangles, with the one chart in which each lies, [p].
+    corners : float64 [p, 3, 3]
+        x w, y w and w > 0 of the parts' corners, where x and y are places on the chart; linear in each triangle.
+    lines : float64 [n + 1]
+        Where texels end, along x and along y.
+    charts : int
+        C.
+    """
+    triangle, barycentrics, chart = parts
+    # barycentrics over w are linear in x and y
+    polygons, n = np.concatenate([corners[..., :2], barycentrics], axis=2) / corners[..., 2:], len(lines) - 1
+    areas = np.zeros((charts, n, n))
+    _add_areas(polygons, mesh.triangle_areas[triangle], chart.astype(np.int64), lines, areas)
+    return areas
+
+
+@kernel
+def _add_areas(polygons: Floats, triangles: Floats, chart: Ints, lines: Floats, areas: Floats) -> None:
+    """Cut parts [p, 3, 5] of triangles of given areas [p] along lines, and add each cell's to that of its texel."""
+    strip, cell = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
+    right, above = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
+    spare = np.empty((MOST_CORNERS, 5))
+    for p in range(len(chart)):
+        right[:3] = polygons[p]
+        begin, end = _reach(right, 3, 0, lines)
+        wide = 3
+        for i in range(begin, end + 1):
+            high = wide
+            if i == end:
+                above[:wide] = right[:wide]
+            else:
+                high = clip(right, wide, lines[i + 1], 0.0, -1.0, 0.0, 0, above)
+                wide = clip(right, wide, lines[i + 1], 0.0, 1.0, 0.0, 0, spare)
+                right, spare = spare, right
+            if high < 3:
+                continue
+            first, last = _reach(above, high, 1, lines)
+            for j in range(first, last + 1):
+                if j == last:
+                    areas[chart[p], j, i] += triangles[p] * _share(above, high)
+                    break
+                corners = clip(above, high, 0.0, lines[j + 1], 0.0, -1.0, 1, cell)
+                high = clip(above, high, 0.0, lines[j + 1], 0.0, 1.0, 1, strip)
+                above, strip = strip, above
+                areas[chart[p], j, i] += triangles[p] * _share(cell, corners)
+
+
+@kernel
+def _reach(corners: Floats, count: int, axis: int, lines: Floats) -> tuple[int, int]:
+    """First and last cell between lines into which a polygon reaches along an axis."""
+    low = high = corners[0, axis]
+    for i in range(1, count):
+        low, high = min(low, corners[i, axis]), max(high, corners[i, axis])
+    first, last = np.searchsorted(lines, low, side="right") - 1, np.searchsorted(lines, high, side="left") - 1
+    first = min(max(first, 0), len(lines) - 2)
+    return first, min(max(last, first), len(lines) - 2)
+
+
+@kernel
+def _share(corners: Floats, count: int) -> float:
+    """Area of a polygon over that of the triangle in which it lies, by its barycentrics up to a factor at each."""
+    share, ux, uy = 0.0, 0.0, 0.0
+    total = corners[0, 2] + corners[0, 3] + corners[0, 4]
+    x, y = corners[0, 2] / total, corners[0, 3] / total
+    for i in range(1, count):
+        total = corners[i, 2] + corners[i, 3] + corners[i, 4]
+        vx, vy = corners[i, 2] / total - x, corners[i, 3] / total - y
+        share += ux * vy - uy * vx
+        ux, uy = vx, vy
+    return share
+
+
 _BITS = 34  # of coordinates in which copies of a point agree
 _ON_SIDE = 1e-9  # barycentric coordinates below it count as 0
 

@@ -1,9 +1,8 @@
 """The texel mesh: charts of texels on a surface, whose centres are the vertices on which waves are solved.
 
 It cuts corners where the surface is creased, and spans twists that the surface has not: its area is up to 2 % too small
-or too large at N = 96. The map onto the charts knows better: a texel's share is its area on the charts times the real
-area for each unit of that in the texel's triangle. Alone that is one sample a texel, exact in the mean and noisy where
-triangles are uneven; so the texel mesh gives the shape of the field, the map its level in every neighbourhood.
+or too large at N = 96. The map onto the charts knows better: a texel's share is the area of the surface that its square
+of a chart covers.
 
 Here is also what keeps a few small texels from setting the time step for all, and figures of how good a texel mesh is.
 """
@@ -48,11 +47,11 @@ def _sum_around(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[
 
 # Least and most area in units of what the texel mesh spans. A limb that falls between the texels is not theirs.
 _LEAST, _MOST = 0.5, 1.2
-_POSITIVE = 0.05  # of what the map says, on average round a texel; a folded one may span less than nothing
+_POSITIVE = 0.05  # of the mean round a texel; one may cover nothing but triangles without area
 
 
-def levelled_areas(
-    topology: TexelTopology, spanned: NDArray[np.float64], sampled: NDArray[np.float64]
+def trimmed_areas(
+    topology: TexelTopology, spanned: NDArray[np.float64], covered: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Area of the surface that belongs to each texel [m^2], [C, n, n].
 
@@ -60,12 +59,12 @@ def levelled_areas(
     ----------
     spanned : float64 [C, n, n]
         Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
-    sampled : float64 [C, n, n]
-        What the map onto the charts says of each texel [m^2].
+    covered : float64 [C, n, n]
+        Area of the surface that each texel covers [m^2].
     """
-    around = smoothed(topology, sampled)
-    level = around / np.maximum(smoothed(topology, spanned), 1e-300)
-    return np.maximum(spanned * np.clip(level, _LEAST, _MOST), _POSITIVE * around)
+    around = smoothed(topology, covered)
+    level = np.maximum(around, 1e-300) / np.maximum(smoothed(topology, spanned), 1e-300)
+    return np.maximum(covered * (np.clip(level, _LEAST, _MOST) / level), _POSITIVE * around)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -99,11 +98,11 @@ class TexelMesh:
         *,
         normals: NDArray[np.float64] | None = None,
         beyond: NDArray[np.float64] | None = None,
-        sampled: NDArray[np.float64] | None = None,
+        covered: NDArray[np.float64] | None = None,
     ) -> TexelMesh:
         """Texel mesh with the normals of its grid lines where none are given.
 
-        Its areas are those that it spans itself, or levelled to `sampled`; see `levelled_areas`. A few of them are
+        Its areas are those that it spans itself, or those of the surface `covered`; see `trimmed_areas`. A few are
         evened out for the sake of the time step; see `evened_areas`.
 
         Raises
@@ -117,7 +116,7 @@ class TexelMesh:
             normals = np.cross(*tangents(around))
             normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
         cells = TexelCells(topology, around)
-        areas = cells.areas if sampled is None else levelled_areas(topology, cells.areas, sampled)
+        areas = cells.areas if covered is None else trimmed_areas(topology, cells.areas, covered)
         if (areas > 0).all():
             areas = evened_areas(areas, cells.at_rest(np.ones_like(areas), np.ones_like(areas)))
         return cls(topology, points, normals, areas, beyond)

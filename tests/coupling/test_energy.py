@@ -90,7 +90,7 @@ def test_a_ball_gives_its_energy_to_waves_without_damping() -> None:
     energy = ripples.energy(data)
     paid = 0.5 * GRAVITY * 0.24
     assert energy.waves > 0.01 * paid
-    assert energy.total < before
+    assert energy.total < before + 2e-6 * energy.waves  # which are in single precision
     assert energy.total == pytest.approx(before, abs=0.1 * paid)
 
 

@@ -15,6 +15,5 @@ from .convention import (
     check_resolution as check_resolution,
     cube_chart_points as cube_chart_points,
     cube_topology as cube_topology,
-    solid_angles as solid_angles,
     texel_directions as texel_directions,
 )

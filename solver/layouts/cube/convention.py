@@ -24,31 +24,8 @@ from ...errors import AtlasError
 from ...files import require_memory
 from ...kernel import log
 from ...mesh.mesh import Mesh
-from ...texels.chart_map import Parts
+from ...texels.chart_map import Parts, texel_areas
 from ...texels.topology import TexelTopology, glue
-
-
-def solid_angles(resolution: int) -> NDArray[np.float64]:
-    """Solid angle of every texel of a chart [sr], [N, N]; the six charts sum to 4 pi."""
-    edge = np.tan(np.pi / 4 * (2 * np.arange(resolution + 1) / resolution - 1))
-    a, b = edge[None, :], edge[:, None]
-    corner = np.arctan(a * b / np.sqrt(1 + a * a + b * b))
-    return np.diff(np.diff(corner, axis=0), axis=1)
-
-
-def sampled_areas(
-    mesh: Mesh, sphere: NDArray[np.float64], triangles: NDArray[np.int64], barycentrics: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Solid angle of each texel times the real area for each unit of it at the texel's centre [m^2], [6, N, N].
-
-    That is 2 A |P|^3 / det(a, b, c) in a triangle of area A that is (a, b, c) on the sphere, where the texel's ray
-    meets its chord plane in P.
-    """
-    corners = sphere[mesh.F]
-    meeting = np.einsum("...k,...kj->...j", barycentrics, corners[triangles])
-    real = 2 * mesh.triangle_areas / np.linalg.det(corners)
-    return solid_angles(triangles.shape[1]) * real[triangles] * np.linalg.norm(meeting, axis=-1) ** 3
-
 
 CHART_NORMALS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 CHART_U = np.array([[0, 1, 0], [0, -1, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]])
@@ -144,6 +121,16 @@ def split_at_edges(corners: NDArray[np.float64]) -> Parts:
     order = np.argsort(triangle, kind="stable")
     barycentrics = np.concatenate([np.tile(np.eye(3), (len(whole), 1, 1)), pieces])[order]
     return triangle[order], barycentrics, np.concatenate([chart[whole], piece_chart])[order]
+
+
+def covered_areas(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> NDArray[np.float64]:
+    """Area of a mesh that each texel covers [m^2], [6, N, N], by its sphere map; see `texel_areas`."""
+    directions = sphere[mesh.F]
+    triangle, barycentrics, chart = split_at_edges(directions)
+    axes = np.stack([CHART_U, CHART_V, CHART_NORMALS], axis=-1).astype(np.float64)
+    corners = barycentrics @ directions[triangle] @ axes[chart]
+    lines = np.tan(np.pi / 4 * (2 * np.arange(resolution + 1) / resolution - 1))
+    return texel_areas(mesh, (triangle, barycentrics, chart), corners, lines, 6)
 
 
 def chart_uv(directions: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.atlas import Atlas
-from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, uncut
+from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, texel_areas, uncut
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, glue, stretch_summary
 from ..energy import COLUMN, FIXED
@@ -21,7 +21,7 @@ from .layout import PatchMap, patch_map
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
 from .samples import centres, untangled
-from .seamless import SeamlessMap, corner_places, follow, places_seen_from
+from .seamless import SeamlessMap, follow, places_seen_from
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -245,13 +245,12 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
     pieces = chart_pieces(patches)
     if offsets.any():
         pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
-    # real area of each triangle for each unit of its area on the charts
-    ratios = patches.surface.areas / signed_areas(corner_places(patches.seamless))
+    lines, corners = np.linspace(0.0, 1.0, n + 1), np.pad(pieces.places, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
+    parts = pieces.triangle, pieces.barycentrics, pieces.chart
+    covered = texel_areas(mesh, parts, corners, lines, len(glued))
     return Atlas(
         mesh=mesh,
-        texels=TexelMesh.of(
-            topology, samples.positions, normals=samples.normals, beyond=beyond, sampled=ratios[samples.small] / n**2
-        ),
+        texels=TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond, covered=covered),
         chart_map=PatchChartMap(pieces),
         triangles=samples.triangles,
         barycentrics=samples.barycentrics,

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import Bools, Floats, Ints, kernel
+from ...texels.chart_map import MOST_CORNERS, clip
 from .layout import PatchMap
 from .seamless import SeamlessMap, follow, places_on_charts, turned
 
 LEAST = 1e-12  # area on a chart below which a piece is left out
-MOST_CORNERS = 12
 
 
 class Pieces(NamedTuple):
@@ -87,11 +87,11 @@ def _cut_at_borders(
         k, p = corner[f], seen[f]
         whole[:, :2] = p
         for i in range(first[f, 0], last[f, 0]):
-            width = _clip(whole, 3, i, 0.0, 1.0, 0.0, 0, spare)
-            width = _clip(spare, width, i + 1.0, 0.0, -1.0, 0.0, 0, column)
+            width = clip(whole, 3, i, 0.0, 1.0, 0.0, 0, spare)
+            width = clip(spare, width, i + 1.0, 0.0, -1.0, 0.0, 0, column)
             for j in range(first[f, 1], last[f, 1]):
-                corners = _clip(column, width, 0.0, j, 0.0, 1.0, 1, spare)
-                corners = _clip(spare, corners, 0.0, j + 1.0, 0.0, -1.0, 1, square)
+                corners = clip(column, width, 0.0, j, 0.0, 1.0, 1, spare)
+                corners = clip(spare, corners, 0.0, j + 1.0, 0.0, -1.0, 1, square)
                 if corners < 3 or _area(square, corners) < LEAST:
                     continue
                 x, y = square[:corners, 0].mean(), square[:corners, 1].mean()
@@ -105,30 +105,6 @@ def _cut_at_borders(
                             places[count, to, 0], places[count, to, 1] = x + sx, y + sy
                     count += 1
     return count
-
-
-@kernel
-def _clip(corners: Floats, count: int, ox: float, oy: float, nx: float, ny: float, axis: int, result: Floats) -> int:
-    """Keep what lies on the side n of a line through o of a convex polygon (Sutherland and Hodgman 1974).
-
-    Returns the number of corners of the `result`. A line across an axis, 0 or 1 (else -1), is met to the last bit.
-    """
-    kept = 0
-    for i in range(count):
-        j = (i + 1) % count
-        a = nx * (corners[i, 0] - ox) + ny * (corners[i, 1] - oy)
-        b = nx * (corners[j, 0] - ox) + ny * (corners[j, 1] - oy)
-        if a >= 0.0:
-            result[kept] = corners[i]
-            kept += 1
-        if (a > 0.0 and b < 0.0) or (a < 0.0 and b > 0.0):
-            # from the same end for both triangles at an edge
-            t = a / (a - b)
-            result[kept] = (1.0 - t) * corners[i] + t * corners[j]
-            if axis >= 0:
-                result[kept, axis] = oy if axis else ox
-            kept += 1
-    return kept
 
 
 @kernel
@@ -191,9 +167,9 @@ def _cut_at_lattice(
                     node[k] = nodes[home, i + k // 2, j + (k + 1) // 2 % 2]
                 for t in range(2):
                     a, b, c = node[0], node[1 + t], node[2 + t]
-                    corners = _clip(whole, 3, a[0], a[1], a[1] - b[1], b[0] - a[0], -1, part)
-                    corners = _clip(part, corners, b[0], b[1], b[1] - c[1], c[0] - b[0], -1, spare)
-                    corners = _clip(spare, corners, c[0], c[1], c[1] - a[1], a[0] - c[0], -1, part)
+                    corners = clip(whole, 3, a[0], a[1], a[1] - b[1], b[0] - a[0], -1, part)
+                    corners = clip(part, corners, b[0], b[1], b[1] - c[1], c[0] - b[0], -1, spare)
+                    corners = clip(spare, corners, c[0], c[1], c[1] - a[1], a[0] - c[0], -1, part)
                     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
                     double = ux * vy - uy * vx
                     for m in range(1, corners - 1):

@@ -17,7 +17,6 @@ from ripple_sim.solver.layouts.cube import (
     CHART_V,
     check_resolution,
     cube_topology,
-    solid_angles,
     texel_directions,
 )
 from ripple_sim.solver.texels import TexelMesh
@@ -60,24 +59,22 @@ def creased() -> Atlas:
     return build_atlas(Mesh.from_arrays(box.vertices, box.faces), 48, cache=False)
 
 
-def test_solid_angles_fill_the_sphere() -> None:
-    for n in (4, 7, 64):
-        assert 6 * solid_angles(n).sum() == pytest.approx(4 * np.pi, rel=1e-12)
-        assert (solid_angles(n) > 0).all()
-
-
 def test_areas_sum_to_that_of_a_creased_surface(creased: Atlas) -> None:
     area = creased.mesh.area
     # the texel mesh alone cuts the box's edges off
     assert spanned_areas(creased).sum() < 0.993 * area
-    assert creased.areas.sum() == pytest.approx(area, rel=1.5e-3)
-    assert creased.quality()["coverage"] == pytest.approx(1, abs=1.5e-3)
+    assert creased.quality()["coverage"] == pytest.approx(1, rel=1e-9)
 
 
 def test_areas_are_those_of_the_texel_mesh_where_it_follows_the_surface(ball_mesh: Mesh) -> None:
     atlas = build_atlas(ball_mesh, 48)
-    np.testing.assert_allclose(atlas.areas, spanned_areas(atlas), rtol=0.03)
-    assert atlas.areas.sum() == pytest.approx(ball_mesh.area, rel=1e-3)
+    share = atlas.areas / spanned_areas(atlas)
+    corners = np.zeros(share.shape, bool)
+    corners[:, [0, 0, -1, -1], [0, -1, -1, 0]] = True
+    np.testing.assert_allclose(share[~corners], 1, atol=0.01)
+    # of a hexagon that three squares make, their centres' triangle and quads leave a seventh of each
+    np.testing.assert_allclose(share[corners], 8 / 7, atol=0.01)
+    assert atlas.areas.sum() == pytest.approx(ball_mesh.area, rel=1e-9)
 
 
 def test_limbs_that_fall_between_the_texels_are_not_covered(animal: Atlas) -> None:

@@ -57,7 +57,7 @@ def test_no_triangle_is_folded_and_every_texel_is_found_where_it_lies(atlas: Atl
 
 
 def test_the_areas_add_up_to_the_surface(atlas: Atlas) -> None:
-    assert atlas.quality()["coverage"] == pytest.approx(1.0, abs=0.01)
+    assert atlas.quality()["coverage"] == pytest.approx(1.0, abs=1e-4)
     assert (atlas.areas > 0).all()
 
 
