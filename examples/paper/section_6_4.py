@@ -53,9 +53,8 @@ def stills(mesh: Path, file: Path) -> Path:
     scene = drop_scene(mesh, bodies=0, up="z" if lies else None)
     material = msgspec.structs.replace(scene.targets[0].material, stiffness=300.0, damping=0.5, density=150.0)
     target = msgspec.structs.replace(scene.targets[0], material=material)
-    near = 0.65 * scene.camera.distance
     camera = msgspec.structs.replace(
-        scene.camera, azimuth=20.0 if lies else 60.0, elevation=-45.0, orbit=0.0, distance=near
+        scene.camera, azimuth=20.0 if lies else 60.0, elevation=-45.0, orbit=0.0, distance=1.1 * scene.camera.distance
     )
     events = Events(poke=(PokeEntry("target", 0.02, (0.5, 0.0, 0.3), 0.25, 0.05),))
     scene = dataclasses.replace(scene, targets=(target,), camera=camera, events=events)
