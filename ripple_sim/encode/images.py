@@ -252,7 +252,7 @@ def _owner(folder: Path) -> str | None:
     """Name of the video that a folder's passes belong to, if it says so."""
     try:
         return json.loads((folder / _CONTENTS).read_text()).get("video")
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError, AttributeError, RecursionError):  # also of brackets in brackets without end
         return None
 
 

@@ -93,7 +93,7 @@ def made_here(path: Path) -> bool:
     """Whether a folder is a store from here, with nothing else in it."""
     try:
         marked = json.loads((path / ".zattrs").read_text()).get("software") == MARK
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError, AttributeError, RecursionError):  # also of brackets in brackets without end
         return False
     return marked and all(
         not each.is_symlink() and (each.is_dir() or each.name in _METADATA or _CHUNK_NAME.fullmatch(each.name))

@@ -276,6 +276,7 @@ def test_unknown_passes_and_foreign_files_are_refused(tmp_path: Path) -> None:
     foreign.write_bytes(b"mine")
     with pytest.raises(VideoError, match="other files"):
         check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=False)
+    foreign.with_name("segmentation.json").write_text("[" * 100_000)
     check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=True)
     foreign.rename(foreign.with_name("thesis.txt"))
     with pytest.raises(VideoError, match=r"thesis\.txt"):

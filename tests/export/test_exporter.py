@@ -56,6 +56,9 @@ def test_folders_of_other_things_are_never_replaced(ripples: Ripples, tmp_path: 
     with pytest.raises(RippleError, match="folder of other things"):
         export(ripples, store, overwrite=True)
     assert (store / "thesis.txt").read_text() == "mine"
+    (store / ".zattrs").write_text("[" * 100_000)
+    with pytest.raises(RippleError, match="folder of other things"):
+        export(ripples, store, overwrite=True)
     shutil.rmtree(store)
     (tmp_path / "run.textures").mkdir()
     (tmp_path / "run.textures" / "texture_0.png").write_text("mine")
