@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from ripple_sim.encode import FrameWriter, check_output, made_here, open_writer
-from ripple_sim.errors import EncodingError, ExportError, VideoError
+from ripple_sim.errors import EncodingError, ExportError, ExportError, VideoError
 from ripple_sim.export import check_export
 from ripple_sim.figures import check_plot_path
 from ripple_sim.solver import AtlasError, RippleError, load_atlas, sphere_atlas
@@ -108,6 +108,18 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
     (tmp_path / "disk" / "real.gif").write_bytes(b"mine")
     with pytest.raises(VideoError, match="--overwrite"):
         write(link)
+
+
+@pytest.mark.parametrize("name", ["run.usda", "run.usdc", "run.csv"])
+def test_an_export_goes_through_no_link_to_another_ending(tmp_path: Path, name: str) -> None:
+    link = tmp_path / name
+    for target in ("nowhere", "run.mp4"):  # USD would write it to a name of the ending's beside, and that was lost
+        link.symlink_to(target)
+        with pytest.raises(ExportError, match=f"is a link to '{target}'; valid is a link to a name that ends in"):
+            check_export(link, True)
+        link.unlink()
+    link.symlink_to(f"real{link.suffix}")
+    check_export(link, True)
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
