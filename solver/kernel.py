@@ -32,7 +32,7 @@ from typing import Any, TypeAlias
 
 import numba
 import numpy as np
-from numba.core import event
+from numba.core import event, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
 from numba.extending import register_jitable
@@ -129,6 +129,8 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     compiled = numba.njit(**options)(function)
     if compiled is not function:  # which it is with NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(function)
+        template = compiled.get_call_template  # a number at a call is of its type: no version of the kernel for each
+        compiled.get_call_template = lambda args, kws: template([types.unliteral(each) for each in args], kws)
     return compiled
 
 
