@@ -306,19 +306,18 @@ class Stencil:
     def _links(self) -> Iterator[tuple[int, _Places, _Places]]:
         """Of the eight links of every texel, the direction, the places where it starts, and its other ends."""
         n = self.topology.shape[1]
-        for link, down, left, up, right in _EIGHT:
-            yield (
-                link,
-                *((_EVERY, slice(1 + r, n + 1 + r), slice(1 + c, n + 1 + c)) for r, c in ((down, left), (up, right))),
-            )
+        for link, *places in _EIGHT:
+            start, end = ((_EVERY, slice(1 + r, n + 1 + r), slice(1 + c, n + 1 + c)) for r, c in places)
+            yield link, start, end
 
 
 _Places: TypeAlias = tuple[slice, slice, slice]
 
-# link, the place from which it starts relative to the texel, and its other end
+# link, the place from which it starts relative to the texel (row, column), and its other end
 _EIGHT = (
-    *((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0)),
-    *((2, 0, 0, 1, 1), (2, -1, -1, -1, -1), (3, -1, 0, -1, 1), (3, 0, -1, 1, -1)),
+    *((EAST, (0, 0), (0, 1)), (EAST, (0, -1), (0, -1)), (NORTH, (0, 0), (1, 0)), (NORTH, (-1, 0), (-1, 0))),
+    *((NORTHEAST, (0, 0), (1, 1)), (NORTHEAST, (-1, -1), (-1, -1))),
+    *((NORTHWEST, (0, -1), (1, -1)), (NORTHWEST, (-1, 0), (-1, 1))),
 )
 
 
