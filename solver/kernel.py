@@ -32,7 +32,7 @@ from typing import Any, TypeAlias
 
 import numba
 import numpy as np
-from numba.core import event, types
+from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
 from numba.extending import register_jitable
@@ -130,7 +130,7 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     if compiled is not function:  # which it is with NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(function)
         template = compiled.get_call_template  # a number at a call is of its type: no version of the kernel for each
-        compiled.get_call_template = lambda args, kws: template([types.unliteral(each) for each in args], kws)
+        compiled.get_call_template = lambda args, kws: template([numba.types.unliteral(each) for each in args], kws)
     return compiled
 
 
