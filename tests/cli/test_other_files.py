@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from ripple_sim.encode import FrameWriter, check_output, made_here, open_writer
-from ripple_sim.errors import EncodingError, ExportError, ExportError, VideoError
+from ripple_sim.errors import EncodingError, ExportError, VideoError
 from ripple_sim.export import check_export
 from ripple_sim.figures import check_plot_path
 from ripple_sim.solver import AtlasError, RippleError, load_atlas, sphere_atlas
