@@ -329,7 +329,7 @@ class GLBackend:
                 drift = dt if step < substeps - 1 else dt / 2
                 self._dispatch.fill_halo(self._h)
                 self._extra.gather(self._h, self._v)
-                if self._held is not None and self._held.follows:
+                if self._held is not None and self._held.follow is not None:
                     self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
@@ -436,7 +436,7 @@ class GLBackend:
     def _keep_volume(self, dt: float) -> None:
         operator = self._operator
         rate = volume_rate(operator, dt) if self.keeps_volume else None
-        if rate is not None or (self._held is not None and self._held.follows):
+        if rate is not None or (self._held is not None and self._held.follow is not None):
             needed = rate is not None or operator.parts is not None
             self._held = Pressure(self._gl, self._fields, operator, self._dispatch, rate) if needed else None
 
