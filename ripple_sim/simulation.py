@@ -17,6 +17,7 @@ from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import SensorEntry, apply_maps, uniform_material
+from ripple_sim.scene.target_maps import rim_of
 from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
 from ripple_sim.solver.kernel import work_clock
 from ripple_sim.solver.waves.sensor import Sensor
@@ -85,7 +86,7 @@ class Simulation:
             {entry.geom: uniform_material(entry) for entry in scene.targets},
             resolution={entry.geom: resolution or entry.resolution for entry in scene.targets},
             layout={entry.geom: layout or entry.layout for entry in scene.targets},
-            rim={entry.geom: rim or entry.rim for entry in scene.targets},
+            rim={entry.geom: rim or rim_of(self.model, entry.geom, entry.rim) for entry in scene.targets},
             backend=backend,
             operator=operator,
             two_way=scene.two_way,

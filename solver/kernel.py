@@ -129,26 +129,23 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     compiled = numba.njit(**options)(function)
     if compiled is not function:  # which it is with NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(function)
+        template = compiled.get_call_template  # a number at a call is of its type: no version of the kernel for each
+        compiled.get_call_template = lambda args, kws: template([numba.types.unliteral(each) for each in args], kws)
     return compiled
 
 
 class _KernelCache(FunctionCache):
     """Compiled versions of one kernel on disk, in place of numba's own cache, which trusts whatever its files hold."""
 
-    class _Reducer(CompileResultCacheImpl):
-        """How numba turns what it has compiled into what can be pickled; it need not know where that is kept."""
-
-        def __init__(self, function: Callable) -> None:
-            self._locator = self
-            self._py_file, self._lineno = function.__code__.co_filename, function.__code__.co_firstlineno
-
-        def ensure_cache_path(self) -> None:
-            """Do nothing: files make their folder."""
-
     def __init__(self, function: Callable) -> None:
-        self._name, self._py_func = repr(function), function
-        self._impl, self._cache_file = self._Reducer(function), self
+        self._name, self._py_func, self._cache_file = repr(function), function, self
+        # how numba turns what it has compiled into what can be pickled; it need not find out where that is kept
+        self._impl = CompileResultCacheImpl.__new__(CompileResultCacheImpl)
+        self._impl._locator = self
         self.enable()
+
+    def ensure_cache_path(self) -> None:
+        """Do nothing: files make their folder."""
 
     @property
     def cache_path(self) -> str:

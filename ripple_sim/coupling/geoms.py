@@ -262,6 +262,15 @@ def for_each(model: mujoco.MjModel, names: Iterable[str], what: str, value: Valu
     return {name: given[name] for name in names}
 
 
+def to_body(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points [..., 3] [m] of a target's atlas in the frame of the geom's body; soft targets are in the world."""
+    if is_soft(model, geom):
+        return points
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+    return points @ rotation.reshape(3, 3).T + model.geom_pos[geom]
+
+
 def integrator_warning(model: mujoco.MjModel) -> str | None:
     """What to warn of where the integrator's forces are not those that MuJoCo reports, else None."""
     if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:

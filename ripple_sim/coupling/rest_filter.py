@@ -165,7 +165,7 @@ class RestFilter:
 def _filter(
     states: np.ndarray, texels: Ints, shares: Floats, present: TexelForces, dt: float, slots: Ints,
     under: Ints, mean: Floats, given: Floats,
-) -> tuple[np.int64, bool]:  # fmt: skip
+) -> tuple[int, bool]:  # fmt: skip
     """Fill in the texels under the geoms; how many there are, and whether all geoms have left.
 
     Parameters
@@ -183,7 +183,7 @@ def _filter(
         Texels under the geoms, their new mean shares, and the forces on them [N].
     """
     at, forces = present.texels, present.forces
-    end, row, over = np.int64(0), 0, True  # no literal, for which `_faded` would be compiled again
+    end, row, over = 0, 0, True
     for geom in range(len(states)):
         state, begin, force, first, last = states[geom], end, 0.0, 0, 0
         if row < len(present.geoms) and present.geoms[row] == geom:

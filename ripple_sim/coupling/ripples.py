@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Material
 from ripple_sim.solver.errors import checked, whole
+from ripple_sim.solver.operator.plate_rim import Rim
 
 from .energy import Energy, body_energy
 from .geoms import (
@@ -70,8 +71,9 @@ class Ripples(Targets):
         target and by the time step, see `suited_resolution`.
     layout : str or mapping
         How surfaces get their charts: "auto", "cube" or "patches", for all targets or by geom; see `build_atlas`.
-    rim : str or mapping
-        "free", "supported", "clamped" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
+    rim : str, callable or mapping
+        "free", "supported", "clamped" or "fixed" rims of open surfaces, or a function of their points in the geom's
+        frame, likewise; see `WaveSolver`.
     two_way : bool
         Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
         Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects
@@ -111,7 +113,7 @@ class Ripples(Targets):
         *,
         resolution: int | ByGeom[int | None] | None = None,
         layout: str | ByGeom[str] = "auto",
-        rim: str | ByGeom[str] = "free",
+        rim: Rim | ByGeom[Rim] = "free",
         two_way: bool = False,
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
         high_pass: bool | ByGeom[bool] = False,

@@ -108,16 +108,10 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
         stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(coupled.model))
     else:
         stiffness = float(np.min(material.stiffness))
-    density = _density_under(_burden(coupled, geom, extent), extent, speed, stiffness)
+    density = _density_under(coupled, geom, extent, speed, stiffness)
     if density == 0:
         density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
-    suited = {
-        "speed": speed,
-        "damping": damping_for(_DECAY),
-        "stiffness": stiffness,
-        "density": float(np.clip(density, 1e-12, 1e12)),
-    }
-    return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
+    return _filled_in(material, speed, stiffness, density)
 
 
 def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
@@ -131,9 +125,8 @@ def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: 
     speed, bending, stiffness, limit = (
         float(np.min(getattr(material, name))) for name in ("speed", "bending", "stiffness", "yield_height")
     )
-    burden, longest = _burden(coupled, geom, extent), _LONGEST / extent.size
-    burden = burden._replace(rest_depth=min(burden.rest_depth, limit), hit_depth=min(burden.hit_depth, limit))
-    return min(_density_under(burden, extent, float(np.hypot(speed, longest * bending**0.5)), stiffness), 1e12)
+    speed = float(np.hypot(speed, _LONGEST / extent.size * bending**0.5))
+    return min(_density_under(coupled, geom, extent, speed, stiffness, limit), 1e12)
 
 
 def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, material: Material) -> Material:
@@ -141,50 +134,40 @@ def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, mat
     if not material.unset:
         return material
     speed = _speed(model, extent)
+    return _filled_in(
+        material, speed, min(narrow_stiffness(extent.size, speed), _stiffest(model)), _density(mass, extent)
+    )
+
+
+def _filled_in(material: Material, speed: float, stiffness: float, density: float) -> Material:
+    """A material with these where it has no parameters of its own."""
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
-        "stiffness": min(narrow_stiffness(extent.size, speed), _stiffest(model)),
-        "density": float(np.clip(_density(mass, extent), 1e-12, 1e12)),
+        "stiffness": stiffness,
+        "density": float(np.clip(density, 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
 
-class _Burden(NamedTuple):
-    """What a target has to bear: a weight at rest [N] and a hit [N s] in a time [s], both on a footprint radius [m].
+def _density_under(
+    coupled: CoupledModel, geom: int, extent: Extent, speed: float, stiffness: float, limit: float = np.inf
+) -> float:
+    """The least with which a target bears a weight at rest and a hit; 0 where there is nothing to bear.
 
-    And how deep they may dent it [m].
+    Neither dents it deeper than the limit [m].
     """
-
-    weight: float
-    impulse: float
-    duration: float
-    radius: float
-    rest_depth: float
-    hit_depth: float
-
-
-def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
     model = coupled.model
     mass, footprint = heaviest(coupled, geom)
-    fall = _fall(model, max(extent.size, _height(coupled, geom)))
-    return _Burden(
-        weight=_resting(coupled, geom) * float(np.linalg.norm(model.opt.gravity)),
-        impulse=BOUNCE * mass * fall,
-        duration=max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep),
-        radius=max(footprint, FOOTPRINT * extent.size),
-        rest_depth=_REST * extent.radius,
-        hit_depth=_HIT * extent.radius,
-    )
-
-
-def _density_under(burden: _Burden, extent: Extent, speed: float, stiffness: float) -> float:
-    """The least with which the surface bears it; 0 where there is nothing to bear."""
+    weight = _resting(coupled, geom) * float(np.linalg.norm(model.opt.gravity))
+    impulse = BOUNCE * mass * _fall(model, max(extent.size, _height(coupled, geom)))
+    duration = max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep)
     # the whole target gives way no further than its longest wave
-    of = {"radius": burden.radius, "speed": speed, "stiffness": max(stiffness, (_LONGEST * speed / extent.size) ** 2)}
+    stiffness = max(stiffness, (_LONGEST * speed / extent.size) ** 2)
+    of = {"radius": max(footprint, FOOTPRINT * extent.size), "speed": speed, "stiffness": stiffness}
     return max(
-        density_under(burden.weight, burden.rest_depth, **of),
-        density_after(burden.impulse, burden.hit_depth, duration=burden.duration, **of),
+        density_under(weight, min(_REST * extent.radius, limit), **of),
+        density_after(impulse, min(_HIT * extent.radius, limit), duration=duration, **of),
     )
 
 

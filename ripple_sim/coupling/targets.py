@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.assembly import hold
+from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
 
@@ -109,7 +110,7 @@ class Targets:
         materials: ByGeom[Material],
         resolution: int | ByGeom[int | None] | None,
         layout: str | ByGeom[str],
-        rim: str | ByGeom[str],
+        rim: Rim | ByGeom[Rim],
         options: Mapping[str, Any],
     ) -> None:
         named = checked_materials(model, materials)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self, Unpack
+from typing import Self
 
 import mujoco
 
@@ -24,8 +24,8 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
 from ripple_sim.video.settings import frame_count, origin
 
-from .options import WRITE_OPTIONS, ExportOptions, WriteOptions
-from .place import Unfinished, check_export, check_options, check_write_options
+from .options import MOST_TRIANGLES, ExportOptions
+from .place import Unfinished, check_export, check_options, check_written
 from .source import Chunking, Source
 
 
@@ -50,13 +50,18 @@ class Exporter:
         Geom, by its name or id, to the look of its surface, one of `LOOKS`; rubber by default, see `RippleRenderer`.
     lighting : str
         "model", "studio" or "auto", see `Renderer`.
-    **options
-        `tessellation` (str, "refined"): surfaces with triangles as fine as their texels, or "own", the object's own;
-        `triangles` (int, 100,000): about how many a refined surface may have; `size` (width, height): of the frames
-        that the camera is meant for [pixels]; `limit` (bool, True): whether heights that are too large for the object
-        are written smaller, see `DisplacementLimit`; `chunk` (int, none): frames in each of the files of a long USD
-        run, which lie in a folder NAME.chunks beside it; `overwrite` (bool, False): replace a file that ripple-sim has
-        not made.
+    tessellation : str
+        "refined": surfaces with triangles as fine as their texels, or "own": the object's own.
+    triangles : int
+        About how many a refined surface may have.
+    size : (width, height)
+        Of the frames that the camera is meant for [pixels].
+    limit : bool
+        Whether heights that are too large for the object are written smaller, see `DisplacementLimit`.
+    chunk : int, optional
+        Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside it.
+    overwrite : bool
+        Replace a file that ripple-sim has not made.
 
     Raises
     ------
@@ -84,13 +89,17 @@ class Exporter:
         camera: str | CameraEntry | None = None,
         looks: ByGeom[str] | None = None,
         lighting: str = "auto",
-        **options: Unpack[WriteOptions],
+        tessellation: str = "refined",
+        triangles: int = MOST_TRIANGLES,
+        size: tuple[int, int] = (1280, 720),
+        limit: bool = True,
+        chunk: int | None = None,
+        overwrite: bool = False,
     ) -> None:
-        written = WRITE_OPTIONS | options
         model = own_model(model)
         check_targets(model, ripples.model, ripples.geom_ids)
         named = by_name(model, looks or {}, "looks")
-        check_write_options(written)
+        check_written(size, tessellation, triangles, chunk)
         for look in named.values():
             find_look(look)
         source = Source(
@@ -98,15 +107,15 @@ class Exporter:
             ripples=ripples,
             fps=fps,
             camera=camera_entry(model, camera),
-            size=written["size"],
+            size=size,
             lighting=lighting,
             paints={name: paint_of(model, geom, named.get(name)) for name, geom in ripples.geom_ids.items()},
-            limited=dict.fromkeys(ripples, written["limit"]),
-            tessellation=written["tessellation"],
-            triangles=written["triangles"],
-            chunking=None if written["chunk"] is None else Chunking(written["chunk"], Path(output)),
+            limited=dict.fromkeys(ripples, limit),
+            tessellation=tessellation,
+            triangles=triangles,
+            chunking=None if chunk is None else Chunking(chunk, Path(output)),
         )
-        self._begin(source, output, written["overwrite"])
+        self._begin(source, output, overwrite)
 
     @classmethod
     def of(cls, source: Source, output: str | Path, overwrite: bool = False) -> Self:

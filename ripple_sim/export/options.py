@@ -6,7 +6,7 @@ It imports nothing heavy, so that the help of a command comes at once; `place` c
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal, TypedDict
+from typing import Literal
 
 from ripple_sim.errors import ExportError
 from ripple_sim.solver.errors import check_fields, whole
@@ -61,24 +61,3 @@ class ExportOptions:
     def rate(self) -> float:
         """Frames in a second of the scene's time."""
         return self.fps * self.slow_motion
-
-
-class WriteOptions(TypedDict, total=False):
-    """Options of an export in anybody's own loop; see `Exporter`."""
-
-    tessellation: str
-    triangles: int
-    size: tuple[int, int]
-    limit: bool
-    chunk: int | None
-    overwrite: bool
-
-
-WRITE_OPTIONS: WriteOptions = {
-    "tessellation": "refined",
-    "triangles": MOST_TRIANGLES,
-    "size": (1280, 720),
-    "limit": True,
-    "chunk": None,
-    "overwrite": False,
-}

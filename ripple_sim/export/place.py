@@ -19,7 +19,7 @@ from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import NO_NAME, final_path
 
-from .options import TESSELLATIONS, WRITE_OPTIONS, ExportOptions, WriteOptions
+from .options import TESSELLATIONS, ExportOptions
 from .source import Source, Writer
 
 Recognised = Callable[[Path], bool]
@@ -174,17 +174,12 @@ def check_options(options: ExportOptions) -> None:
         raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
     if options.resume and options.chunk is None:
         raise ExportError("only an export in chunks can be resumed; add --chunk, or leave --resume out")
-    shared = WriteOptions(size=options.size, tessellation=options.tessellation, triangles=options.triangles)
-    check_write_options(shared | {"chunk": options.chunk})
+    check_written(options.size, options.tessellation, options.triangles, options.chunk)
 
 
-def check_write_options(options: WriteOptions) -> None:
-    """Make sure that there are such options, and that their values are possible; raises `RippleError`."""
-    if unknown := [name for name in options if name not in WRITE_OPTIONS]:
-        raise ExportError(f"there is no option {unknown[0]!r}; valid are {', '.join(WRITE_OPTIONS)}")
-    given = WRITE_OPTIONS | options
-    check_size(*given["size"])
-    triangles, tessellation, chunk = given["triangles"], given["tessellation"], given["chunk"]
+def check_written(size: tuple[int, int], tessellation: str, triangles: int, chunk: int | None) -> None:
+    """Make sure that options of an export in anybody's own loop are possible; raises `RippleError`."""
+    check_size(*size)
     if not isinstance(triangles, int) or not 1 <= triangles <= LARGEST_MESH:
         raise ExportError(f"there shall be {shown(triangles)} triangles; valid is a whole number, 1 to {LARGEST_MESH}")
     if chunk is not None and (not isinstance(chunk, int) or chunk < 1):

@@ -124,7 +124,7 @@ COLUMNS = 512  # of a trace
 MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
 
 
-def curve(values: Sequence[float], frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def curve(values: NDArray[np.float64], frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Frame numbers and values of a curve of a value a frame so far, of so many frames in all.
 
     It has at most `MOST_POINTS`: of several frames the largest value is kept.
@@ -265,7 +265,7 @@ class Notebook:
         self._heatmap_limit = Limit(self._least_limit(), request.limit, _MEMORY)
         self._mark_limit, self._energy_limit = Limit(), Limit()
         self._marks = [ContactMarks(simulation, self._dt) for simulation in simulations]
-        self._frames, self._energies = frames, [list[float]() for _ in simulations]
+        self._energies, self._followed = np.zeros((len(simulations), frames)), 0
 
     def follow(self) -> Notes:
         """Take in the simulations' present frame. Call it for every frame, rendered or not."""
@@ -273,10 +273,11 @@ class Notebook:
         heatmaps = [self._heatmaps(each.ripples, request.heatmap) for each in self._simulations if request.heatmap]
         marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []
         ledgers = [simulation.energy for simulation in self._simulations] if request.energy else []
-        for energies, ledger in zip(self._energies, ledgers, strict=False):
-            energies.append(ledger.waves)
+        if ledgers:
+            self._energies[:, self._followed] = [ledger.waves for ledger in ledgers]
+            self._followed += 1
         magnitudes = [magnitude(heatmap) for run in heatmaps for heatmap in run.values()]
-        curves = [curve(energies, self._frames) for energies in self._energies]
+        curves = [curve(energies[: self._followed], len(energies)) for energies in self._energies]
         return Notes(
             time=float(self._simulations[0].data.time),
             heatmaps=heatmaps,

@@ -35,6 +35,7 @@ from .events import DropEntry, Events, Script, ThrowEntry
 from .material_entry import PresetEntry, given_fields
 from .scene import Scene, check_duration, parse_request, read_toml, scene_path
 from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
+from .target_maps import check_rim
 
 
 def check_scene(scene: Scene) -> None:
@@ -94,12 +95,12 @@ def _check_sensors(scene: Scene) -> None:
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     from ripple_sim.render import LOOKS
-    from ripple_sim.solver.operator.plate_rim import RIMS
 
     find_target(model, entry.geom)
-    for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):
+    for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS)):
         if name not in valid:
             raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
+    check_rim(entry.rim)
     if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
         raise SceneError(f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)")
     entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)

@@ -113,8 +113,10 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     """Texels along the edge of a chart; by default chosen by the model, see `suited_resolution`."""
     layout: str = "auto"
     """How the surface gets its charts, see `build_atlas`."""
-    rim: str = "free"
-    """Rims of an open surface: waves come back upright from a free one, inverted from one that is held."""
+    rim: str | dict[str, str] = "free"
+    """Rims of an open surface: waves come back upright from a free one, inverted from one that is held. By region, a
+    table such as `rim = {clamped = "x < -0.24"}`: conditions as in `ripple.height`, of which the first that holds
+    counts; the rest is free."""
     look: str = "rubber"
     """What the surface looks made of; `model` as the MJCF's material says."""
     color: Color | None = None

@@ -1,8 +1,8 @@
 """What a scene file says of a target texel by texel, beside its material.
 
 `[ripple.height]` is the shape of the surface at the beginning, also as an expression of position such as
-"0.02 * exp(-(x**2 + y**2) / 0.1**2)"; `[[ripple.inside]]` is what lies under a layer, as a bone under the skin, and so
-how thick the layer is.
+"0.02 * exp(-(x**2 + y**2) / 0.1**2)"; `rim` may be by region, where such expressions hold; `[[ripple.inside]]` is what
+lies under a layer, as a bone under the skin, and so how thick the layer is.
 """
 
 from __future__ import annotations
@@ -15,14 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.geoms import find_target, to_body
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, texture_map
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.volume import is_volume
+from ripple_sim.solver.operator.plate_rim import RIMS, Rim
 
 # name: function and how many arguments it takes
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
@@ -141,17 +144,11 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
         """
         atlas = ripples[geom].atlas
         if self.expression is not None:
-            return evaluate(self.expression, dict(zip("xyz", _places(ripples, geom), strict=True)))
+            places = to_body(ripples.model, find_target(ripples.model, geom), atlas.positions)
+            return evaluate(self.expression, dict(zip("xyz", np.moveaxis(places, -1, 0), strict=True)))
         if self.map is not None:
             return texture_map(atlas, self.map, self.low, self.high, self.channel)
         return _saved(self.field or "", atlas)
-
-
-def _places(ripples: Ripples, geom: str) -> NDArray[np.float64]:
-    """Positions of the texels in the frame of the geom's body [m], [3, C, n, n]."""
-    origin = ripples.to_geom(geom, np.zeros(3))
-    axes = ripples.to_geom(geom, np.eye(3)) - origin  # of the body, as rows
-    return np.moveaxis((ripples[geom].atlas.positions - origin) @ axes.T, -1, 0)
 
 
 def _saved(path: str, atlas: Atlas) -> NDArray[np.float64]:
@@ -165,6 +162,43 @@ def _saved(path: str, atlas: Atlas) -> NDArray[np.float64]:
     if not np.isfinite(field).all():
         raise SceneError(f"saved field {path!r} has heights that are not finite")
     return field.astype(np.float64)
+
+
+def check_rim(rim: str | dict[str, str]) -> None:
+    """Raise `SceneError` unless `rim` of a target is a name, or a table of conditions by name."""
+    for name in (rim,) if isinstance(rim, str) else rim:
+        valid = RIMS if isinstance(rim, str) else RIMS[:3]
+        if name not in valid:
+            raise SceneError(f"rim {name!r} does not exist; valid are {', '.join(valid)}")
+    for where in () if isinstance(rim, str) else rim.values():
+        evaluate(where, dict.fromkeys("xyz", np.ones(0)))
+
+
+def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
+    """What the rims of a target do, as `Ripples` takes it: a name, or a function of the rims' points.
+
+    That function raises `SceneError` for a closed surface, and for a condition that holds nowhere on the rims.
+    """
+    if isinstance(rim, str):
+        return rim
+
+    def conditions(points: NDArray[np.float64]) -> NDArray[np.str_]:
+        if not len(points):
+            raise SceneError(f"rim of geom {geom!r} names regions, and it has no rim: it is closed; leave rim out")
+        places = to_body(model, find_target(model, geom), points).T
+        found = np.full(len(points), "free", dtype="<U9")
+        for name, where in reversed(rim.items()):
+            there = evaluate(where, dict(zip("xyz", places, strict=True))) != 0
+            if not there.any():
+                low, high = ([round(float(end(axis)), 4) for axis in places] for end in (np.min, np.max))
+                raise SceneError(
+                    f"rim {name!r} of geom {geom!r} is where {where!r}, which holds nowhere on its rims; they lie from "
+                    f"{low} to {high} m in the frame of its body"
+                )
+            found[there] = name
+        return found
+
+    return conditions
 
 
 Array = NDArray[np.float64]

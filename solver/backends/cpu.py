@@ -195,7 +195,7 @@ class CPUBackend:
         self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
         self._crests: NDArray[np.float32] | None = None
-        self._probes = kernels.NO_PROBES
+        self._probes: kernels.Probes | None = None
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
@@ -269,7 +269,7 @@ class CPUBackend:
         self._add_shift()
         features = self._features
         drags = self._plain and len(features.viscosity.rows) > 0
-        self._sums = np.zeros((substeps, len(self._probes.heights)), np.float32)
+        self._sums = np.zeros((substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32)
         kernels.advance(
             substeps,
             np.float32(dt),
@@ -290,8 +290,7 @@ class CPUBackend:
 
     def probe(self, probes: kernels.Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
-        probes = kernels.NO_PROBES if probes is None else probes
-        self._probes = probes._replace(texels=self._fields.addresses[probes.texels])
+        self._probes = probes and probes._replace(texels=self._fields.addresses[probes.texels])
 
     def probed(self) -> NDArray[np.float32]:
         """The sums of the latest `advance`, [substeps, k]."""

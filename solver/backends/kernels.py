@@ -211,9 +211,6 @@ class Probes(NamedTuple):
         return np.where(self.heights, *both)
 
 
-NO_PROBES = Probes(np.zeros(1, np.int64), _NO_INTS, _NO_FLOATS, np.zeros(0, np.bool_))
-
-
 @kernel(no_cpython_wrapper=True)
 def _probe(probes: Probes, h: Floats32, v: Floats32, dent: Floats32, drifted: np.float32, sums: Floats32) -> None:
     """Fill in the sums [k] of a substep, whose heights have drifted beyond its velocities [s]."""
@@ -298,7 +295,7 @@ def advance(
     kicks: Floats32,
     viscosity: Weights | None,
     features: Features | None,
-    probes: Probes,
+    probes: Probes | None,
     dent: Floats32,
     sums: Floats32,
 ) -> None:
@@ -306,7 +303,7 @@ def advance(
 
     The height ends in `h_next` where their number is odd.
 
-    `sums` [substeps, k] are filled with those of the probes, often none; `dent` is what stays of the height, or empty.
+    `sums` [substeps, k] are filled with those of the probes; `dent` is what stays of the height, or empty.
 
     What is None is compiled away: `features` where a material has no more than viscosity, which then is `viscosity`.
     """
@@ -328,7 +325,7 @@ def advance(
         for i in range(len(addresses)):
             v[addresses[i]] += kicks[i]
             h[addresses[i]] += drifted * kicks[i]
-        if len(probes.heights):
+        if probes is not None:
             _probe(probes, h, v, dent, drifted - half, sums[step])
         if features is not None and len(features.dent):
             flow(h, features.limit, features.dent)

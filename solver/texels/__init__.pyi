@@ -48,7 +48,6 @@ from .stencil import (
     IrregularLinks as IrregularLinks,
     Stencil as Stencil,
     crossing_links as crossing_links,
-    gather_links as gather_links,
     largest_eigenvalue as largest_eigenvalue,
     link_exists as link_exists,
     link_lengths as link_lengths,

@@ -230,12 +230,14 @@ def clip(corners: Floats, count: int, ox: float, oy: float, nx: float, ny: float
         a = nx * (corners[i, 0] - ox) + ny * (corners[i, 1] - oy)
         b = nx * (corners[j, 0] - ox) + ny * (corners[j, 1] - oy)
         if a >= 0.0:
-            result[kept] = corners[i]
+            for k in range(corners.shape[1]):  # slices would take ten times as long to compile
+                result[kept, k] = corners[i, k]
             kept += 1
         if (a > 0.0 and b < 0.0) or (a < 0.0 and b > 0.0):
             # from the same end for both triangles at an edge
             t = a / (a - b)
-            result[kept] = (1.0 - t) * corners[i] + t * corners[j]
+            for k in range(corners.shape[1]):
+                result[kept, k] = (1.0 - t) * corners[i, k] + t * corners[j, k]
             if axis >= 0:
                 result[kept, axis] = oy if axis else ox
             kept += 1
@@ -260,51 +262,52 @@ def texel_areas(mesh: Mesh, parts: Parts, corners: Floats, lines: Floats, charts
     triangle, barycentrics, chart = parts
     # barycentrics over w are linear in x and y
     polygons, n = np.concatenate([corners[..., :2], barycentrics], axis=2) / corners[..., 2:], len(lines) - 1
+    low, high = polygons[..., :2].min(axis=1), polygons[..., :2].max(axis=1)
+    first = np.searchsorted(lines, low, side="right").clip(1, n) - 1
+    last = np.maximum(np.searchsorted(lines, high, side="left").clip(1, n) - 1, first)
     areas = np.zeros((charts, n, n))
-    _add_areas(polygons, mesh.triangle_areas[triangle], chart.astype(np.int64), lines, areas)
+    _add_areas(polygons, mesh.triangle_areas[triangle], chart.astype(np.int64), first, last, lines, areas)
     return areas
 
 
 @kernel
-def _add_areas(polygons: Floats, triangles: Floats, chart: Ints, lines: Floats, areas: Floats) -> None:
-    """Cut parts [p, 3, 5] of triangles of given areas [p] along lines, and add each cell's to that of its texel."""
-    strip, cell = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
-    right, above = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
-    spare = np.empty((MOST_CORNERS, 5))
+def _add_areas(
+    polygons: Floats, triangles: Floats, chart: Ints, first: Ints, last: Ints, lines: Floats, areas: Floats
+) -> None:
+    """Cut parts [p, 3, 5] of triangles of given areas [p] along lines, and add each cell's to that of its texel.
+
+    The first and last column and row of texels [p, 2] are those into which each reaches.
+    """
+    rest, strip = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
+    cell, spare = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
     for p in range(len(chart)):
-        right[:3] = polygons[p]
-        begin, end = _reach(right, 3, 0, lines)
         wide = 3
-        for i in range(begin, end + 1):
+        for k in range(wide):
+            for m in range(5):
+                rest[k, m] = polygons[p, k, m]
+        for i in range(first[p, 0], last[p, 0] + 1):
             high = wide
-            if i == end:
-                above[:wide] = right[:wide]
+            if i == last[p, 0]:
+                rest, strip = strip, rest
             else:
-                high = clip(right, wide, lines[i + 1], 0.0, -1.0, 0.0, 0, above)
-                wide = clip(right, wide, lines[i + 1], 0.0, 1.0, 0.0, 0, spare)
-                right, spare = spare, right
+                high = clip(rest, wide, lines[i + 1], 0.0, -1.0, 0.0, 0, strip)
+                wide = clip(rest, wide, lines[i + 1], 0.0, 1.0, 0.0, 0, spare)
+                rest, spare = spare, rest
             if high < 3:
                 continue
-            first, last = _reach(above, high, 1, lines)
-            for j in range(first, last + 1):
-                if j == last:
-                    areas[chart[p], j, i] += triangles[p] * _share(above, high)
+            bottom = top = strip[0, 1]
+            for k in range(1, high):
+                bottom, top = min(bottom, strip[k, 1]), max(top, strip[k, 1])
+            for j in range(first[p, 1], last[p, 1] + 1):
+                if j < last[p, 1] and lines[j + 1] <= bottom:
+                    continue
+                if j == last[p, 1] or lines[j + 1] >= top:
+                    areas[chart[p], j, i] += triangles[p] * _share(strip, high)
                     break
-                corners = clip(above, high, 0.0, lines[j + 1], 0.0, -1.0, 1, cell)
-                high = clip(above, high, 0.0, lines[j + 1], 0.0, 1.0, 1, strip)
-                above, strip = strip, above
+                corners = clip(strip, high, 0.0, lines[j + 1], 0.0, -1.0, 1, cell)
+                high = clip(strip, high, 0.0, lines[j + 1], 0.0, 1.0, 1, spare)
+                strip, spare = spare, strip
                 areas[chart[p], j, i] += triangles[p] * _share(cell, corners)
-
-
-@kernel
-def _reach(corners: Floats, count: int, axis: int, lines: Floats) -> tuple[int, int]:
-    """First and last cell between lines into which a polygon reaches along an axis."""
-    low = high = corners[0, axis]
-    for i in range(1, count):
-        low, high = min(low, corners[i, axis]), max(high, corners[i, axis])
-    first, last = np.searchsorted(lines, low, side="right") - 1, np.searchsorted(lines, high, side="left") - 1
-    first = min(max(first, 0), len(lines) - 2)
-    return first, min(max(last, first), len(lines) - 2)
 
 
 @kernel

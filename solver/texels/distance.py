@@ -174,11 +174,11 @@ def march(halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scra
 
 
 @kernel
-def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints) -> np.int64:
+def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints) -> int:
     """Touch the nine texels round the one nearest to a point, at their straight distances from it; return how many."""
     n = halo.shape[1] - 2
     chart, row, column = center // (n * n), center // n % n, center % n
-    seeds = np.int64(0)  # whoever is called with a number's literal is compiled for that too
+    seeds = 0
     for i in range(3):
         for j in range(3):
             t = halo[chart, row + i, column + j]

@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import coo_array, csr_array
 
-from ..kernel import Floats, Ints, kernel
+from ..kernel import Floats, Ints
 from .topology import TexelTopology
 
 
@@ -66,17 +66,6 @@ class IrregularLinks(NamedTuple):
 
 
 NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
-
-
-@kernel
-def gather_links(links: IrregularLinks, field: Floats, out: Floats) -> None:
-    """Add the sum over the links of weight (h_j - h_i) to a flat field."""
-    for i in range(len(links.texels)):
-        t = links.texels[i]
-        total = 0.0
-        for k in range(links.begins[i], links.begins[i + 1]):
-            total += links.weights[k] * (field[links.others[k]] - field[t])
-        out[t] += total
 
 
 EAST, NORTH, NORTHEAST, NORTHWEST = range(4)
@@ -276,10 +265,14 @@ class Stencil:
 
     def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
-        result = np.empty(self.topology.shape)
-        _gather(self.weights, self.topology.with_boundary(field), result)
-        if self.irregular is not None:
-            gather_links(self.irregular, field.reshape(-1), result.reshape(-1))
+        around, result = self.topology.with_boundary(field), np.zeros(self.topology.shape)
+        for link, start, end in self._links():
+            result += self.weights[:, link][start] * (around[end] - field)
+        links, h = self.irregular, field.reshape(-1)
+        if links is not None:
+            row = np.repeat(np.arange(len(links.texels)), np.diff(links.begins))
+            forces = links.weights * (h[links.others] - h[links.texels[row]])
+            result.reshape(-1)[links.texels] += np.bincount(row, forces)
         return result
 
     def scaled(self, factor: float) -> Stencil:
@@ -294,9 +287,9 @@ class Stencil:
 
         Twice that is Gershgorin's bound: the other end of a link to a rim does not move.
         """
-        n, sums = self.topology.shape[1], np.zeros(self.topology.shape)
-        for link, down, left, _, _ in (*_SIDES, *_DIAGONALS):
-            sums += np.abs(self.weights[:, link, 1 + down : n + 1 + down, 1 + left : n + 1 + left])
+        sums = np.zeros(self.topology.shape)
+        for link, start, _ in self._links():
+            sums += np.abs(self.weights[:, link][start])
         if self.topology.fixed_rim:
             texels, ties = rim_ties(self.topology)
             np.subtract.at(sums.reshape(-1), texels, np.abs(self.weights.reshape(-1)[ties]) / 2)
@@ -310,24 +303,22 @@ class Stencil:
         """Gershgorin's bound of the largest eigenvalue over a lumped mass [C, n, n]."""
         return float((self.absolute_sums() * 2 / mass).max())
 
+    def _links(self) -> Iterator[tuple[int, _Places, _Places]]:
+        """Of the eight links of every texel, the direction, the places where it starts, and its other ends."""
+        n = self.topology.shape[1]
+        for link, *places in _EIGHT:
+            start, end = ((_EVERY, slice(1 + r, n + 1 + r), slice(1 + c, n + 1 + c)) for r, c in places)
+            yield link, start, end
 
-# link, the place from which it starts relative to the texel, and its other end
-_SIDES = ((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0))
-_DIAGONALS = ((2, 0, 0, 1, 1), (2, -1, -1, -1, -1), (3, -1, 0, -1, 1), (3, 0, -1, 1, -1))
 
+_Places: TypeAlias = tuple[slice, slice, slice]
 
-@kernel
-def _gather(w: Floats, h: Floats, out: Floats) -> None:
-    """Sum of weight (h_j - h_i) over the stencil; h has a halo."""
-    n = out.shape[1]
-    for chart in range(len(out)):
-        for r in range(1, n + 1):
-            for c in range(1, n + 1):
-                total = 0.0
-                for links in (_SIDES, _DIAGONALS):
-                    for link, i, j, dr, dc in links:
-                        total += w[chart, link, r + i, c + j] * (h[chart, r + dr, c + dc] - h[chart, r, c])
-                out[chart, r - 1, c - 1] = total
+# link, the place from which it starts relative to the texel (row, column), and its other end
+_EIGHT = (
+    *((EAST, (0, 0), (0, 1)), (EAST, (0, -1), (0, -1)), (NORTH, (0, 0), (1, 0)), (NORTH, (-1, 0), (-1, 0))),
+    *((NORTHEAST, (0, 0), (1, 1)), (NORTHEAST, (-1, -1), (-1, -1))),
+    *((NORTHWEST, (0, -1), (1, -1)), (NORTHWEST, (-1, 0), (-1, 1))),
+)
 
 
 def stiffness_matrix(stencil: Stencil) -> csr_array:

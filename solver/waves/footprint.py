@@ -112,7 +112,7 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance
     """
     halo, positions, normals = grid.halo, grid.positions, grid.normals
     n = halo.shape[1] - 2
-    count, done = np.int64(1), 0
+    count, done = 1, 0
     texels[0], distance[center] = center, distance_to(positions, center, point)
     while done < count:
         t = texels[done]
@@ -134,7 +134,7 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance
                     distance[a] = distance_to(positions, a, point)
                     texels[count] = a
                     count += 1
-    return int(count)
+    return count
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

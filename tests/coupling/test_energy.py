@@ -90,8 +90,8 @@ def test_a_ball_gives_its_energy_to_waves_without_damping() -> None:
     energy = ripples.energy(data)
     paid = 0.5 * GRAVITY * 0.24
     assert energy.waves > 0.01 * paid
-    assert energy.total < before + 2e-6 * energy.waves  # which are in single precision
-    assert energy.total == pytest.approx(before, abs=0.1 * paid)
+    # nothing is gained or lost but by the waves' single precision, whose sign is chance
+    assert energy.total == pytest.approx(before, abs=2e-6 * energy.waves)
 
 
 def test_ledger_of_a_free_fall_is_exact() -> None:

@@ -7,6 +7,7 @@ take the arithmetic that they promise, and nothing of Python beside it.
 from pathlib import Path
 
 import msgspec
+import mujoco
 import numpy as np
 import pytest
 import trimesh
@@ -16,6 +17,7 @@ from ripple_sim import RippleError
 from ripple_sim.errors import SceneError
 from ripple_sim.scene import InsideEntry, evaluate, load_inside, load_scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.operator import STIFF
 
 RADIUS, CORE, SHIFT = 0.5, 0.3, 0.08  # m; the core is shifted towards the body's x
@@ -252,3 +254,60 @@ def test_senseless_shapes_are_refused(tmp_path: Path, height: str, message: str)
     np.save(tmp_path / "endless.npy", np.full((6, 8, 8), np.nan))
     with pytest.raises(RippleError, match=message):
         simulated(tmp_path, height)
+
+
+def plate(folder: Path, rim: str) -> Simulation:
+    """A steel plate of 1 x 0.4 m that lies along the y axis of its body, at rest."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.2, 4)))
+    corner = (np.arange(3)[:, None] * 6 + np.arange(5)).ravel()
+    F = np.concatenate([corner[:, None] + [0, 1, 7], corner[:, None] + [0, 7, 6]])
+    trimesh.Trimesh(np.stack([x, y, 0 * x], axis=1), F, process=False).export(folder / "plate.obj")
+    (folder / "plate.xml").write_text(
+        """<mujoco><compiler balanceinertia="true"/><asset><mesh name="plate" file="plate.obj" inertia="shell"/></asset>
+        <worldbody><body>
+        <geom name="plate" type="mesh" mesh="plate" pos="0 2 0" euler="0 0 90" contype="0"
+        conaffinity="0"/></body></worldbody></mujoco>"""
+    )
+    (folder / "plate.toml").write_text(
+        f'model = "plate.xml"\n[[ripple]]\ngeom = "plate"\nresolution = 12\nrim = {rim}\nmaterial.preset = "plate"\n'
+    )
+    return Simulation(load_scene(folder / "plate.toml"), backend="cpu")
+
+
+def test_rims_are_what_they_are_said_to_be_where_the_conditions_hold(tmp_path: Path) -> None:
+    running = plate(tmp_path, '{clamped = "y < 1.51", supported = "where(y > 2.49, 1, y < 1.6)"}')
+    waves, data = running.ripples["plate"], running.data
+    mujoco.mj_forward(running.model, data)
+    geom = running.model.geom("plate").id
+
+    def conditions(points: np.ndarray) -> np.ndarray:
+        y = (points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[:, 1]  # its body is at the origin
+        return np.select([y < 1.51, (y > 2.49) | (y < 1.6)], ["clamped", "supported"], "free")
+
+    same, free = (WaveSolver(waves.atlas, waves.material, rim=rim, backend="cpu") for rim in (conditions, "free"))
+    for each in (waves, same, free):
+        each.add_impulse((0.1, 0.05, 0.0), 1e-3, 0.1)
+        each.step(0.08)
+    np.testing.assert_array_equal(waves.height, same.height)
+    assert np.abs(waves.height - free.height).max() > 0.1 * np.abs(free.height).max()
+
+
+@pytest.mark.parametrize(
+    ("rim", "message"),
+    [
+        ('"loose"', "rim 'loose' does not exist; valid are free, supported, clamped, fixed"),
+        ('{fixed = "x < 0"}', "rim 'fixed' does not exist; valid are free, supported, clamped"),
+        ('{clamped = "x < "}', "'x < ' is not valid"),
+        ('{clamped = "y < 1"}', r"nowhere on its rims; they lie from \[-0.2, 1.5, 0.0\] to \[0.2, 2.5, 0.0\] m"),
+    ],
+)
+def test_rims_that_cannot_be_are_refused(tmp_path: Path, rim: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        plate(tmp_path, rim)
+
+
+def test_a_closed_surface_has_no_rims_by_region(folder: Path) -> None:
+    toml = TOML.replace("resolution = 24", "resolution = 8\nlayout = 'patches'\nrim = {clamped = 'x < 0'}")
+    (folder / "egg.toml").write_text(toml)
+    with pytest.raises(SceneError, match="it is closed; leave rim out"):
+        Simulation(load_scene(folder / "egg.toml"), backend="cpu")

@@ -44,6 +44,19 @@ def test_division_by_zero_follows_numpy_and_raises_nothing(a: float, b: float, e
     np.testing.assert_equal(quotient(a, b), expected)
 
 
+def test_numbers_written_at_calls_are_of_one_type() -> None:
+    @kernel
+    def doubled(x):
+        return 2 * x
+
+    @kernel
+    def calls(x):
+        return doubled(1) + doubled(2) + doubled(x)
+
+    assert calls(3) == 12
+    assert numba.config.DISABLE_JIT or len(doubled.signatures) == 1
+
+
 def test_sums_are_rounded_as_they_are_written() -> None:
     x = np.full(1000, 0.1)
     x[0] = 1e8

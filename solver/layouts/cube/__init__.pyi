@@ -5,7 +5,6 @@ from .atlas import (
     cast_rays as cast_rays,
     sphere_atlas as sphere_atlas,
     sphere_directions as sphere_directions,
-    texel_at as texel_at,
 )
 from .convention import (
     CHART_NORMALS as CHART_NORMALS,

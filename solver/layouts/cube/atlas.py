@@ -61,29 +61,23 @@ def sphere_directions(corners: Floats, sphere: Floats, points: Floats) -> Floats
 
 @kernel
 def texels_towards(directions: Floats, n: int) -> Ints:
-    """Flat indices of the texels in which directions [k, 3] lie."""
+    """Flat indices (chart N + row) N + column of the texels in which directions [k, 3] lie; see `cube_chart_points`."""
     texels = np.empty(len(directions), np.int64)
     for i in range(len(directions)):
-        texels[i] = texel_at(directions[i, 0], directions[i, 1], directions[i, 2], n)
+        axis = 0
+        for k in range(1, 3):
+            if abs(directions[i, k]) > abs(directions[i, axis]):
+                axis = k
+        chart = 2 * axis + (1 if directions[i, axis] < 0 else 0)
+        texel = chart
+        for along in (CHART_V, CHART_U):
+            across = 0.0
+            for k in range(3):
+                across += directions[i, k] * along[chart, k]
+            angle = np.arctan(across / abs(directions[i, axis])) * (4 / np.pi)
+            texel = texel * n + min(max(int(np.rint(((angle + 1) * n - 1) / 2)), 0), n - 1)
+        texels[i] = texel
     return texels
-
-
-@kernel
-def texel_at(x: float, y: float, z: float, n: int) -> int:
-    """Flat index (chart N + row) N + column of the texel in which a direction lies; see `cube_chart_points`."""
-    direction, axis = (x, y, z), 0
-    for k in range(1, 3):
-        if abs(direction[k]) > abs(direction[axis]):
-            axis = k
-    chart = 2 * axis + (1 if direction[axis] < 0 else 0)
-    place = 0
-    for along in (CHART_V, CHART_U):
-        across = 0.0
-        for k in range(3):
-            across += direction[k] * along[chart, k]
-        angle = np.arctan(across / abs(direction[axis])) * (4 / np.pi)
-        place = place * n + min(max(int(np.rint(((angle + 1) * n - 1) / 2)), 0), n - 1)
-    return chart * n * n + place
 
 
 def cast_rays(
