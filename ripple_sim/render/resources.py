@@ -57,13 +57,13 @@ class Resources:
 
         return create
 
-    def program(self, name: str, captured: str = "", **options: object) -> moderngl.Program:
+    def program(self, name: str, *captured: str, **options: object) -> moderngl.Program:
         """Program of one of the renderer's files, by its path; `options` are defines beside the contract.
 
         For `captured` see `GLContext.program`.
         """
         defines = {"HOLD_UNIFORMS": int(self.gl.software), **DEFINES, **options}
-        return self._own(self.gl.program(_PACKAGE, name, captured, **defines))
+        return self._own(self.gl.program(_PACKAGE, name, *captured, **defines))
 
     def compute_shader(self, name: str, stage: str = "compute", **options: object) -> moderngl.ComputeShader:
         """One of the renderer's compute shaders, likewise; it is shared."""

@@ -365,7 +365,7 @@ class GLContext:
             time.sleep(_PAUSE)
 
     def compute_shader(
-        self, package: str, name: str, stage: str = "compute", **defines: object
+        self, package: str, name: str, stage: str = "compute", /, **defines: object
     ) -> moderngl.ComputeShader:
         """Compile a stage of `{name}.glsl` below `package` once and share it: set all uniforms before each use."""
         if not self.computes:
@@ -378,29 +378,28 @@ class GLContext:
                 self._shaders[source] = _compiled(name, lambda: ctx.compute_shader(source))
         return self._shaders[source]
 
-    def program(self, package: str, name: str, captured: str = "", **defines: object) -> moderngl.Program:
+    def program(self, package: str, name: str, *captured: str, **defines: object) -> moderngl.Program:
         """Compile and link the stages "vertex" and "fragment" of `{name}.glsl` below `package`; see `load_shader`.
 
-        `VARYING` is what the one hands to the other: `out` and `in`. With `captured`, the name of an output of the
-        vertex stage, there is no other stage, and transform feedback captures it. A shader may say `binding = N` of its
+        `VARYING` is what the one hands to the other: `out` and `in`. With `captured`, names of outputs of the
+        vertex stage, there is no other, and transform feedback captures these. A shader may say `binding = N` of its
         samplers and uniform blocks, each by a name of its own: GLSL has that from 4.2 on, and here it is done.
         """
-        stages = {"vertex_shader": load_shader(package, name, "vertex", VARYING="out", **defines)}
-        if not captured:
-            stages["fragment_shader"] = load_shader(package, name, "fragment", VARYING="in", **defines)
-        found = [each for text in stages.values() for each in _BOUND.findall(text)]
+        stages = {"vertex": "out"} if captured else {"vertex": "out", "fragment": "in"}
+        texts = [load_shader(package, name, stage, VARYING=way, **defines) for stage, way in stages.items()]
+        found = [each for text in texts for each in _BOUND.findall(text)]
         bindings = {bound: int(str(defines.get(number, number))) for number, bound in found}
-        stages = {stage: _BINDING.sub("", text) for stage, text in stages.items()}
+        vertex, *fragment = (_BINDING.sub("", text) for text in texts)
 
         def linked() -> moderngl.Program:
-            program = ctx.program(**stages, varyings=(captured,) if captured else ())
+            program = ctx.program(vertex_shader=vertex, fragment_shader=(fragment or [None])[0], varyings=captured)
             for each in bindings.keys() & set(program):
                 member = program[each]
                 setattr(member, "value" if isinstance(member, moderngl.Uniform) else "binding", bindings[each])
             return program
 
         with self as ctx:
-            return self._pool.take((*stages.values(), captured), lambda: _compiled(name, linked))
+            return self._pool.take((vertex, *fragment, *captured), lambda: _compiled(name, linked))
 
     def release(self, created: Any) -> None:
         """Release an object; programs are kept for whoever asks for the same ones next."""

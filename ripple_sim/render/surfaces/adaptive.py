@@ -279,7 +279,7 @@ class Displacement:
         self._content = np.concatenate([*columns, vertices.places, mapped], axis=1).astype(np.float32)
         self.vertices: moderngl.Buffer = resources.buffer(self._content.tobytes(), dynamic=True)
         self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(own))
-        self._program = resources.program("surfaces/displacement", captured="moved")
+        self._program = resources.program("surfaces/displacement", "moved")
         self._program["layer"] = float(layer)
         names = "in_position", "in_direction", "in_lookup"
         self._pass = resources.vertex_array(self._program, [(self.vertices, "3f 3f 2f 11x4", *names)])
