@@ -392,7 +392,7 @@ class GLContext:
         vertex, *fragment = (_BINDING.sub("", text) for text in texts)
 
         def linked() -> moderngl.Program:
-            program = ctx.program(vertex_shader=vertex, fragment_shader=(fragment or [None])[0], varyings=captured)
+            program = ctx.program(vertex_shader=vertex, fragment_shader=next(iter(fragment), None), varyings=captured)
             for each in bindings.keys() & set(program):
                 member = program[each]
                 setattr(member, "value" if isinstance(member, moderngl.Uniform) else "binding", bindings[each])
