@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext, bind_buffers, shared_context
+from ..gl import GLContext, shared_context
 from ..kernel import Ints
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
@@ -19,7 +19,7 @@ from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, 
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .gl_dispatch import DeviceProbes, Dispatch, Pressure
-from .gl_fields import DeviceField, FieldLayout, TexelList, link_buffers
+from .gl_fields import DeviceField, FieldLayout, TexelList, bind_buffers, link_buffers
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for

@@ -12,10 +12,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext, bind_buffers
+from ..gl import GLContext
 from ..operator.volume import VolumeRate
 from ..operator.wave_operator import WaveOperator
-from .gl_fields import FieldLayout
+from .gl_fields import FieldLayout, bind_buffers
 from .kernels import Amplitude, Probes
 
 # Threads of a group that works through a list.
@@ -32,9 +32,7 @@ class Dispatch:
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
-        return self._gl.shared_compute_shader(
-            "ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines
-        )
+        return self._gl.compute_shader("ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines)
 
     def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over all texels, see charts.glsl."""
