@@ -146,8 +146,8 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
     Raises
     ------
     ExportError
-        If the ending is unknown, needs what is not installed, has no chunks where they are wanted, something foreign
-        stands in the path's place, or there can be no such name.
+        If the ending is unknown, needs what is not installed, has no chunks where they are wanted, or is another where
+        a link leads; something foreign stands in the path's place, or there can be no such name.
     EncodingError
         If nothing can be written there.
     """
@@ -157,6 +157,11 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
         raise ExportError(f"there are chunks of {able} files alone, not of {path.name}; leave --chunk out")
     try:
         final = final_path(path)
+        if final.suffix.lower() != path.suffix.lower():  # what is written there, and told again, goes by the ending
+            raise ExportError(
+                f"output {str(path)!r} is a link to {final.name!r}; valid is a link to a name that ends in "
+                f"{path.suffix}"
+            )
         _check_replaceable(final, ending.made_here, overwrite)
         with tempfile.TemporaryFile(dir=next(each for each in final.parents if each.exists())):
             return ending

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext, bind_buffers, shared_context
+from ..gl import GLContext, shared_context
 from ..kernel import Ints
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
@@ -19,7 +19,7 @@ from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, 
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .gl_dispatch import DeviceProbes, Dispatch, Pressure
-from .gl_fields import DeviceField, FieldLayout, TexelList, link_buffers
+from .gl_fields import DeviceField, FieldLayout, TexelList, bind_buffers, link_buffers
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
@@ -330,7 +330,7 @@ class GLBackend:
                 drift = dt if step < substeps - 1 else dt / 2
                 self._dispatch.fill_halo(self._h)
                 self._extra.gather(self._h, self._v)
-                if self._held is not None and self._held.follows:
+                if self._held is not None and self._held.follow is not None:
                     self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
@@ -437,7 +437,7 @@ class GLBackend:
     def _keep_volume(self, dt: float) -> None:
         operator = self._operator
         rate = volume_rate(operator, dt) if self.keeps_volume else None
-        if rate is not None or (self._held is not None and self._held.follows):
+        if rate is not None or (self._held is not None and self._held.follow is not None):
             needed = rate is not None or operator.parts is not None
             self._held = Pressure(self._gl, self._fields, operator, self._dispatch, rate) if needed else None
 

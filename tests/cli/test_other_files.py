@@ -110,6 +110,18 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
         write(link)
 
 
+@pytest.mark.parametrize("name", ["run.usda", "run.usdc", "run.csv"])
+def test_an_export_goes_through_no_link_to_another_ending(tmp_path: Path, name: str) -> None:
+    link = tmp_path / name
+    for target in ("nowhere", "run.mp4"):  # USD would write it to a name of the ending's beside, and that was lost
+        link.symlink_to(target)
+        with pytest.raises(ExportError, match=f"is a link to '{target}'; valid is a link to a name that ends in"):
+            check_export(link, True)
+        link.unlink()
+    link.symlink_to(f"real{link.suffix}")
+    check_export(link, True)
+
+
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_a_part_folder_that_is_a_link_is_left_alone(tmp_path: Path, overwrite: bool) -> None:
     (tmp_path / "thesis").mkdir()
