@@ -166,8 +166,8 @@ def collect() -> dict[str, Any]:
         Operating system and architecture.
     processors : int
     opengl : dict or None
-        The driver's `renderer`, `vendor` and `version` in its own words, and whether it is `software`; None if there is
-        no usable context; `advice` then says what to install.
+        The driver's `renderer`, `vendor` and `version` in its own words, whether it is `software`, and whether it
+        `computes`, as waves in OpenGL need; None if there is no usable context; `advice` then says what to install.
     backend : str
         The wave solver of "auto": "gl" or "cpu".
     measured : str
@@ -181,7 +181,7 @@ def collect() -> dict[str, Any]:
     except GLError as error:
         failure = str(error)
     else:
-        opengl = {name: getattr(context, name) for name in ("renderer", "vendor", "version", "software")}
+        opengl = {name: getattr(context, name) for name in ("renderer", "vendor", "version", "software", "computes")}
     findings = find_problems(opengl["software"] if opengl else None)
     return {
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
@@ -189,7 +189,7 @@ def collect() -> dict[str, Any]:
         "processors": os.cpu_count() or 1,
         "opengl": opengl,
         "backend": auto_backend(),
-        "measured": str(measured(context)) if opengl and not opengl["software"] else "",
+        "measured": str(measured(context)) if opengl and opengl["computes"] and not opengl["software"] else "",
         "advice": "\n".join(findings) or failure,
     }
 

@@ -22,7 +22,6 @@ from .contract import (
     MAX_SHADOWS as MAX_SHADOWS,
     OBJECT as OBJECT,
     OBJECT_COLUMNS as OBJECT_COLUMNS,
-    VERTEX_GROUP as VERTEX_GROUP,
     Binding as Binding,
     MappingKind as MappingKind,
     Struct as Struct,

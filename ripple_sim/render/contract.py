@@ -14,7 +14,6 @@ from .tone_mapping import CURVES
 
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
 HELD_LIGHTS = 2  # that come to fragments as varyings
-VERTEX_GROUP = 64  # vertices that a work group displaces
 OBJECT_COLUMNS = 64  # objects in a row of their table; a power of two
 
 
@@ -42,21 +41,19 @@ class Unit(IntEnum):
     TRANSMISSION = 18  # what transparent objects take from the lights
     OBJECTS = 19  # the table of objects
     FLOOR_SEEN = 20  # the floor's light as solids see it
+    TILE_KINDS = 21  # how each tile of the background is filled
 
 
 class Binding(IntEnum):
     """Bindings of storage buffers and uniform blocks; `NAME_BINDING` in GLSL.
 
-    OpenGL promises eight: passes that never run at the same time share some, which makes the later names aliases.
+    OpenGL promises eight of the former, and names for the same number are aliases.
     """
 
-    # displacement, the frame and its shading
-    REST_VERTICES = 0
-    MOVED_VERTICES = 1
-    MIDPOINTS = 2
+    # uniform blocks
     FRAME = 3
     OCCLUDERS = 4
-    # adaptive tessellation, before all of those
+    # storage buffers, of adaptive tessellation on the GPU
     SPLIT = 0
     LONG_EDGES = 1
     LOOKUPS = 2
@@ -65,9 +62,6 @@ class Binding(IntEnum):
     TOTALS = 5
     INDICES = 6
     COMMAND = 7
-    # tiles of the background
-    TILES = 0
-    COMMANDS = 1
 
 
 class MappingKind(IntEnum):
@@ -195,7 +189,6 @@ DEFINES: dict[str, object] = {
     "MAX_OCCLUDERS": MAX_OCCLUDERS,
     "HELD_LIGHTS": HELD_LIGHTS,
     "SOFT_BOXES": SOFT_BOXES,
-    "VERTEX_GROUP": VERTEX_GROUP,
     **numbered(Unit, "_UNIT"),
     **numbered(Binding, "_BINDING"),
     **numbered(MappingKind),

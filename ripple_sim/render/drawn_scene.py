@@ -91,9 +91,9 @@ class SurfaceMesh:
         self._indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
         self._written: NDArray[np.int32] | None = None  # the triangles that the buffer holds
         self._on_device: DeviceTessellation | None = None
-        self._midpoints: NDArray[np.int32] | moderngl.Buffer
         self._count: int | moderngl.Buffer
-        self._displacement = Displacement(resources, vertices, index)
+        mapped = mapped_coordinates(vertices.attributes, mapping)
+        self._displacement = displacement = Displacement(resources, vertices, mapped, index)
         self._mesh = surface.moving or (surface.V, surface.F)
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
@@ -108,19 +108,11 @@ class SurfaceMesh:
             self._program["grid_spacing"] = float(surface.grid)
         if mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
             self._program["tiling"] = mapping.tiling
-        attributes, mapped = vertices.attributes, mapped_coordinates(vertices.attributes, mapping)
-        self._normals = resources.buffer(attributes[:, NORMAL].astype("f4").tobytes())
-        self._baked = resources.buffer(attributes[:, BAKED].astype("f4").tobytes())
-        still = resources.buffer(np.concatenate([vertices.places, mapped], axis=1).astype("f4").tobytes())
-        moved = (self._displacement.moved, "4f", "in_moved")
-        content = [
-            moved,
-            (self._normals, "3f", "in_normal"),
-            (self._baked, "3f", "in_baked"),
-            (still, "2f 3f", "in_place", "in_mapped"),
-        ]
+        moved = (displacement.moved, "4f", "in_moved")
         # what a program does not use is optimised away
-        self._solid = resources.vertex_array(self._program, content, self._indices, skip_errors=True)
+        self._solid = resources.vertex_array(
+            self._program, [moved, (displacement.vertices, *displacement.KEPT)], self._indices, skip_errors=True
+        )
         # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
         whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse))
         solid, passing = (
@@ -141,8 +133,7 @@ class SurfaceMesh:
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
         """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.
 
-        Storage buffers are bound for that; `update` displaces the vertices. Raises `RippleError` if the height map has
-        another shape.
+        `update` displaces the vertices. Raises `RippleError` if the height map has another shape.
         """
         if isinstance(height_map, MovedHeightMap):
             self._move(height_map.V)
@@ -158,7 +149,7 @@ class SurfaceMesh:
             height_map = np.asarray(height_map)  # it is in the memory of another device
         self._highest = self._height_maps.write(self._layer, height_map)
         if isinstance(height_map, np.ndarray):
-            triangles, self._midpoints = self._adaptive(height_map)
+            triangles, midpoints = self._adaptive(height_map)
             if triangles is not self._written:
                 self._indices.write(triangles)
                 self._written = triangles
@@ -170,18 +161,17 @@ class SurfaceMesh:
                     self._resources, self._adaptive, self._page, self._layer, self._indices
                 )
             self._on_device.run(ctx)
-            self._midpoints, self._count, self._written = self._on_device.split, self._on_device.command, None
+            midpoints, self._count, self._written = self._on_device.midpoints, self._on_device.command, None
+        self._displacement.use(midpoints)
 
-    def update(
-        self, ctx: moderngl.Context, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: Occluders
-    ) -> None:
+    def update(self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: Occluders) -> None:
         """Displace the vertices by the height map where the geom is, among bound occluders."""
         self._pose = rotation, origin
         near = int(occluders.near(self.ball(), np.array([self.geom]))[0])
         bias = min(1.5 * self._highest, _HIGHEST_BIAS * self._radius)
         self._objects.place(self.numbers[0], bias, rotation=rotation)
         self._height_maps.bind()
-        self._displacement.run(ctx, rotation, origin, near, self._midpoints)
+        self._displacement.run(rotation, origin, near)
 
     def _move(self, V: NDArray[np.float64]) -> None:
         """Take the vertices along with those of the mesh, [n, 3] [m]."""
@@ -192,9 +182,7 @@ class SurfaceMesh:
             self._moving = vertices, MovingOcclusion(*self._mesh, rest, along, baked)
         vertices, occlusion = self._moving
         points, directions, normals = vertices(V)
-        self._displacement.move(points, directions)
-        self._normals.write(normals)
-        self._baked.write(occlusion(V))
+        self._displacement.move(points, directions, normals, occlusion(V))
         self._balls = balls_about(V[self._mesh[1]], _BALLS)
         self._middle = (V.min(axis=0) + V.max(axis=0)) / 2
         # in steps, so that shadow maps stay as they are while the surface wobbles
@@ -325,7 +313,7 @@ class DrawnScene:
         self._occluders.bind(data, pose.focus)
         for target in self.targets:
             origin, rotation = target_pose(data, target.geom)
-            target.update(ctx, rotation, origin, self._occluders)
+            target.update(rotation, origin, self._occluders)
         pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
         for instances in self._instances:
             instances.update(data, pose.position, pixels, self._occluders, sharp)

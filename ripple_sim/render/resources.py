@@ -57,14 +57,17 @@ class Resources:
 
         return create
 
-    def program(self, name: str, **options: object) -> moderngl.Program:
-        """Program of one of the renderer's files, by its path; `options` are defines beside the contract."""
+    def program(self, name: str, *captured: str, **options: object) -> moderngl.Program:
+        """Program of one of the renderer's files, by its path; `options` are defines beside the contract.
+
+        For `captured` see `GLContext.program`.
+        """
         defines = {"HOLD_UNIFORMS": int(self.gl.software), **DEFINES, **options}
-        return self._own(self.gl.program(_PACKAGE, name, **defines))
+        return self._own(self.gl.program(_PACKAGE, name, *captured, **defines))
 
     def compute_shader(self, name: str, stage: str = "compute", **options: object) -> moderngl.ComputeShader:
-        """One of the renderer's compute shaders, likewise."""
-        return self._own(self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options))
+        """One of the renderer's compute shaders, likewise; it is shared."""
+        return self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options)
 
     def clamped_texture(
         self, size: tuple[int, int], components: int, *, mipmaps: bool = False, **options: Any

@@ -192,12 +192,12 @@ def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool = Fals
 def auto_backend(texels: int = _TYPICAL) -> str:
     """Backend that "auto" stands for on this machine for so many texels: "gl" or "cpu".
 
-    On a hardware driver the faster one, measured once; a software driver runs on the processor's own cores, where the
-    CPU's loops are many times faster.
+    On a hardware driver with compute shaders the faster one, measured once; a software driver runs on the processor's
+    own cores, where the CPU's loops are many times faster.
     """
     try:
         gl = shared_context()
-        if gl.software:
+        if gl.software or not gl.computes:
             return "cpu"
         return measured(gl).faster(texels)
     except GLError:

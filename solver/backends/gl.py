@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext, bind_buffers, shared_context
+from ..gl import GLContext, shared_context
 from ..kernel import Ints
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
@@ -19,11 +19,11 @@ from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, 
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .gl_dispatch import DeviceProbes, Dispatch, Pressure
-from .gl_fields import DeviceField, FieldLayout, TexelList, link_buffers
+from .gl_fields import DeviceField, FieldLayout, TexelList, bind_buffers, link_buffers
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
-_LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "TINY", "PER_TINY")
+_LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "FADED", "TINY", "PER_TINY")
 
 
 class DeviceStiffness:
@@ -51,9 +51,9 @@ class DeviceStiffness:
             self._values, self._peak = ctx.buffer(reserve=4 * (1 + len(added))), ctx.buffer(bytes(4))
         self._corners, self._texels = (_upload(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
         self._weights, quads = _upload(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
-        self._conductance, self._per_area, self._shares, self._masses, self._beside = (
+        self._conductance, self._per_area, self._detours, self._shares, self._masses, self._beside = (
             _upload(gl, each, np.float32)
-            for each in (quads.conductance, quads.per_area, shares, mass, np.zeros(mass.size))
+            for each in (quads.conductance, quads.per_area, quads.detours, shares, mass, np.zeros(mass.size))
         )
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
         self._shaders = {name: dispatch.shader(name) for name in names}
@@ -71,7 +71,8 @@ class DeviceStiffness:
             self._values.write(values.astype(np.float32).tobytes() or bytes(4))
             self._run("ride", self._count, self._vertices, self._corners, self._weights, self._places)
             shape = {"width": self._width, "scale": quads.scale, "power": quads.power}
-            self._run("quads", self._count, self._places, self._conductance, self._per_area, self._sides, **shape)
+            given = self._places, self._conductance, self._per_area, self._detours
+            self._run("quads", self._count, *given, self._sides, **shape)
             self._run("quad_links", self._count, self._sides, buffer, width=self._width)
             for (groups, *links), factor in ((self._missing, 0.0), (self._copies, 1.0)):
                 self._run("close_links", groups, buffer, *links, factor=factor)
@@ -329,7 +330,7 @@ class GLBackend:
                 drift = dt if step < substeps - 1 else dt / 2
                 self._dispatch.fill_halo(self._h)
                 self._extra.gather(self._h, self._v)
-                if self._held is not None and self._held.follows:
+                if self._held is not None and self._held.follow is not None:
                     self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
@@ -436,7 +437,7 @@ class GLBackend:
     def _keep_volume(self, dt: float) -> None:
         operator = self._operator
         rate = volume_rate(operator, dt) if self.keeps_volume else None
-        if rate is not None or (self._held is not None and self._held.follows):
+        if rate is not None or (self._held is not None and self._held.follow is not None):
             needed = rate is not None or operator.parts is not None
             self._held = Pressure(self._gl, self._fields, operator, self._dispatch, rate) if needed else None
 

@@ -6,15 +6,16 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext, bind_buffers
+from ..gl import GLContext
 from ..operator.volume import VolumeRate
 from ..operator.wave_operator import WaveOperator
-from .gl_fields import FieldLayout
+from .gl_fields import FieldLayout, bind_buffers
 from .kernels import Amplitude, Probes
 
 # Threads of a group that works through a list.
@@ -31,9 +32,7 @@ class Dispatch:
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
-        return self._gl.shared_compute_shader(
-            "ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines
-        )
+        return self._gl.compute_shader("ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines)
 
     def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over all texels, see charts.glsl."""
@@ -64,7 +63,10 @@ _CHUNK = 2048
 class Pressure:
     """Amplitudes of the operator's response, one for each part, of which the field `parts` has the numbers.
 
-    With a `rate` they follow height and velocity, so that the volume stays.
+    Attributes
+    ----------
+    follow : callable or None
+        With a `rate`: sets the amplitudes of the coming substep by its height and velocity, so that the volume stays.
     """
 
     def __init__(
@@ -72,37 +74,43 @@ class Pressure:
         rate: VolumeRate | None = None,
     ) -> None:  # fmt: skip
         numbers = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
-        self._gl, self._fields, self._count = gl, fields, int(numbers.max()) + 1
+        self._gl, self._count = gl, int(numbers.max()) + 1
         self.parts = fields.upload(numbers)
         with gl as ctx:
-            self._asked = self.amplitudes = ctx.buffer(reserve=4 * self._count)
-        self.follows = rate is not None
-        if rate is None:
-            return
-        self._dispatch = dispatch
-        velocities = rate.velocities if len(rate.velocities) else np.zeros_like(rate.heights)
-        chunks, begins = _chunks(rate.begins)
-        self._chunk_count = len(chunks)
-        with gl as ctx:
-            self._addresses = ctx.buffer(fields.texels[rate.texels].astype(np.int32).tobytes())
-            self._factors = ctx.buffer(np.stack([rate.heights, velocities], axis=1).tobytes())
-            self._chunks = ctx.buffer(chunks.astype(np.int32).tobytes())
-            self._begins = ctx.buffer(begins.astype(np.int32).tobytes())
-            self._sums, self._asked = ctx.buffer(reserve=4 * len(chunks)), ctx.buffer(reserve=4 * self._count)
-        self._weigh, self._balance = dispatch.shader("volume"), dispatch.shader("volume", PARTS=1)
+            self._asked = ctx.buffer(reserve=4 * self._count)
+            self.amplitudes = self._asked if rate is None else ctx.buffer(reserve=4 * self._count)
+        self.follow = None if rate is None else self._following(rate, fields, dispatch)
 
     def set(self, amplitude: Amplitude) -> None:
         """Write what the load asks for: a number, or one for each part."""
         with self._gl:
             self._asked.write(np.full(self._count, amplitude, np.float32).tobytes())
 
-    def follow(self, height: moderngl.Buffer, velocity: moderngl.Buffer) -> None:
-        """Set the amplitudes of the coming substep."""
-        bind_buffers(height, velocity, self._addresses, self._factors, self._chunks, self._sums)
-        self._weigh.run(self._chunk_count)
-        self._gl.barrier()
-        bind_buffers(self._asked, self._sums, self._begins, self.amplitudes)
-        self._dispatch.run_list(self._balance, self._count)
+    def _following(
+        self, rate: VolumeRate, fields: FieldLayout, dispatch: Dispatch
+    ) -> Callable[[moderngl.Buffer, moderngl.Buffer], None]:
+        velocities = rate.velocities if len(rate.velocities) else np.zeros_like(rate.heights)
+        chunks, begins = _chunks(rate.begins)
+        tables = (
+            fields.texels[rate.texels].astype(np.int32),
+            np.stack([rate.heights, velocities], axis=1),
+            *(each.astype(np.int32) for each in (chunks, begins)),
+        )
+        with self._gl as ctx:
+            *entries, bounds = (ctx.buffer(each.tobytes()) for each in tables)
+            sums = ctx.buffer(reserve=4 * len(chunks))
+        weigh, balance = dispatch.shader("volume"), dispatch.shader("volume", PARTS=1)
+        # by themselves: a circle with `self` would keep buffers until Python looks for garbage
+        gl, asked, amplitudes, count = self._gl, self._asked, self.amplitudes, self._count
+
+        def follow(height: moderngl.Buffer, velocity: moderngl.Buffer) -> None:
+            bind_buffers(height, velocity, *entries, sums)
+            weigh.run(len(chunks))
+            gl.barrier()
+            bind_buffers(asked, sums, bounds, amplitudes)
+            dispatch.run_list(balance, count)
+
+        return follow
 
 
 def _chunks(begins: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

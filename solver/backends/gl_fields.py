@@ -12,12 +12,19 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gl import GLContext, bind_buffers
+from ..gl import GLContext
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil
 from ..texels.topology import TexelTopology
 
 _GROUP = 256
 _SHADERS = "ripple_sim.solver"
+
+
+def bind_buffers(*buffers: moderngl.Buffer | None) -> None:
+    """Bind storage buffers to 0, 1, 2 ..., in the order in which a shader declares them; None leaves out a binding."""
+    for binding, buffer in enumerate(buffers):
+        if buffer is not None:
+            buffer.bind_to_storage_buffer(binding)
 
 
 class DeviceField:
@@ -34,7 +41,7 @@ class DeviceField:
         with gl as ctx:
             self.buffer: moderngl.Buffer = ctx.buffer(reserve=4 * count)
             self._peak = ctx.buffer(bytes(4))
-            program = gl.shared_compute_shader(_SHADERS, "backends/shaders/device_field", GROUP=_GROUP, **defines)
+            program = gl.compute_shader(_SHADERS, "backends/shaders/device_field", GROUP=_GROUP, **defines)
             program["count"], program["share"] = count, share
             bind_buffers(self.buffer, self._peak, *sources)
             program.run(-(-count // _GROUP))

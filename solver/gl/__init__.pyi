@@ -1,6 +1,5 @@
 from .context import (
     GLContext as GLContext,
-    bind_buffers as bind_buffers,
     create_context as create_context,
     current_context as current_context,
     is_software as is_software,

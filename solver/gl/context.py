@@ -83,6 +83,10 @@ def _lines(file: Traversable) -> list[str]:
     return file.read_text().splitlines()
 
 
+# The number that a shader gives to a sampler or uniform block, and its name; and what is to be left out of it.
+_BOUND = re.compile(r"layout\((?:std140, )?binding = (\w+)\) uniform (?:\w+ )?(\w+)")
+_BINDING = re.compile(r"layout\(binding = \w+\) |, binding = \w+")
+
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
 
 
@@ -93,6 +97,9 @@ def is_software(renderer: str) -> bool:
 
 # The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
 _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
+
+# Versions of OpenGL that compute shaders need, and that rendering needs.
+COMPUTE, RENDERING = 430, 410
 
 # What Mesa's shader cache may come to need while a process runs [bytes].
 _SHADER_CACHE = 64e6
@@ -112,44 +119,34 @@ def _spare_full_disks() -> None:
 
 
 def create_context(device: int | None) -> moderngl.Context:
-    """Create a headless OpenGL 4.3 context on a device, or on the first that yields one; raises GLError."""
-    if not sys.platform.startswith("linux"):  # macOS ends at OpenGL 4.1, without compute shaders
-        raise GLError(
-            f"no OpenGL 4.3 over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'"
-        )
+    """Create a headless context on a device, or the first that yields one: OpenGL 4.3, or else 4.1; raises GLError."""
+    if not sys.platform.startswith("linux"):
+        raise GLError(f"no OpenGL over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'")
     _spare_full_disks()
     devices = range(8) if device is None else [device]
-    reason, older = "no device", ""
-    for libraries in _LIBRARIES:
-        for index in devices:
-            try:
+    reason = "no device"
+    for version in (COMPUTE, RENDERING, 330):  # drivers may give the very version that is asked for
+        for libraries in _LIBRARIES:
+            for index in devices:
                 settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}  # not in its hints
-                return moderngl.create_context(require=430, standalone=True, **settings)
-            except Exception as error:  # moderngl raises bare Exception here
-                reason = str(error)
-                if not older and "eglCreateContext failed" in reason:
-                    older = _older(settings)
-                if "not loaded" in reason:
-                    break
-    if older:
-        raise GLError(
-            f"{older}; rendering and backend 'gl' need 4.3 or later, for its compute shaders: update the driver, or "
-            "take Mesa's llvmpipe (LIBGL_ALWAYS_SOFTWARE=1); waves alone run with backend 'cpu'"
-        )
+                try:
+                    ctx = moderngl.create_context(require=version, standalone=True, **settings)
+                except Exception as error:  # moderngl raises bare Exception here
+                    reason = str(error)
+                    if "not loaded" in reason:
+                        break
+                    continue
+                if version >= RENDERING:
+                    return ctx
+                raise GLError(
+                    f"{ctx.info['GL_RENDERER']} has OpenGL {ctx.version_code / 100:.1f}; rendering needs 4.1 or later, "
+                    "backend 'gl' 4.3: update the driver, or take Mesa's llvmpipe (LIBGL_ALWAYS_SOFTWARE=1); waves "
+                    "alone run with backend 'cpu'"
+                )
     if device is not None:
-        raise GLError(f"no OpenGL 4.3 context on EGL device {device} ({reason}); devices are counted from 0")
+        raise GLError(f"no OpenGL 4.1 context on EGL device {device} ({reason}); devices are counted from 0")
     advice = "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
-    raise GLError(f"no OpenGL 4.3 context on any EGL device ({reason}); {advice}")
-
-
-def _older(settings: dict[str, Any]) -> str:
-    """What there is with these settings of an earlier version, "NAME has OpenGL 4.1"; empty without any."""
-    with contextlib.suppress(Exception):
-        ctx = moderngl.create_context(require=330, standalone=True, **settings)
-        found = f"{ctx.info['GL_RENDERER']} has OpenGL {ctx.version_code / 100:.1f}"
-        ctx.release()
-        return found
-    return ""
+    raise GLError(f"no OpenGL 4.1 context on any EGL device ({reason}); {advice}")
 
 
 def current_context() -> int | None:
@@ -176,13 +173,6 @@ def load_egl() -> ctypes.CDLL:
     raise GLError("the EGL library is gone since the context was created; see `ripple-sim info`")
 
 
-def bind_buffers(*buffers: moderngl.Buffer | None) -> None:
-    """Bind storage buffers to 0, 1, 2 ..., in the order in which a shader declares them; None leaves out a binding."""
-    for binding, buffer in enumerate(buffers):
-        if buffer is not None:
-            buffer.bind_to_storage_buffer(binding)
-
-
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
 _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
@@ -191,7 +181,7 @@ _MOST = 64  # idle at a time
 
 
 class ProgramPool:
-    """Compiled programs and compute shaders by their sources, with the uniforms that they began with."""
+    """Compiled programs by their sources, with the uniforms that they began with."""
 
     def __init__(self) -> None:
         self._idle: dict[int, Any] = {}  # by their number in OpenGL, the longest idle first
@@ -235,7 +225,7 @@ _TURN, _PAUSE = 1e-3, 1e-4
 
 
 class GLContext:
-    """One headless OpenGL 4.3 context on EGL, shared by the GPU wave solver and the renderer.
+    """One headless OpenGL context on EGL, shared by the GPU wave solver and the renderer.
 
     Use it as a context manager: entering makes the context current, frees the objects that Python has collected, and
     returns the `moderngl.Context`; leaving the outermost block restores the previous context and raises `GLError` if
@@ -249,7 +239,7 @@ class GLContext:
     Raises
     ------
     GLError
-        If no EGL device gives an OpenGL 4.3 core context; at entering, if the context was lost, if another thread does
+        If no EGL device gives an OpenGL 4.1 core context; at entering, if the context was lost, if another thread does
         not leave it, or in a process that was forked.
     """
 
@@ -263,13 +253,14 @@ class GLContext:
         self.renderer: str = info["GL_RENDERER"]
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
+        self.computes = self._ctx.version_code >= COMPUTE
         self._depth = 0
         # fences, which moderngl lacks; ctypes lets go of the interpreter's lock while they are waited for
         pointer, number, address = ctypes.c_void_p, ctypes.c_uint, load_egl().eglGetProcAddress
         self._create_fence = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
         self._client_wait = ctypes.CFUNCTYPE(number, pointer, number, ctypes.c_uint64)(address(b"glClientWaitSync"))
         self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
-        self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
+        self._shaders: dict[str, moderngl.ComputeShader] = {}
         self._before: int | None = None
         self._pool = ProgramPool()
         release_current()
@@ -374,44 +365,49 @@ class GLContext:
             time.sleep(_PAUSE)
 
     def compute_shader(
-        self, package: str, name: str, stage: str = "compute", **defines: object
+        self, package: str, name: str, stage: str = "compute", /, **defines: object
     ) -> moderngl.ComputeShader:
-        """Compile `{name}.glsl` below `package` as a compute shader; see `load_shader`."""
+        """Compile a stage of `{name}.glsl` below `package` once and share it: set all uniforms before each use."""
+        if not self.computes:
+            raise GLError(
+                f"{self.renderer} has OpenGL {self.version.split()[0]}; backend 'gl' needs 4.3: take backend 'cpu'"
+            )
         source = load_shader(package, name, stage, **defines)
-        with self:
-            return self._pool.take((source,), lambda: self._compute_shader(name, source))
+        if source not in self._shaders:
+            with self as ctx:
+                self._shaders[source] = _compiled(name, lambda: ctx.compute_shader(source))
+        return self._shaders[source]
 
-    def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
-        """Compile a compute shader once and share it: set all uniforms before each use."""
-        source = load_shader(package, name, "compute", **defines)
-        if source not in self._shared_shaders:
-            self._shared_shaders[source] = self._compute_shader(name, source)
-        return self._shared_shaders[source]
-
-    def program(self, package: str, name: str, **defines: object) -> moderngl.Program:
+    def program(self, package: str, name: str, *captured: str, **defines: object) -> moderngl.Program:
         """Compile and link the stages "vertex" and "fragment" of `{name}.glsl` below `package`; see `load_shader`.
 
-        `VARYING` is what the one hands to the other: `out` and `in`.
+        `VARYING` is what the one hands to the other: `out` and `in`. With `captured`, names of outputs of the
+        vertex stage, there is no other, and transform feedback captures these. A shader may say `binding = N` of its
+        samplers and uniform blocks, each by a name of its own: GLSL has that from 4.2 on, and here it is done.
         """
-        vertex = load_shader(package, name, "vertex", VARYING="out", **defines)
-        fragment = load_shader(package, name, "fragment", VARYING="in", **defines)
+        stages = {"vertex": "out"} if captured else {"vertex": "out", "fragment": "in"}
+        texts = [load_shader(package, name, stage, VARYING=way, **defines) for stage, way in stages.items()]
+        found = [each for text in texts for each in _BOUND.findall(text)]
+        bindings = {bound: int(str(defines.get(number, number))) for number, bound in found}
+        vertex, *fragment = (_BINDING.sub("", text) for text in texts)
+
+        def linked() -> moderngl.Program:
+            program = ctx.program(vertex_shader=vertex, fragment_shader=next(iter(fragment), None), varyings=captured)
+            for each in bindings.keys() & set(program):
+                member = program[each]
+                setattr(member, "value" if isinstance(member, moderngl.Uniform) else "binding", bindings[each])
+            return program
+
         with self as ctx:
-            return self._pool.take(
-                (vertex, fragment),
-                lambda: _compiled(name, lambda: ctx.program(vertex_shader=vertex, fragment_shader=fragment)),
-            )
+            return self._pool.take((vertex, *fragment, *captured), lambda: _compiled(name, linked))
 
     def release(self, created: Any) -> None:
-        """Release an object; programs and compute shaders are kept for whoever asks for the same ones next."""
+        """Release an object; programs are kept for whoever asks for the same ones next."""
         with self:
-            if isinstance(created, moderngl.Program | moderngl.ComputeShader):
+            if isinstance(created, moderngl.Program):
                 created = self._pool.give_back(created)
             if created is not None:
                 created.release()
-
-    def _compute_shader(self, name: str, source: str) -> moderngl.ComputeShader:
-        with self as ctx:
-            return _compiled(name, lambda: ctx.compute_shader(source))
 
     def _free(self) -> None:
         """Free the objects that Python has collected; `moderngl.Context.gc` fails on those released by hand."""

@@ -14,11 +14,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backends.gl_fields import DeviceField
+from ..backends.gl_fields import DeviceField, bind_buffers
 from ..cache import kept_with
 from ..errors import SolverError
 from ..files import require_memory
-from ..gl import GLContext, bind_buffers
+from ..gl import GLContext
 from ..kernel import Floats32, kernel
 from ..texels.atlas import Atlas
 from ..texels.texel_atlas import ChartPage
@@ -98,7 +98,7 @@ class HeightMapShaders:
         defines = {"GROUP": _GROUP, "N": n, "COLUMNS": ChartPage(charts, n).columns, "FREE": FREE, "MOST": MOST}
         with gl as ctx:
             self._heights, self._limited, self._map, self._corners = (
-                gl.shared_compute_shader(_SHADERS, f"waves/shaders/{name}", **defines, **more)
+                gl.compute_shader(_SHADERS, f"waves/shaders/{name}", **defines, **more)
                 for name, more in (
                     ("halo_heights", {}),
                     ("halo_heights", {"LIMIT": 1}),

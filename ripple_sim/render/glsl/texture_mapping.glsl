@@ -1,7 +1,7 @@
 // The texture on an object. MAPPING is one of the kinds in contract.py; what flat textures are wrapped round has half
 // size 1.
 #if MAPPING == CUBE_IMAGE
-layout(binding = CUBE_IMAGE_UNIT) uniform samplerCube image;
+layout(binding = CUBE_IMAGE_UNIT) uniform samplerCube cube_image;
 #else
 layout(binding = FLAT_IMAGE_UNIT) uniform sampler2D image;
 #endif
@@ -54,7 +54,7 @@ vec3 textured(vec3 albedo, vec3 mapped, vec4 tiling)
 #if MAPPING == FLAT_IMAGE
     albedo *= texture(image, mapped.xy * tiling.xy + tiling.zw).rgb;
 #elif MAPPING == CUBE_IMAGE
-    albedo *= texture(image, mapped).rgb;
+    albedo *= texture(cube_image, mapped).rgb;
 #elif MAPPING > CUBE_IMAGE
     // coordinates jump from one edge of the texture to the other: their own differences would blur it there
     mat3x2 slope;

@@ -1,5 +1,6 @@
 // Rays from the eye through the frame, and where they meet the plane of the floor. What varies linearly over the frame is
-// computed at the corners of what is drawn: one triangle over the whole framebuffer, or with TILES squares of the frame.
+// computed at the corners of what is drawn: one triangle over the whole framebuffer; with TILES 1 squares of the frame, as
+// instances; with TILES 2 those of a kind.
 #include "glsl/held_uniforms.glsl"
 
 VARYING vec2 screen;          // position in the frame, from -1 to 1
@@ -16,7 +17,9 @@ flat VARYING vec3 floor_lit, floor_surround;  // radiance of the open floor by t
 #include "glsl/lights.glsl"
 
 uniform float level;  // depth of what is drawn
-#if TILES
+#if TILES == 2
+#include "glsl/tiles.glsl"
+#elif TILES
 in vec2 in_corner;    // the tile's lower left
 uniform vec2 extent;  // of a tile
 #else
@@ -31,7 +34,9 @@ vec3 along_floor(vec3 v)
 
 void main()
 {
-#if TILES
+#if TILES == 2
+    screen = tile_corner();
+#elif TILES
     screen = in_corner + extent * vec2(gl_VertexID & 1, gl_VertexID >> 1);
     vec2 drawn = screen;
 #else
@@ -49,7 +54,11 @@ void main()
     floor_lit = floor_albedo.rgb * (floor_light.rgb + key_box);
     floor_surround = floor_albedo.rgb * around;
     hold_uniforms();
+#if TILES == 2
+    gl_Position = on_tile(level);
+#else
     gl_Position = vec4(drawn, 2.0 * level - 1.0, 1.0);
+#endif
 }
 
 #stage fragment

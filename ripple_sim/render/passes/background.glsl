@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW those pixels.
 // Each pixel stands for a block of BLOCK x BLOCK of the frame's.
 #define OWN_POINTS (BLOCK > 1)

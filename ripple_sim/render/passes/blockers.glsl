@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // What may block a light: how much of the shadow map is covered, and that times the distance from the light [m] and times
 // its square. Mipmaps of it are means over as much as the search for blockers steps over.
 #include "glsl/frame.glsl"

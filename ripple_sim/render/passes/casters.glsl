@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // Objects as a light or the floor sees them: their depth, with ALBEDO_MAP their linear colour, with TRANSMISSION_MAP what
 // something transparent takes from a light (see soft_shadows.glsl). With MOVED vertices are those of a target, displaced.
 #include "glsl/frame.glsl"

@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // Classifies pixels by what they show, as a depth, so that each of the next passes runs over its own pixels only: whether
 // all or some of the samples show solids; with LAYER, whether any shows the object.
 #include "glsl/view.glsl"

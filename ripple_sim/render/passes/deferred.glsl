@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // Deferred shading of the pixels that show solids, in all or some of their samples: every surface that is visible in a
 // pixel is lit once. It reflects light with GGX highlights and Schlick's Fresnel term over a diffuse, translucent base, under
 // a clear coat.

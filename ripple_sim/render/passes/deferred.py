@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.camera import Pose, boxes_of, scissor_of
-from ripple_sim.render.contract import LEVELS, Binding, Unit
+from ripple_sim.render.contract import LEVELS, Unit
 from ripple_sim.render.resources import SRGB8_ALPHA8, FrameUniforms, Resources
 from ripple_sim.render.targets import FrameFormat, FramePass, GBuffer
 from ripple_sim.solver.errors import RippleError
@@ -25,7 +25,6 @@ from .shadows import Floor
 
 _PIXELS = 4  # along an edge of a block, which a texel of the coarse background stands for
 _BLOCKS = 8  # along an edge of a tile
-_GROUP = 64  # tiles that a work group sorts
 # how a tile is filled: from its corners, from the blocks, or likewise but for pixels that are shaded one by one
 _PLAIN, _SMOOTH, _ROUGH = _KINDS = range(3)
 
@@ -82,7 +81,7 @@ class Background:
 class CoarseBackground:
     """Floor and sky at a fraction of the frame's resolution, from which the frame is filled.
 
-    Square tiles of the frame are sorted on the GPU, each to be filled as fast as it allows. Tiles that are plain are
+    Square tiles of the frame are filled as fast as each allows, which the GPU finds. Tiles that are plain are
     interpolated from their corners. In the others, pixels are interpolated from blocks, or shaded one by one near an
     edge, a narrow penumbra or anything else that is not smooth.
 
@@ -98,57 +97,52 @@ class CoarseBackground:
         self._blocks = Background(resources, size, options, floor, _PIXELS)
         edge = _PIXELS * _BLOCKS
         tiles = -(-size[0] // edge), -(-size[1] // edge)
-        count = tiles[0] * tiles[1]
-        self._groups = -(-count // _GROUP)
-        self._corners = resources.buffer(reserve=8 * len(_KINDS) * count)
-        # indirect draw calls: vertices, instances, first vertex, first instance; and a number of padding
-        self._empty = np.array([[4, 0, 0, kind * count, 0] for kind in _KINDS], dtype=np.uint32).tobytes()
-        self._commands = resources.buffer(self._empty)
-        self._sort = resources.compute_shader("passes/background_tiles", TILE=_BLOCKS, GROUP=_GROUP)
-        self._sort["tiles"] = tiles
+        self._kinds = resources.texture(tiles, 1, dtype="u1")
+        self._kinds.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._kinds_framebuffer = resources.framebuffer([self._kinds])
+        self._find_kinds = resources.vertex_array(resources.program("passes/background_kinds", TILE=_BLOCKS), [])
         filling = [
             resources.program("passes/background_tiles", **options, PLAIN=plain, ROUGH=rough)
             for plain, rough in ((1, 0), (0, 0), (0, 1))
         ]
-        shading = resources.program("passes/background", **options, SHADOW=1, BLOCK=1, TILES=1)
-        self._sort["extent"] = extent = 2.0 * edge / size[0], 2.0 * edge / size[1]
-        for program in (*filling, shading):
-            program["extent"] = extent
+        shading = resources.program("passes/background", **options, SHADOW=1, BLOCK=1, TILES=2)
+        for kind, program in zip((*_KINDS, _ROUGH), (*filling, shading), strict=True):
+            program["extent"] = 2.0 * edge / size[0], 2.0 * edge / size[1]
+            program["kind"] = kind
         for program in filling:
             program["blocks"] = size[0] / _PIXELS, size[1] / _PIXELS
-        *self._fill, self._shade = (
-            resources.vertex_array(program, [(self._corners, "2f/i", "in_corner")]) for program in (*filling, shading)
-        )
+        corners = 4 * np.arange(tiles[0] * tiles[1])[:, None] + [0, 1, 2, 2, 1, 3]
+        indices = resources.buffer(corners.astype("i4").tobytes())
+        *self._fill, self._shade = (resources.vertex_array(each, [], indices) for each in (*filling, shading))
 
     def prepare(self, ctx: moderngl.Context) -> None:
-        """Shade the blocks, and sort the tiles."""
+        """Shade the blocks, and find how each tile is to be filled."""
         self._framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         self._framebuffer.clear(depth=LEVELS["OPEN"])
         self._blocks.draw(ctx, self._framebuffer)
         self._texture.use(Unit.COARSE_BACKGROUND)
-        self._commands.write(self._empty)
-        self._corners.bind_to_storage_buffer(Binding.TILES)
-        self._commands.bind_to_storage_buffer(Binding.COMMANDS)
-        self._sort.run(self._groups)
-        ctx.memory_barrier()
+        self._kinds_framebuffer.use()
+        ctx.enable_only(moderngl.NOTHING)
+        self._find_kinds.render(moderngl.TRIANGLES, vertices=3)
 
     def draw(self, ctx: moderngl.Context, frame: moderngl.Framebuffer) -> None:
         """Fill the framebuffer in use, but for pixels that show solids in all of their samples."""
         self._texture.use(Unit.COARSE_BACKGROUND)
+        self._kinds.use(Unit.TILE_KINDS)
         ctx.depth_func = "<="
-        self._draw(self._fill[_ROUGH], _ROUGH, 0.0)
+        self._draw(self._fill[_ROUGH], 0.0)
         frame.depth_mask = False
         for kind in (_PLAIN, _SMOOTH):
-            self._draw(self._fill[kind], kind, LEVELS["MIXED"])
+            self._draw(self._fill[kind], LEVELS["MIXED"])
         ctx.depth_func = "=="
         for level in ("SHADED", "MIXED"):
-            self._draw(self._shade, _ROUGH, LEVELS[level])
+            self._draw(self._shade, LEVELS[level])
         frame.depth_mask = True
 
-    def _draw(self, tiles: moderngl.VertexArray, kind: int, level: float) -> None:
+    def _draw(self, tiles: moderngl.VertexArray, level: float) -> None:
         tiles.program["level"] = level
-        tiles.render_indirect(self._commands, moderngl.TRIANGLE_STRIP, count=1, first=kind)
+        tiles.render()
 
 
 TILE = 32  # [pixels]

@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // What light reaches a point of the floor. Its ambient visibility comes from the height of what hangs above it: the form
 // factor of horizontal patches at height h and horizontal distance d is h^2 / (pi (h^2 + d^2)^2) per unit area.
 #include "glsl/view.glsl"

@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // What is seen at the middle of each pixel, without light: of solids, transparent or not, and of the floor.
 #include "glsl/view.glsl"
 

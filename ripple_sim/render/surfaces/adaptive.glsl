@@ -11,10 +11,11 @@ layout(std430, binding = BEFORE_BINDING) buffer Before { int before[]; };
 layout(std430, binding = TOTALS_BINDING) buffer Totals { int totals[]; };
 
 uniform int count;  // of edges or faces
+uniform int first_midpoint;  // as a vertex
 
 bool is_split(int face, int side)
 {
-    return split_edges[faces[face].middles[side] - FIRST_MIDPOINT] != 0;
+    return split_edges[faces[face].middles[side] - first_midpoint] != 0;
 }
 
 int splits_of(int face)

@@ -1,7 +1,8 @@
 """What a frame does to a target's mesh: edges from which the waves depart are split, and vertices are displaced.
 
-Edges are split either on the processor, from heights in its memory, or on the GPU, from a texture's heights: the same
-triangles in the same order. Heights between the texels are those of a quadratic B-spline (glsl/height_maps.glsl).
+Edges are split either on the processor, from heights in its memory, or on the GPU, from a texture's heights, by compute
+shaders, as the waves are: the same triangles in the same order. Heights between the texels are those of a quadratic
+B-spline (glsl/height_maps.glsl).
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.contract import VERTEX_GROUP, Binding
+from ripple_sim.render.contract import Binding
 from ripple_sim.render.resources import Resources
 from ripple_sim.solver.kernel import Floats, Floats32, Ints32, kernel
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .vertices import DIRECTION, POSITION, SurfaceVertices
+from .vertices import BAKED, DIRECTION, NORMAL, POSITION, SurfaceVertices
 
 
 def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
@@ -109,7 +110,8 @@ class AdaptiveTessellation:
     def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.
 
-        Where no edge is split, the triangles are the same array each time.
+        In the triangles these midpoints follow the mesh's own vertices, as `Displacement.use` arranges them. Where no
+        edge is split, the triangles are the same array each time.
         """
         whole = self.faces, np.empty(0, np.int32)
         if not len(self.long) or not height_map[..., 3].any():
@@ -120,8 +122,8 @@ class AdaptiveTessellation:
         if not len(split):
             return whole
         midpoint = np.full(len(self.length), -1, np.int32)
-        midpoint[split] = used = np.int32(self.base_count) + split
-        return _triangles(self.faces, self.sides, midpoint, self.length), used
+        midpoint[split] = np.arange(self.base_count, self.base_count + len(split))
+        return _triangles(self.faces, self.sides, midpoint, self.length), np.int32(self.base_count) + split
 
 
 @kernel
@@ -183,6 +185,8 @@ class DeviceTessellation:
 
     Attributes
     ----------
+    midpoints : int32 [k]
+        All of them, as vertices: the triangles may use any.
     split : moderngl.Buffer
         int32 an edge: whether its midpoint is used.
     command : moderngl.Buffer
@@ -204,6 +208,7 @@ class DeviceTessellation:
         places = np.concatenate([first + adaptive.texel[:, :0:-1], adaptive.offset], axis=1)
         middles = len(adaptive.texel) - len(adaptive.long) + np.arange(len(adaptive.long))
         groups = -(-len(adaptive.faces) // _GROUP)
+        self.midpoints = np.arange(adaptive.base_count, adaptive.base_count + len(adaptive.length), dtype=np.int32)
 
         def buffer(content: NDArray, dtype: str = "i4") -> moderngl.Buffer:
             return resources.buffer(content.astype(dtype).tobytes() or bytes(16))
@@ -222,7 +227,7 @@ class DeviceTessellation:
             Binding.COMMAND: self.command,
         }
         self._split_edges, self._count, self._add, self._write = (
-            resources.compute_shader("surfaces/adaptive", stage, GROUP=_GROUP, FIRST_MIDPOINT=adaptive.base_count)
+            resources.compute_shader("surfaces/adaptive", stage, GROUP=_GROUP)
             for stage in ("split", "count", "add", "write")
         )
 
@@ -231,8 +236,9 @@ class DeviceTessellation:
         edges, faces = self._counts
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
-        if edges:
-            self._split_edges["layer"], self._split_edges["tolerance"] = self._layer, self._tolerance
+        self._split_edges["layer"], self._split_edges["tolerance"] = self._layer, self._tolerance
+        for shader in (self._count, self._write):
+            shader["first_midpoint"] = self.midpoints[0]
         for shader, count in ((self._split_edges, edges), (self._count, faces), (self._add, 1), (self._write, faces)):
             if count:
                 if shader is not self._add:
@@ -242,10 +248,14 @@ class DeviceTessellation:
 
 
 class Displacement:
-    """The compute pass that displaces vertices and puts them into the world, once a frame.
+    """The vertices of a target on the GPU, and the pass that displaces them and puts them into the world, once a frame.
+
+    First come the mesh's own, then the midpoints in use. What the pass finds is captured by transform feedback.
 
     Parameters
     ----------
+    mapped : float64 [n, 3]
+        Texture coordinates of all vertices.
     layer : int
         Of its height map.
 
@@ -253,35 +263,47 @@ class Displacement:
     ----------
     moved : moderngl.Buffer
         vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms leave.
+    vertices : moderngl.Buffer
+        What `KEPT` says of each vertex.
     """
 
-    def __init__(self, resources: Resources, vertices: SurfaceVertices, layer: int) -> None:
-        attributes = vertices.attributes
-        self._midpoint_count = midpoint_count = len(vertices.edges.ends)
-        self._base_count = base_count = len(attributes) - midpoint_count
-        self._program = resources.compute_shader("surfaces/displacement")
-        rest = np.concatenate([attributes[:, POSITION], attributes[:, DIRECTION], vertices.lookups], axis=1)
-        self._vertices = rest.astype(np.float32)
-        self._rest = resources.buffer(self._vertices.tobytes())
-        self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(attributes))
-        self._midpoints = resources.buffer(reserve=4 * midpoint_count, dynamic=True)
-        self._program["base_count"] = base_count
-        self._program["layer"] = float(layer)
+    # buffer, format and names of what is drawn with
+    KEPT = "8x4 3f 3f 2f 3f", "in_normal", "in_baked", "in_place", "in_mapped"
 
-    def move(self, points: NDArray[np.float32], directions: NDArray[np.float32]) -> None:
-        """Replace where the vertices are at rest [m] and the directions that they are displaced in, [n, 3]."""
-        self._vertices[:, :3], self._vertices[:, 3:6] = points, directions
-        self._rest.write(self._vertices)
-
-    def run(
-        self,
-        ctx: moderngl.Context,
-        rotation: NDArray[np.float64],
-        origin: NDArray[np.float64],
-        occluders: int,
-        midpoints: NDArray[np.int32] | moderngl.Buffer,
+    def __init__(
+        self, resources: Resources, vertices: SurfaceVertices, mapped: NDArray[np.float64], layer: int
     ) -> None:
-        """Displace all vertices and the given midpoints; height maps and occluders are bound already.
+        own = vertices.attributes
+        self._base_count = len(own) - len(vertices.edges.ends)
+        columns = own[:, POSITION], own[:, DIRECTION], vertices.lookups, own[:, NORMAL], own[:, BAKED]
+        self._content = np.concatenate([*columns, vertices.places, mapped], axis=1).astype(np.float32)
+        self.vertices: moderngl.Buffer = resources.buffer(self._content.tobytes(), dynamic=True)
+        self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(own))
+        self._program = resources.program("surfaces/displacement", "moved")
+        self._program["layer"] = float(layer)
+        names = "in_position", "in_direction", "in_lookup"
+        self._pass = resources.vertex_array(self._program, [(self.vertices, "3f 3f 2f 11x4", *names)])
+        # nothing is drawn, but OpenGL asks for a framebuffer
+        self._framebuffer = resources.framebuffer([resources.renderbuffer((1, 1))])
+        self._used: NDArray[np.int32] | None = None
+
+    def move(self, points: Floats32, directions: Floats32, normals: Floats32, baked: Floats32) -> None:
+        """Replace where all vertices are at rest [m], the directions that they are displaced in, and more, [n, 3]."""
+        self._content[:, :6] = np.hstack([points, directions])
+        self._content[:, 8:14] = np.hstack([normals, baked])
+        self.vertices.write(self._content[: self._base_count])
+        self._used = None
+
+    def use(self, midpoints: NDArray[np.int32]) -> None:
+        """Let these vertices follow the mesh's own."""
+        if len(midpoints) and midpoints is not self._used:
+            rows = self._content[midpoints]
+            self.vertices.write(rows, offset=self._base_count * rows.strides[0])
+        self._used = midpoints
+        self._count = self._base_count + len(midpoints)
+
+    def run(self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: int) -> None:
+        """Displace all that are in use; height maps and occluders are bound already.
 
         Parameters
         ----------
@@ -289,23 +311,9 @@ class Displacement:
             Of the target in the world [m].
         occluders : int
             Bits of those near it; see `Occluders.near`.
-        midpoints : int32 array or moderngl.Buffer
-            A list of vertices, or a buffer on the GPU that says of each midpoint whether it is in use.
         """
-        if isinstance(midpoints, moderngl.Buffer):
-            listed, count = midpoints, self._midpoint_count
-        else:
-            listed, count = self._midpoints, len(midpoints)
-            if count:
-                listed.write(midpoints)
-        self._rest.bind_to_storage_buffer(Binding.REST_VERTICES)
-        self.moved.bind_to_storage_buffer(Binding.MOVED_VERTICES)
-        listed.bind_to_storage_buffer(Binding.MIDPOINTS)
-        count += self._base_count
-        self._program["flagged"] = listed is not self._midpoints
         self._program["rotation"] = tuple(rotation.T.ravel())
         self._program["origin"] = tuple(origin)
-        self._program["count"] = count
         self._program["occluders_near"] = occluders
-        self._program.run(-(-count // VERTEX_GROUP))
-        ctx.memory_barrier()
+        self._framebuffer.use()
+        self._pass.transform(self.moved, moderngl.POINTS, vertices=self._count)

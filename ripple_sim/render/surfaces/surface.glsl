@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // A target into the G-buffer, with its texture; with HEATMAP one of the solver's fields in false colours, with GRID lines
 // between blocks of texels.
 uniform float resolution;  // texels along a chart's side

@@ -1,4 +1,4 @@
-#version 430
+#version 410
 // Geoms and sites of one shape into the G-buffer, as instances.
 VARYING vec3 normal;
 VARYING vec3 mapped;

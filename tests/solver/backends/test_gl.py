@@ -8,8 +8,8 @@ import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, WaveSolver, build_atlas, sphere_atlas, texel_atlas
-from ripple_sim.solver.backends import Dispatch, FieldLayout, TexelList
-from ripple_sim.solver.gl import GLContext, bind_buffers, shared_context
+from ripple_sim.solver.backends import Dispatch, FieldLayout, TexelList, bind_buffers
+from ripple_sim.solver.gl import GLContext, shared_context
 
 pytestmark = pytest.mark.usefixtures("opengl")
 MESHES = [square(1), square(66), flat_torus(17), polygon(3, 9), two_squares(3)]
