@@ -184,7 +184,8 @@ class Film:
     def warn_of_unseen(self) -> None:
         """Warn of waves that no frame shows, neither by their height nor by colours."""
         if not self._request.heatmap:
-            self._sources[0].warn_of_unseen()
+            self._sources[0].shown.warn_of_low()
+            self._sources[0].shown.warn_of_none()
 
     def _see(self, seen: tuple[int, Sighting] | None) -> None:
         """Write the passes of the last frame, whose pixels flow to what is seen now, if anything."""

@@ -66,6 +66,16 @@ def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_show
     assert not rendered(1e6, overlay=["height"]), "colours show them"
 
 
+@pytest.mark.parametrize("beside", [0.0, 5.0])
+def test_a_target_that_nothing_has_touched_is_told_of(scene, tmp_path, beside):
+    text = (tmp_path / "scene.xml").read_text()
+    (tmp_path / "scene.xml").write_text(text.replace('pos="0.05 0 0.3"', f'pos="{0.05 + beside} 0 0.3"'))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "frames", VideoOptions(**OPTIONS, duration=0.5))
+    assert ["no wave on 'egg': nothing touched it" in str(each.message) for each in told] == [True] * (beside > 0)
+
+
 def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene, tmp_path):
     def resume(scene: Scene, **options: object) -> None:
         render_video(
