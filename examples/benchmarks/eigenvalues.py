@@ -8,8 +8,9 @@ and the texels of curved ones are put there too, so that no facet counts as an e
 built. The operator is that of `WaveSolver`, with masses evened out for the sake of the time step. After the sphere
 comes the cube layout of the same sphere, and how the patches' errors stand to it at equal texels.
 
-With `--meshes` those are taken as they are instead, texels on their facets, against quadratic finite elements on the
-same polyhedron.
+With `--meshes` those are taken as they are instead, texels on their facets, in each layout that fits them. The
+reference are quadratic finite elements on the same polyhedron; beside it stand linear ones with lumped masses, as
+triangle meshes are often solved, on its triangles cut in four, once and twice.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
+import igl
 import numpy as np
 import trimesh
 from scipy.linalg import eigh
@@ -200,11 +202,21 @@ def least(stiffness: csr_array, mass: csr_array) -> Values:
     return np.sort(values)[:COUNT] / scale
 
 
+def halved(mesh: Mesh, times: int) -> tuple[Points, Values]:
+    V, F = mesh.V, mesh.F
+    for _ in range(times):
+        V, F = trimesh.remesh.subdivide(V, F)
+    return V, F
+
+
+def of_linear_elements(V: Points, F: Values) -> Values:
+    """The twenty least eigenvalues of a mesh, rims free, by its vertices' cotangent weights and shares of the area."""
+    return least(csr_array(-igl.cotmatrix(V, F)), csr_array(igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_BARYCENTRIC)))
+
+
 def of_polyhedron(mesh: Mesh, halvings: int) -> Values:
     """The twenty least eigenvalues of a mesh as it is, rims free, by quadratic elements on its halved triangles."""
-    V, F = mesh.V, mesh.F
-    for _ in range(halvings):
-        V, F = trimesh.remesh.subdivide(V, F)
+    V, F = halved(mesh, halvings)
     sides = np.sort(F[:, [[0, 1], [1, 2], [2, 0]]], axis=-1).reshape(-1, 2)
     edges, of_side = np.unique(sides, axis=0, return_inverse=True)
     nodes = np.hstack([F, len(V) + of_side.reshape(-1, 3)])
@@ -234,17 +246,22 @@ def line(name: str, texels: list[int], errors: list[float]) -> str:
 
 
 def polyhedra(names: list[str], resolutions: list[int]) -> None:
-    """Meshes as they are: mean and worst relative error in the layout that they get by themselves."""
+    """Meshes as they are: mean and worst relative error, in the layout that they get by themselves and on patches."""
     for name in names:
         mesh = load_mesh(name)
         coarser, exact = (of_polyhedron(mesh, halvings) for halvings in (0, 1))
         change = np.abs(exact[1:] / coarser[1:] - 1).max()
         print(f"{Path(name).name}, {len(mesh.F):,} triangles; halving them changes the reference by {change:.1e}")
-        atlases = [build_atlas(mesh, n) for n in resolutions]
-        errors = np.array([errors_against(exact, atlas) for atlas in atlases])
-        texels = [atlas.areas.size for atlas in atlases]
-        print(line(f"{atlases[0].layout}, mean", texels, errors.mean(axis=1)))
-        print(line(f"{atlases[0].layout}, worst", texels, errors.max(axis=1)), flush=True)
+        for layout in dict.fromkeys((build_atlas(mesh, resolutions[0]).layout, "patches")):
+            atlases = [build_atlas(mesh, n, layout=layout) for n in resolutions]
+            errors = np.array([errors_against(exact, atlas) for atlas in atlases])
+            texels = [atlas.areas.size for atlas in atlases]
+            print(line(f"{layout}, mean", texels, errors.mean(axis=1)))
+            print(line(f"{layout}, worst", texels, errors.max(axis=1)), flush=True)
+        meshes = [halved(mesh, times) for times in (1, 2)]
+        errors = np.array([np.abs(of_linear_elements(*each)[1:] / exact[1:] - 1) for each in meshes])
+        print(line("triangles, mean", [len(V) for V, _ in meshes], errors.mean(axis=1)))
+        print(line("triangles, worst", [len(V) for V, _ in meshes], errors.max(axis=1)), flush=True)
 
 
 def main() -> None:
