@@ -8,7 +8,6 @@ numbers: distances, normals, geoms, positions, heights and motion.
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable, Mapping
 
 import mujoco
@@ -16,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.soft import first_skin
-from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.camera import Pose, Viewpoint
 from ripple_sim.render.resources import MovedHeightMap
@@ -28,12 +26,11 @@ from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import SphereAtlas, WaveSolver, sphere_atlas
-from ripple_sim.solver.backends.gl_fields import DeviceField
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.kernel import Floats32, kernel
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .snapshot import Snapshot, exposures_of
+from .snapshot import ShownWaves, Snapshot, exposures_of
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -302,9 +299,6 @@ def _turned(camera: FixedCamera, angle: float) -> FixedCamera:
     return FixedCamera(focus + turn @ (camera.position - focus), turn @ camera.rotation, camera.distance, camera.fovy)
 
 
-_SEEN = 5.0  # pixels of a height that catches the eye
-
-
 class FrameSource:
     """Renders snapshots of a simulation in the process's shared OpenGL context.
 
@@ -322,6 +316,12 @@ class FrameSource:
         Frames are linear light, float16, multiplied by opacity; otherwise sRGB, uint8.
     annotate : callable, optional
         Adds a heatmap or a grid to a target's surface before it is drawn.
+
+    Attributes
+    ----------
+    renderer : Renderer
+    shown : ShownWaves
+        How high the waves were.
     """
 
     def __init__(
@@ -340,8 +340,7 @@ class FrameSource:
         _, self._lens_points = exposures_of(simulation.scene.camera)
         self._sensor = Sensor(supersample, len(self._lens_points))
         self._geoms = simulation.ripples.geom_ids
-        # by target: of the highest wave so far in pixels, these, its height [m], and the width of a pixel there [m]
-        self._highest = dict.fromkeys(self._geoms, (0.0, 0.0, 1.0))
+        self.shown = ShownWaves(simulation.ripples, height)
         surfaces = {
             self._geoms[entry.geom]: annotate(surface_of(simulation.ripples[entry.geom], entry.look, entry.color))
             for entry in simulation.scene.targets
@@ -365,7 +364,7 @@ class FrameSource:
         """Draw a snapshot without waiting for it: `fetch` returns it, after those submitted before."""
         height_maps = {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}
         camera: Viewpoint = self.camera(snapshot)
-        self._measure(snapshot, camera.pose())
+        self.shown.look(snapshot.data, snapshot.heights, camera.pose())
         lens = self._lens_points[snapshot.exposure]
         if lens.any():
             sim = self._simulation
@@ -373,32 +372,6 @@ class FrameSource:
             focus = focal_distance(sim.model, snapshot.data, sim.scene.camera, pose)
             camera = dataclasses.replace(pose, lens=tuple(lens), focal_distance=focus)
         self.renderer.submit(snapshot.data, height_maps, camera, snapshot.exposure)
-
-    def _measure(self, snapshot: Snapshot, pose: Pose) -> None:
-        """Take note of the highest waves, in pixels of the nearest point of their target that may be seen."""
-        model, data = self._simulation.model, snapshot.data
-        for name, height in snapshot.heights.items():
-            geom, distance = self._geoms[name], pose.distance
-            if geom < model.ngeom:  # what is soft has no place of its own
-                away = float(np.linalg.norm(data.geom_xpos[geom] - pose.position)) - float(model.geom_rbound[geom])
-                distance = max(away, 0.1 * distance)
-            pixel = 2 * distance * float(np.tan(np.radians(pose.fovy) / 2)) / self.height
-            peak = height.peak if isinstance(height, DeviceField) else float(np.abs(height).max())
-            self._highest[name] = max(self._highest[name], (peak / pixel, peak, pixel))
-
-    def warn_of_unseen(self) -> None:
-        """Warn of targets whose waves were there, but in no frame so far higher than a pixel, and say what would do."""
-        for name, (pixels, peak, pixel) in self._highest.items():
-            if 0 < pixels < 1:
-                density, factor = np.asarray(self._simulation.ripples[name].material.density), _SEEN / pixels
-                lower = "" if density.ndim else f", {float(density) / factor:.2g} kg/m^2,"
-                warnings.warn(
-                    f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a pixel is {pixel:.2g} m"
-                    f" wide. A density {factor:.2g} times lower{lower} would show {_SEEN:g} pixels; so may "
-                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in Python',
-                    RippleWarning,
-                    stacklevel=4,
-                )
 
     def fetch(self) -> NDArray | None:
         """Wait for the earliest snapshot submitted, and return what `render` does."""

@@ -2,6 +2,7 @@
 
 `exposures_of` says at which times while the shutter is open, and through which points of the lens; `ShutterTimes` takes
 the simulation there, between its physics steps, and `drawn_heights` makes height maps, wherever a surface is.
+`ShownWaves` tells whether there is anything to be seen of the waves.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import dataclasses
 import functools
 import hashlib
 import itertools
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
@@ -18,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Impulse, Ripples
+from ripple_sim.errors import RippleWarning
+from ripple_sim.render.camera import Pose
 from ripple_sim.render.resources import AnyHeightMap, MovedHeightMap
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
@@ -120,6 +124,55 @@ def drawn_heights(ripples: Ripples, name: str, limit: bool) -> Callable[[Field, 
         return height_map if V is None else MovedHeightMap(gradients()(np.asarray(height_map), V), V)
 
     return drawn
+
+
+_SEEN = 5.0  # pixels of a height that catches the eye
+
+
+class ShownWaves:
+    """Takes note of how high waves are in pictures of a height [pixels], and warns of those that no picture shows."""
+
+    def __init__(self, ripples: Ripples, height: int) -> None:
+        self._ripples, self._height = ripples, height
+        # by target: of the highest wave so far in pixels, these, its height [m], and the width of a pixel there [m]
+        self._highest = dict.fromkeys(ripples, (0.0, 0.0, 1.0))
+
+    def look(self, data: mujoco.MjData, heights: Heights, pose: Pose) -> None:
+        """Take in a picture from a pose: the highest waves, in pixels of the nearest point that may be seen."""
+        model = self._ripples.model
+        for name, height in heights.items():
+            geom, distance = self._ripples.geom_ids[name], pose.distance
+            if geom < model.ngeom:  # what is soft has no place of its own
+                away = float(np.linalg.norm(data.geom_xpos[geom] - pose.position)) - float(model.geom_rbound[geom])
+                distance = max(away, 0.1 * distance)
+            pixel = 2 * distance * float(np.tan(np.radians(pose.fovy) / 2)) / self._height
+            peak = height.peak if isinstance(height, DeviceField) else float(np.abs(height).max())
+            self._highest[name] = max(self._highest[name], (peak / pixel, peak, pixel))
+
+    def warn_of_low(self) -> None:
+        """Warn of targets whose waves were there, but never higher than a pixel, and say what would do."""
+        for name, (pixels, peak, pixel) in self._highest.items():
+            if 0 < pixels < 1:
+                density, factor = np.asarray(self._ripples[name].material.density), _SEEN / pixels
+                lower = "" if density.ndim else f", {float(density) / factor:.2g} kg/m^2,"
+                warnings.warn(
+                    f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a pixel is {pixel:.2g} m"
+                    f" wide. A density {factor:.2g} times lower{lower} would show {_SEEN:g} pixels; so may "
+                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in Python',
+                    RippleWarning,
+                    stacklevel=4,
+                )
+
+    def warn_of_none(self) -> None:
+        """Warn of targets without any wave."""
+        for name, (pixels, _, _) in self._highest.items():
+            if pixels == 0:
+                warnings.warn(
+                    f"there was no wave on {name!r}: nothing touched it. Drop or throw a body on it, or poke it, in a "
+                    "scene file by [[drop]], [[throw]] or [[poke]]; or let a geom ripple that is touched",
+                    RippleWarning,
+                    stacklevel=4,
+                )
 
 
 _GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0

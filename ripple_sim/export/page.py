@@ -105,6 +105,7 @@ def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
             "cutoff": float(np.cos(light.cutoff)),
             "exponent": light.exponent,
             "falloff": light.falloff.tolist(),
+            "gloss": light.gloss,
             "shadow": light.shadow,
         }
         for light in lighting.lights[:4]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import surface_of
-from ripple_sim.capture.snapshot import drawn_heights
+from ripple_sim.capture.snapshot import ShownWaves, drawn_heights
 from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RenderError, RippleWarning, SceneError
@@ -100,6 +100,7 @@ class RippleRenderer:
         self.model, self._ripples = own_model(model), ripples
         check_targets(self.model, ripples.model, ripples.geom_ids)
         self._height_maps = {name: drawn_heights(ripples, name, limit) for name in ripples}
+        self._shown = ShownWaves(ripples, height)
         named = by_name(self.model, looks or {}, "looks")
         surfaces = {
             geom: surface_of(ripples[name], *paint_of(self.model, geom, named.get(name)))
@@ -161,8 +162,10 @@ class RippleRenderer:
         option, everything = scene_option or mujoco.MjvOption(), int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self.model, state, option, None, self._own(camera), everything, self.scene)
         self._own_geoms = self.scene.ngeom
+        heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
+        self._shown.look(state, heights, seen.pose())
         height_maps = {
-            self._ripples.geom_ids[name]: height_map(self._ripples[name].snapshot(), state)
+            self._ripples.geom_ids[name]: height_map(heights[name], state)
             for name, height_map in self._height_maps.items()
         }
         self._drawn, self._seen = (state, height_maps, seen), (now, self._entry(camera, seen))
@@ -218,8 +221,12 @@ class RippleRenderer:
         return out
 
     def close(self) -> None:
-        """Release what is on the GPU; nothing can be rendered afterwards. Repeated calls do nothing."""
+        """Release what is on the GPU; nothing can be rendered afterwards. Repeated calls do nothing.
+
+        Warns of waves that were there, but in no scene taken in higher than a pixel.
+        """
         if self._renderer is not None:
+            self._shown.warn_of_low()
             self._renderer.close()
         self._renderer = None
 

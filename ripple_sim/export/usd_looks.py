@@ -128,7 +128,7 @@ def _far(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> Usd
     angle = 2 * np.arctan(light.size)
     lamp.CreateAngleAttr(float(np.degrees(angle)))
     lamp.CreateNormalizeAttr(True)
-    _set_light(lamp, light.radiance, np.pi)
+    _set_light(lamp, light.radiance, np.pi, light.gloss)
     keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())  # [W/m^2], as Blender has it
     keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
     return lamp
@@ -141,7 +141,7 @@ def _near(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> Us
     distance = 1.0 if light.position is None else max(float(np.linalg.norm(light.position - middle)), 1e-3)
     # a sphere's irradiance is its intensity over four times the distance squared
     strength = np.pi / float(light.falloff @ [1.0, distance, distance**2])
-    _set_light(lamp, light.radiance, 4 * distance**2 * strength)
+    _set_light(lamp, light.radiance, 4 * distance**2 * strength, light.gloss)
     keep(lamp.GetPrim(), "power", 4 * np.pi * distance**2 * strength * light.radiance.max())  # [W], as Blender has it
     if light.cutoff < np.pi:
         shaping = UsdLux.ShapingAPI.Apply(lamp.GetPrim())
@@ -150,10 +150,11 @@ def _near(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> Us
     return lamp
 
 
-def _set_light(lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float) -> None:
+def _set_light(lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float, gloss: float = 1.0) -> None:
     brightest = max(float(radiance.max()), 1e-9)
     lamp.CreateColorAttr(Gf.Vec3f(*(float(each) / brightest for each in radiance)))
     lamp.CreateIntensityAttr(intensity * brightest)
+    lamp.CreateSpecularAttr(gloss)
 
 
 def _towards(direction: NDArray) -> NDArray[np.float64]:

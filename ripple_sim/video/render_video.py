@@ -181,10 +181,12 @@ class Film:
         self._submitted.append(shot)
         self.seconds += work_clock() - start
 
-    def warn_of_unseen(self) -> None:
-        """Warn of waves that no frame shows, neither by their height nor by colours."""
+    def warn_of_unseen(self, whole: bool) -> None:
+        """Warn of waves that no frame shows, neither by their height nor by colours; of none only in a whole scene."""
         if not self._request.heatmap:
-            self._sources[0].warn_of_unseen()
+            self._sources[0].shown.warn_of_low()
+        if whole:
+            self._sources[0].shown.warn_of_none()
 
     def _see(self, seen: tuple[int, Sighting] | None) -> None:
         """Write the passes of the last frame, whose pixels flow to what is seen now, if anything."""
@@ -394,7 +396,7 @@ def render_video(
             film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)
         if not resumed_at:  # the frames before were not looked at
-            film.warn_of_unseen()
+            film.warn_of_unseen(whole=(options.duration or 0.0) >= scene.duration)
         if microphone is not None:
             pressure = microphone.pressure(frames / options.rate)
             writer.sound = pressure * gain(pressure)

@@ -23,7 +23,7 @@ from .gl_fields import DeviceField, FieldLayout, TexelList, bind_buffers, link_b
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
-_LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "TINY", "PER_TINY")
+_LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "FADED", "TINY", "PER_TINY")
 
 
 class DeviceStiffness:
@@ -51,9 +51,9 @@ class DeviceStiffness:
             self._values, self._peak = ctx.buffer(reserve=4 * (1 + len(added))), ctx.buffer(bytes(4))
         self._corners, self._texels = (_upload(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
         self._weights, quads = _upload(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
-        self._conductance, self._per_area, self._shares, self._masses, self._beside = (
+        self._conductance, self._per_area, self._detours, self._shares, self._masses, self._beside = (
             _upload(gl, each, np.float32)
-            for each in (quads.conductance, quads.per_area, shares, mass, np.zeros(mass.size))
+            for each in (quads.conductance, quads.per_area, quads.detours, shares, mass, np.zeros(mass.size))
         )
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
         self._shaders = {name: dispatch.shader(name) for name in names}
@@ -71,7 +71,8 @@ class DeviceStiffness:
             self._values.write(values.astype(np.float32).tobytes() or bytes(4))
             self._run("ride", self._count, self._vertices, self._corners, self._weights, self._places)
             shape = {"width": self._width, "scale": quads.scale, "power": quads.power}
-            self._run("quads", self._count, self._places, self._conductance, self._per_area, self._sides, **shape)
+            given = self._places, self._conductance, self._per_area, self._detours
+            self._run("quads", self._count, *given, self._sides, **shape)
             self._run("quad_links", self._count, self._sides, buffer, width=self._width)
             for (groups, *links), factor in ((self._missing, 0.0), (self._copies, 1.0)):
                 self._run("close_links", groups, buffer, *links, factor=factor)

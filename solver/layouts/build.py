@@ -55,7 +55,11 @@ def load_atlas(path: str | Path) -> Atlas:
     topology = glue(arrays["glued"], arrays["positions"].shape[1])
     return (SphereAtlas if kind == SphereAtlas.__name__ else Atlas)(
         mesh=Mesh(arrays["V"], arrays["F"], arrays.get("uv"), arrays.get("corner_uv")),
-        texels=TexelMesh(topology, arrays["positions"], arrays["normals"], arrays["areas"], arrays.get("beyond")),
+        texels=TexelMesh(
+            topology,
+            *(arrays[name] for name in ("positions", "normals", "areas")),
+            *(arrays.get(name) for name in ("beyond", "detours")),
+        ),
         chart_map=chart_map,
         triangles=arrays["triangles"],
         barycentrics=arrays["barycentrics"],

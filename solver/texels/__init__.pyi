@@ -30,6 +30,7 @@ from .chart_map import (
     texture_coordinates as texture_coordinates,
     uncut as uncut,
 )
+from .detours import link_detours as link_detours
 from .distance import (
     clean as clean,
     depth_in_region as depth_in_region,

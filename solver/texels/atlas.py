@@ -56,7 +56,7 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
 
 
 # Raise it when a layout's map or the file's contents change: older files are rebuilt.
-FORMAT = 14
+FORMAT = 15
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 
 _NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
@@ -282,7 +282,7 @@ class Atlas:
             "barycentrics": self.barycentrics,
             **self.chart_map.arrays(),
         }
-        optional = {"uv": mesh.uv, "corner_uv": mesh.corner_uv, "beyond": texels.beyond}
+        optional = {"uv": mesh.uv, "corner_uv": mesh.corner_uv, "beyond": texels.beyond, "detours": texels.detours}
         write_atlas_file(Path(path), arrays | {name: each for name, each in optional.items() if each is not None})
 
     def __getstate__(self) -> dict[str, Any]:

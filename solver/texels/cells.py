@@ -28,14 +28,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..kernel import Floats, Ints, kernel, shared
+from ..mesh.vectors import Vector, cross, dot, subtract
 from .stencil import crossing_links
 from .topology import TRIANGLE, TexelTopology
 
 Numbers: TypeAlias = Any  # a float, or an array of them
-Vectors: TypeAlias = Any  # coordinates [3] of a vector, or [3, ...] of many
 
 # In single precision, which holds these exactly, they do not make single numbers double.
-_QUARTER, _HALF, _ONE, _TWO, _THREE, _FOUR = map(np.float32, (0.25, 0.5, 1, 2, 3, 4))
+_ZERO, _QUARTER, _HALF, _ONE, _TWO, _THREE, _FOUR = map(np.float32, (0, 0.25, 0.5, 1, 2, 3, 4))
 
 # One over the stiffness of a square against the hourglass, which is 0.4. At 1 waves lag along its sides as much as they
 # lead along its diagonals, 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the longest time step.
@@ -52,45 +52,49 @@ EVEN = np.float32(1000)
 # A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
 LEAST_AREA = np.float32(0.02)
 
+# Detours fade out in quads where |p|^2 |q|^2 - (p.q)^2 is below this share of |p|^2 |q|^2, with diagonals p and q.
+FADED = np.float32(0.02)
+
 _TINY = 1e-12  # area of a cell in one point
 TINY, PER_TINY = np.float32(_TINY), np.float32(1 / _TINY)
 
 
 @shared
-def dot(a: Vectors, b: Vectors) -> Numbers:
-    """Inner product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@shared
-def cross_length(a: Vectors, b: Vectors) -> Numbers:
+def cross_length(a: Vector, b: Vector) -> Numbers:
     """Length of the vector product."""
-    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    return np.sqrt(x * x + y * y + z * z)
+    normal = cross(a, b)
+    return np.sqrt(dot(normal, normal))
 
 
 @shared
-def between(a: Vectors, b: Vectors) -> Vectors:
-    """Difference b - a."""
-    return (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-
-
-@shared
-def quad(e: Vectors, n: Vectors, p: Vectors) -> tuple[Numbers, ...]:
+def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...]:
     """Weights of a quad's links: south, north, west and east side, diagonal sw-ne, diagonal se-nw; its area.
 
-    Its corners se, nw and ne are at e, n and p from sw. With diagonals p, q and u_p, u_q the differences along them,
-    area |gradient|^2 is (|q|^2 u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared
-    differences along west and east, less that along south and north. The hourglass, less what the linear function of
-    that gradient has of it, is (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne, where a p + b q is how far the quad is
-    from a parallelogram, and next to none in an even one. A quad in one point has neither.
+    Its corners se, nw and ne are at e, n and p from sw; `detours` are those of the links in this order. With diagonals
+    p, q and u_p, u_q the differences along them, area |gradient|^2 is
+    (|q|^2 u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared differences along west
+    and east, less that along south and north. The hourglass, less what the linear function of that gradient has of it,
+    is (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne, where a p + b q is how far the quad is from a parallelogram,
+    and next to none in an even one. A quad in one point has neither.
     """
-    q = between(e, n)
-    pp, qq, pq = dot(p, p), dot(q, q), dot(p, q)
-    twice = np.maximum(_TWO * np.maximum(cross_length(p, q), _HALF * LEAST_AREA * (pp + qq)), TINY)
+    q, north, east = subtract(n, e), subtract(p, n), subtract(p, e)
+    pp, qq, pq, flat = dot(p, p), dot(q, q), dot(p, q), cross_length(p, q)
     # the way between the diagonals' middles, twice; in a convex quad a and b lie between -1 and 1
-    way = between(e, between(n, p))
-    along_p, along_q, square = dot(way, p), dot(way, q), _QUARTER * twice * twice
+    way = subtract(north, e)
+    # what detours add to the squares of sides and diagonals, and so to the products of diagonals
+    to_south, to_north = detours[0] * dot(e, e), detours[1] * dot(north, north)
+    to_west, to_east = detours[2] * dot(n, n), detours[3] * dot(east, east)
+    to_pp, to_qq, to_pq = detours[4] * pp, detours[5] * qq, _HALF * (to_west + to_east - to_south - to_north)
+    # no more than leaves a quad: in one p.q is less than |p| |q|
+    most, both = (pp + to_pp) * (qq + to_qq), pq + to_pq
+    fit = np.minimum(np.maximum((most - both * both) / (FADED * np.maximum(most, TINY)), _ZERO), _ONE)
+    to_pp, to_qq, to_pq = fit * to_pp, fit * to_qq, fit * to_pq
+    square = np.maximum(flat * flat + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq)), _ZERO)
+    pp, qq, pq = pp + to_pp, qq + to_qq, pq + to_pq
+    along_p = dot(way, p) + _HALF * fit * (to_east + to_north - to_south - to_west)
+    along_q = dot(way, q) + _HALF * fit * (to_east + to_south - to_north - to_west)
+    twice = np.maximum(_TWO * np.maximum(np.sqrt(square), _HALF * LEAST_AREA * (pp + qq)), TINY)
+    square = _QUARTER * twice * twice
     a, b = (along_p * qq - along_q * pq) / square, (along_q * pp - along_p * pq) / square
     uneven = EVEN * (a * a + b * b)
     share = uneven / (uneven + _ONE)
@@ -125,37 +129,37 @@ def hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
 
 
 @shared
-def quad_area(e: Vectors, n: Vectors, p: Vectors) -> Numbers:
+def quad_area(e: Vector, n: Vector, p: Vector) -> Numbers:
     """Area of a quad, see `quad`, that need not be flat: that of its smaller triangulation.
 
     The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice.
     """
     rising = cross_length(e, p) + cross_length(p, n)
-    falling = cross_length(e, n) + cross_length(between(e, p), between(e, n))
+    falling = cross_length(e, n) + cross_length(subtract(p, e), subtract(n, e))
     return _HALF * np.minimum(rising, falling)
 
 
 @shared
-def triangle(a: Vectors, b: Vectors, c: Vectors) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+def triangle(a: Vector, b: Vector, c: Vector) -> tuple[Numbers, Numbers, Numbers, Numbers]:
     """Cotangent weights of the links bc, ca, ab, and the area of a triangle (Pinkall and Polthier 1993)."""
-    ab, ac, bc = between(a, b), between(a, c), between(b, c)
+    ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
     double_area = cross_length(ab, ac)
     longest = np.maximum(np.maximum(dot(ab, ab), dot(ac, ac)), dot(bc, bc))
     twice = np.maximum(2 * np.maximum(double_area, LEAST_AREA * longest), _TINY)
     return dot(ab, ac) / twice, -dot(ab, bc) / twice, dot(ac, bc) / twice, double_area / 2
 
 
-def strip(a: Vectors, b: Vectors, beside_a: Vectors, beside_b: Vectors) -> Floats:
+def strip(a: Vector, b: Vector, beside_a: Vector, beside_b: Vector) -> Floats:
     """Weights of the links between two texels at a free rim, by the strips from them to the rim's points beside them.
 
     Heights have no slope across a free rim (the natural condition). Their gradient in the strip is the difference of
     the two texels over their distance along the rim, at whatever angle the grid lines meet that.
     """
-    rim, link = between(beside_a, beside_b), between(a, b)
+    rim, link = subtract(beside_b, beside_a), subtract(b, a)
     squared = dot(rim, rim)
     along = dot(rim, link) ** 2 / np.maximum(squared, _TINY)
     least = LEAST_AREA * np.maximum(squared, dot(link, link))
-    area = quad_area(link, between(a, beside_a), between(a, beside_b))
+    area = quad_area(link, subtract(beside_a, a), subtract(beside_b, a))
     return np.where(squared > 0, area / np.maximum(np.maximum(along, least), _TINY), 0.0)
 
 
@@ -220,7 +224,7 @@ def _virtual_node(corners: Floats) -> Floats:
         weights[i] = 1 / count
     mean = _mean(corners, weights)
     for i in range(count):
-        here, side = between(mean, corners[:, i]), between(corners[:, i], corners[:, (i + 1) % count])
+        here, side = subtract(corners[:, i], mean), subtract(corners[:, (i + 1) % count], corners[:, i])
         squared, along = dot(side, side), dot(side, here)
         for a in range(3):
             squares[a, a] += squared
@@ -230,7 +234,7 @@ def _virtual_node(corners: Floats) -> Floats:
                 spread[a, b] += here[a] * here[b]
     slope = _solved(spread, _solved(squares, (right[0], right[1], right[2])))
     for i in range(count):
-        weights[i] = 1 / count + dot(slope, between(mean, corners[:, i]))
+        weights[i] = 1 / count + dot(slope, subtract(corners[:, i], mean))
         total += weights[i]
     for i in range(count):
         weights[i] /= total
@@ -247,7 +251,7 @@ def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
 
 
 @kernel
-def _solved(matrix: Floats, right: Vectors) -> tuple[float, float, float]:
+def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
     """Solution of a symmetric positive semidefinite system [3, 3]; next to 0 where this leaves it open."""
     ridge = _FLAT**2 * (matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) + 1e-300
     first = matrix[0, 0] + ridge
@@ -412,7 +416,7 @@ def _link_places(topology: TexelTopology, cells: Ints, links: tuple[tuple[int, i
 
 def _whole_quads(x: Floats) -> tuple[Floats, Floats, Floats]:
     """Six links, and a quarter of the area to each corner."""
-    *links, area = quad(*_from_first(x))
+    *links, area = quad(*_from_first(x), (_ZERO,) * 6)
     return np.stack(links), np.tile(area / 4, (4, 1)), area
 
 

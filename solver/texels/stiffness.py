@@ -27,6 +27,10 @@ LEAST_RATIO = np.float32(1e-3)
 _BLOCK = 2**13  # cells at rest that are worked out at once: they stay in the processor's cache
 _BAND = 1024  # places of moving texels, in whole rows: they stay in the fastest memory
 
+# Places from one row of what they give to the next, at least the width of a chart. As a constant it spares the compiler
+# most of the pairs of arrays of which it would have to check that they lie apart: with more it makes no wide loop.
+_ROW = 2**14 + 16
+
 _ONE, _QUARTER, _ZERO = np.float32(1), np.float32(0.25), np.float32(0)
 
 
@@ -43,12 +47,15 @@ class QuadCells(NamedTuple):
         One over about the length of a quad at rest [1/m]: all that is computed is then about 1.
     power : float
         With which the coefficient goes with the area.
+    detours : float32 [4, C, n + 2, n + 2]
+        See `link_detours`.
     """
 
     conductance: Floats32
     per_area: Floats32
     scale: float
     power: float
+    detours: Floats32
 
 
 # A coefficient at rest: of the quads, and of the special cells, kind by kind, each [k]
@@ -61,11 +68,13 @@ class TexelCells:
     A coefficient of a surface that moves goes with a power of each cell's area over that at rest: with -1 what is
     spread over the surface, such as its density, gets thinner as that stretches.
 
-    `halo_positions` [C, n + 2, n + 2, 3] [m] are those of the texels at rest; see `TexelMesh`.
+    `halo_positions` [C, n + 2, n + 2, 3] [m] are those of the texels at rest, and `detours` [4, C, n + 2, n + 2] how
+    much longer than straight the links of quads are, by the same share wherever the texels move; see `TexelMesh`.
     """
 
-    def __init__(self, topology: TexelTopology, halo_positions: Floats) -> None:
+    def __init__(self, topology: TexelTopology, halo_positions: Floats, detours: Floats32 | None = None) -> None:
         self.topology, self._positions = topology, halo_positions
+        self._detours = np.zeros((4, *topology.halo.shape), np.float32) if detours is None else detours
         charts, n, _ = topology.shape
         self._shape, self._special = (charts, 4, n + 1, n + 1), special_cells(topology, halo_positions)
         there = (topology.halo >= 0) & ~topology.rim
@@ -97,7 +106,8 @@ class TexelCells:
             x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
             factor = conductance(*(self._at_corners(each[part]) for each in fields))
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
-                links = np.where(self._whole[charts, rows], np.stack(quad(*(each - x[0] for each in x[1:]))[:6]), 0.0)
+                quads = quad(*(each - x[0] for each in x[1:]), _of_cells(self._detours[:, *part]))
+                links = np.where(self._whole[charts, rows], np.stack(quads[:6]), 0.0)
             south, north, west, east, rising, falling = factor * links
             link = weights[charts]
             link[:, 0, above] += north[:, : len(link[0, 0, above])]
@@ -112,7 +122,7 @@ class TexelCells:
         """Coefficient of a surface that moves, of values at the texels at rest [C, n, n]; see `TexelMesh.stencil`."""
         fields = [self.topology.with_halo(each) for each in (values, softening)]
         quads = np.where(self._per_area > 0, _with_zeros(conductance(*map(self._at_corners, fields))), _ZERO)
-        return QuadCells(quads, self._per_area, self._scale, power), self._special_coefficient(*fields)
+        return QuadCells(quads, self._per_area, self._scale, power, self._detours), self._special_coefficient(*fields)
 
     def moved(self, around: Floats, coefficient: CellCoefficient) -> tuple[Stencil, Floats]:
         """Stencil of texels that have moved, and the area that belongs to each [m^2], [C, n, n].
@@ -224,6 +234,14 @@ class TexelCells:
         return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
 
 
+def _of_cells(links: Floats32) -> tuple[Floats32, ...]:
+    """South, north, west, east, rising and falling of each of r x c cells, of links [4, ..., r + 1, c + 1]."""
+    east, north, rising, falling = links
+    low, high = slice(None, -1), slice(1, None)
+    sides = east[..., low, low], east[..., high, low], north[..., low, low], north[..., low, high]
+    return *sides, rising[..., low, low], falling[..., low, low]
+
+
 def _with_zeros(quads: Floats) -> Floats32:
     """Values of quads [C, n + 1, n + 1] at their south-west corners among the places of a field with halo."""
     return np.pad(quads, ((0, 0), (0, 1), (0, 1))).astype(np.float32)
@@ -241,7 +259,7 @@ def quad_pass(around: Floats, cells: QuadCells, weights: Floats, areas: Floats) 
     """
     charts, width = cells.conductance.shape[:2]
     rows = max(_BAND // width, 1)
-    places, sides = around.reshape(3, -1), np.zeros((7, rows * width), np.float32)
+    places, sides = around.reshape(3, -1), np.zeros((7, _ROW), np.float32)
     below = np.zeros((2, width - 1), np.float32)
     factor = np.zeros(rows * width, np.float32)  # not one of the sides: loops over both would not be wide
     for first in range(0, charts * width, rows):
@@ -264,6 +282,9 @@ def _weigh(places: Floats, first: int, count: int, cells: QuadCells, sides: Floa
     Differences are taken in double precision, so that a surface far from the origin loses nothing.
     """
     scale, above = cells.scale, first + cells.conductance.shape[1]
+    detours, found = cells.detours.reshape(4, -1), sides.reshape(-1)
+    to_east, to_east_above, to_north = detours[0, first:], detours[0, above:], detours[1, first:]
+    to_rise, to_fall = detours[2, first:], detours[3, first:]
     x, y, z = places[0, first:], places[1, first:], places[2, first:]
     x_above, y_above, z_above = places[0, above:], places[1, above:], places[2, above:]
     for c in range(count):
@@ -275,9 +296,10 @@ def _weigh(places: Floats, first: int, count: int, cells: QuadCells, sides: Floa
             (np.float32(ex), np.float32(ey), np.float32(ez)),
             (np.float32(nx), np.float32(ny), np.float32(nz)),
             (np.float32(px), np.float32(py), np.float32(pz)),
+            (to_east[c], to_east_above[c], to_north[c], to_north[c + 1], to_rise[c], to_fall[c]),
         )
-        sides[0, c], sides[1, c], sides[2, c], sides[3, c] = south, north, west, east
-        sides[4, c], sides[5, c], sides[6, c] = rising, falling, area
+        found[c], found[c + _ROW], found[c + 2 * _ROW], found[c + 3 * _ROW] = south, north, west, east
+        found[c + 4 * _ROW], found[c + 5 * _ROW], found[c + 6 * _ROW] = rising, falling, area
 
 
 @kernel

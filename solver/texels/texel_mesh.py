@@ -82,6 +82,8 @@ class TexelMesh:
         Positions of the halo [m], where these are not simply those of the texels that it shows: the points of a rim
         nearest to the texels beside it, or images of a periodic surface; NaN where there is nothing. None: as the
         texels lie, and the surface ends at the centres of its last ones.
+    detours : float32 [4, C, n + 2, n + 2] or None
+        How much longer than straight the links are; see `link_detours`. None: they are straight.
     """
 
     topology: TexelTopology
@@ -89,6 +91,7 @@ class TexelMesh:
     normals: NDArray[np.float64]
     areas: NDArray[np.float64]
     beyond: NDArray[np.float64] | None = None
+    detours: NDArray[np.float32] | None = None
 
     @classmethod
     def of(
@@ -99,6 +102,7 @@ class TexelMesh:
         normals: NDArray[np.float64] | None = None,
         beyond: NDArray[np.float64] | None = None,
         covered: NDArray[np.float64] | None = None,
+        detours: NDArray[np.float32] | None = None,
     ) -> TexelMesh:
         """Texel mesh with the normals of its grid lines where none are given.
 
@@ -115,11 +119,11 @@ class TexelMesh:
         if normals is None:
             normals = np.cross(*tangents(around))
             normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
-        cells = TexelCells(topology, around)
+        cells = TexelCells(topology, around, detours)
         areas = cells.areas if covered is None else trimmed_areas(topology, cells.areas, covered)
         if (areas > 0).all():
             areas = evened_areas(areas, cells.at_rest(np.ones_like(areas), np.ones_like(areas)))
-        return cls(topology, points, normals, areas, beyond)
+        return cls(topology, points, normals, areas, beyond, detours)
 
     def with_positions(
         self,
@@ -132,7 +136,7 @@ class TexelMesh:
 
         Areas change in proportion to what the texel mesh spans, so that a level taken from a finer mesh is kept.
         """
-        moved = TexelMesh.of(self.topology, positions, normals=normals, beyond=beyond)
+        moved = TexelMesh.of(self.topology, positions, normals=normals, beyond=beyond, detours=self.detours)
         spanned = self.cells.areas
         level = np.divide(self.areas, spanned, out=np.ones_like(spanned), where=spanned > 0)
         return dataclasses.replace(moved, areas=moved.cells.areas * level)
@@ -155,7 +159,7 @@ class TexelMesh:
     @functools.cached_property
     def cells(self) -> TexelCells:
         """The cells between the texels."""
-        return TexelCells(self.topology, self.halo_positions)
+        return TexelCells(self.topology, self.halo_positions, self.detours)
 
     @functools.cached_property
     def grid(self) -> TexelGrid:

@@ -89,7 +89,7 @@ class Motion:
         mesh.__dict__["vertex_normals"] = self._folds.vertex_normals(V)
         positions, beyond = self._ride.positions(V)
         normals = self._ride.normals(mesh.vertex_normals)
-        texels = TexelMesh(rest.texels.topology, positions, normals, self.areas, beyond)
+        texels = TexelMesh(rest.texels.topology, positions, normals, self.areas, beyond, rest.texels.detours)
         moved = Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
         moved.__dict__["tree"] = refitted(rest.tree, V, mesh.F)
         return moved

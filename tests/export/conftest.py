@@ -11,7 +11,7 @@ from ripple_sim.scene import Scene, load_scene
 MJCF = """<mujoco><option timestep="0.001"/>
 <asset><texture name="tiles" type="2d" builtin="checker" width="8" height="8"/>
 <material name="tiles" texture="tiles" texrepeat="4 4"/></asset>
-<worldbody><light pos="1 0 2" dir="-1 0 -2" type="spot"/>
+<worldbody><light pos="1 0 2" dir="-1 0 -2" type="spot" specular=".1 .1 .1"/>
 <camera name="side" pos="0 -2 0.5" xyaxes="1 0 0 0 0.2 1" fovy="40"/>
 <geom name="floor" type="plane" size="2 2 .1" pos="0 0 -0.4" material="tiles"/>
 <body name="nest" pos="0.1 0 0" euler="0 0 30"><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/></body>

@@ -4,6 +4,7 @@ import base64
 import contextlib
 import html
 import io
+import json
 import re
 import shutil
 from collections.abc import Iterator
@@ -110,6 +111,12 @@ def test_a_page_is_one_file_that_asks_for_nothing_else(page: Path) -> None:
     assert not re.search(r'https?://|src="|href="', text)
     assert [each.name for each in page.parent.iterdir()] == ["run.html"]
     assert made_here(page)
+
+
+def test_a_pages_lamps_have_highlights_as_weak_as_ours(page: Path) -> None:
+    (meta,) = re.findall(r'<script type="application/json" id="meta">(.+)</script>', page.read_text())
+    gloss = [lamp["gloss"] for lamp in json.loads(meta)["light"]["lamps"]]
+    assert gloss == [pytest.approx(0.137, abs=1e-3), 1]  # sRGB 0.1 over 0.3, as light; the headlight's
 
 
 def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp_path: Path) -> None:

@@ -43,6 +43,21 @@ def test_a_ripple_changes_the_picture_where_it_is(egg):
     assert not changed[:, -8:].any()
 
 
+@pytest.mark.parametrize(("impulse", "lines"), [(0.0, 0), (1e-6, 1), (3.0, 0)])
+def test_waves_that_no_picture_showed_are_told_of_at_the_end(egg, impulse, lines):
+    model, data, ripples, _ = egg
+    renderer = RippleRenderer(model, ripples, width=96, height=72)
+    ripples["egg"].add_impulse((0.0, -0.3, 0.1), impulse, radius=0.1)
+    ripples["egg"].step(0.1)
+    renderer.render(data, "side")
+    ripples.reset()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        renderer.close()
+        renderer.close()
+    assert ["no wave on 'egg' was higher than a pixel" in str(each.message) for each in told] == [True] * lines
+
+
 def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):
     model, data, ripples, renderer = egg
     camera = Camera(lookat=(0, 0, 0), distance=2.0, azimuth=90.0, elevation=-20.0)

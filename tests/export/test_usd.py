@@ -100,6 +100,12 @@ def test_lamps_light_the_middle_as_strongly_as_ours(run: Any) -> None:
     lamps = [UsdLux.LightAPI(prim) for prim in stage.Traverse() if prim.HasAPI(UsdLux.LightAPI)]
     kinds = {lamp.GetPrim().GetTypeName() for lamp in lamps}
     assert {"DistantLight", "SphereLight", "DomeLight"} == kinds  # headlight, spot lamp, ambient light
+    gloss = {lamp.GetPrim().GetTypeName(): lamp.GetSpecularAttr().Get() for lamp in lamps}
+    assert gloss == {
+        "DistantLight": 1,
+        "DomeLight": 1,
+        "SphereLight": pytest.approx(0.137, abs=1e-3),
+    }  # sRGB 0.1 over 0.3, as light
     (far,) = (prim for prim in stage.Traverse() if prim.GetTypeName() == "DistantLight")
     degrees = np.degrees(far.GetAttribute("userProperties:angle").Get())  # which Blender doubles
     assert degrees == pytest.approx(UsdLux.DistantLight(far).GetAngleAttr().Get())

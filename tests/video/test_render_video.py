@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from programs import ended
-from unfinished_videos import MJCF, contents, interrupting_at
+from unfinished_videos import MJCF, contents, egg_scene, interrupting_at
 
 from ripple_sim import ExportOptions
 from ripple_sim.encode import FRAMES_IN_CLIP
@@ -64,6 +64,18 @@ def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_show
     density = float(re.search(r"lower, ([^ ]+) kg/m", message)[1])
     assert not rendered(density)
     assert not rendered(1e6, overlay=["height"]), "colours show them"
+
+
+@pytest.mark.parametrize(("beside", "duration", "lines"), [(0.0, None, 0), (5.0, None, 1), (5.0, 0.3, 0)])
+def test_a_target_that_nothing_touches_in_the_whole_scene_is_told_of(tmp_path, opengl, beside, duration, lines):
+    egg_scene(tmp_path, duration=0.5)
+    text = (tmp_path / "scene.xml").read_text()
+    (tmp_path / "scene.xml").write_text(text.replace('pos="0.05 0 0.3"', f'pos="{0.05 + beside} 0 0.3"'))
+    scene, options = load_scene(tmp_path / "scene.toml"), VideoOptions(**OPTIONS, duration=duration)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        render_video(scene, tmp_path / "frames", options)
+    assert ["no wave on 'egg': nothing touched it" in str(each.message) for each in told] == [True] * lines
 
 
 def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene, tmp_path):

@@ -41,7 +41,7 @@ class Drawing {
 
   makePrograms() {
     const {gl, meta: {light: {lamps}, floor}, shadowSize} = this, near = lamps.some(lamp => lamp.position);
-    const told = {lamps: lamps.length, near, taps: this.software ? 2 : 5, shadowSize};
+    const told = {lamps: lamps.length, near, gloss: lamps.map(lamp => lamp.gloss), taps: this.software ? 2 : 5, shadowSize};
     const light = lightShader(told), lit = litShader(told), onFloor = floorShader(told);
     const plain = floor && !(floor.texture in this.meta.images) && !near;
     this.floor = floor && new Floor(gl, floor, [floorVertex(light, onFloor), floorFragment(light, onFloor)], plain);

@@ -69,8 +69,8 @@ const CASTS = `
 `;
 
 // What a surface reflects, in linear light. Defined are COAT, METAL, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
-// With `taps` of the shadow map along each side, which has `shadowSize` texels.
-const litShader = ({lamps, taps, shadowSize}) => `
+// With `taps` of the shadow map along each side, which has `shadowSize` texels, and each lamp's share of its radiance in highlights.
+const litShader = ({lamps, gloss, taps, shadowSize}) => `
 uniform sampler2DShadow shadowMap;
 float shadowOf(vec3 c) { return outsideShadows(c) ? 1.0 : ${samples(taps, shadowSize)}; }
 uniform sampler2D ambientMap, mirrorMap, coatMap;
@@ -82,7 +82,7 @@ uniform vec4 base, volume;  // roughness, metallic, sheen, coat; translucency, t
 #endif
 F0 fresnel(F0 f0, float c) { float m = max(1.0 - c, 0.0), m2 = m * m; return f0 + (1.0 - f0) * (m2 * m2 * m); }
 float ggx(float nh, float r) { float a2 = r * r * r * r, d = nh * nh * (a2 - 1.0) + 1.0; return a2 / (d * d); }
-void reflected(vec3 radiance, vec3 way, float shadow, vec3 n, vec3 view, vec3 albedo, F0 f0, float rough, inout vec3 direct, inout vec3 highlight) {
+void reflected(vec3 radiance, vec3 way, float shadow, float gloss, vec3 n, vec3 view, vec3 albedo, F0 f0, float rough, inout vec3 direct, inout vec3 highlight) {
   vec3 halfway = normalize(view + way);
   float nl = dot(n, way);
 #ifdef TRANSLUCENT
@@ -91,7 +91,7 @@ void reflected(vec3 radiance, vec3 way, float shadow, vec3 n, vec3 view, vec3 al
 #else
   direct += radiance * (max(nl, 0.0) * shadow);
 #endif
-  highlight += radiance * (shadow * clamp(nl * 4.0, 0.0, 1.0) * ggx(max(dot(n, halfway), 0.0), rough) * 0.25) * fresnel(f0, max(dot(view, halfway), 0.0));
+  highlight += radiance * (gloss * shadow * clamp(nl * 4.0, 0.0, 1.0) * ggx(max(dot(n, halfway), 0.0), rough) * 0.25) * fresnel(f0, max(dot(view, halfway), 0.0));
 }
 // A map of light by direction, the same for all that turn with the camera.
 vec4 from(sampler2D map, vec3 d) {
@@ -115,7 +115,7 @@ vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
   vec3 way, radiance;
   float shadow = 1.0;
 ${lampNumbers(lamps).map(i => `  radiance = incident${i}(point, way);
-${i ? "" : CASTS}  reflected(radiance, way, ${i ? "1.0" : "shadow"}, n, view, albedo, f0, rough, direct, highlight);`).join("\n")}
+${i ? "" : CASTS}  reflected(radiance, way, ${i ? "1.0" : "shadow"}, ${gloss[i].toFixed(4)}, n, view, albedo, f0, rough, direct, highlight);`).join("\n")}
   vec3 ambience = from(ambientMap, n).rgb + mix(bounce, sky, 0.5 + 0.5 * n.z), shade = albedo * (direct + ambience);
 #ifdef METAL
   shade *= 1.0 - base.y;

@@ -5,7 +5,8 @@ layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Places { double places[]; };
 layout(std430, binding = 1) readonly buffer Conductance { float conductance[]; };
 layout(std430, binding = 2) readonly buffer PerArea { float per_area[]; };
-layout(std430, binding = 3) writeonly buffer Sides { float sides[]; };  // south, north, west, east, rising, falling
+layout(std430, binding = 3) readonly buffer Detours { float detours[]; };  // east, north, rising, falling
+layout(std430, binding = 4) writeonly buffer Sides { float sides[]; };  // south, north, west, east, rising, falling
 uniform int count, width;
 uniform float scale, power;
 
@@ -26,12 +27,32 @@ float quad_area(vec3 e, vec3 n, vec3 p) {
     return 0.5 * min(rising, falling);
 }
 
-void quad(vec3 e, vec3 n, vec3 p, out float links[6]) {
-    vec3 q = n - e;
-    float pp = dot(p, p), qq = dot(q, q), pq = dot(p, q);
-    float twice = max(2.0 * max(cross_length(p, q), 0.5 * LEAST_AREA * (pp + qq)), TINY);
-    vec3 way = p - n - e;
-    float along_p = dot(way, p), along_q = dot(way, q), square = 0.25 * twice * twice;
+float[6] products(vec3 e, vec3 n, vec3 p, float detours[6]) {
+    vec3 q = n - e, north = p - n, east = p - e, way = north - e;
+    float pp = dot(p, p), qq = dot(q, q), pq = dot(p, q), area = cross_length(p, q);
+    float to_south = detours[0] * dot(e, e), to_north = detours[1] * dot(north, north);
+    float to_west = detours[2] * dot(n, n), to_east = detours[3] * dot(east, east);
+    float to_pp = detours[4] * pp, to_qq = detours[5] * qq, to_pq = 0.5 * (to_west + to_east - to_south - to_north);
+    float most = (pp + to_pp) * (qq + to_qq), both = pq + to_pq;
+    float fit = clamp((most - both * both) / (FADED * max(most, TINY)), 0.0, 1.0);
+    to_pp *= fit;
+    to_qq *= fit;
+    to_pq *= fit;
+    float square = area * area + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq));
+    return float[6](
+        pp + to_pp,
+        qq + to_qq,
+        pq + to_pq,
+        sqrt(max(square, 0.0)),
+        dot(way, p) + 0.5 * fit * (to_east + to_north - to_south - to_west),
+        dot(way, q) + 0.5 * fit * (to_east + to_south - to_north - to_west)
+    );
+}
+
+void quad(vec3 e, vec3 n, vec3 p, float detours[6], out float links[6]) {
+    float given[6] = products(e, n, p, detours);
+    float pp = given[0], qq = given[1], pq = given[2], along_p = given[4], along_q = given[5];
+    float twice = max(2.0 * max(given[3], 0.5 * LEAST_AREA * (pp + qq)), TINY), square = 0.25 * twice * twice;
     float a = (along_p * qq - along_q * pq) / square, b = (along_q * pp - along_p * pq) / square;
     float uneven = EVEN * (a * a + b * b), share = uneven / (uneven + 1.0);
     a = clamp(share * a, -1.0, 1.0);
@@ -61,7 +82,11 @@ void main() {
     float links[6] = float[6](0.0, 0.0, 0.0, 0.0, 0.0, 0.0), factor = 0.0;
     if (conductance[i] > 0.0) {
         vec3 e = between(i, i + 1), n = between(i, i + width), p = between(i, i + width + 1);
-        quad(e, n, p, links);
+        int rising = 2 * count + i, falling = 3 * count + i;
+        float longer[6] = float[6](
+            detours[i], detours[i + width], detours[count + i], detours[count + i + 1], detours[rising], detours[falling]
+        );
+        quad(e, n, p, longer, links);
         float ratio = max(quad_area(e, n, p) * per_area[i], LEAST_RATIO);
         factor = power == -1.0 ? conductance[i] / ratio : conductance[i] * pow(ratio, power);
     }

@@ -23,6 +23,7 @@ from ...mesh.rays import RayScene
 from ...mesh.vectors import cross, dot
 from ...texels.atlas import Atlas, check_points
 from ...texels.chart_map import Parts, barycentrics_at, uncut
+from ...texels.detours import link_detours
 from ...texels.texel_atlas import triangles_of
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import stretch_summary
@@ -227,13 +228,15 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
     positions, normals = _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics)
     shape = directions.shape[:3]
     triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)
+    topology = cube_topology(resolution)
     return Atlas(
         mesh=mesh,
         texels=TexelMesh.of(
-            cube_topology(resolution),
+            topology,
             positions.reshape(*shape, 3),
             normals=normals.reshape(*shape, 3),
             covered=covered_areas(mesh, sphere, resolution),
+            detours=link_detours(mesh, topology, triangles, barycentrics),
         ),
         chart_map=CubeChartMap(sphere),
         triangles=triangles,

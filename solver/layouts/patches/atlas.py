@@ -13,6 +13,7 @@ from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.atlas import Atlas
 from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, texel_areas, uncut
+from ...texels.detours import link_detours
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, glue, stretch_summary
 from ..energy import COLUMN, FIXED
@@ -250,7 +251,14 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
     covered = texel_areas(mesh, parts, corners, lines, len(glued))
     return Atlas(
         mesh=mesh,
-        texels=TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond, covered=covered),
+        texels=TexelMesh.of(
+            topology,
+            samples.positions,
+            normals=samples.normals,
+            beyond=beyond,
+            covered=covered,
+            detours=link_detours(mesh, topology, samples.triangles, samples.barycentrics),
+        ),
         chart_map=PatchChartMap(pieces),
         triangles=samples.triangles,
         barycentrics=samples.barycentrics,

@@ -12,12 +12,14 @@ from ripple_sim.solver import TexelMesh, build_atlas, texel_atlas
 from ripple_sim.solver.layouts.cube import cube_topology, sphere_atlas, texel_directions
 from ripple_sim.solver.texels import SurfaceRide, TexelCells, polygons, quad
 
+STRAIGHT = (0.0,) * 6
+
 
 @pytest.mark.parametrize(("long", "angle"), [(1.0, 30.0), (2.0, 35.0), (3.0, 20.0), (1.3, 150.0)])
 def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(long: float, angle: float) -> None:
     east = np.array([long, 0.0, 0.0])
     north = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
-    south, north_side, west, east_side, rising, falling, area = quad(east, north, east + north)
+    south, north_side, west, east_side, rising, falling, area = quad(east, north, east + north, STRAIGHT)
     direction = np.linspace(0, np.pi, 180, endpoint=False)
     errors = []
     for k in (0.2, 0.1):
@@ -43,7 +45,7 @@ def test_a_quad_of_any_convex_shape_is_next_to_exact_for_linear_functions() -> N
         angle = np.sort(rng.uniform(0, 2 * np.pi, 4))[[0, 1, 3, 2]]
         corners = np.stack([np.cos(angle), 0.5 * np.sin(angle), 0 * angle], axis=1) @ turn
         slope = turn.T @ np.array([*rng.standard_normal(2), 0.0])
-        *weights, area = quad(*(corners[1:] - corners[0]))
+        *weights, area = quad(*(corners[1:] - corners[0]), STRAIGHT)
         if area < 0.1:
             continue
         matrix = np.zeros((4, 4))

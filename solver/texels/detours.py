@@ -1,0 +1,167 @@
+"""How much longer the way over the facets of a mesh is than the straight line between two texels.
+
+Straight lines cut the edges between facets short. The way is the shortest over those triangles that a plane through
+both texels, and along the mean normal of their facets, cuts between them: drawn where the plane cuts them, then pulled
+tight. In one fold that is the geodesic of the polyhedron, elsewhere next to it.
+"""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from ..kernel import Floats, Floats32, Ints, kernel
+from ..mesh.mesh import Mesh
+from ..mesh.vectors import combine, cross, dot, row, subtract, unit
+from .topology import TexelTopology
+
+_MOST = 256  # edges that a way crosses
+_PULLS, _TIGHT = 32, 1e-4  # passes over a way's points, and how far one moves along its edge where it counts as tight
+# Excess of squares: less is round-off, and a way twice as long as straight leads round other things than folds.
+_LEAST, _GREATEST = 1e-9, 3.0
+_ON_SIDE = 1e-9  # barycentric coordinates below it count as 0
+
+
+def link_detours(mesh: Mesh, topology: TexelTopology, triangles: Ints, barycentrics: Floats) -> Floats32:
+    """By what share the square of the way over the facets exceeds that of the straight line, for each link.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    topology : TexelTopology
+    triangles, barycentrics : int64 [C, n, n], float64 [C, n, n, 3]
+        Where in the mesh's triangles the texels lie.
+
+    Returns
+    -------
+    float32 [4, C, n + 2, n + 2]
+        Of the links of each place with halo to the east, north, north-east, and of its other diagonal, as in a stencil;
+        0 where there is no link, or no way was found. All copies of a link agree to the last bit.
+    """
+    there = np.where(topology.rim, -1, topology.halo)
+    detours = np.zeros((4, *there.shape), np.float32)
+    F = np.asarray(mesh.F, np.int64)
+    neighbours = igl.triangle_triangle_adjacency(F)[0].astype(np.int64)
+    _measure(there, mesh.V, F, neighbours, triangles.reshape(-1), barycentrics.reshape(-1, 3), detours)
+    return detours
+
+
+@kernel
+def _measure(there: Ints, V: Floats, F: Ints, beside: Ints, triangles: Ints, weights: Floats, out: Floats32) -> None:
+    """Fill in the detours between texels at places [C, n + 2, n + 2], -1 for none."""
+    charts, width, _ = there.shape
+    edges, points = np.empty((_MOST, 2), np.int64), np.empty((_MOST, 3))
+    for link, (dr, dc, shift) in enumerate(((0, 1, 0), (1, 0, 0), (1, 1, 0), (1, -1, 1))):
+        for chart in range(charts):
+            for r in range(width - dr):
+                for c in range(width - 1 if link != 1 else width):
+                    a, b = there[chart, r, c + shift], there[chart, r + dr, c + shift + dc]
+                    a, b = min(a, b), max(a, b)  # from the same end for all copies
+                    if a < 0 or a == b or triangles[a] == triangles[b]:
+                        continue
+                    p, q = _point(V, F[triangles[a]], weights[a]), _point(V, F[triangles[b]], weights[b])
+                    square = dot(subtract(q, p), subtract(q, p))
+                    if not square > 0.0:
+                        continue
+                    start, end = (triangles[a], p, weights[a]), (triangles[b], q, weights[b])
+                    count = _cut(V, F, beside, start, end, edges, points)
+                    if count > 0:
+                        length = _pulled(V, edges, points, count, p, q)
+                        excess = length * length / square - 1.0
+                        out[link, chart, r, c] = excess if _LEAST < excess < _GREATEST else 0.0
+
+
+@kernel
+def _point(V: Floats, corners: Ints, weights: Floats) -> tuple[float, float, float]:
+    """The point with such weights at the corners of a triangle."""
+    first = combine(weights[0], row(V, corners[0]), weights[1], row(V, corners[1]))
+    return combine(1.0, first, weights[2], row(V, corners[2]))
+
+
+@kernel
+def _holds(corners: Ints, others: Ints, weights: Floats) -> bool:
+    """Whether a triangle holds a point that is given by its weights in another."""
+    for k in range(3):
+        v = others[k]
+        if weights[k] > _ON_SIDE and v != corners[0] and v != corners[1] and v != corners[2]:
+            return False
+    return True
+
+
+@kernel
+def _cut(V: Floats, F: Ints, beside: Ints, start: tuple, end: tuple, edges: Ints, points: Floats) -> int:
+    """Edges, with the points on them, that the plane cuts from start to end, each triangle, point and weights.
+
+    Returns how many there are, 0 where the end is in the same triangle, or is not found.
+    """
+    (here, p, from_weights), (target, q, to_weights) = start, end
+    if _holds(F[target], F[here], from_weights) or _holds(F[here], F[target], to_weights):
+        return 0
+    way = subtract(q, p)
+    normal = cross(way, combine(1.0, _normal(V, F[here]), 1.0, _normal(V, F[target])))
+    entered = -1
+    for count in range(_MOST):
+        best, leaving = -np.inf, -1
+        for k in range(3):
+            v, w = F[here, k], F[here, (k + 1) % 3]
+            side_v, side_w = dot(normal, subtract(row(V, v), p)), dot(normal, subtract(row(V, w), p))
+            if k == entered or (side_v >= 0.0) == (side_w >= 0.0):
+                continue
+            t = side_v / (side_v - side_w)
+            x = combine(1.0 - t, row(V, v), t, row(V, w))
+            along = dot(way, subtract(x, p))
+            if along > best:
+                best, leaving = along, k
+                edges[count, 0], edges[count, 1] = v, w
+                points[count, 0], points[count, 1], points[count, 2] = x
+        if leaving < 0 or beside[here, leaving] < 0:
+            return 0
+        here = beside[here, leaving]
+        if _holds(F[here], F[target], to_weights):
+            return count + 1
+        entered = -1
+        for k in range(3):
+            if F[here, k] == edges[count, 1] and F[here, (k + 1) % 3] == edges[count, 0]:
+                entered = k
+    return 0
+
+
+@kernel
+def _normal(V: Floats, corners: Ints) -> tuple[float, float, float]:
+    """Unit normal of a triangle."""
+    a = row(V, corners[0])
+    return unit(cross(subtract(row(V, corners[1]), a), subtract(row(V, corners[2]), a)))
+
+
+@kernel
+def _pulled(V: Floats, edges: Ints, points: Floats, count: int, p: tuple, q: tuple) -> float:
+    """Length of the way from p to q through points on edges, once each has moved along its edge to where it is short.
+
+    Laid flat, the two triangles at an edge hold a straight line between the points before and after.
+    """
+    for _ in range(_PULLS):
+        moved = 0.0
+        for i in range(count):
+            a = row(V, edges[i, 0])
+            edge = subtract(row(V, edges[i, 1]), a)
+            square = dot(edge, edge)
+            before = subtract(p if i == 0 else row(points, i - 1), a)
+            after = subtract(q if i == count - 1 else row(points, i + 1), a)
+            s, t = dot(before, edge) / square, dot(after, edge) / square
+            off_s, off_t = combine(1.0, before, -s, edge), combine(1.0, after, -t, edge)
+            far_s, far_t = np.sqrt(dot(off_s, off_s)), np.sqrt(dot(off_t, off_t))
+            place = min(max((s * far_t + t * far_s) / (far_s + far_t), 0.0), 1.0)
+            if not (square > 0.0 and far_s + far_t > 0.0):
+                continue
+            x = combine(1.0, a, place, edge)
+            step = subtract(x, row(points, i))
+            moved = max(moved, dot(step, step) / square)
+            points[i, 0], points[i, 1], points[i, 2] = x
+        if count == 1 or moved < _TIGHT * _TIGHT:
+            break
+    length, last = 0.0, p
+    for i in range(count):
+        step = subtract(row(points, i), last)
+        length, last = length + np.sqrt(dot(step, step)), row(points, i)
+    step = subtract(q, last)
+    return length + np.sqrt(dot(step, step))
