@@ -129,9 +129,15 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     compiled = numba.njit(**options)(function)
     if compiled is not function:  # which it is with NUMBA_DISABLE_JIT
         compiled._cache = _KernelCache(function)
-        template = compiled.get_call_template  # a number at a call is of its type: no version of the kernel for each
-        compiled.get_call_template = lambda args, kws: template([numba.types.unliteral(each) for each in args], kws)
+        template = compiled.get_call_template
+        compiled.get_call_template = lambda args, kws: template([_plain(each) for each in args], kws)
     return compiled
+
+
+def _plain(kind: Any) -> Any:
+    """The type that kernels are called with for one of numba's: no version for each number, or for small integers."""
+    kind = numba.types.unliteral(kind)
+    return numba.types.int64 if kind in (numba.types.int8, numba.types.int16, numba.types.int32) else kind
 
 
 class _KernelCache(FunctionCache):

@@ -184,7 +184,9 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
         x = corners[:, :, m]
         shares = _virtual_node(x)
         middle, inner = _mean(x, shares), 0.0
-        spokes[:] = 0
+        total, link = 0.0, 0
+        for i in range(count):
+            spokes[i] = 0.0
         for i in range(count):
             j = (i + 1) % count
             to_j, to_i, sides[i], area = triangle(x[:, i], x[:, j], middle)
@@ -193,7 +195,8 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
             areas[i, m] += area / 3
             areas[j, m] += area / 3
             inner += area / 3
-        total, link = spokes.sum(), 0
+        for i in range(count):
+            total += spokes[i]
         for i in range(count):
             areas[i, m] += shares[i] * inner
             for j in range(i + 1, count):
@@ -216,7 +219,10 @@ def _virtual_node(corners: Floats) -> Floats:
     count = corners.shape[1]
     # |x - c| x side, squared: x' A x - 2 b' x, with A = sum of |s|^2 1 - s s'
     squares, right, spread = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
-    mean = _mean(corners, np.full(count, 1 / count))
+    weights, total = np.empty(count), 0.0
+    for i in range(count):
+        weights[i] = 1 / count
+    mean = _mean(corners, weights)
     for i in range(count):
         here, side = subtract(corners[:, i], mean), subtract(corners[:, (i + 1) % count], corners[:, i])
         squared, along = dot(side, side), dot(side, here)
@@ -226,11 +232,13 @@ def _virtual_node(corners: Floats) -> Floats:
             for b in range(3):
                 squares[a, b] -= side[a] * side[b]
                 spread[a, b] += here[a] * here[b]
-    slope = _solved(spread, _solved(squares, right))
-    weights = np.empty(count)
+    slope = _solved(spread, _solved(squares, (right[0], right[1], right[2])))
     for i in range(count):
         weights[i] = 1 / count + dot(slope, subtract(corners[:, i], mean))
-    return weights / weights.sum()
+        total += weights[i]
+    for i in range(count):
+        weights[i] /= total
+    return weights
 
 
 @kernel
@@ -432,7 +440,7 @@ def _triangle(x: Floats) -> tuple[Floats, Floats, Floats]:
 
 def _polygon(x: Floats) -> tuple[Floats, Floats, Floats]:
     """The links between all pairs of corners."""
-    links, shares = polygons(x)
+    links, shares = polygons(np.ascontiguousarray(x))
     return links, shares, shares.sum(axis=0)
 
 

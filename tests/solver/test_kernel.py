@@ -51,9 +51,9 @@ def test_numbers_written_at_calls_are_of_one_type() -> None:
 
     @kernel
     def calls(x):
-        return doubled(1) + doubled(2) + doubled(x)
+        return doubled(1) + doubled(2) + doubled(x[0])
 
-    assert calls(3) == 12
+    assert calls(np.array([3], np.int32)) == 12
     assert numba.config.DISABLE_JIT or len(doubled.signatures) == 1
 
 
@@ -101,19 +101,12 @@ def sum_of(x):
     for each in x:
         total += each
     return total
-
-@kernel
-def product_of(x):
-    total = 1.0
-    for each in x:
-        total *= each
-    return total
 """
 
 
 @pytest.fixture
 def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], ModuleType]]:
-    """Imports a module of two kernels anew, as a new process would, each time it is called."""
+    """Imports a module of a kernel anew, as a new process would, each time it is called."""
     (tmp_path / "library_of_kernels.py").write_text(LIBRARY)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a change within the second would go unnoticed
@@ -150,26 +143,6 @@ def test_a_kernel_is_compiled_once_and_again_when_its_source_changes(library, tm
     source.write_text(LIBRARY.replace("total = 0.0", "total = 1.0"))
     assert library().sum_of(np.array([1.0, 2.0, 4.0])) == 8.0
     assert len(list((tmp_path / "kernels").iterdir())) == 1  # the older one is replaced
-
-
-@pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "swapped", "foreign", "folder"])
-def test_a_damaged_kernel_is_compiled_anew(library, damage: str, tmp_path: Path) -> None:
-    for name in ("sum_of", "product_of"):
-        assert not is_loaded(getattr(library(), name))
-    files = sorted((tmp_path / "kernels").iterdir())
-    contents = [path.read_bytes() for path in files]
-    for path, content, other in zip(files, contents, contents[::-1], strict=True):
-        middle = len(content) // 2
-        if damage == "folder":
-            path.unlink()
-            path.mkdir()
-            continue
-        flipped = content[:middle] + bytes([content[middle] ^ 4]) + content[middle + 1 :]
-        made = {"empty": b"", "cut": content[:middle], "flipped": flipped, "swapped": other, "foreign": b"mine" * 99}
-        path.write_bytes(made[damage])
-    for name in ("sum_of", "product_of"):
-        assert not is_loaded(getattr(library(), name))
-        assert is_loaded(getattr(library(), name)) == (damage != "folder")
 
 
 WAVES = """

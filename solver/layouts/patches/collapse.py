@@ -130,10 +130,12 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
         chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
         if chosen.sum() <= _LEAST_SHARE * cut.sum():
             break
-        F, frame, turn, shift, parent, inside = _collapsed(seamless, parents, chosen, target)
+        F, turn, shift, inside = seamless.F.copy(), seamless.turn.copy(), seamless.shift.copy(), parents[1].copy()
+        left = _collapse(seamless, parents, chosen, target, F, turn, shift, inside)
+        F, frame, turn, shift = F[left], seamless.frame[left], turn[left], shift[left]
         start, star = stars(F, len(seamless.x))
         seamless = seamless._replace(F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star)
-        parents = parent, inside
+        parents = parents[0][left], inside[left]
     used, F = np.unique(seamless.F, return_inverse=True)
     F = F.reshape(-1, 3)
     start, star = stars(F, len(used))
@@ -179,37 +181,34 @@ def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> 
 
 
 @kernel
-def _collapsed(
-    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints
-) -> tuple[Ints, Ints, Ints, Ints, Ints, Floats]:
-    """What is left of the triangles: their vertices, frames, and changes to these; their parents, and where in them."""
-    F, frame, turn, shift = seamless.F.copy(), seamless.frame.copy(), seamless.turn.copy(), seamless.shift.copy()
-    parent, inside = parents[0].copy(), parents[1].copy()
-    size = 0
+def _collapse(
+    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints, F: Ints, turn: Ints, shift: Ints,
+    inside: Floats,
+) -> Bools:  # fmt: skip
+    """Change copies of the triangles' vertices, of the changes to their frames, and of where in their parents they lie.
+
+    Returns which triangles are left.
+    """
+    left = np.ones(len(F), np.bool_)
     for f in range(len(F)):
         k = 0
         while k < 3 and not chosen[seamless.F[f, k]]:
             k += 1
-        F[size], turn[size], shift[size], frame[size] = (
-            seamless.F[f],
-            seamless.turn[f],
-            seamless.shift[f],
-            seamless.frame[f],
-        )
-        parent[size], inside[size] = parents[0][f], parents[1][f]
-        if k < 3:
-            u = seamless.F[f, k]
-            g, m = target[u] // 3, target[u] % 3
-            v = seamless.F[g, m]
-            if v == seamless.F[f, 0] or v == seamless.F[f, 1] or v == seamless.F[f, 2]:
-                continue
-            at_u = 0 if seamless.F[g, 0] == u else (1 if seamless.F[g, 1] == u else 2)
-            through_u = after(inverse(frame_of(seamless, g, at_u)), frame_of(seamless, f, k))
-            change = after(frame_of(seamless, g, m), through_u)
-            F[size, k], turn[size, k], shift[size, k, 0], shift[size, k, 1] = v, change[0], change[1], change[2]
-            for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
-                h, c = seamless.star[i] // 3, seamless.star[i] % 3
-                if parents[0][h] == parents[0][f]:
-                    inside[size, k] = parents[1][h, c]
-        size += 1
-    return F[:size], frame[:size], turn[:size], shift[:size], parent[:size], inside[:size]
+        if k == 3:
+            continue
+        u = seamless.F[f, k]
+        g, m = target[u] // 3, target[u] % 3
+        v = seamless.F[g, m]
+        if v == seamless.F[f, 0] or v == seamless.F[f, 1] or v == seamless.F[f, 2]:
+            left[f] = False
+            continue
+        at_u = 0 if seamless.F[g, 0] == u else (1 if seamless.F[g, 1] == u else 2)
+        through_u = after(inverse(frame_of(seamless, g, at_u)), frame_of(seamless, f, k))
+        change = after(frame_of(seamless, g, m), through_u)
+        F[f, k], turn[f, k], shift[f, k, 0], shift[f, k, 1] = v, change[0], change[1], change[2]
+        for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
+            h, c = seamless.star[i] // 3, seamless.star[i] % 3
+            if parents[0][h] == parents[0][f]:
+                for j in range(3):
+                    inside[f, k, j] = parents[1][h, c, j]
+    return left

@@ -134,9 +134,17 @@ def _moved(
             return True
     for i in range(len(vertices)):
         w = vertices[i]
-        seamless.x[w], seamless.chart[w], seamless.freedom[w] = x[i], chart[i], freedom[i]
+        seamless.x[w, 0], seamless.x[w, 1], seamless.chart[w], seamless.freedom[w] = (
+            x[i, 0],
+            x[i, 1],
+            chart[i],
+            freedom[i],
+        )
     for i in range(len(triangles)):
-        seamless.turn[triangles[i]], seamless.shift[triangles[i]] = turn[i], shift[i]
+        for k in range(3):
+            seamless.turn[triangles[i], k] = turn[i, k]
+            for j in range(2):
+                seamless.shift[triangles[i], k, j] = shift[i, k, j]
     return False
 
 
@@ -237,7 +245,7 @@ def _change_frames(seamless: SeamlessMap, v: int, u: int, fan: Ints) -> None:
             px, py = turned(float(tip_x), float(tip_y), change[0])
             tip_x, tip_y = int(px) + change[1], int(py) + change[2]
         seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1] = 0, tip_x, tip_y
-    seamless.x[u] = 0.0
+    seamless.x[u, 0] = seamless.x[u, 1] = 0.0
     seamless.freedom[u], seamless.freedom[v] = FIXED, FREE
 
 

@@ -82,29 +82,41 @@ def _cut_at_borders(
     count, room = 0, len(origin)
     whole, spare = np.empty((3, 5)), np.empty((MOST_CORNERS, 5))
     column, square = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
-    whole[:, 2:] = np.eye(3)
     for f in range(len(seen)):
         k, p = corner[f], seen[f]
-        whole[:, :2] = p
+        _fill_in(p, whole)
         for i in range(first[f, 0], last[f, 0]):
-            width = clip(whole, 3, i, 0.0, 1.0, 0.0, 0, spare)
+            width = clip(whole, 3, float(i), 0.0, 1.0, 0.0, 0, spare)
             width = clip(spare, width, i + 1.0, 0.0, -1.0, 0.0, 0, column)
             for j in range(first[f, 1], last[f, 1]):
-                corners = clip(column, width, 0.0, j, 0.0, 1.0, 1, spare)
+                corners = clip(column, width, 0.0, float(j), 0.0, 1.0, 1, spare)
                 corners = clip(spare, corners, 0.0, j + 1.0, 0.0, -1.0, 1, square)
                 if corners < 3 or _area(square, corners) < LEAST:
                     continue
-                x, y = square[:corners, 0].mean(), square[:corners, 1].mean()
-                target, turn, sx, sy, _, _ = follow(seamless, homes[f], p[k, 0], p[k, 1], x, y)
+                x = y = 0.0
+                for c in range(corners):
+                    x, y = x + square[c, 0], y + square[c, 1]
+                target, turn, sx, sy, _, _ = follow(seamless, homes[f], p[k, 0], p[k, 1], x / corners, y / corners)
                 for c in range(1, corners - 1):
                     if count < room:
                         origin[count], chart[count] = f, target
-                        for to, of in ((0, 0), (1, c), (2, c + 1)):
-                            weights[count, to] = square[of, 2:]
+                        for to in range(3):
+                            of = c + to - 1 if to > 0 else 0
+                            for m in range(3):
+                                weights[count, to, m] = square[of, 2 + m]
                             x, y = turned(square[of, 0], square[of, 1], turn)
                             places[count, to, 0], places[count, to, 1] = x + sx, y + sy
                     count += 1
     return count
+
+
+@kernel
+def _fill_in(places: Floats, whole: Floats) -> None:
+    """Places of a triangle's corners, [3, 2], and their barycentrics, [3, 5] together; slices compile slowly."""
+    for k in range(3):
+        whole[k, 0], whole[k, 1] = places[k, 0], places[k, 1]
+        for m in range(3):
+            whole[k, 2 + m] = 1.0 if m == k else 0.0
 
 
 @kernel
@@ -155,7 +167,7 @@ def _cut_at_lattice(
     for p in range(len(pieces.triangle)):
         home, place = pieces.chart[p], pieces.places[p]
         left, right, low, high = first[p, 0], last[p, 0], first[p, 1], last[p, 1]
-        whole[:, :2], whole[:, 2:] = place, np.eye(3)
+        _fill_in(place, whole)
         if not bent[home, low:high, left:right].any():
             if count < room:
                 origin[count], chart[count], inside[count], places[count] = p, home, whole[:, 2:], place

@@ -157,9 +157,10 @@ def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
 
     All alternating paths that close up to `most` joints are tried, depth first.
     """
-    path, best_path = np.zeros(most, np.int64), np.zeros(most, np.int64)
-    nodes, following, cost = np.empty(most, np.int64), np.empty(most, np.int64), np.zeros(most)
-    nodes[0], following[0], length, best, best_length = node, pairing.start[node], 0, np.inf, 0
+    path, best_path, cost = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
+    nodes, following = np.empty(most, np.int64), np.empty(most, np.int64)
+    nodes[0], following[0], cost[0] = node, pairing.start[node], 0.0
+    length, best, best_length = 0, np.inf, 0
     pairing.passed[node] = True
     while length >= 0:
         if following[length] == pairing.start[nodes[length] + 1]:
@@ -183,7 +184,8 @@ def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
             _change(pairing, e, 1)
             if total < best:
                 best, best_length = total, length + 1
-                best_path[:best_length] = path[:best_length]
+                for i in range(best_length):
+                    best_path[i] = path[i]
         elif length + 1 < most:
             beyond = pairing.ends[f, 0] + pairing.ends[f, 1] - other
             pairing.passed[other] = pairing.passed[beyond] = True
@@ -193,7 +195,8 @@ def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
     pairing.passed[node] = False
     if not best < limit:
         return False
-    for e in best_path[:best_length]:
+    for i in range(best_length):
+        e = best_path[i]
         other = pairing.ends[e, 0] + pairing.ends[e, 1] - node
         f = pairing.closed[other]
         if f >= 0:

@@ -183,7 +183,7 @@ def _go_round(seamless: SeamlessMap, twin: Ints, places: Floats, v: int, h: int,
     first, chart = h, seamless.frame
     turn, sx, sy, crossed = 0, 0, 0, 0
     seamless.chart[v] = chart[h // 3]
-    seamless.x[v] = places[h // 3, h % 3]
+    seamless.x[v, 0], seamless.x[v, 1] = x, y = places[h // 3, h % 3, 0], places[h // 3, h % 3, 1]
     while True:
         f, k = h // 3, h % 3
         seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1] = turn, sx, sy
@@ -194,14 +194,13 @@ def _go_round(seamless: SeamlessMap, twin: Ints, places: Floats, v: int, h: int,
         if chart[t // 3] != chart[f]:
             c = chart[f]
             side = _side_of(places[f, k], places[f, before % 3], seamless.glued[c], chart[t // 3])
-            x, y = turned(float(sx), float(sy), seamless.side_turn[c, side])
-            sx, sy = int(x) + seamless.side_shift[c, side, 0], int(y) + seamless.side_shift[c, side, 1]
+            tx, ty = turned(float(sx), float(sy), seamless.side_turn[c, side])
+            sx, sy = int(tx) + seamless.side_shift[c, side, 0], int(ty) + seamless.side_shift[c, side, 1]
             turn = (turn + seamless.side_turn[c, side]) % 4
             crossed += 1
         h = t
         if h == first:
             break
-    x, y = seamless.x[v]
     corner = (x == 0 or x == 1) and (y == 0 or y == 1)
     cone = corner and crossed != (1 if at_rim else 4)
     if at_rim:
@@ -211,7 +210,7 @@ def _go_round(seamless: SeamlessMap, twin: Ints, places: Floats, v: int, h: int,
     if not cone:
         return
     seamless.freedom[v] = FIXED
-    seamless.x[v] = 0.0
+    seamless.x[v, 0] = seamless.x[v, 1] = 0.0
     for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
         f, k = seamless.star[i] // 3, seamless.star[i] % 3
         seamless.turn[f, k] = 0

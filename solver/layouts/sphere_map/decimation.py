@@ -245,7 +245,8 @@ def _collapse_round(order: Ints32, quota: int, front: _Front, limit: int, log: I
         degree[table.tail[preceding(h)]] -= 1
         degree[table.tail[preceding(table.twin[h])]] -= 1
         collapse(table, h)
-        quadrics[v] += quadrics[u]
+        for k in range(quadrics.shape[1]):  # slices would take longer to compile
+            quadrics[v, k] += quadrics[u, k]
         merged[v] += merged[u]
         cost[u] = -1.0
         log[done] = h
