@@ -60,7 +60,8 @@ class Ripples(Targets):
         Or dm_control's wrapper of one; likewise the data of each step.
     materials : mapping
         Geom to its `Material`: by its name, for unnamed geoms by "body/index" (index among the geoms of its body), or
-        by its id. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
+        by its id. Geoms of type mesh, sdf, hfield, sphere, ellipsoid, capsule, cylinder and box can ripple, and
+        flexes and skins, by their names.
         Note that MuJoCo collides a mesh geom as its convex hull. A geom of type="sdf" collides as the true surface, and
         so does a mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
         `make_collidable`. Impulses are exact with every integrator but RK4. Of a material without a density,

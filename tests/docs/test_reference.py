@@ -11,6 +11,8 @@ from typing import Any
 import msgspec
 import pytest
 
+import ripple_sim
+import ripple_sim.solver
 from ripple_sim.encode import MARK
 from ripple_sim.render import LOOKS
 from ripple_sim.scene import scene_file
@@ -58,6 +60,11 @@ def test_the_page_has_the_errors_and_warnings_that_users_catch() -> None:
     assert {"SceneError", "RippleWarning", "RippleError", "SolverError"} <= {
         path.rsplit(".", 1)[1] for path in objects()
     }
+
+
+def test_the_page_has_every_public_name() -> None:
+    shown = {path.rsplit(".", 1)[1] for path in objects()}
+    assert {*ripple_sim.__all__, *ripple_sim.solver.__all__} <= shown
 
 
 @pytest.mark.parametrize("path", objects())
