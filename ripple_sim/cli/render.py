@@ -235,7 +235,7 @@ class _VideoCommand(VideoOptions):
         with frame_progress(f"renderer Cycles, {self.samples} samples", frames) as progress:
             summary = render_cycles(scene, self.output, self.options(), samples=self.samples, progress=progress)
         print(f"{summary.output}: {summary.frames} frames")
-        print(f"stages    simulation and export {summary.export_seconds:.1f} s, Cycles {summary.render_seconds:.1f} s")
+        print(f"stages    simulation and export {summary.simulate_seconds:.1f} s, Cycles {summary.write_seconds:.1f} s")
 
     def _seen(self) -> Scene:
         """The scene through the camera that is asked for."""

@@ -300,18 +300,18 @@ class TargetLoad:
         if self._is_open:  # which may be touched from inside
             pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
             inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
-        loads = load_points(
+        patches, points, parts, radii = load_points(
             points, contacts.forces, starts, self._radii[geoms], self._convex[geoms], self._atlas.closest_places
         )
-        under = self._footprints.under(geoms[loads.patches], loads.points, loads.radii, self._filter.active)
+        under = self._footprints.under(geoms[patches], points, radii, self._filter.active)
         # what touches from inside pushes outwards
-        pushes = loads.forces * np.where(inner, -timestep / elapsed, timestep / elapsed)[loads.patches]
+        pushes = parts * np.where(inner, -timestep / elapsed, timestep / elapsed)[patches]
         texels, shares = (np.concatenate(each) for each in zip(*under, strict=True))
         counts = [len(each) for each, _ in under]
-        first = np.searchsorted(loads.patches, np.arange(len(geoms) + 1))
+        first = np.searchsorted(patches, np.arange(len(geoms) + 1))
         begins = np.array([0, *itertools.accumulate(counts)])[first]
         on_texels = TexelForces(
-            geoms, middles, loads.radii[first[:-1]] / 2, begins, texels, shares * np.repeat(pushes, counts)
+            geoms, middles, radii[first[:-1]] / 2, begins, texels, shares * np.repeat(pushes, counts)
         )
         done = StepContacts(self._target, *pose, contacts, starts, places, at, forces, inner, on_texels)
         self._filter.set_timestep(timestep)

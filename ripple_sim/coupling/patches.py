@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,27 +26,6 @@ _INSET = 0.75
 _OVERLAP = 0.3
 
 
-class LoadPoints(NamedTuple):
-    """Points that carry the forces of the patches, patch by patch, 36 a patch at most.
-
-    Attributes
-    ----------
-    patches : int64 [n]
-        The patch of each, ascending.
-    points : float64 [n, 3]
-        Near the surface, in the target's frame [m].
-    forces : float64 [n]
-        [N].
-    radii : float64 [n]
-        Footprint radii [m].
-    """
-
-    patches: Ints
-    points: Floats
-    forces: Floats
-    radii: Floats
-
-
 def load_points(
     points: Floats,
     forces: Floats,
@@ -55,8 +33,8 @@ def load_points(
     radii: Floats,
     convex: Bools,
     closest: Callable[[Floats], Floats],
-) -> LoadPoints:
-    """Points that carry the forces of all patches on a target.
+) -> tuple[Ints, Floats, Floats, Floats]:
+    """Points that carry the forces of all patches on a target, patch by patch, 36 a patch at most.
 
     Parameters
     ----------
@@ -72,21 +50,32 @@ def load_points(
         Whether the geom that touches is.
     closest : callable
         Surface points [m], [q, 3], nearest to points [q, 3].
+
+    Returns
+    -------
+    patches : int64 [n]
+        The patch of each, ascending.
+    points : float64 [n, 3]
+        Near the surface, in the target's frame [m].
+    forces : float64 [n]
+        [N].
+    radii : float64 [n]
+        Footprint radii [m].
     """
     if len(forces) == len(starts):
-        return LoadPoints(np.arange(len(starts)), points, forces, radii)
+        return np.arange(len(starts)), points, forces, radii
     patches = np.zeros(len(forces), dtype=np.int64)
     patches[starts[1:]] = 1
     patches, points, forces = corners(patches.cumsum(), points, forces, radii)
     pairs = _pairs(patches, convex)
     if not len(pairs):
-        return LoadPoints(patches, points, forces, radii[patches])
+        return patches, points, forces, radii[patches]
     probes = np.concatenate([points, points[pairs].sum(axis=1) / 2])
     # contact points lie a little outside the surface, by up to their depth: so may the midpoints
     away = _length(closest(probes) - probes)
     patches, points, forces, near, radii = _spread(patches, forces, radii, pairs, probes, away)
     patches, points, forces = _joined(patches, points, forces, near, len(forces))
-    return LoadPoints(patches, points, forces, radii[patches])
+    return patches, points, forces, radii[patches]
 
 
 def _pairs(patches: Ints, convex: Bools) -> Ints:
@@ -115,8 +104,8 @@ def _spread(
     Returns
     -------
     patches, points, forces
-        As in `LoadPoints`, but for points of a lattice that have yet to be joined: of each patch its corners, then the
-        midpoints.
+        As `load_points` returns them, but for points of a lattice that have yet to be joined: of each patch its
+        corners, then the midpoints.
     near, radii : float64 [p]
         Of the patches: within which distance their points are to be joined, and footprint radii [m].
     """

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.errors import ExportError, VideoError
-from ripple_sim.export.exporter import Exporter, scene_source
+from ripple_sim.export.exporter import Exporter, ExportSummary, scene_source
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.export.place import ending_of
 from ripple_sim.export.source import Source
@@ -181,16 +181,6 @@ SAMPLES = 64
 _OURS_ALONE = ("sound", "compare", "overlay", "passes", "resume", "transparent")
 
 
-@dataclasses.dataclass(frozen=True)
-class CyclesSummary:
-    """What a video by Cycles took: its frames, and times [s]."""
-
-    output: Path
-    frames: int
-    export_seconds: float
-    render_seconds: float
-
-
 def render_cycles(
     scene: Scene,
     output: str | Path,
@@ -198,7 +188,7 @@ def render_cycles(
     *,
     samples: int = SAMPLES,
     progress: Progress | None = None,
-) -> CyclesSummary:
+) -> ExportSummary:
     """Simulate a scene and write its video with frames by Cycles, of the same camera, lamps and looks.
 
     The run goes to a USD file in a temporary folder, which a process of Blender's own renders.
@@ -248,7 +238,7 @@ def render_cycles(
             writer.write(coded)
             if progress is not None:
                 progress(writer.frames, frames)
-    return CyclesSummary(output, frames, exported - start, time.perf_counter() - exported)
+    return ExportSummary(output, frames, exported - start, time.perf_counter() - exported)
 
 
 def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) -> str:

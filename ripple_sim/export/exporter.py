@@ -249,7 +249,7 @@ Progress = Callable[[int, int], None]
 
 @dataclasses.dataclass(frozen=True)
 class ExportSummary:
-    """What an export took: frames, points on rippling surfaces, and times [s]."""
+    """What an export took: its frames, and times [s]; by Cycles, `write_seconds` is what the pictures took."""
 
     output: Path
     frames: int

@@ -5,7 +5,6 @@ It finds the rippling surface under a ray, and has the triangles that are drawn 
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -20,25 +19,6 @@ from ripple_sim.solver import RippleError
 from ripple_sim.solver.mesh.rays import RayScene
 
 from .opening import FLIGHT, Balls, poke_strength, surface_size
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Hit:
-    """Where a ray meets a rippling surface.
-
-    Attributes
-    ----------
-    geom : str
-    point : float64 [3]
-        In the frame of the geom [m].
-    distance : float
-        From the ray's origin, in lengths of its direction.
-    """
-
-    geom: str
-    point: NDArray[np.float64]
-    distance: float
-
 
 # Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
 MAX_TRIANGLES = 24_000
@@ -176,8 +156,11 @@ class Session:
         self._change_material(**coefficients)
         self._material.update(coefficients)
 
-    def pick(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
-        """Nearest point of an undisplaced rippling surface on a ray from a point [m] of the world, or None."""
+    def pick(self, origin: ArrayLike, direction: ArrayLike) -> tuple[str, NDArray[np.float64], float] | None:
+        """Where a ray from a point [m] of the world first meets an undisplaced rippling surface, or None.
+
+        Returns the name of the geom, the point in its frame [m], and the distance in lengths of the direction.
+        """
         start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
         hits = []
         for name in self.simulation.ripples:
@@ -186,15 +169,17 @@ class Session:
             triangle, far, _, _ = self._scene(name).cast(local[None], heading[None])
             if triangle[0] >= 0:
                 distance = float(far[0])
-                hits.append(Hit(name, local + distance * heading, distance))
-        return min(hits, key=lambda hit: hit.distance, default=None)
+                hits.append((name, local + distance * heading, distance))
+        return min(hits, key=lambda hit: hit[2], default=None)
 
-    def poke(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
-        """Press on the first surface on a ray, with `poke_impulse`; return the place, if there is one."""
+    def poke(self, origin: ArrayLike, direction: ArrayLike) -> NDArray[np.float64] | None:
+        """Press on the first surface on a ray, with `poke_impulse`; return the point in its frame [m], if any."""
         hit = self.pick(origin, direction)
-        if hit is not None:
-            self.simulation.ripples[hit.geom].add_impulse(hit.point, self.poke_impulse, self._poke_radius)
-        return hit
+        if hit is None:
+            return None
+        name, point, _ = hit
+        self.simulation.ripples[name].add_impulse(point, self.poke_impulse, self._poke_radius)
+        return point
 
     def throw(self, origin: ArrayLike, direction: ArrayLike) -> bool:
         """Throw a ball from a point [m] of the world along a direction; it comes down where that meets a surface.
@@ -205,7 +190,7 @@ class Session:
         start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
         hit = self.pick(start, along)
         middle, _ = self._pose(self.simulation.scene.targets[0].geom)
-        reach = max(float((middle - start) @ along / (along @ along)), 0.0) if hit is None else hit.distance
+        reach = max(float((middle - start) @ along / (along @ along)), 0.0) if hit is None else hit[2]
         return self._balls.throw(self.simulation.data, start, start + reach * along, FLIGHT)
 
     def _scene(self, name: str) -> RayScene:

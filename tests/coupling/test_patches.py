@@ -17,7 +17,7 @@ SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
 def spread_patch(
     atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    patch = load_points(
+    patches, at, shares, radii = load_points(
         points,
         forces,
         np.zeros(1, int),
@@ -25,9 +25,9 @@ def spread_patch(
         np.array([convex]),
         lambda probes: atlas.nearest(probes)[0],
     )
-    assert not patch.patches.any()
-    assert np.ptp(patch.radii) == 0
-    return patch.points, patch.forces, patch.radii[0]
+    assert not patches.any()
+    assert np.ptp(radii) == 0
+    return at, shares, radii[0]
 
 
 def test_four_equal_corners_spread_evenly_over_the_square(block: Atlas) -> None:
@@ -85,14 +85,14 @@ def test_patches_do_not_depend_on_one_another(block: Atlas, seed: int) -> None:
     points = np.column_stack([rng.uniform(-0.4, 0.4, (size, 2)), rng.uniform(0.5, 0.501, size)])
     forces, radii = rng.uniform(0.1, 3.0, size), np.array([0.04, 0.06, 0.03, 0.05])
     convex = np.array([True, False, True, True])
-    together = load_points(points, forces, starts, radii, convex, lambda probes: block.nearest(probes)[0])
-    assert (np.diff(together.patches) >= 0).all()
+    patches, *together = load_points(points, forces, starts, radii, convex, lambda probes: block.nearest(probes)[0])
+    assert (np.diff(patches) >= 0).all()
     for i, (first, count) in enumerate(zip(starts, counts, strict=True)):
-        mine, rows = together.patches == i, slice(first, first + count)
+        mine, rows = patches == i, slice(first, first + count)
         at, pushes, radius = spread_patch(block, points[rows], forces[rows], radii[i], bool(convex[i]))
-        np.testing.assert_allclose(together.points[mine], at, atol=1e-12)
-        np.testing.assert_allclose(together.forces[mine], pushes, rtol=1e-9)
-        np.testing.assert_allclose(together.radii[mine], radius)
+        np.testing.assert_allclose(together[0][mine], at, atol=1e-12)
+        np.testing.assert_allclose(together[1][mine], pushes, rtol=1e-9)
+        np.testing.assert_allclose(together[2][mine], radius)
 
 
 def test_footprints_under_many_points_are_those_of_each() -> None:

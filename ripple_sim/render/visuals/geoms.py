@@ -102,11 +102,11 @@ class Instances:
         model, self._visual = self._assets.model, members[0][0]
         self.numbers = [number for _, number in members]
         self.transparent = self._visual.opacity < 1.0
-        self.occludes = not (self.transparent or self._visual.site or self._visual.placed)
+        self.occludes = not (self.transparent or self._visual.site or self._visual.pose)
         self.casts = self._visual.casts
         self._indices = np.array([visual.index for visual, _ in members], dtype=np.int64)
         self._hosts = np.array([host_of(model, visual) for visual, _ in members])
-        self._placed = [visual.placed for visual, _ in members if visual.placed is not None]
+        self._poses = [visual.pose for visual, _ in members if visual.pose is not None]
         self._records = np.zeros(len(members), dtype=INSTANCE)
         for record, (visual, number) in zip(self._records, members, strict=True):
             mapping = mapping_of(model, visual)
@@ -120,7 +120,7 @@ class Instances:
         self._unit, self._image = mapping.unit, None if mapping.texture < 0 else self._assets.texture(mapping.texture)
         if self._buffer.size < self._records.nbytes:
             self._buffer.orphan(2 * self._records.nbytes)
-        corners = self._placed[0].corners if self._placed else None
+        corners = self._visual.corners
         self._corners = -1 if corners is None else len(corners)
         if corners is not None and (found := shape_of(model, self._visual)) is not None:
             for buffer, content in zip(self._level(0), _packed(found[1](0)), strict=True):
@@ -135,8 +135,8 @@ class Instances:
 
         With `sharp` edges are as MuJoCo has them, and what is round is so at any size.
         """
-        if self._placed:
-            position, rotation = (np.array(each) for each in list(zip(*self._placed, strict=True))[:2])
+        if self._poses:
+            position, rotation = (np.array(each) for each in zip(*self._poses, strict=True))
         else:
             poses = (data.site_xpos, data.site_xmat) if self._visual.site else (data.geom_xpos, data.geom_xmat)
             position, rotation = (pose[self._indices] for pose in poses)
@@ -224,7 +224,7 @@ def instances_of(
         mapping = mapping_of(model, visual)
         look, host = look_of(model, visual), host_of(model, visual)
         number = assets.objects.add(look, host, opacity=visual.opacity, identity=visual.identity)
-        kind = visual.site, visual.placed is not None, visual.casts
+        kind = visual.site, visual.pose is not None, visual.casts
         key = *kind, shape[0], mapping.kind, mapping.texture, index if visual.opacity < 1.0 else None
         groups.setdefault(key, (shape, mapping, []))[2].append((visual, number))
 

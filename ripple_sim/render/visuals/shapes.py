@@ -197,10 +197,10 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
     kind, asset = visual.kind, visual.asset
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and asset >= 0:
         return f"{'hull' if visual.hull else 'mesh'} {asset}", lambda _: mesh_asset(model, asset, visual.hull)
-    if visual.placed is not None and (corners := visual.placed.corners) is not None:
-        own = corners.astype(np.float64)
+    if visual.corners is not None:
+        own = visual.corners.astype(np.float64)
         points, normals, uv = own[:, :3], own[:, 3:6], own[:, 6:]
-        faces = np.arange(len(corners)).reshape(-1, 3)
+        faces = np.arange(len(own)).reshape(-1, 3)
         return f"{kind} {visual.identity[0]}", lambda _: Shape(np.zeros_like(points), points, normals, faces, uv)
     if kind == _GEOM.mjGEOM_HFIELD and asset >= 0:
         return f"hfield {asset}", lambda _: height_field(model, asset)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -80,18 +80,6 @@ _VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
 _UNSET = [0.5, 0.5, 0.5, 1.0]  # a geom's or site's colour where the MJCF gives none
 
 
-class Placed(NamedTuple):
-    """What a visual has that is neither a geom nor a site: its pose, and the corners of a flex's or a skin's triangles.
-
-    `origin` [m] and `rotation` have the shapes [3] and [3, 3]; `corners`, [3 m, 8], are points, normals and texture
-    coordinates.
-    """
-
-    origin: NDArray[np.float32]
-    rotation: NDArray[np.float32]
-    corners: NDArray[np.float32] | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class Visual:
     """A geom or a site as it is drawn, or something else of a scene of MuJoCo's: a contact, a tendon, a flex and so on.
@@ -116,8 +104,10 @@ class Visual:
         Whether a mesh is drawn as its convex hull.
     identity : (int, int)
         Id and type, of `mujoco.mjtObj`, of what it shows.
-    placed : Placed, optional
-        Where it is, of anything but geoms and sites.
+    pose : (float32 [3], float32 [3, 3]), optional
+        Where it is [m], and its rotation, of anything but geoms and sites.
+    corners : float32 [3 m, 8], optional
+        Points, normals and texture coordinates of the corners of a flex's or a skin's triangles.
     """
 
     site: bool
@@ -130,7 +120,8 @@ class Visual:
     group: int
     hull: bool = False
     identity: tuple[int, int] = (-1, -1)
-    placed: Placed | None = None
+    pose: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
+    corners: NDArray[np.float32] | None = None
 
     @property
     def visible(self) -> bool:
@@ -161,7 +152,7 @@ class Visual:
     def half_sizes(self) -> NDArray[np.float64]:
         """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane is infinite."""
         match self.kind:
-            case _ if self.placed is not None:  # a scene has them as they are
+            case _ if self.pose is not None:  # a scene has them as they are
                 return self.size
             case _GEOM.mjGEOM_SPHERE:
                 return np.full(3, self.size[0])
@@ -218,17 +209,16 @@ def visuals_in(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> lis
     if identity[1] == _GEOM_OBJECT:  # of a mesh there is the convex hull, too, with the next id
         hull = kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and bool(drawn.dataid % 2)
         return [replace(geom_visual(model, identity[0]), hull=hull, **paint)]
-    placed = Placed(np.array(drawn.pos), np.array(drawn.mat))
+    pose = np.array(drawn.pos), np.array(drawn.mat)
     if kind in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN):
-        corners = _corners_of(model, scene, drawn)
-        placed = Placed(np.zeros(3, np.float32), np.eye(3, dtype=np.float32), corners)
+        corners, pose = _corners_of(model, scene, drawn), (np.zeros(3, np.float32), np.eye(3, dtype=np.float32))
     size = np.array(drawn.size, dtype=np.float64)
-    visual = Visual(False, -1, kind, size, -1, **paint, group=0, identity=identity, placed=placed)
+    visual = Visual(False, -1, kind, size, -1, **paint, group=0, identity=identity, pose=pose, corners=corners)
     return [visual] if corners is None or len(corners) else list(_edges_of(scene, visual))
 
 
 def _corners_of(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> NDArray[np.float32]:
-    """Corners of the triangles of a scene's flex or skin, see `Placed`."""
+    """Corners of the triangles of a scene's flex or skin, see `Visual`."""
     index = drawn.objid
     if drawn.type == _GEOM.mjGEOM_FLEX:
         first, count = int(scene.flexfaceadr[index]), int(scene.flexfaceused[index])
@@ -255,9 +245,9 @@ def _edges_of(scene: mujoco.MjvScene, flex: Visual) -> Iterator[Visual]:
         length, turn, rotation = float(np.linalg.norm(b - a)), np.zeros(4), np.zeros(9)
         mujoco.mju_quatZ2Vec(turn, (b - a).astype(np.float64))
         mujoco.mju_quat2Mat(rotation, turn)
-        placed = Placed((a + b) / 2, rotation.reshape(3, 3).astype(np.float32))
+        pose = (a + b) / 2, rotation.reshape(3, 3).astype(np.float32)
         size = np.array([radius, radius, length / 2])
-        yield replace(flex, kind=int(_GEOM.mjGEOM_CYLINDER), size=size, material=-1, placed=placed)
+        yield replace(flex, kind=int(_GEOM.mjGEOM_CYLINDER), size=size, material=-1, pose=pose, corners=None)
 
 
 def _paint(model: Any, which: str, index: int) -> tuple[NDArray[np.float64], int, int]:
@@ -290,12 +280,12 @@ def host_of(model: Any, visual: Visual) -> int:
 
 def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
     """Bounding ball [1, 4] of a visual in the world; that of a plane is infinite."""
-    if visual.placed is not None:
-        origin, _, corners = visual.placed
-        if corners is None:
-            return np.array([[*origin, 2 * np.linalg.norm(visual.size)]])
-        middle = corners[:, :3].mean(axis=0)
-        return np.array([[*middle, np.linalg.norm(corners[:, :3] - middle, axis=1).max(initial=0.0)]])
+    if visual.corners is not None:
+        points = visual.corners[:, :3]
+        middle = points.mean(axis=0)
+        return np.array([[*middle, np.linalg.norm(points - middle, axis=1).max(initial=0.0)]])
+    if visual.pose is not None:
+        return np.array([[*visual.pose[0], 2 * np.linalg.norm(visual.size)]])
     if visual.site:
         half = visual.half_sizes
         radius = float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
