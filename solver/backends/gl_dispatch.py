@@ -19,7 +19,7 @@ from .gl_fields import FieldLayout, bind_buffers
 from .kernels import Amplitude, Probes
 
 # Threads of a group that works through a list.
-_LIST_GROUP = 64
+_GROUP = 64
 
 
 class Dispatch:
@@ -32,7 +32,7 @@ class Dispatch:
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
-        return self._gl.compute_shader("ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines)
+        return self._gl.compute_shader("ripple_sim.solver.backends.shaders", name, GROUP=_GROUP, **defines)
 
     def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over all texels, see charts.glsl."""
@@ -45,7 +45,7 @@ class Dispatch:
     def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
         """Run a shader over a list of so many entries, of which it is told."""
         shader["count"] = count
-        shader.run(-(-count // _LIST_GROUP))
+        shader.run(-(-count // _GROUP))
         self._gl.barrier()
 
     def fill_halo(self, field: moderngl.Buffer) -> None:
