@@ -149,17 +149,18 @@ def volume_balance(operator: WaveOperator, dt: float, fields: RowLayout) -> Bala
     rate = volume_rate(operator, dt)
     if rate is None:
         return None
-    addresses = fields.addresses[rate.texels]
+    begins, texels, heights, velocities = rate
+    addresses = fields.addresses[texels]
     follows = np.append(False, np.diff(addresses) == 1)
-    follows[rate.begins[:-1][rate.begins[:-1] < len(follows)]] = False
+    follows[begins[:-1][begins[:-1] < len(follows)]] = False
     starts = np.flatnonzero(~follows)
-    loaded, total = np.zeros((2, len(rate.begins) - 1), np.float32)
+    loaded, total = np.zeros((2, len(begins) - 1), np.float32)
     return Balance(
-        np.searchsorted(starts, rate.begins),
+        np.searchsorted(starts, begins),
         addresses[starts],
         np.append(starts, len(addresses)),
-        rate.heights,
-        rate.velocities,
+        heights,
+        velocities,
         loaded,
         total,
         fields.coefficients(np.zeros(operator.mass.shape, np.float32)),

@@ -97,7 +97,7 @@ class DeviceStiffness:
         if not count:
             return
         shader = self._shaders[name]
-        for uniform, value in {"count": count, **uniforms}.items():
+        for uniform, value in uniforms.items():
             shader[uniform] = value
         bind_buffers(*buffers)
         self._dispatch.run_list(shader, count)

@@ -1,6 +1,6 @@
 """Compute shaders of the waves: compiled for a layout of fields, bound to buffers, and run over texels or lists.
 
-`Pressure` holds the pressure on each part of the surface in storage buffers; see `VolumeRate`.
+`Pressure` holds the pressure on each part of the surface in storage buffers; see `volume_rate`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .gl_fields import FieldLayout, bind_buffers
 from .kernels import Amplitude, Probes
 
 # Threads of a group that works through a list.
-_LIST_GROUP = 64
+_GROUP = 64
 
 
 class Dispatch:
@@ -32,7 +32,7 @@ class Dispatch:
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
-        return self._gl.compute_shader("ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines)
+        return self._gl.compute_shader("ripple_sim.solver.backends.shaders", name, GROUP=_GROUP, **defines)
 
     def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over all texels, see charts.glsl."""
@@ -45,7 +45,7 @@ class Dispatch:
     def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
         """Run a shader over a list of so many entries, of which it is told."""
         shader["count"] = count
-        shader.run(-(-count // _LIST_GROUP))
+        shader.run(-(-count // _GROUP))
         self._gl.barrier()
 
     def fill_halo(self, field: moderngl.Buffer) -> None:
@@ -89,15 +89,15 @@ class Pressure:
     def _following(
         self, rate: VolumeRate, fields: FieldLayout, dispatch: Dispatch
     ) -> Callable[[moderngl.Buffer, moderngl.Buffer], None]:
-        velocities = rate.velocities if len(rate.velocities) else np.zeros_like(rate.heights)
-        chunks, begins = _chunks(rate.begins)
+        begins, texels, heights, velocities = rate
+        chunks, bounds = _chunks(begins)
         tables = (
-            fields.texels[rate.texels].astype(np.int32),
-            np.stack([rate.heights, velocities], axis=1),
-            *(each.astype(np.int32) for each in (chunks, begins)),
+            fields.texels[texels].astype(np.int32),
+            np.stack([heights, velocities if len(velocities) else np.zeros_like(heights)], axis=1),
+            *(each.astype(np.int32) for each in (chunks, bounds)),
         )
         with self._gl as ctx:
-            *entries, bounds = (ctx.buffer(each.tobytes()) for each in tables)
+            *entries, first = (ctx.buffer(each.tobytes()) for each in tables)
             sums = ctx.buffer(reserve=4 * len(chunks))
         weigh, balance = dispatch.shader("volume"), dispatch.shader("volume", PARTS=1)
         # by themselves: a circle with `self` would keep buffers until Python looks for garbage
@@ -107,7 +107,7 @@ class Pressure:
             bind_buffers(height, velocity, *entries, sums)
             weigh.run(len(chunks))
             gl.barrier()
-            bind_buffers(asked, sums, bounds, amplitudes)
+            bind_buffers(asked, sums, first, amplitudes)
             dispatch.run_list(balance, count)
 
         return follow

@@ -139,7 +139,7 @@ class Kick(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What keeps the volume, see `VolumeRate`: factors of texels that lie side by side in runs.
+    """What keeps the volume, see `volume_rate`: factors of texels that lie side by side in runs.
 
     Where the runs of each part begin, [p + 1], the address of each run, [r], and where its factors begin, [r + 1]; what
     the load asks for and the sum, each [p]; the pressure, a coefficient, and the `part_runs` of its texels.

@@ -44,7 +44,8 @@ def load_shader(package: str, name: str, stage: str = "", **defines: object) -> 
         Which of the shaders in the file, if there are several: lines behind `#stage vertex` belong to the stage
         "vertex" alone, up to the next such line; those before the first belong to all. So it is in files included.
     **defines
-        Constants, written as `#define NAME value` where the text has the name.
+        Constants, written as `#define NAME value` where the text has the name. GROUP is how many threads a group of a
+        compute shader has, which is declared too.
 
     Raises
     ------
@@ -58,7 +59,8 @@ def load_shader(package: str, name: str, stage: str = "", **defines: object) -> 
     # only those that it knows: shaders that do not differ in them are the same, and compiled once
     known = set(re.findall(r"\w+", " ".join([body, *map(str, defines.values())])))
     lines = "".join(f"#define {key} {value}\n" for key, value in defines.items() if key in known)
-    return f"{head}\n{lines}{body}"
+    layout = f"layout(local_size_x = {defines['GROUP']}) in;\n" if "GROUP" in defines else ""
+    return f"{head}\n{lines}{layout}{body}"
 
 
 def _read(folder: Traversable, path: str, stage: str, seen: set[str]) -> str:

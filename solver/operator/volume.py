@@ -8,11 +8,12 @@ projected with masses as weights, so that the operator stays symmetric and energ
 
 from __future__ import annotations
 
-import dataclasses
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernel import Floats32, Ints
 from .wave_operator import WaveOperator, damped_step
 
 
@@ -70,30 +71,22 @@ class VolumeBalance:
 _NOTHING = 1e-12
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class VolumeRate:
-    """The pressure's acceleration of part p: the sum over its entries of `heights` h + `velocities` v.
-
-    Attributes
-    ----------
-    begins : int64 [p + 1]
-        The entries of part p are those from begins[p] to begins[p + 1].
-    texels : int64 [k]
-        Flat texel index of each entry: where the density varies, as a rule.
-    heights, velocities : float32 [k]
-        [1/s^2] and [1/s]; no velocities, [0], where none count.
-    """
-
-    begins: NDArray[np.int64]
-    texels: NDArray[np.int64]
-    heights: NDArray[np.float32]
-    velocities: NDArray[np.float32]
+VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]  # begins, texels, heights, velocities; see `volume_rate`
 
 
 def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     """What keeps the volume over a substep of dt [s]; None where nothing changes it, or it is not kept anyway.
 
     It is not where a clamp holds a part of the surface, or the stiffness varies: those take up momentum themselves.
+
+    Returns
+    -------
+    begins : int64 [p + 1]
+        The pressure's acceleration of part p is the sum of heights h + velocities v from begins[p] to begins[p + 1].
+    texels : int64 [k]
+        Flat texel index of each entry: where the density varies, as a rule.
+    heights, velocities : float32 [k]
+        [1/s^2] and [1/s]; no velocities, [0], where none count.
     """
     if operator.density is None:
         return None
@@ -124,7 +117,7 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     if not len(texels):
         return None
     counting = velocities[texels] if velocities.any() else velocities[:0]
-    return VolumeRate(begins, texels, heights[texels].astype(np.float32), counting.astype(np.float32))
+    return begins, texels, heights[texels].astype(np.float32), counting.astype(np.float32)
 
 
 def _mean(field: NDArray[np.float64]) -> float:

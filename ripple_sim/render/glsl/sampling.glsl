@@ -1,10 +1,4 @@
-// Points and pixels that samples are taken at: noise, blocks of 2 x 2 pixels that share their work, points of a disc.
-
-// Interleaved gradient noise, 0 to 1: evenly spread over any few neighbouring pixels.
-float gradient_noise(vec2 pixel)
-{
-    return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
-}
+// Points and pixels that samples are taken at: blocks of 2 x 2 pixels that share their work, points of a disc.
 
 // Mean over a block of 2 x 2 pixels, or over the part of it that lies to the given sides.
 float block_mean(float value, bvec2 sides)
@@ -17,11 +11,6 @@ float block_mean(float value, bvec2 sides)
 vec3 block_mean(vec3 value, bvec2 sides)
 {
     return vec3(block_mean(value.r, sides), block_mean(value.g, sides), block_mean(value.b, sides));
-}
-
-float block_mean(float value)
-{
-    return block_mean(value, bvec2(true));
 }
 
 const float TWO_PI = 6.2831853;

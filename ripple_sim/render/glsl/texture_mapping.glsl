@@ -13,38 +13,31 @@ const float TURNS = 0.15915494;  // in a radian
 vec2 wrapped(vec3 p, out mat3x2 slope)
 {
     vec3 side = abs(p);
+    float radius = max(length(p.xy), 1e-6);
+    float u = fract(TURNS * atan(p.y, p.x)), v = 0.5 - 0.5 * p.z;
+    vec3 along_u = TURNS / (radius * radius) * vec3(-p.y, p.x, 0.0), along_v = vec3(0.0, 0.0, -0.5);
 #if MAPPING == BOX_IMAGE
     // projected along the axes
     bool x = side.x > max(side.y, side.z), y = !x && side.y > side.z;
     slope = x ? mat3x2(0.0, 0.0, 0.5, 0.0, 0.0, -0.5) : y ? mat3x2(0.5, 0.0, 0.0, 0.0, 0.0, -0.5)
                                                           : mat3x2(0.5, 0.0, 0.0, -0.5, 0.0, 0.0);
     return 0.5 + slope * p;
-#else
-    float radius = max(length(p.xy), 1e-6);
-    float u = fract(TURNS * atan(p.y, p.x)), v = 0.5 - 0.5 * p.z;
-    vec3 along_u = TURNS / (radius * radius) * vec3(-p.y, p.x, 0.0), along_v = vec3(0.0, 0.0, -0.5);
-#if MAPPING == CYLINDER_IMAGE
+#elif MAPPING == CYLINDER_IMAGE
     if (side.z > radius) {
         slope = mat3x2(0.5, 0.0, 0.0, 0.5, 0.0, 0.0);
         return 0.5 + slope * p;
     }
 #else
-#if MAPPING == BALL_IMAGE
-    const float up = 1.0, equator = 0.5, rate = -2.0 * TURNS;
-    float z = p.z;
-#else
-    // a capsule's ends are hemispheres on the discs at -1 and 1
-    float up = sign(p.z), equator = 0.5 + 0.5 * up, rate = -4.0 * TURNS * up;
-    float z = side.z - 1.0;
-#endif
-    // v is proportional to the elevation above the equator
-    bool curved = MAPPING == BALL_IMAGE || z > 0.0;
+    // v is proportional to the elevation above the equator; a capsule's ends are hemispheres on the discs at -1 and 1
+    const bool ball = MAPPING == BALL_IMAGE;
+    float up = ball ? 1.0 : sign(p.z), equator = ball ? 0.5 : 0.5 + 0.5 * up, z = ball ? p.z : side.z - 1.0;
+    float rate = (ball ? -2.0 : -4.0) * TURNS * up;
+    bool curved = ball || z > 0.0;
     v = curved ? equator + rate * atan(z, radius) : v;
     along_v = curved ? rate / (radius * radius + z * z) * vec3(-z * p.xy / radius, up * radius) : along_v;
 #endif
     slope = mat3x2(along_u.x, along_v.x, along_u.y, along_v.y, along_u.z, along_v.z);
     return vec2(u, v);
-#endif
 }
 #endif
 

@@ -1,21 +1,14 @@
 // From linear radiance to the frame's colours; with LINEAR these are the radiance itself.
 #include "glsl/sampling.glsl"
 
-#if LINEAR
-vec3 tone_mapped(vec3 radiance)
-{
-    return clamp(radiance, 0.0, 65504.0);  // what half floats hold
-}
 
-vec3 dithered(vec3 color)
-{
-    return color;
-}
-#else
 // Linear radiance to sRGB: values below the shoulder keep hue and contrast, brighter ones roll off towards white;
 // `tone_mapped` in tone_mapping.py is the same.
 vec3 tone_mapped(vec3 radiance)
 {
+#if LINEAR
+    return clamp(radiance, 0.0, 65504.0);  // what half floats hold
+#endif
     float peak = max(radiance.r, max(radiance.g, radiance.b));
     float excess = max(peak - SHOULDER, 0.0);
     float compressed = min(peak, SHOULDER) + (1.0 - SHOULDER) * excess / (excess + 1.0 - SHOULDER);
@@ -25,8 +18,9 @@ vec3 tone_mapped(vec3 radiance)
     return mix(SRGB_SLOPE * color, above, step(SRGB_BREAK, color));
 }
 
+// By interleaved gradient noise, which is evenly spread over any few neighbouring pixels.
 vec3 dithered(vec3 color)
 {
-    return color + (gradient_noise(gl_FragCoord.xy) - 0.5) / 255.0;
+    float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+    return LINEAR > 0 ? color : color + (noise - 0.5) / 255.0;
 }
-#endif

@@ -29,12 +29,7 @@ const float HIGHEST_LEVEL = 4.0;  // of the floor map
 const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
 const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
 
-// A skybox continues below the horizon, which the floor hides.
-#if SKYBOX
-const float HORIZON = 0.0;
-#else
-const float HORIZON = -1.0;
-#endif
+const float HORIZON = SKYBOX > 0 ? 0.0 : -1.0;  // a skybox continues below it, which the floor hides
 
 #if !SHADOW
 // Whether a shadow may fall on a point of the floor; `near` is its texel of the floor map.
@@ -70,13 +65,12 @@ void main()
     vec3 world = eye.xyz + at * way;
     vec2 place = floor_map_position(plane);
     // the blocks of 2 x 2 that share their light are texels of the next level
+    float level = 1.0;
 #if BLOCK > 1
     // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
-    float level = clamp(textureQueryLod(floor_visibility, place).y + 1.0, 1.0, HIGHEST_LEVEL);
-    vec2 near = textureLod(floor_visibility, place, level).rg;
-#else
-    vec2 near = textureLod(floor_visibility, place, 1.0).rg;
+    level = clamp(textureQueryLod(floor_visibility, place).y + 1.0, level, HIGHEST_LEVEL);
 #endif
+    vec2 near = textureLod(floor_visibility, place, level).rg;
     vec3 bounce = textureLod(floor_bounce, place, BOUNCE_LEVEL).rgb;
     vec3 shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
@@ -84,7 +78,7 @@ void main()
     float blur = 0.0;
 #if SHADOW
     // the search for what shades is shared where all four pixels of a block see the floor
-    bvec2 block = bvec2(BLOCK == 1 && block_mean(met ? 0.0 : 1.0) == 0.0);
+    bvec2 block = bvec2(BLOCK == 1 && block_mean(met ? 0.0 : 1.0, bvec2(true)) == 0.0);
 #if BLOCK > 1
     // narrow penumbras are widened, so that none falls between blocks, and left to pixels
     blur = 0.5 * length(fwidth(plane));
@@ -99,7 +93,7 @@ void main()
 #else
     // all four pixels of a block, so that they can share their search for what shades them
     bool shaded = met && may_be_shaded(place, near);
-    gl_FragDepth = block_mean(shaded ? 1.0 : 0.0) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
+    gl_FragDepth = block_mean(shaded ? 1.0 : 0.0, bvec2(true)) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
 #if NEAR_LIGHTS
     vec3 light = vec3(0.0), unshaded = vec3(0.0);

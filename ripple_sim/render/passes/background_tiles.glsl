@@ -39,6 +39,6 @@ void main()
     fragment = vec4(dithered(shown.rgb), 1.0);
 #if ROUGH
     // all four pixels of a block, so that they can share their search for what shades them
-    gl_FragDepth = block_mean(min(shown.a, 1.0 - shown.a)) > UNSURE ? SHADED_LEVEL : OPEN_LEVEL;
+    gl_FragDepth = block_mean(min(shown.a, 1.0 - shown.a), bvec2(true)) > UNSURE ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
 }

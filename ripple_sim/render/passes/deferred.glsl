@@ -27,18 +27,6 @@ const float PIXEL_VARIANCE = 1.0 / 24.0;  // of normals in a pixel, over the squ
 const float MOST_VARIANCE = 0.1;
 const vec3 INK = vec3(0.09, 0.11, 0.16);
 
-struct Material {
-    vec3 albedo;
-    float roughness, metallic, sheen, coat, translucency, transparency, emission;
-    float thickness;    // of the object under the surface, 0 to about 1
-    vec3 behind;        // radiance of what is seen through the object
-    float shadow_bias;  // height of bumps that the shading normal accounts for [m]
-    float scatter;      // how far light gets under the surface [m]
-    float visibility;   // ambient visibility that the object itself leaves, and its neighbours where `occluders` is 0
-    int occluders;      // bits of those that count
-    bvec2 block;        // neighbours in the block of 2 x 2 pixels that share their shadows with this one
-};
-
 const float SOFTENED = 0.6;  // most of the ripples' shading that light under the surface takes away
 const float COAT_ROUGHNESS = 0.25;  // of a lamp's highlight: lamps are not points
 
@@ -72,71 +60,17 @@ vec3 fresnel(vec3 f0, float cosine)
     return f0 + (1.0 - f0) * fifth_power(max(1.0 - cosine, 0.0));
 }
 
-vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom, float spread)
-{
-    vec3 view = normalize(eye.xyz - position);
-    // interpolated normals of bumpy silhouettes may look away from the camera
-    normal = normalize(normal + max(0.1 - dot(normal, view), 0.0) * view);
-    vec3 reflected = reflect(-view, normal);
-    float n_v = clamp(dot(normal, view), 0.1, 1.0);
-
-    float open = m.visibility * occluder_visibility(position, flat_normal, m.occluders);
-    float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
-    // a wall sees the floor before it, about as far away as it is high
-    vec3 bounce = floor_radiance(position + 1.2 * height * normal, height);
-    float rough = roughened(m.roughness, spread);
-    // what is reflected of the floor: where the coat is a mirror, the base is not, and sees much of it
-    vec3 met = position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2);
-    vec3 mirrored = floor_radiance(met, 0.3 * height), blurred_floor = floor_radiance(met, (0.3 + 2.0 * rough) * height);
-    vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
-
-    // in translucent objects light of their own colour wraps round the edges
-    vec3 wrap = 0.6 * m.translucency * m.albedo;
-    // and it gets the further under the surface: shadows have edges of that colour, ripples are softened
-    vec3 reach = m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3));
-    vec3 blurred = SOFTENED * m.translucency * reach, sharpness = 1.0 / mix(vec3(1.0), 0.3 + 0.7 * reach, m.translucency);
-    // light that enters elsewhere and leaves here: more of it where the object is thin
-    float thin = exp(-4.0 * m.thickness);
-    vec3 shadow[SHADOWS];
-    for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = light_arriving(i, position, flat_normal, m.shadow_bias, m.scatter, m.block);
-    vec3 direct = vec3(0.0), highlight = vec3(0.0), coated = vec3(0.0), glow = vec3(0.0);
-    for (int i = 0; i < LIGHTS; ++i) {
-        vec3 light;
-        vec3 radiance = incident(light_at(i), position, light);
-        float n_l = dot(normal, light);
-        vec3 visible = i < SHADOWS ? shadow[i] : vec3(1.0);
-        vec3 halfway = normalize(view + light);
-        vec3 facing = mix(vec3(n_l), vec3(dot(flat_normal, light)), blurred);
-        vec3 diffuse = max(facing + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
-        vec3 lit = clamp((visible - 0.5) * sharpness + 0.5, 0.0, 1.0);
-        direct += radiance * diffuse * mix(lit, vec3(1.0), 0.35 * m.translucency);
-        vec3 arrives = 0.25 * light_at(i).falloff.w * radiance * visible * clamp(n_l * 4.0, 0.0, 1.0);
-        float n_h = max(dot(normal, halfway), 0.0), v_h = max(dot(view, halfway), 0.0);
-        highlight += arrives * fresnel(f0, v_h) * ggx(n_h, m.roughness, spread);
-        coated += arrives * fresnel(vec3(0.04), v_h) * ggx(n_h, COAT_ROUGHNESS, spread);
-        float behind = clamp(0.5 - 0.5 * n_l, 0.0, 1.0);
-        glow += radiance * thin * (0.35 + 0.65 * behind * behind);
-    }
-    vec3 surround = ambient(normal, bounce, shadow[0]) * open;
-    surround *= mix(vec3(1.0), reach, 0.8 * m.translucency);
-    // light bounces between coloured walls: occlusion is less deep and more saturated
-    surround *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
-    vec3 base = m.albedo * (direct + surround) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;
-    base += m.emission * m.albedo;
-#if LAYER
-    // transparent objects show what is behind them, refracted, and tinted by their thickness
-    base = mix(base, m.behind * pow(m.albedo, vec3(0.15 + 0.8 * m.thickness)), m.transparency);
-#endif
-    base += m.sheen * m.albedo * surround * ((1.0 - n_v) * (1.0 - n_v) * (1.0 - n_v));
-
-    float hidden = clamp(open * open + 0.15, 0.0, 1.0);
-    vec3 at_edge = f0 + (max(vec3(1.0 - m.roughness), f0) - f0) * fifth_power(1.0 - n_v);
-    vec3 gloss = environment(reflected, rough, blurred_floor) * at_edge * hidden + highlight;
-    float coat = m.coat * fresnel(vec3(0.04), n_v).x;
-    vec3 film = environment(reflected, roughened(0.06, spread), mirrored) * hidden;
-    return (base + gloss) * (1.0 - coat) + coat * film + m.coat * coated;
-}
+// The surface that a sample shows.
+struct SurfaceSample {
+    int object;
+    vec3 normal;   // without ripples
+    vec3 rippled;
+    vec3 color;    // square root of the albedo
+    float ink;     // opacity of lines on top
+    float visibility, thickness;
+    vec2 place;    // on the page of charts [texels]
+    bool inner;    // whether the object's inner side is seen
+};
 
 #if LAYER
 // What lies behind the point where a ray, refracted as in water, leaves the object; blurred where that is turbid.
@@ -150,17 +84,77 @@ vec3 seen_through(vec3 position, vec3 normal, float thickness, float size, float
 }
 #endif
 
-// The surface that a sample shows.
-struct SurfaceSample {
-    int object;
-    vec3 normal;   // without ripples
-    vec3 rippled;
-    vec3 color;    // square root of the albedo
-    float ink;     // opacity of lines on top
-    float visibility, thickness;
-    vec2 place;    // on the page of charts [texels]
-    bool inner;    // whether the object's inner side is seen
-};
+// Radiance of a surface; `spread` is the variance of its normals in the pixel, `block` says which neighbours in the block
+// of 2 x 2 share their shadows with it.
+vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, float spread, bvec2 block)
+{
+    float roughness = object.base.x, metallic = object.base.y, sheen = object.base.z, coat = object.base.w;
+    float translucency = object.volume.x, transparency = object.volume.y, emission = object.volume.z;
+    float size = object.place.y, bumps = object.place.z;  // those that the shading normal accounts for
+    vec3 normal = surface.rippled, flat_normal = surface.normal, view = normalize(eye.xyz - position);
+    // interpolated normals of bumpy silhouettes may look away from the camera
+    normal = normalize(normal + max(0.1 - dot(normal, view), 0.0) * view);
+    vec3 reflected = reflect(-view, normal);
+    float n_v = clamp(dot(normal, view), 0.1, 1.0);
+
+    float open = surface.visibility * occluder_visibility(position, flat_normal, int(object.height_map.z));
+    float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
+    // a wall sees the floor before it, about as far away as it is high
+    vec3 bounce = floor_radiance(position + 1.2 * height * normal, height);
+    float rough = roughened(roughness, spread);
+    // what is reflected of the floor: where the coat is a mirror, the base is not, and sees much of it
+    vec3 met = position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2);
+    vec3 mirrored = floor_radiance(met, 0.3 * height), blurred_floor = floor_radiance(met, (0.3 + 2.0 * rough) * height);
+    vec3 f0 = mix(vec3(0.04), albedo, metallic);
+
+    // in translucent objects light of their own colour wraps round the edges
+    vec3 wrap = 0.6 * translucency * albedo;
+    // and it gets the further under the surface: shadows have edges of that colour, ripples are softened
+    vec3 reach = albedo / max(max(albedo.r, albedo.g), max(albedo.b, 1e-3));
+    vec3 blurred = SOFTENED * translucency * reach, sharpness = 1.0 / mix(vec3(1.0), 0.3 + 0.7 * reach, translucency);
+    // light that enters elsewhere and leaves here: more of it where the object is thin
+    float thin = exp(-4.0 * surface.thickness);
+    vec3 shadow[SHADOWS];
+    for (int i = 0; i < SHADOWS; ++i)
+        shadow[i] = light_arriving(i, position, flat_normal, bumps, SCATTER * translucency * size, block);
+    vec3 direct = vec3(0.0), highlight = vec3(0.0), coated = vec3(0.0), glow = vec3(0.0);
+    for (int i = 0; i < LIGHTS; ++i) {
+        vec3 light;
+        vec3 radiance = incident(light_at(i), position, light);
+        float n_l = dot(normal, light);
+        vec3 visible = i < SHADOWS ? shadow[i] : vec3(1.0);
+        vec3 halfway = normalize(view + light);
+        vec3 facing = mix(vec3(n_l), vec3(dot(flat_normal, light)), blurred);
+        vec3 diffuse = max(facing + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
+        vec3 lit = clamp((visible - 0.5) * sharpness + 0.5, 0.0, 1.0);
+        direct += radiance * diffuse * mix(lit, vec3(1.0), 0.35 * translucency);
+        vec3 arrives = 0.25 * light_at(i).falloff.w * radiance * visible * clamp(n_l * 4.0, 0.0, 1.0);
+        float n_h = max(dot(normal, halfway), 0.0), v_h = max(dot(view, halfway), 0.0);
+        highlight += arrives * fresnel(f0, v_h) * ggx(n_h, roughness, spread);
+        coated += arrives * fresnel(vec3(0.04), v_h) * ggx(n_h, COAT_ROUGHNESS, spread);
+        float behind = clamp(0.5 - 0.5 * n_l, 0.0, 1.0);
+        glow += radiance * thin * (0.35 + 0.65 * behind * behind);
+    }
+    vec3 surround = ambient(normal, bounce, shadow[0]) * open;
+    surround *= mix(vec3(1.0), reach, 0.8 * translucency);
+    // light bounces between coloured walls: occlusion is less deep and more saturated
+    surround *= mix(albedo * (1.0 - open) + open, vec3(1.0), open);
+    vec3 base = albedo * (direct + surround) * (1.0 - metallic) + translucency * albedo * glow;
+    base += emission * albedo;
+#if LAYER
+    // transparent objects show what is behind them, refracted, and tinted by their thickness
+    vec3 behind = seen_through(position, surface.rippled, surface.thickness, size, translucency);
+    base = mix(base, behind * pow(albedo, vec3(0.15 + 0.8 * surface.thickness)), transparency);
+#endif
+    base += sheen * albedo * surround * ((1.0 - n_v) * (1.0 - n_v) * (1.0 - n_v));
+
+    float hidden = clamp(open * open + 0.15, 0.0, 1.0);
+    vec3 at_edge = f0 + (max(vec3(1.0 - roughness), f0) - f0) * fifth_power(1.0 - n_v);
+    vec3 gloss = environment(reflected, rough, blurred_floor) * at_edge * hidden + highlight;
+    float film_share = coat * fresnel(vec3(0.04), n_v).x;
+    vec3 film = environment(reflected, roughened(0.06, spread), mirrored) * hidden;
+    return (base + gloss) * (1.0 - film_share) + film_share * film + coat * coated;
+}
 
 SurfaceSample surface_sample(ivec2 pixel, int s)
 {
@@ -171,7 +165,6 @@ SurfaceSample surface_sample(ivec2 pixel, int s)
     vec2 red_green = unpack_unorm8(color.z), blue_ink = unpack_unorm8(color.w), baked = unpack_unorm8(normal.w);
     surface.color = vec3(red_green, blue_ink.x);
     surface.ink = blue_ink.y;
-    surface.rippled = surface.normal;
     surface.visibility = baked.x;
     surface.thickness = 2.0 * baked.y;
     surface.place = color.xy * vec2(textureSize(height_maps, 0).xy);
@@ -208,22 +201,13 @@ float rippled(inout SurfaceSample surface, bvec2 same)
     return min(max(PIXEL_VARIANCE * between, variance), MOST_VARIANCE);
 }
 
-// Colour and opacity; `spread` is the variance of the normals in the pixel, `block` says which neighbours in the block of
-// 2 x 2 share their shadows with it.
+// Colour and opacity; see `shaded`.
 vec4 lit_solid(SurfaceSample surface, vec3 position, float spread, bvec2 block)
 {
     Object object = object_at(surface.object);
-    vec3 behind = vec3(0.0);
     bool heatmap = object.place.w > 0.0;
-#if LAYER
-    behind = seen_through(position, surface.rippled, surface.thickness, object.place.y, object.volume.x);
-#endif
     vec3 albedo = heatmap ? vec3(NEUTRAL) : surface.color * surface.color;
-    Material m = Material(albedo, object.base.x, object.base.y, object.base.z, object.base.w, object.volume.x,
-                          object.volume.y, object.volume.z, surface.thickness, behind, object.place.z,
-                          SCATTER * object.volume.x * object.place.y, surface.visibility,
-                          int(object.height_map.z), block);
-    vec3 shown = tone_mapped(shaded(m, position, surface.rippled, surface.normal, object.place.x, spread));
+    vec3 shown = tone_mapped(shaded(object, surface, albedo, position, spread, block));
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
     return vec4(mix(heatmap ? surface.color * shade : shown, INK, surface.ink), object.volume.w);
 }

@@ -87,7 +87,7 @@ void main()
     // nothing is known beyond the map
     vec2 off = abs(screen);
     float known = 1.0 - smoothstep(0.7, 1.0, max(off.x, off.y));
-    covered = block_mean(covered) * known;
+    covered = block_mean(covered, bvec2(true)) * known;
     colors = block_mean(colors, bvec2(true));
     across = block_mean(across, bvec2(true));
     along = block_mean(along, bvec2(true));

@@ -1,7 +1,6 @@
 #version 430
 // The triangles of `AdaptiveTessellation`, in its order: which edges are split, how many triangles each face has, how many
 // come before each group of faces, and the triangles themselves, in four shaders that run one after another.
-layout(local_size_x = GROUP) in;
 
 // A face's corners, the midpoints of its sides as vertices, ranks of the sides by their length.
 struct Face { int corners[3], middles[3], ranks[3]; };

@@ -1,5 +1,4 @@
 // Fields are charts with halo, [C, N + 2, N + 2]; a thread works on one texel of them.
-layout(local_size_x = LIST_GROUP) in;
 uniform int count;  // of texels
 
 const int PITCH = N + 2;

@@ -1,6 +1,5 @@
 #version 430
-// Raise the crests to the size of the height, with what is permanent of it. Bits of positive floats are in the order of
-// the floats, and those of what is no number are beyond.
+// Raise the crests to the size of the height, with what is permanent of it; bits as in peak.glsl.
 #include "charts.glsl"
 
 layout(std430, binding = 0) readonly buffer Height { float h[]; };

@@ -1,7 +1,6 @@
 #version 430
 // A field's texels one after the other: of one field with halo or the sum of two; or, with BLEND, those of a field that
 // lies so already and a share of the way to another.
-layout(local_size_x = GROUP) in;
 layout(std430, binding = 0) writeonly buffer Texels { float texels[]; };
 layout(std430, binding = 2) readonly buffer First { float first[]; };
 layout(std430, binding = 3) readonly buffer Second { float second[]; };

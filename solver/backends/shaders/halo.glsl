@@ -1,6 +1,5 @@
 #version 430
 // Copy the texels beyond the borders of charts into the halo.
-layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) buffer Field { float x[]; };
 layout(std430, binding = 1) readonly buffer Pairs { ivec2 pairs[]; };  // (place in the halo, texel it shows)
 uniform int count;

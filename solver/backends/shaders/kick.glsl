@@ -1,6 +1,5 @@
 #version 430
 // Kick a list of texels, and drift them by that; every texel is named once, so no two threads meet.
-layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) buffer Height { float h[]; };
 layout(std430, binding = 1) buffer Velocity { float v[]; };
 layout(std430, binding = 2) readonly buffer Places { int places[]; };

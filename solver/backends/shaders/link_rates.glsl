@@ -1,7 +1,6 @@
 #version 430
 // Gershgorin's bound of the largest eigenvalue: the greatest of twice the sum of |w| over the mass. The other end of a
 // link to a fixed rim does not move, and its share of that is a half.
-layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Links { vec4 links[]; };
 layout(std430, binding = 2) readonly buffer Places { int places[]; };
 layout(std430, binding = 3) readonly buffer Shares { float shares[]; };

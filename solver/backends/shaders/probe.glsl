@@ -1,6 +1,5 @@
 #version 430
 // Weighted sums of heights or velocities, one group of threads each; see Probes. Heights have drifted beyond velocities.
-layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Height { float h[]; };
 layout(std430, binding = 1) readonly buffer Velocity { float v[]; };
 layout(std430, binding = 2) readonly buffer Rows { int rows[]; };  // first entry, one after the last, of heights
@@ -12,12 +11,12 @@ layout(std430, binding = 5) readonly buffer Dent { float dent[]; };
 uniform int first;
 uniform float drifted;
 
-shared float partial[LIST_GROUP];
+shared float partial[GROUP];
 
 void main() {
     int thread = int(gl_LocalInvocationID.x), row = int(gl_WorkGroupID.x);
     float sum = 0.0;
-    for (int i = rows[3 * row] + thread; i < rows[3 * row + 1]; i += LIST_GROUP) {
+    for (int i = rows[3 * row] + thread; i < rows[3 * row + 1]; i += GROUP) {
         int p = entries[i].x;
         float value = v[p];
         if (rows[3 * row + 2] != 0) {
@@ -29,7 +28,7 @@ void main() {
         sum += intBitsToFloat(entries[i].y) * value;
     }
     partial[thread] = sum;
-    for (int half_group = LIST_GROUP / 2; half_group > 0; half_group /= 2) {
+    for (int half_group = GROUP / 2; half_group > 0; half_group /= 2) {
         barrier();
         if (thread < half_group) partial[thread] += partial[thread + half_group];
     }

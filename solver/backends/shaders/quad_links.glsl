@@ -1,6 +1,5 @@
 #version 430
 // The links that start in each place, of the quads on either side. Quads beyond a chart have weights of 0.
-layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Sides { float sides[]; };
 layout(std430, binding = 1) writeonly buffer Links { vec4 links[]; };  // east, north, north-east, and across that
 uniform int count, width;

@@ -1,7 +1,6 @@
 #version 430
 // Weights of the six links of the quads whose south-west corners are at the places. The law is that of cells.py, the
 // rest that of the kernel `quad_pass`, by the same names.
-layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Places { double places[]; };
 layout(std430, binding = 1) readonly buffer Conductance { float conductance[]; };
 layout(std430, binding = 2) readonly buffer PerArea { float per_area[]; };
@@ -40,10 +39,7 @@ float[6] products(vec3 e, vec3 n, vec3 p, float detours[6]) {
     to_pq *= fit;
     float square = area * area + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq));
     return float[6](
-        pp + to_pp,
-        qq + to_qq,
-        pq + to_pq,
-        sqrt(max(square, 0.0)),
+        pp + to_pp, qq + to_qq, pq + to_pq, sqrt(max(square, 0.0)),
         dot(way, p) + 0.5 * fit * (to_east + to_north - to_south - to_west),
         dot(way, q) + 0.5 * fit * (to_east + to_south - to_north - to_west)
     );
@@ -59,21 +55,15 @@ void quad(vec3 e, vec3 n, vec3 p, float detours[6], out float links[6]) {
     b = clamp(share * b, -1.0, 1.0);
     float skew = pq / twice, h = hourglass(pp, qq, pq, 0.25 * twice);
     links = float[6](
-        skew + h * (1.0 + a) * (1.0 - b),
-        skew + h * (1.0 - a) * (1.0 + b),
-        h * (1.0 + a) * (1.0 + b) - skew,
-        h * (1.0 - a) * (1.0 - b) - skew,
-        qq / twice - h * (1.0 - a * a),
-        pp / twice - h * (1.0 - b * b)
+        skew + h * (1.0 + a) * (1.0 - b), skew + h * (1.0 - a) * (1.0 + b),
+        h * (1.0 + a) * (1.0 + b) - skew, h * (1.0 - a) * (1.0 - b) - skew,
+        qq / twice - h * (1.0 - a * a), pp / twice - h * (1.0 - b * b)
     );
 }
 
 vec3 between(int a, int b) {
-    return vec3(
-        scale * (places[b] - places[a]),
-        scale * (places[count + b] - places[count + a]),
-        scale * (places[2 * count + b] - places[2 * count + a])
-    );
+    dvec3 from = dvec3(places[a], places[count + a], places[2 * count + a]);
+    return vec3(scale * (dvec3(places[b], places[count + b], places[2 * count + b]) - from));
 }
 
 void main() {

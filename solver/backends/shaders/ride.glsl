@@ -1,6 +1,5 @@
 #version 430
 // Places of the texels with halo, on vertices that have moved. In double precision: what counts are their differences.
-layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Vertices { double vertices[]; };
 layout(std430, binding = 1) readonly buffer Corners { int corners[]; };
 layout(std430, binding = 2) readonly buffer Barycentrics { double barycentrics[]; };

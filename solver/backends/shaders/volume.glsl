@@ -1,7 +1,6 @@
 #version 430
 // The pressure on each part of the surface: what the load asks for, and sums of factor times field over the chunks of a
 // list. First the sums, one group of threads a chunk; then, with PARTS, what they add up to.
-layout(local_size_x = LIST_GROUP) in;
 #ifdef PARTS
 layout(std430, binding = 0) readonly buffer Loaded { float loaded[]; };
 layout(std430, binding = 1) readonly buffer Sums { float sums[]; };
@@ -24,16 +23,16 @@ layout(std430, binding = 3) readonly buffer Factors { vec2 factors[]; };  // of 
 layout(std430, binding = 4) readonly buffer Chunks { ivec2 chunks[]; };  // first entry, one after the last
 layout(std430, binding = 5) writeonly buffer Sums { float sums[]; };
 
-shared float partial[LIST_GROUP];
+shared float partial[GROUP];
 
 void main() {
     int thread = int(gl_LocalInvocationID.x);
     ivec2 chunk = chunks[gl_WorkGroupID.x];
     float sum = 0.0;
-    for (int i = chunk.x + thread; i < chunk.y; i += LIST_GROUP)
+    for (int i = chunk.x + thread; i < chunk.y; i += GROUP)
         sum += factors[i].x * h[addresses[i]] + factors[i].y * v[addresses[i]];
     partial[thread] = sum;
-    for (int half_group = LIST_GROUP / 2; half_group > 0; half_group /= 2) {
+    for (int half_group = GROUP / 2; half_group > 0; half_group /= 2) {
         barrier();
         if (thread < half_group) partial[thread] += partial[thread + half_group];
     }

@@ -1,6 +1,5 @@
 #version 430
 // Heights with their halo; with LIMIT as `DisplacementLimit` bends them.
-layout(local_size_x = GROUP) in;
 layout(std430, binding = 0) writeonly buffer Around { float around[]; };
 layout(std430, binding = 2) readonly buffer Sources { int sources[]; };
 layout(std430, binding = 3) readonly buffer Heights { float heights[]; };

@@ -3,7 +3,6 @@
 // What lies beyond a fixed rim is the texels' mirror image, with heights turned over. After that, with CORNERS, the
 // corners of the halo that show no texel: the mean of the three places about them, or, in a fixed rim, the height that
 // makes the mean of all four 0.
-layout(local_size_x = GROUP) in;
 layout(rgba32f, binding = 0) uniform image2DArray page;
 uniform int layer;
 const int BLOCK = N + 2;
