@@ -313,7 +313,7 @@ class Plan(msgspec.Struct, frozen=True):
     store: StoreEntry
 
 
-def read_plan(path: Path) -> Plan:
+def read_plan(path: str | Path) -> Plan:
     """Read the TOML file of a batch.
 
     Raises
@@ -321,6 +321,7 @@ def read_plan(path: Path) -> Plan:
     SceneError
         Naming the key, its value and what is valid.
     """
+    path = Path(path)
     if path.exists() and not path.is_file():
         raise SceneError(f"plan {str(path)!r} is not a regular file; give the path of a TOML file")
     table = read_toml(path, "plan")

@@ -201,6 +201,11 @@ def test_keys_that_fit_nothing_are_refused_with_what_there_is(tmp_path, vary, mo
         varied(tmp_path, vary, model)
 
 
+def test_a_path_may_be_a_string():
+    with pytest.raises(SceneError, match=r"plan 'lost\.toml' does not exist"):
+        read_plan("lost.toml")
+
+
 def test_a_drop_scene_takes_keys_of_scene_files_too(tmp_path):
     (tmp_path / "plan.toml").write_text(
         f'count = 4\n[meshes]\nfiles = ["{LIMBED_FILE}"]\nbodies = {{integers = [2, 4]}}\n'
