@@ -44,7 +44,7 @@ def load_atlas(path: str | Path) -> Atlas:
     Raises
     ------
     AtlasError
-        If the file is missing, truncated, changed, or not an atlas of this version.
+        If the file is missing, truncated, changed, or of a version before 1.0.0 or after this one.
     """
     arrays = read_atlas_file(Path(path))
     kind, layout = arrays["kind"].tolist()

@@ -55,8 +55,9 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
     return arrays
 
 
-# Raise it when a layout's map or the file's contents change: older files are rebuilt.
-FORMAT = 15
+# Raise it when a layout's map or the file's contents change: the cache has its atlases rebuilt. Files of users are read
+# from that of version 1.0.0 on, as `docs/stability.md` says.
+FORMAT, OLDEST = 15, 13
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 
 _NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
@@ -103,7 +104,7 @@ def check_atlas_place(path: Path, overwrite: bool) -> None:
 def read_atlas_file(path: Path) -> dict[str, NDArray]:
     """Read the arrays of an atlas.
 
-    Raises `AtlasError` if the file is missing, truncated, changed, or not an atlas of this version.
+    Raises `AtlasError` if the file is missing, truncated, changed, or of a version before 1.0.0 or after this one.
     """
     try:
         if not path.is_file():
@@ -112,7 +113,7 @@ def read_atlas_file(path: Path) -> dict[str, NDArray]:
         arrays = read_arrays(path)
     except (OSError, ValueError) as error:
         raise AtlasError(f"atlas file {str(path)!r} is damaged or not an atlas ({error}); {ADVICE}") from error
-    if _NEEDED - arrays.keys() or arrays["format"].tolist() != [FORMAT]:
+    if _NEEDED - arrays.keys() or arrays["format"].tolist() not in [[each] for each in range(OLDEST, FORMAT + 1)]:
         raise AtlasError(f"atlas file {str(path)!r} is not an atlas, or of another version; {ADVICE}")
     return arrays | {name: arrays[name].astype(np.int64) for name in _INDICES & arrays.keys()}
 

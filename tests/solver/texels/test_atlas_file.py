@@ -33,12 +33,18 @@ def written(path: Path, arrays: dict[str, np.ndarray]) -> Path:
 
 
 def test_another_version_is_refused_with_the_advice_to_make_it_again(tmp_path: Path, arrays) -> None:
-    for version in (FORMAT - 1, FORMAT + 1):
+    for version in (12, FORMAT + 1):
         path = written(tmp_path / "other.atlas", {**arrays, "format": np.array([version])})
         with pytest.raises(
             AtlasError, match=r"other\.atlas.* of another version; make it again with `ripple-sim atlas"
         ):
             read_atlas_file(path)
+
+
+@pytest.mark.parametrize("version", range(13, FORMAT))
+def test_files_since_version_1_0_0_are_read(tmp_path: Path, arrays, version: int) -> None:
+    path = written(tmp_path / "old.atlas", {**arrays, "format": np.array([version])})
+    np.testing.assert_array_equal(read_atlas_file(path)["areas"], arrays["areas"])
 
 
 @pytest.mark.parametrize("missing", ["V", "glued", "kind", "barycentrics", "format"])
