@@ -36,7 +36,7 @@ def layers(arrows: Arrows) -> dict[str, int]:
 
     def find(node: str) -> int:
         if node not in level:
-            level[node] = 1 + max((find(other) for other in arrows[node]), default=-1)
+            level[node] = 1 + max((find(other) for other in sorted(arrows[node])), default=-1)
         return level[node]
 
     above: dict[str, list[str]] = {node: [] for node in arrows}
@@ -61,7 +61,7 @@ class Layout:
         for node, row in level.items():
             rows.setdefault(row, []).append(node)
         for node, ends in arrows.items():
-            for end in ends:
+            for end in sorted(ends):  # sets have another order in each process
                 passed: list[Node] = [(node, end, row) for row in range(level[node] - 1, level[end], -1)]
                 for place, row in zip(passed, range(level[node] - 1, level[end], -1), strict=True):
                     rows[row].append(place)

@@ -17,7 +17,7 @@ from ripple_sim.encode.replace import MARK
 from ripple_sim.solver.texels.moving import SurfaceRide
 from ripple_sim.solver.waves.sensor import UNITS
 
-from .source import Source
+from .source import Source, Writer
 from .tables import COLUMNS, rows
 
 CHUNK = 16  # entries that are kept in memory, and lie in one chunk
@@ -110,7 +110,7 @@ _IMPULSES = 4096  # in one chunk
 DTYPES = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}  # of the columns of impulses in NumPy
 
 
-class FieldWriter:
+class FieldWriter(Writer):
     """Writes heights, velocities, energies, poses and impulses to a Zarr store, with units and coordinates.
 
     Variables of a target end in its name: `height_duck` has the dimensions time, chart_duck, row_duck and column_duck.
@@ -155,10 +155,6 @@ class FieldWriter:
             self._store.fixed(time, [time], sensor.times, "s", f"time of the samples of sensor {name}")
             self._store.fixed(f"sensor_{suffix}", [time, point], sensor.samples, unit, f"{sensor.kind} at {name}")
         self._store.finish()
-
-    def close(self) -> str:
-        """Keep nothing: no file is open."""
-        return ""
 
 
 class _TargetFields:

@@ -13,10 +13,10 @@ from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import ExportError
 from ripple_sim.sound import Microphone, gain, write_wav
 
-from .source import Source
+from .source import Source, Writer
 
 
-class WavWriter:
+class WavWriter(Writer):
     """Writes one file of 16 bits a sample, with one gain for all channels; see `Writer`.
 
     Slow motion makes it longer and lower.
@@ -48,10 +48,6 @@ class WavWriter:
             signals = np.concatenate([samples[:shortest] for samples in each], axis=1).astype(np.float64)
             rate = next(iter(source.sensors.values())).rate
         write_wav(self._path, signals * gain(signals), round(rate / source.slow_motion))
-
-    def close(self) -> str:
-        """Keep nothing: no file is open."""
-        return ""
 
 
 def made_here(path: Path) -> bool:

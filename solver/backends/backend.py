@@ -1,6 +1,7 @@
-"""The backends' protocol, the plain one of deep fluid, backends by name, and which is the faster on this machine.
+"""`Backend`: what holds height and velocity as float32, kicks texels, and takes leapfrog substeps; which is the faster.
 
-The latter is measured once, and remembered in the user's cache folder.
+Where one keeps the volume, forces inside a surface of uneven density do not change it either; see `volume_rate`. Which
+is the faster on this machine is measured once, and remembered in the user's cache folder.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import importlib.metadata
 import os
 import platform
 import time
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,41 +27,11 @@ from ..operator.wave_operator import WaveOperator, damped_step
 from ..texels.stencil import Stencil
 from .cpu import CPUBackend
 from .gl import GLBackend
-from .gl_fields import DeviceField
 from .kernels import Amplitude, Probes
 
 BACKENDS = ("auto", "gl", "cpu")
 
 _TYPICAL = 6 * 128**2  # texels of a video's target
-
-
-class Backend(Protocol):
-    """A backend holds height and velocity as float32, kicks texels, and takes leapfrog substeps.
-
-    `move` takes over the stencils of the same surface with its texels elsewhere.
-
-    Where it keeps the volume, forces inside a surface of uneven density do not change it either; see `volume_rate`.
-    """
-
-    name: str
-    keeps_volume: bool
-
-    def height(self) -> NDArray[np.float32]: ...  # noqa: D102
-    def snapshot(self) -> NDArray[np.float32] | DeviceField: ...  # noqa: D102
-    def crests(self) -> NDArray[np.float32]: ...  # noqa: D102
-    def velocity(self) -> NDArray[np.float32]: ...  # noqa: D102
-    def elastic(self) -> NDArray[np.float32]: ...  # noqa: D102
-    def dent(self) -> NDArray[np.float32]: ...  # noqa: D102
-    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None: ...  # noqa: D102
-    def set_velocity(self, velocity: NDArray[np.float32]) -> None: ...  # noqa: D102
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None: ...  # noqa: D102
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None: ...  # noqa: D102
-    def advance(self, substeps: int, dt: float) -> None: ...  # noqa: D102
-    def probe(self, probes: Probes | None) -> None: ...  # noqa: D102
-    def probed(self) -> NDArray[np.float32]: ...  # noqa: D102
-    def move(self, operator: WaveOperator) -> None: ...  # noqa: D102
-    def wait(self) -> None: ...  # noqa: D102
-    def finite(self) -> bool: ...  # noqa: D102
 
 
 class FluidBackend:
@@ -166,6 +137,9 @@ class FluidBackend:
         """Whether all heights are finite."""
         with np.errstate(over="ignore", invalid="ignore"):
             return bool(np.isfinite(self._h.sum()))
+
+
+Backend: TypeAlias = CPUBackend | GLBackend | FluidBackend
 
 
 def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool = False) -> Backend:
