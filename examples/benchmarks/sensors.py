@@ -67,7 +67,7 @@ def main() -> None:
         runs[1].sensors["skin"].read()
         seconds[2].append((time.process_time() - begun) / runs[1].steps_per_frame)
     plain, measured, read = (1e3 * np.median(each) for each in seconds)
-    print(f"drum: a step {plain:.3f} ms, with eight points {measured:.3f} ms, and {read:.3f} ms more when they are read")
+    print(f"drum: a step {plain:.3f} ms, with eight points {measured:.3f} ms, and {read:.3f} ms more with reading")
 
     drums = Simulation(load_scene("drums"), fps=60, backend="cpu")
     drums.advance_frame()
