@@ -175,8 +175,8 @@ def test_a_plan_that_has_changed_is_refused_with_what_changed(tmp_path):
 def test_strings_that_are_not_text_are_damage_as_any_other(tmp_path):
     batch = new_batch(tmp_path)
     batch.note_failure(0, Failure(errors=1, error="it fell"), "log")
-    for path in (batch.plan, batch.failed / "000000.json"):
-        path.write_bytes(path.read_bytes().replace(b'": "', b'": "\xef', 1))
+    for path, word in ((batch.plan, b"scene"), (batch.failed / "000000.json", b"fell")):
+        path.write_bytes(path.read_bytes().replace(word, word[:2] + b"\xef", 1))
     assert batch.failures() == {}
     with pytest.raises(BatchError, match="it is the plan of a batch and must stay as it is"):
         load_stored(batch.plan)
