@@ -173,7 +173,7 @@ class BatchFolder:
         found = {}
         for path in _entries(self.failed):
             if path.suffix == ".json" and NUMBER.fullmatch(path.stem):
-                with contextlib.suppress(msgspec.DecodeError):
+                with contextlib.suppress(ValueError, RecursionError):
                     found[int(path.stem)] = msgspec.json.decode(path.read_bytes(), type=Failure)
         return found
 
@@ -259,7 +259,7 @@ def load_stored(path: Path) -> StoredPlan:
         found = msgspec.json.decode(path.read_bytes(), type=StoredPlan)
         check_plan(found.plan)
         return found
-    except (OSError, RecursionError, msgspec.MsgspecError, SceneError) as error:
+    except (OSError, RecursionError, ValueError, SceneError) as error:  # strings that are not UTF-8 are a ValueError
         raise BatchError(f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is") from error
 
 

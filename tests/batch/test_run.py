@@ -24,6 +24,7 @@ from ripple_sim.batch import (
     run_batch,
     status_text,
 )
+from ripple_sim.batch.folder import Failure, load_stored
 from ripple_sim.cli.main import main
 from ripple_sim.errors import BatchError, SceneError
 
@@ -169,6 +170,16 @@ def test_a_plan_that_has_changed_is_refused_with_what_changed(tmp_path):
     (tmp_path / "scene.xml").write_text((tmp_path / "scene.xml").read_text().replace("0.25", "0.24"))
     with pytest.raises(BatchError, match=r"files.scene.toml was .* take it back, or name another folder"):
         run_batch(plan, tmp_path / "out")
+
+
+def test_strings_that_are_not_text_are_damage_as_any_other(tmp_path):
+    batch = new_batch(tmp_path)
+    batch.note_failure(0, Failure(errors=1, error="it fell"), "log")
+    for path, word in ((batch.plan, b"scene"), (batch.failed / "000000.json", b"fell")):
+        path.write_bytes(path.read_bytes().replace(word, word[:2] + b"\xef", 1))
+    assert batch.failures() == {}
+    with pytest.raises(BatchError, match="it is the plan of a batch and must stay as it is"):
+        load_stored(batch.plan)
 
 
 def test_a_key_that_fits_nothing_is_told_before_anything_is_made(tmp_path):
