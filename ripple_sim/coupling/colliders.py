@@ -57,11 +57,11 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         "sdf": as a signed distance, which MuJoCo computes when it compiles the model. For moving targets too, and right
         for geoms of all shapes. Only planes meet the mesh's convex hull, and height fields nothing at all.
         "flex": through a rigid flex of its triangles, with the geom's name and on its body; the geom itself keeps its
-        looks and mass. Planes and height fields meet it too, and an open mesh is met from both
-        sides. A step costs by the triangles, that of a signed distance by the bodies: on ten thousand triangles ten balls
-        take a third of its time, and one takes twice as long. Right for spheres, capsules and
-        ellipsoids, and for cylinders and meshes that sink in by less than 0.7 of the flex's thickness (2 to 5 % of the
-        mesh's size). Boxes may be thrown aside, and SDF geoms sink in; a warning names both. See `add_flex_collider`.
+        looks and mass. Planes and height fields meet it too, and an open mesh is met from both sides. A step costs by
+        the triangles, that of a signed distance by the bodies: on ten thousand triangles ten balls take a third of its
+        time, and one takes twice as long. Right for spheres, capsules and ellipsoids, and for cylinders and meshes that
+        sink in by less than 0.7 of the flex's thickness (2 to 5 % of the mesh's size). Boxes may be thrown aside, and
+        SDF geoms sink in; a warning names both. See `add_flex_collider`.
         "convex": as the convex parts of its mesh, geoms of their own without mass, which CoACD finds in some ten
         seconds and which are then kept in the user's cache (needs the package coacd). The most robust: boxes stack on
         it, and all geoms meet it. Bodies are held up to 2.5 % of the mesh's size off the surface. For closed meshes.
