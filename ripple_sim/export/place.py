@@ -154,7 +154,7 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
     ending = ending_of(path)
     if chunked and not ending.chunks:
         able = " and ".join(suffix for suffix, each in ENDINGS.items() if each.chunks)
-        raise ExportError(f"there are chunks of {able} files alone, not of {path.name}; leave --chunk out")
+        raise ExportError(f"there are chunks of {able} files alone, not of {path.name}; leave chunk out")
     try:
         final = final_path(path)
         if final.suffix.lower() != path.suffix.lower():  # what is written there, and told again, goes by the ending
