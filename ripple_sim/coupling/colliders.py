@@ -25,6 +25,7 @@ from ripple_sim.solver.mesh.rays import RayScene
 from ripple_sim.solver.mesh.topology import corner_angles
 from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 
+from .geoms import to_body
 from .model import SPECULATIVE, part_name
 from .target_mesh import target_mesh
 from .target_warnings import GAP_TOLERANCE
@@ -180,9 +181,8 @@ def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
         )
     model = _compiled(spec, geom)
     index = model.geom(geom.name).id
-    mesh, rotation = target_mesh(model, index), np.zeros(9)
-    mujoco.mju_quat2Mat(rotation, model.geom_quat[index])
-    return dataclasses.replace(mesh, V=model.geom_pos[index] + mesh.V @ rotation.reshape(3, 3).T)
+    mesh = target_mesh(model, index)
+    return dataclasses.replace(mesh, V=to_body(model, index, mesh.V))
 
 
 def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:

@@ -266,9 +266,14 @@ def to_body(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> ND
     """Points [..., 3] [m] of a target's atlas in the frame of the geom's body; soft targets are in the world."""
     if is_soft(model, geom):
         return points
+    return points @ rotation_in_body(model, geom).T + model.geom_pos[geom]
+
+
+def rotation_in_body(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
+    """Rotation [3, 3] of a geom in the frame of its body, with its axes as columns."""
     rotation = np.zeros(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-    return points @ rotation.reshape(3, 3).T + model.geom_pos[geom]
+    return rotation.reshape(3, 3)
 
 
 def integrator_warning(model: mujoco.MjModel) -> str | None:

@@ -20,7 +20,7 @@ from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
-from .geoms import find_collision_geoms, geom_name
+from .geoms import find_collision_geoms, geom_name, rotation_in_body
 from .soft import SoftSurface, is_soft, soft_names
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
@@ -376,9 +376,7 @@ def _outward_normals(model: mujoco.MjModel, geom: int, flex: int, mesh: Mesh) ->
     F, V = model.flex_elem[first : first + 3 * count].reshape(-1, 3), mesh.V
     if not np.array_equal(F, mesh.F):
         # a flex not made by `make_collidable`
-        rotation = np.zeros(9)
-        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-        V = model.flex_vert[model.flex_vertadr[flex] :][: model.flex_vertnum[flex]] @ rotation.reshape(3, 3)
+        V = model.flex_vert[model.flex_vertadr[flex] :][: model.flex_vertnum[flex]] @ rotation_in_body(model, geom)
     corners = V[F]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # they point outwards where the volume that they enclose is positive

@@ -19,7 +19,16 @@ from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
 
-from .geoms import ByGeom, GeomKey, checked_materials, find_any, find_target, for_each, target_name
+from .geoms import (
+    ByGeom,
+    GeomKey,
+    checked_materials,
+    find_any,
+    find_target,
+    for_each,
+    rotation_in_body,
+    target_name,
+)
 from .soft import is_soft
 from .suited import suited_targets
 from .target_mesh import target_atlas
@@ -255,10 +264,8 @@ class Targets:
         geom = self._target(name).geom
         if is_soft(self.model, geom):  # it is in the world
             return np.array(point, dtype=np.float64)
-        rotation = np.zeros(9)
-        mujoco.mju_quat2Mat(rotation, self.model.geom_quat[geom])
         places = check_points(point) - self.model.geom_pos[geom]
-        return (places @ rotation.reshape(3, 3)).reshape(np.shape(point))
+        return (places @ rotation_in_body(self.model, geom)).reshape(np.shape(point))
 
     def _target(self, name: GeomKey) -> Target:
         target = self._targets.get(name) if isinstance(name, str) else None

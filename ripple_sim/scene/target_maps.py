@@ -166,11 +166,12 @@ def _saved(path: str, atlas: Atlas) -> NDArray[np.float64]:
 
 def check_rim(rim: str | dict[str, str]) -> None:
     """Raise `SceneError` unless `rim` of a target is a name, or a table of conditions by name."""
-    for name in (rim,) if isinstance(rim, str) else rim:
-        valid = RIMS if isinstance(rim, str) else RIMS[:3]
+    # a name alone holds everywhere
+    regions, valid = ({rim: "1"}, RIMS) if isinstance(rim, str) else (rim, RIMS[:3])
+    for name in regions:
         if name not in valid:
             raise SceneError(f"rim {name!r} does not exist; valid are {', '.join(valid)}")
-    for where in () if isinstance(rim, str) else rim.values():
+    for where in regions.values():
         evaluate(where, dict.fromkeys("xyz", np.ones(0)))
 
 

@@ -315,9 +315,14 @@ _Places: TypeAlias = tuple[slice, slice, slice]
 
 # link, the place from which it starts relative to the texel (row, column), and its other end
 _EIGHT = (
-    *((EAST, (0, 0), (0, 1)), (EAST, (0, -1), (0, -1)), (NORTH, (0, 0), (1, 0)), (NORTH, (-1, 0), (-1, 0))),
-    *((NORTHEAST, (0, 0), (1, 1)), (NORTHEAST, (-1, -1), (-1, -1))),
-    *((NORTHWEST, (0, -1), (1, -1)), (NORTHWEST, (-1, 0), (-1, 1))),
+    (EAST, (0, 0), (0, 1)),
+    (EAST, (0, -1), (0, -1)),
+    (NORTH, (0, 0), (1, 0)),
+    (NORTH, (-1, 0), (-1, 0)),
+    (NORTHEAST, (0, 0), (1, 1)),
+    (NORTHEAST, (-1, -1), (-1, -1)),
+    (NORTHWEST, (0, -1), (1, -1)),
+    (NORTHWEST, (-1, 0), (-1, 1)),
 )
 
 

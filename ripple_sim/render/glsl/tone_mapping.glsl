@@ -1,14 +1,13 @@
 // From linear radiance to the frame's colours; with LINEAR these are the radiance itself.
 #include "glsl/sampling.glsl"
 
-
 // Linear radiance to sRGB: values below the shoulder keep hue and contrast, brighter ones roll off towards white;
 // `tone_mapped` in tone_mapping.py is the same.
 vec3 tone_mapped(vec3 radiance)
 {
 #if LINEAR
     return clamp(radiance, 0.0, 65504.0);  // what half floats hold
-#endif
+#else
     float peak = max(radiance.r, max(radiance.g, radiance.b));
     float excess = max(peak - SHOULDER, 0.0);
     float compressed = min(peak, SHOULDER) + (1.0 - SHOULDER) * excess / (excess + 1.0 - SHOULDER);
@@ -16,6 +15,7 @@ vec3 tone_mapped(vec3 radiance)
     color = mix(color, vec3(compressed), 1.0 - 1.0 / (1.0 + BLEACHING * excess));
     vec3 above = (1.0 + SRGB_OFFSET) * pow(color, vec3(1.0 / SRGB_EXPONENT)) - SRGB_OFFSET;
     return mix(SRGB_SLOPE * color, above, step(SRGB_BREAK, color));
+#endif
 }
 
 // By interleaved gradient noise, which is evenly spread over any few neighbouring pixels.

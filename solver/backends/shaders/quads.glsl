@@ -26,9 +26,9 @@ float quad_area(vec3 e, vec3 n, vec3 p) {
     return 0.5 * min(rising, falling);
 }
 
-float[6] products(vec3 e, vec3 n, vec3 p, float detours[6]) {
+void quad(vec3 e, vec3 n, vec3 p, float detours[6], out float links[6]) {
     vec3 q = n - e, north = p - n, east = p - e, way = north - e;
-    float pp = dot(p, p), qq = dot(q, q), pq = dot(p, q), area = cross_length(p, q);
+    float pp = dot(p, p), qq = dot(q, q), pq = dot(p, q), flat_area = cross_length(p, q);
     float to_south = detours[0] * dot(e, e), to_north = detours[1] * dot(north, north);
     float to_west = detours[2] * dot(n, n), to_east = detours[3] * dot(east, east);
     float to_pp = detours[4] * pp, to_qq = detours[5] * qq, to_pq = 0.5 * (to_west + to_east - to_south - to_north);
@@ -37,18 +37,14 @@ float[6] products(vec3 e, vec3 n, vec3 p, float detours[6]) {
     to_pp *= fit;
     to_qq *= fit;
     to_pq *= fit;
-    float square = area * area + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq));
-    return float[6](
-        pp + to_pp, qq + to_qq, pq + to_pq, sqrt(max(square, 0.0)),
-        dot(way, p) + 0.5 * fit * (to_east + to_north - to_south - to_west),
-        dot(way, q) + 0.5 * fit * (to_east + to_south - to_north - to_west)
-    );
-}
-
-void quad(vec3 e, vec3 n, vec3 p, float detours[6], out float links[6]) {
-    float given[6] = products(e, n, p, detours);
-    float pp = given[0], qq = given[1], pq = given[2], along_p = given[4], along_q = given[5];
-    float twice = max(2.0 * max(given[3], 0.5 * LEAST_AREA * (pp + qq)), TINY), square = 0.25 * twice * twice;
+    float square = max(flat_area * flat_area + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq)), 0.0);
+    pp += to_pp;
+    qq += to_qq;
+    pq += to_pq;
+    float along_p = dot(way, p) + 0.5 * fit * (to_east + to_north - to_south - to_west);
+    float along_q = dot(way, q) + 0.5 * fit * (to_east + to_south - to_north - to_west);
+    float twice = max(2.0 * max(sqrt(square), 0.5 * LEAST_AREA * (pp + qq)), TINY);
+    square = 0.25 * twice * twice;
     float a = (along_p * qq - along_q * pq) / square, b = (along_q * pp - along_p * pq) / square;
     float uneven = EVEN * (a * a + b * b), share = uneven / (uneven + 1.0);
     a = clamp(share * a, -1.0, 1.0);
