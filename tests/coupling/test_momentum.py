@@ -1,7 +1,6 @@
 """What the surface gets is what the bodies lose: for every shape, route, restitution, time step and frame rate.
 
-Moving targets that fall on planes and height fields get what the ground gives them, and so do those that meet bodies
-which are tied, driven or sticky.
+So it is of moving targets that fall on the ground, or meet bodies which are tied, driven or sticky.
 """
 
 import runpy

@@ -1,9 +1,4 @@
-"""Primitive geoms ripple on their own surface.
-
-Height fields: the triangles that MuJoCo collides, and waves on them.
-
-Triangles on primitives lie on the surface that MuJoCo collides, and nowhere else.
-"""
+"""Primitive geoms and height fields ripple on their own surface: its triangles lie where MuJoCo collides it."""
 
 import mujoco
 import numpy as np
