@@ -1,7 +1,4 @@
-"""Interrupted videos: whatever kills them, what is left is whole, and they go on to the very same bytes.
-
-Their record tells whether they may.
-"""
+"""Interrupted videos: what a kill leaves is whole, and they go on to the very same bytes."""
 
 import fcntl
 import os

@@ -1,7 +1,4 @@
-"""Frames of a model with ripples in somebody's own loop, where `mujoco.Renderer` was.
-
-Depth and segmentation are held against that one's, where there are no ripples.
-"""
+"""Frames of a model with ripples in somebody's own loop, where `mujoco.Renderer` was, which draws the rest alike."""
 
 import copy
 import os

@@ -1,7 +1,4 @@
-"""What is drawn of a model: targets, geoms and sites; their bounds, their order, and messages.
-
-What lights a scene: the lights and skybox of the MJCF, or the studio.
-"""
+"""What is drawn of a model, its bounds and order; the lights and skybox of the MJCF, or the studio."""
 
 import mujoco
 import numpy as np

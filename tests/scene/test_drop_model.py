@@ -1,9 +1,4 @@
-"""Bodies of a default scene wait out of reach, and drop above the surface onto what is open to the sky.
-
-Falling bodies of all shapes are about as large as the ball they stand for.
-
-Bodies vary by a seed within their ranges, and nothing else does.
-"""
+"""Bodies of a default scene, about as large as a ball, wait out of reach, drop, and vary by a seed."""
 
 import mujoco
 import numpy as np

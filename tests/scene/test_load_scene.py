@@ -1,7 +1,4 @@
-"""Scene files and models are found, edited, varied and refused with the reason, in one line.
-
-Models that MuJoCo would wait for, or take though they are senseless, are refused too.
-"""
+"""Scene files and models are found, edited, varied, or refused in one line if they are senseless or never end."""
 
 import os
 import re

@@ -1,7 +1,4 @@
-"""Scripted events happen when and where the scene says, in MuJoCo's own state and on the waves.
-
-Bodies are held, dropped, thrown and placed; the hook is called at every step.
-"""
+"""Scripted events happen when and where the scene says, in MuJoCo's own state and on the waves."""
 
 from pathlib import Path
 

@@ -1,8 +1,4 @@
-"""A scene's table: every value arrives, and what is wrong by itself or against the model is named with its place.
-
-Cameras that the model does not have, and exposures that cannot be or have no effect, are refused with what is valid, as
-are overlays. TOML files of any content become a table or one line that says what is wrong.
-"""
+"""A scene's table: every value arrives, and what is wrong, by itself or against the model, is named with its place."""
 
 import dataclasses
 from pathlib import Path

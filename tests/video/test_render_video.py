@@ -1,7 +1,4 @@
-"""Interrupted renders go on to the same video, or say why not; passes beside the frames, and the summary.
-
-A stage that runs ahead: the same items in the same order, no more of them than may wait, and its errors.
-"""
+"""Interrupted renders go on to the same video or say why not; passes; a stage that runs ahead."""
 
 import dataclasses
 import json

@@ -1,7 +1,4 @@
-"""Geoms and sites that are drawn, their materials, and what is not drawn.
-
-Capsules in place of geoms: their sizes, which of them count, and how much of the sky they hide.
-"""
+"""Geoms and sites that are drawn, their materials, and how much of the sky capsules in their place hide."""
 
 import warnings
 
