@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from PIL import Image
+from scene_files import write_scene
 
 from ripple_sim import VideoOptions, load_scene
 from ripple_sim.cycles import PYTHON, check_cycles, render_cycles
@@ -47,11 +48,8 @@ for number in range(settings["frames"]):
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "scene.xml").write_text(MODEL)
-    (tmp_path / "scene.toml").write_text(
-        'model = "scene.xml"\nduration = 0.1\n[[ripple]]\ngeom = "egg"\nresolution = 8\nlook = "jelly"\n'
-        "material = {speed = 0.3, density = 1000.0}\n"
-    )
+    table = 'model = "scene.xml"\nduration = 0.1\n[[ripple]]\ngeom = "egg"\nresolution = 8\nlook = "jelly"\n'
+    write_scene(tmp_path, MODEL, table + "material = {speed = 0.3, density = 1000.0}\n")
     return tmp_path
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from scene_files import write_scene
+
 from ripple_sim.scene import Scene, load_scene
 
 MJCF = """<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
@@ -18,9 +20,8 @@ material = {{speed = 0.3, density = {}}}
 
 def egg_scene(folder: Path, floor: str = "", duration: float = 2.0, density: float = 1500.0) -> Scene:
     """A scene that is written to a folder and loaded."""
-    (folder / "scene.xml").write_text(MJCF.replace("</worldbody>", floor + "</worldbody>"))
-    (folder / "scene.toml").write_text(TOML.format(duration, density))
-    return load_scene(folder / "scene.toml")
+    model = MJCF.replace("</worldbody>", floor + "</worldbody>")
+    return load_scene(write_scene(folder, model, TOML.format(duration, density)))
 
 
 def interrupting_at(frame: int) -> Callable[[int, int], None]:

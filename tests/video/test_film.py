@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bouncing_stone import MJCF, TOML
 from mujoco_models import posed
+from scene_files import write_scene
 from sphere_height_maps import cube_charts
 from unfinished_videos import interrupting_at
 
@@ -44,12 +45,7 @@ pytestmark = pytest.mark.usefixtures("opengl")
 
 @pytest.fixture
 def make_scene(tmp_path: Path) -> Callable[..., Scene]:
-    def make(toml: str = TOML) -> Scene:
-        (tmp_path / "scene.xml").write_text(MJCF)
-        (tmp_path / "scene.toml").write_text(toml)
-        return load_scene(tmp_path / "scene.toml")
-
-    return make
+    return lambda toml=TOML: load_scene(write_scene(tmp_path, MJCF, toml))
 
 
 def film_of(scene: Scene, words: list[str], size: tuple[int, int], baseline: str | None = None) -> Film:
