@@ -6,7 +6,6 @@ import html
 import io
 import json
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from chromium import PATIENCE, browsing, launched
 from PIL import Image
 
 from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, export_scene
@@ -24,12 +24,7 @@ from ripple_sim.render.surfaces import memory_order
 from ripple_sim.scene import Scene
 from ripple_sim.simulation import Simulation
 
-playwright = pytest.importorskip("playwright.sync_api")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-browsing = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (on Debian: apt-get install chromium)")
-
 SIZE, FPS, FRAMES, SEEN = (320, 180), 100, 20, 18
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
 
 
 @pytest.fixture(scope="module")
@@ -56,17 +51,15 @@ def ours(scene: Scene, opengl: None) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS, timeout=180_000)  # [ms]
-        yield browser
-        browser.close()
+    with launched("--use-angle=swiftshader", "--enable-unsafe-swiftshader") as made:
+        yield made
 
 
 @contextlib.contextmanager
 def opened(browser: Any, page: Path) -> Iterator[Any]:
     """A page in a browser, in which nothing may go wrong."""
     tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
-    tab.set_default_timeout(180_000)  # [ms]; the machine may be busy
+    tab.set_default_timeout(1000 * PATIENCE)  # [ms]
     faults: list[str] = []
     tab.on("pageerror", lambda error: faults.append(str(error)))
     tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)
