@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from hits import Run
-from mujoco_models import add_ball, mesh_spec
+from mujoco_models import add_ball, forwarded, mesh_spec
 from vessels import opened
 
 from ripple_sim import make_collidable
@@ -121,8 +121,7 @@ def solid(extents: tuple[float, float, float], fineness: float = 2.0) -> tuple[n
 @pytest.mark.parametrize("place", [{}, {"pos": [0.3, 0.1, 0.2], "quat": [0.5, 0.5, 0.1, 0.7]}])
 def test_flex_lies_as_deep_inside_of_the_mesh_as_it_is_thick(place: dict[str, list[float]]) -> None:
     model = mesh_spec(peanut(0.04), **place).compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    data = forwarded(model)
     flex = find_flex_colliders(model)[model.geom("target").id]
     surface = data.geom("target").xpos + model.mesh_vert @ data.geom("target").xmat.reshape(3, 3).T
     depth = -igl.signed_distance(data.flexvert_xpos, surface, model.mesh_face.astype(np.int64))[0]

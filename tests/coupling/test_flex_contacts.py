@@ -256,9 +256,7 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
         ([(ASIDE, (5, 0, 0))], 1.0),
     ],
 )
-def test_the_share_of_pushes_sideways_beyond_friction_is_warned_of(
-    slab: tuple, contacts: list, unexplained: float
-) -> None:
+def test_pushes_sideways_beyond_friction_are_warned_of(slab: tuple, contacts: list, unexplained: float) -> None:
     with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
         summed(slab, contacts)
     told = [f"wrong by about {unexplained:.1%}" in str(each.message) for each in caught]

@@ -175,8 +175,7 @@ def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so()
     model = mujoco.MjModel.from_xml_string(link.replace('0.25"/>', '0.25"/></body>', 1))
     with pytest.warns(RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit=\(1, m/s"):
         Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         Ripples(model, {"target": Material.suited(1.0, (1.0, 2.0))}, resolution=8, backend="cpu")
 
 

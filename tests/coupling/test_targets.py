@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from hits import Run
-from mujoco_models import BALL, model_of
+from mujoco_models import BALL, forwarded, model_of
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning
 
@@ -124,8 +124,7 @@ def test_a_sensor_on_a_site_goes_on_when_the_material_changes() -> None:
         'pos="1 0 0" euler="0 90 0"/><body euler="0 0 20"><site name="end" pos="0.94 -0.34 -0.3"/></body></body>'
         '<body name="b"><freejoint/><geom size="0.1"/><site name="off"/></body>'
     )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    data = forwarded(model)
     ripples = Run(model, "target", resolution=16, conserve_volume=True).ripples
     sensor, geom = ripples["target"].sensor("end", "velocity", 1000.0), data.geom("target")
     world = sensor.points @ geom.xmat.reshape(3, 3).T + geom.xpos

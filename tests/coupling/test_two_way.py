@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from hits import Run
+from mujoco_models import posed
 
 from ripple_sim import Material, Ripples
 from ripple_sim.coupling import support_point
@@ -173,8 +174,8 @@ GEOMS = {
 }
 
 
-def geom_model(kind: str) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(
+def geom_model(kind: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    return posed(
         f"""<mujoco><asset><mesh name="tetrahedron" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset>
         <worldbody><geom {GEOMS[kind]}/></worldbody></mujoco>"""
     )
@@ -182,9 +183,7 @@ def geom_model(kind: str) -> mujoco.MjModel:
 
 @pytest.mark.parametrize("kind", GEOMS)
 def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
-    model = geom_model(kind)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = geom_model(kind)
     rotation, origin = data.geom_xmat[0].reshape(3, 3), data.geom_xpos[0]
     rng, geom = np.random.default_rng(3), np.zeros(1, dtype=np.int32)
 
@@ -205,6 +204,6 @@ def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
 
 def test_middle_of_a_face_that_lies_flat() -> None:
     down = np.array([0.005, -0.004, -1.0])
-    np.testing.assert_allclose(support_point(geom_model("box"), 0, down), [0, 0, -0.1])
-    np.testing.assert_allclose(support_point(geom_model("cylinder"), 0, down), [0, 0, -0.3])
-    np.testing.assert_allclose(support_point(geom_model("capsule"), 0, np.array([0.0, 1.0, 0.01])), [0, 0.1, 0.001])
+    np.testing.assert_allclose(support_point(geom_model("box")[0], 0, down), [0, 0, -0.1])
+    np.testing.assert_allclose(support_point(geom_model("cylinder")[0], 0, down), [0, 0, -0.3])
+    np.testing.assert_allclose(support_point(geom_model("capsule")[0], 0, np.array([0.0, 1.0, 0.01])), [0, 0.1, 0.001])

@@ -126,9 +126,7 @@ def test_options_of_ours_alone_are_refused(given: dict, said: str, tmp_path: Pat
         check_cycles(VideoOptions(**given), tmp_path / "a.webp")
 
 
-def test_a_missing_blender_and_one_that_cannot_be_used_are_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_blender_that_cannot_be_used_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(said: str) -> None:
         with pytest.raises(VideoError, match=said) as refusal:
             check_cycles(VideoOptions(), tmp_path / "a.mp4")

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 from chromium import PATIENCE, browsing, launched
+from mujoco_models import forwarded
 from PIL import Image
 
 from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, export_scene
@@ -113,10 +114,8 @@ def test_a_pages_lamps_have_highlights_as_weak_as_ours(page: Path) -> None:
 
 
 def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp_path: Path) -> None:
-    data = mujoco.MjData(scene.model)
-    mujoco.mj_forward(scene.model, data)
     with Exporter(scene.model, ripples, tmp_path / "run.html") as exporter:
-        exporter.write(data)
+        exporter.write(forwarded(scene.model))
         assert "not complete" in exporter._repr_html_()
     shown = exporter._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
@@ -126,8 +125,7 @@ def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp
 @browsing
 def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Ripples, tmp_path: Path) -> None:
     """Of an exporter, and of a renderer what it rendered last."""
-    data = mujoco.MjData(ripples.model)
-    mujoco.mj_forward(ripples.model, data)
+    data = forwarded(ripples.model)
     with Exporter(ripples.model, ripples, tmp_path / "run.html", size=SIZE) as exporter:
         exporter.write(data)
     renderer = RippleRenderer(ripples.model, ripples, width=SIZE[0], height=SIZE[1])
@@ -177,8 +175,7 @@ def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> N
 def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
     browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
 ) -> None:
-    data = mujoco.MjData(soft_model)
-    mujoco.mj_forward(soft_model, data)
+    data = forwarded(soft_model)
     waves, looks = Material(speed=0.3, density=1500.0), {"egg": "rubber", "jelly": "jelly"}
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")
     with Exporter(soft_model, ripples, tmp_path / "run.html", size=SIZE, looks=looks) as exporter:
@@ -240,9 +237,7 @@ def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
 
 
 @browsing
-def test_the_browser_has_every_point_of_surfaces_that_move(
-    browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
-) -> None:
+def test_the_browser_has_moving_surfaces(browser: Any, soft_model: mujoco.MjModel, tmp_path: Path) -> None:
     """A soft body that moves from the first frame, and a geom that is moved by hand within the second chunk."""
     data, waves = mujoco.MjData(soft_model), Material(speed=0.3, density=1500.0)
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from drawn import BALL, FLOOR, FRONT, SPOT, SUN, ball_surface, frame_of
+from mujoco_models import forwarded
 
 from ripple_sim.render import Camera, DrawnScene, Resources
 from ripple_sim.render.visuals import Assets, visuals_of
@@ -28,9 +29,7 @@ def model():
 
 @pytest.fixture
 def data(model):
-    made = mujoco.MjData(model)
-    mujoco.mj_forward(model, made)
-    return made
+    return forwarded(model)
 
 
 @pytest.fixture(scope="module", params=["clay", "water"])
