@@ -14,7 +14,8 @@ from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation, DeviceTessellation, Displacement
 from ripple_sim.render.surfaces.moving import MovingOcclusion, MovingVertices
 from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearance
-from ripple_sim.render.surfaces.vertices import BAKED, DIRECTION, NORMAL, POSITION, mapped_coordinates, surface_vertices
+from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION
+from ripple_sim.render.surfaces.vertices import mapped_coordinates, surface_vertices
 from ripple_sim.render.visuals.geoms import Instances, instances_of
 from ripple_sim.render.visuals.objects import Assets, Occluders
 from ripple_sim.render.visuals.shapes import NamedShape
