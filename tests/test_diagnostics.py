@@ -1,7 +1,4 @@
-"""What `ripple-sim info` says where OpenGL does not run, or not on the GPU: each cause is provoked.
-
-What `ripple-sim info` reports, with OpenGL and without.
-"""
+"""What `ripple-sim info` reports, and says where OpenGL does not run, or not on the GPU."""
 
 import grp
 import importlib.metadata

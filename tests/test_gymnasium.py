@@ -1,7 +1,4 @@
-"""Environments of Gymnasium ripple with each of their physics steps, and stay environments of Gymnasium.
-
-Their camera is held against the one that MuJoCo's own visualiser would set up.
-"""
+"""Environments of Gymnasium ripple with each of their physics steps, and are seen by their own camera."""
 
 import functools
 import importlib

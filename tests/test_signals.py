@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scene_files import write_scene
 
 from ripple_sim import VideoOptions, export_scene, load_scene, render_video
 from ripple_sim.batch.worker import FrameRecord, StoreEntry
@@ -19,7 +20,7 @@ MODEL = """<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 <geom name="ball" type="sphere" size="0.3" pos="0 0 0.3"/><site name="top" pos="0 0 0.6"/>
 <body pos="0.05 0 0.65"><freejoint/><geom size="0.05" mass="0.3"/></body></worldbody></mujoco>"""
 SCENE = """
-model = "tap.xml"
+model = "scene.xml"
 duration = 0.5
 [[ripple]]
 geom = "ball"
@@ -43,9 +44,7 @@ OPTIONS = {"fps": 20, "backend": "cpu"}
 
 
 def scene_of(folder: Path, sensors: str = SENSORS):
-    (folder / "tap.xml").write_text(MODEL)
-    (folder / "tap.toml").write_text(SCENE + sensors)
-    return load_scene(folder / "tap.toml")
+    return load_scene(write_scene(folder, MODEL, SCENE + sensors))
 
 
 @pytest.fixture

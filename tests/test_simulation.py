@@ -6,6 +6,7 @@ import av
 import numpy as np
 import pytest
 from bouncing_stone import MJCF, TOML
+from scene_files import write_scene
 
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.errors import SceneError, SimulationError
@@ -20,9 +21,7 @@ pytestmark = pytest.mark.usefixtures("opengl")
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Scene:
-    (tmp_path / "scene.xml").write_text(MJCF)
-    (tmp_path / "scene.toml").write_text(TOML)
-    return load_scene(tmp_path / "scene.toml")
+    return load_scene(write_scene(tmp_path, MJCF, TOML))
 
 
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
@@ -83,12 +82,10 @@ def test_supersampled_frames_have_softer_edges_of_the_same_brightness(scene: Sce
 
 
 def test_unstable_physics_is_reported_and_no_file_is_left(tmp_path: Path) -> None:
-    (tmp_path / "scene.xml").write_text(
-        MJCF.replace('<option timestep="0.002"/>', '<option timestep="0.01" gravity="0 0 -1e9"/>')
-    )
-    (tmp_path / "scene.toml").write_text(TOML)
+    wild = MJCF.replace('<option timestep="0.002"/>', '<option timestep="0.01" gravity="0 0 -1e9"/>')
+    scene = load_scene(write_scene(tmp_path, wild, TOML))
     with pytest.raises(SimulationError, match="became unstable at"):
-        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "x.mp4", VideoOptions(size=(64, 48), fps=20))
+        render_video(scene, tmp_path / "x.mp4", VideoOptions(size=(64, 48), fps=20))
     assert not (tmp_path / "x.mp4").exists()
     assert len(list(tmp_path.iterdir())) == 2
 

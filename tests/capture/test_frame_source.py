@@ -1,9 +1,4 @@
-"""Motion blur and depth of field: streaks as long and discs as wide as a camera's, and no light lost.
-
-Averaging pixels: in linear light, weighted by opacity.
-
-Where the camera of a scene stands: free, fixed, orbiting, tracking a body.
-"""
+"""Motion blur and depth of field as of a camera, means of pixels, and where a scene's camera stands."""
 
 import dataclasses
 from typing import Any

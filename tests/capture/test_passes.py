@@ -1,10 +1,10 @@
 """Passes against what is known of the scene: a ball, a floor, and points that are tracked on a rippling egg."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
+from scene_files import write_scene
 
 from ripple_sim.capture import FrameSource, Sighting, passes_of, snapshots
 from ripple_sim.export import MovingMesh
@@ -42,10 +42,8 @@ def seen(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, opengl: None
 ) -> list[tuple[Sighting, np.ndarray]]:
     """Two frames: what is seen, and where points on the egg are in the world. Its surface may move by itself, too."""
-    folder: Path = tmp_path_factory.mktemp("scene")
-    (folder / "scene.xml").write_text(MJCF)
-    (folder / "scene.toml").write_text(TOML)
-    simulation = Simulation(load_scene(folder / "scene.toml"), fps=20, backend="cpu")
+    path = write_scene(tmp_path_factory.mktemp("scene"), MJCF, TOML)
+    simulation = Simulation(load_scene(path), fps=20, backend="cpu")
     simulation.data.qvel[:] = [1.5, 0.8, 0, 0, 0, 0, 0]
     waves = simulation.ripples["egg"]
     x, y, z = np.moveaxis(waves.atlas.normals, -1, 0)

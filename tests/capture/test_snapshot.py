@@ -1,9 +1,4 @@
-"""Snapshots hold the state of their time while the simulation goes on, and tell states apart bit for bit.
-
-The exposures of a frame: points of the lens, and times.
-
-States at times between physics steps.
-"""
+"""Snapshots hold the state of their time, between steps too, and tell states apart; exposures."""
 
 import dataclasses
 

@@ -1,7 +1,4 @@
-"""Words of the command line: what they mean, and what is said where they mean nothing.
-
-The command line of a video has every option of `VideoOptions`, with its default and its type.
-"""
+"""Words of the command line: what they mean, and what is said where they mean nothing; every option has one."""
 
 import dataclasses
 from pathlib import Path

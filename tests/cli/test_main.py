@@ -1,7 +1,4 @@
-"""The program's manners: quick help, one line for a mistake, exit statuses, nothing left behind.
-
-Strange words are refused at once, in one line that is no longer than a line should be.
-"""
+"""The program's manners: quick help, one short line for a mistake, exit statuses, nothing left behind."""
 
 import os
 import re

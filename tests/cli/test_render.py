@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numba
 import pytest
+from scene_files import write_scene
 
 from ripple_sim.cli import frame_progress, main as cli, reports
 from ripple_sim.solver import kernel
@@ -146,11 +147,9 @@ def test_every_material_is_listed_with_source_speed_and_decay(capsys: pytest.Cap
 def test_a_number_out_of_range_in_an_mjcf_is_one_line(refusal, tmp_path: Path, number: str, place: str) -> None:
     """Not MuJoCo's warning and ours, nor NumPy's of what they lead to."""
     numbers = {"gravity": "-9.81", "size": "0.3", "body": "0.7"} | {place: number}
-    (tmp_path / "model.xml").write_text(
-        f"""<mujoco><option gravity="0 0 {numbers["gravity"]}"/><worldbody>
+    model = f"""<mujoco><option gravity="0 0 {numbers["gravity"]}"/><worldbody>
         <geom name="egg" type="ellipsoid" size="0.4 {numbers["size"]} 0.3"/>
         <body pos="0 0 {numbers["body"]}"><freejoint/><geom size="0.06"/></body></worldbody></mujoco>"""
-    )
-    (tmp_path / "scene.toml").write_text('model = "model.xml"\n[[ripple]]\ngeom = "egg"\nresolution = 8\n')
-    message = refusal("render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "o.mp4"), "--duration", "0.1")
+    scene = write_scene(tmp_path, model, 'model = "scene.xml"\n[[ripple]]\ngeom = "egg"\nresolution = 8\n')
+    message = refusal("render", str(scene), "-o", str(tmp_path / "o.mp4"), "--duration", "0.1")
     assert re.search(r"(nan|inf|1e\+300).*valid are numbers up to 1e\+10|MuJoCo refuses .*nan", message)

@@ -1,8 +1,4 @@
-"""The program as a process: signals, streams and disks.
-
-Signals become exceptions where there is something to clean up, and end the process at once where there is not. A full
-disk, closed and full standard streams, no home, no cache: the right status, nothing in the wrong place.
-"""
+"""The program as a process: signals, full disks, closed streams, no home: the right status every time."""
 
 import errno
 import os

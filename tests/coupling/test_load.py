@@ -1,13 +1,11 @@
-"""The load on a target gives the impulse of its contacts: no more, no less, and where they are.
-
-What is told of the contacts of a step: impulses for the user, touches for two-way coupling.
-"""
+"""The load on a target gives the impulse of its contacts, no more and no less, where they are, and it is told of."""
 
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 import pytest
+from hits import Run
 
 from ripple_sim import Material, Ripples
 from ripple_sim.coupling import Contacts, StepContacts, TargetLoad
@@ -198,25 +196,16 @@ GROOVE = """<mujoco><option timestep="0.001"/><asset>
 def test_a_wedged_ball_is_told_of_where_it_touches() -> None:
     """The middle of its contacts lies in the air between the two walls."""
     model = mujoco.MjModel.from_xml_string(GROOVE.format(height=0.16 * np.sqrt(2) + 1e-3))
-    data = mujoco.MjData(model)
-    ripples = Ripples(
-        model,
-        {"groove": Material(1.0, density=10.0)},
-        resolution=16,
-        backend="cpu",
-        contacts={"groove": ["left", "right"]},
-    )
-    given, wedged = 0.0, 0
+    run, wedged = Run(model, "groove", density=10, resolution=16, contacts={"groove": ["left", "right"]}), 0
     for _ in range(200):
-        ripples.mj_step(data)
-        given += sum(hit.impulse for hit in ripples.last_impulses)
-        if data.ncon == 2 and len(ripples.last_impulses) == 2:
+        hits, contact = run.step(), run.data.contact
+        if run.data.ncon == 2 and len(hits) == 2:
             wedged += 1
-            places = sorted(ripples.last_impulses, key=lambda hit: hit.point[0])
-            at = data.contact.pos[np.argsort(data.contact.pos[:, 0])]
+            places = sorted(hits, key=lambda hit: hit.point[0])
+            at = contact.pos[np.argsort(contact.pos[:, 0])]
             assert max(np.linalg.norm(hit.point - each) for hit, each in zip(places, at, strict=True)) < 0.01
         else:
-            assert data.ncon < 2
+            assert run.data.ncon < 2
     assert wedged > 100
-    gained = data.qvel[2] + 9.81 * data.time
-    assert given * np.sqrt(0.5) == pytest.approx(gained, rel=1e-3)
+    gained = run.data.qvel[2] + 9.81 * run.data.time
+    assert run.given() * np.sqrt(0.5) == pytest.approx(gained, rel=1e-3)

@@ -1,7 +1,6 @@
 """What the surface gets is what the bodies lose: for every shape, route, restitution, time step and frame rate.
 
-Moving targets that fall on planes and height fields get what the ground gives them, and so do those that meet bodies
-which are tied, driven or sticky.
+So it is of moving targets that fall on the ground, or meet bodies which are tied, driven or sticky.
 """
 
 import runpy
@@ -169,9 +168,8 @@ def test_integrator_that_does_not_is_warned_of() -> None:
 
 def test_answer_does_not_depend_on_the_frame_rate(tmp_path: Path) -> None:
     mujoco.mj_saveLastXML(str(tmp_path / "scene.xml"), ball_on_sphere(0.002, "0.02 1"))
-    (tmp_path / "scene.toml").write_text(
-        'model = "scene.xml"\n[[ripple]]\ngeom = "target"\nresolution = 32\nmaterial = {density = 50.0}\n'
-    )
+    table = 'model = "scene.xml"\n[[ripple]]\ngeom = "target"\nresolution = 32\nmaterial = {density = 50.0}\n'
+    (tmp_path / "scene.toml").write_text(table)
     scene = load_scene(tmp_path / "scene.toml")
     given, arrivals = [], []
     for fps in (24, 60, 100):

@@ -1,7 +1,4 @@
-"""Contacts mark the corners of a patch: the force is spread over it, and force and torque stay the same.
-
-Footprints under the points of a patch.
-"""
+"""Contacts mark the corners of a patch: the force is spread over it, and force and torque stay the same."""
 
 import numpy as np
 import pytest
@@ -17,14 +14,8 @@ SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
 def spread_patch(
     atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    patches, at, shares, radii = load_points(
-        points,
-        forces,
-        np.zeros(1, int),
-        np.array([radius]),
-        np.array([convex]),
-        lambda probes: atlas.nearest(probes)[0],
-    )
+    patch = np.zeros(1, int), np.array([radius]), np.array([convex])
+    patches, at, shares, radii = load_points(points, forces, *patch, lambda probes: atlas.nearest(probes)[0])
     assert not patches.any()
     assert np.ptp(radii) == 0
     return at, shares, radii[0]

@@ -1,13 +1,11 @@
-"""Bodies that come to rest: the surface becomes still, and bears their weight.
-
-The rest filter: forces pass as they are, places and chatter are averaged, and no impulse is lost.
-"""
+"""Bodies at rest: the surface becomes still and bears their weight; chatter is averaged, and no impulse is lost."""
 
 import functools
 
 import mujoco
 import numpy as np
 import pytest
+from hits import Run
 from mujoco_models import limbed_asset
 from unfiltered import WithAndWithout, rms
 
@@ -65,12 +63,10 @@ CALM, CHATTERING = "0.02 1", "0.01 0.2"
     ],
 )
 def test_surface_under_a_body_at_rest_becomes_still_in_its_dimple(target: str, body: str, solref: str) -> None:
-    model = model_of(target, body, solref)
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {"target": MATERIAL}, resolution=24, backend="cpu", conserve_volume=False)
-    waves, history = ripples["target"], []
+    run, history = Run(model_of(target, body, solref), "target", material=MATERIAL, resolution=24), []
+    data, waves = run.data, run.ripples["target"]
     while data.time < 4:
-        ripples.mj_step(data)
+        run.step()
         history.append(rms(waves))
     # a body that still rocks on a chattering contact disturbs the surface now and then
     assert np.median(history[-250:]) < 0.001 * max(history[:250])
@@ -84,13 +80,9 @@ def test_surface_under_a_body_at_rest_becomes_still_in_its_dimple(target: str, b
 
 
 def test_box_that_lies_flat_loads_the_surface_under_its_middle_too() -> None:
-    model = model_of("box", "box", "0.02 1")
-    data = mujoco.MjData(model)
     material = Material(speed=0.1, damping=20.0, stiffness=1000.0, density=100.0)
-    ripples = Ripples(model, {"target": material}, resolution=64, backend="cpu")
-    while data.time < 1.5:
-        ripples.mj_step(data)
-    waves = ripples["target"]
+    run = Run(model_of("box", "box", "0.02 1"), "target", material=material, resolution=64, conserve_volume=True)
+    waves = run.until(1.5).ripples["target"]
     place, height = waves.atlas.positions.reshape(-1, 3), waves.height.reshape(-1)
     above = place[:, 2] > 0.099
     middle = above & (np.hypot(place[:, 0], place[:, 1]) < 0.015)
@@ -113,12 +105,11 @@ def test_surface_under_a_stack_and_its_neighbours_becomes_still(target: str, dt:
         f"""<mujoco><option timestep="{dt}" sdf_initpoints="10"/><default><geom friction="1 0.05 0.05" condim="6"/>
         </default><asset>{limbed_asset()}</asset><worldbody>{TARGETS[target][0]}{bodies}</worldbody></mujoco>"""
     )
-    data, history = mujoco.MjData(model), []
-    ripples = Ripples(model, {"target": MATERIAL}, resolution=16, backend="cpu", conserve_volume=False)
-    while data.time < 4:
-        ripples.mj_step(data)
-        history.append(rms(ripples["target"]))
-    assert len(ripples.last_impulses) == len(places) - 1
+    run, history = Run(model, "target", material=MATERIAL, resolution=16), []
+    while run.data.time < 4:
+        run.step()
+        history.append(rms(run.ripples["target"]))
+    assert len(run.hits[-1]) == len(places) - 1
     assert max(history[-50:]) < 0.001 * max(history)
 
 
@@ -206,9 +197,8 @@ def dropped(scale: float) -> np.ndarray:
         <body pos="{-0.25 * s} {0.1 * s} {0.25 * s}"><freejoint/><geom size="{0.06 * s}" mass="{0.3 * s**3}"/></body>
         </worldbody></mujoco>"""
     )
-    data = mujoco.MjData(model)
     material = Material(t, 1 / t, 200 / s, density=100 * s, viscosity=1e-3 * s * t)
-    ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu")
+    ripples, data = Ripples(model, {"target": material}, resolution=16, backend="cpu"), mujoco.MjData(model)
     heights = []
     for _ in range(50):
         ripples.mj_step(data, nstep=10)

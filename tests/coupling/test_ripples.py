@@ -7,7 +7,7 @@ import igl
 import mujoco
 import numpy as np
 import pytest
-from mujoco_models import BALL, limbed_asset, model_of
+from mujoco_models import BALL, forwarded, limbed_asset, model_of
 
 from ripple_sim import Material, Ripples
 
@@ -47,8 +47,7 @@ def test_ball_on_a_concave_mesh_hits_the_surface_under_it(transform: str, placin
     geom = f'<geom name="target" type="sdf" mesh="limbed" {placing}/>'
     asset = limbed_asset(transform)
     probe = model_of(geom + BALL.format("0 0 99"), asset)
-    data = mujoco.MjData(probe)
-    mujoco.mj_forward(probe, data)
+    data = forwarded(probe)
     ripples = Ripples(probe, {"target": Material()}, resolution=64, backend="cpu")
     mesh = ripples["target"].atlas.mesh
     world = mesh.V @ data.geom("target").xmat.reshape(3, 3).T + data.geom("target").xpos

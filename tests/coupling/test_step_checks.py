@@ -1,8 +1,4 @@
-"""Checks at every step warn once where impulses are going to be wrong.
-
-Geoms too fast for the time step are reported before they get through, and others are not. Where MuJoCo's solver stops
-too early, impulses and momentum disagree, and a warning says so.
-"""
+"""Checks at every step warn once where impulses are going to be wrong: geoms too fast, solvers that stop early."""
 
 import warnings
 
@@ -103,17 +99,21 @@ def test_speeds_of_geoms_on_turning_trees_of_bodies_are_mujocos(seed: int) -> No
 # springs that throw back 0.9 of the speed
 BOUNCY = "0.149 0.0335"
 PLATE = '<geom name="plate" type="box" size="0.3 0.3 0.02"/>'
+SHOT = '<body name="ball" pos="0 0 {}"><freejoint/><geom size="0.03"/></body>'
 
 
-def shoot(speed: float, solref: str, timestep: float, worldbody: str = PLATE) -> tuple[bool, list[str]]:
+def watched(xml: str) -> tuple[mujoco.MjModel, mujoco.MjData, TunnellingCheck]:
+    """A model without gravity, and the check of its geom 0."""
+    model = mujoco.MjModel.from_xml_string(f'<mujoco><option gravity="0 0 0"/>{xml}</mujoco>')
+    return model, mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
+
+
+def shoot(speed: float, solref: str, timestep: float) -> tuple[bool, list[str]]:
     """Whether a ball is thrown back by a plate, and the warnings on its way."""
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{timestep}" gravity="0 0 0"/><default><geom solref="{solref}"/></default>
-        <worldbody>{worldbody}<body name="ball" pos="0 0 0.6"><freejoint/><geom size="0.03"/></body></worldbody>
-        </mujoco>"""
+    model, data, check = watched(
+        f"""<option timestep="{timestep}"/><default><geom solref="{solref}"/></default>
+        <worldbody>{PLATE}{SHOT.format(0.6)}</worldbody>"""
     )
-    data = mujoco.MjData(model)
-    check = TunnellingCheck(CoupledModel(model), [0])
     data.qvel[2] = -speed
     with warnings.catch_warnings(record=True, action="always") as caught:
         for _ in range(int(1.2 / speed / timestep) + 200):
@@ -157,10 +157,8 @@ def test_where_the_time_step_will_do_a_solref_is_named_and_no_longer_step() -> N
 def test_one_warning_serves_all_pairs_but_those_that_are_much_worse() -> None:
     ball = '<body name="{}" pos="{} 0 {}"><freejoint/><geom size="0.03"/></body>'
     balls = [("first", 0.0, 0.2, 10), ("as bad", 0.1, 0.9, 15), ("worse", 0.2, 2.0, 40)]
-    model = mujoco.MjModel.from_xml_string(
-        f"<mujoco><worldbody>{PLATE}{''.join(ball.format(*each[:3]) for each in balls)}</worldbody></mujoco>"
-    )
-    data, check = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
+    xml = f"<worldbody>{PLATE}{''.join(ball.format(*each[:3]) for each in balls)}</worldbody>"
+    model, data, check = watched(xml)
     data.qvel[2::6] = [-speed for *_, speed in balls]
     with warnings.catch_warnings(record=True, action="always") as caught:
         for _ in range(60):
@@ -170,16 +168,11 @@ def test_one_warning_serves_all_pairs_but_those_that_are_much_worse() -> None:
 
 
 def test_moving_target_counts_with_its_own_speed() -> None:
-    body = '<body name="plate" pos="0 0 {}"><freejoint/><geom name="plate" type="box" size="0.3 0.3 0.02"/></body>'
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option gravity="0 0 0"/><worldbody>{body.format(0)}
-        <body name="ball" pos="0 0 0.2"><freejoint/><geom size="0.03"/></body></worldbody></mujoco>"""
-    )
-    data = mujoco.MjData(model)
+    model, data, check = watched(f"<worldbody><body><freejoint/>{PLATE}</body>{SHOT.format(0.2)}</worldbody>")
     data.qvel[:6] = data.qvel[6:] = [0, 0, -30, 0, 0, 0]
     mujoco.mj_forward(model, data)
     with warnings.catch_warnings(action="error"):
-        TunnellingCheck(CoupledModel(model), [0])(data)  # both fly along together
+        check(data)  # both fly along together
     data.qvel[2], data.qvel[8] = 15, -15
     mujoco.mj_forward(model, data)
     with pytest.warns(RippleWarning, match="at 30 m/s"):
@@ -247,15 +240,11 @@ def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: p
     flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
     assert sum(int(flag) for flag in flags) == step_checks.SPECULATIVE
     monkeypatch.setattr(step_checks, "SPECULATIVE", 1 << 20)
-    model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option gravity="0 0 0"/><worldbody>{PLATE}<body name="ball" pos="0 0 0.2"><freejoint/>
-        <geom size="0.03"/></body></worldbody></mujoco>"""
-    )
-    data = mujoco.MjData(model)
+    model, data, check = watched(f"<worldbody>{PLATE}{SHOT.format(0.2)}</worldbody>")
     data.qvel[2] = -60
     mujoco.mj_forward(model, data)
     with pytest.warns(RippleWarning, match="at 60 m/s"):
-        TunnellingCheck(CoupledModel(model), [0])(data)
+        check(data)
     model.opt.enableflags |= 1 << 20
     with warnings.catch_warnings(action="error"):
         TunnellingCheck(CoupledModel(model), [0])(data)

@@ -1,10 +1,6 @@
-"""The time between looks, when it goes on, stands still, or begins anew.
+"""The time between looks, and resets, of which a mark in the data tells; forces are those of the present contacts.
 
 MuJoCo's own warnings are ours, each once, and its errors say what helps.
-
-The mark stays through steps and copies, is wiped out by any reset, and is shared by those who look at it.
-
-Forces of the step before are not taken for those of the present contacts, whatever solves and integrates.
 """
 
 import copy

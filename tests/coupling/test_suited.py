@@ -1,7 +1,6 @@
-"""What a model chooses where its user leaves it open, and what it says where waves become too high or too steep.
+"""Material and resolution that suit the target, where its user leaves them open, whatever the scale.
 
-The material: waves that suit the target, whatever the scale. The resolution: by what touches the target, and by the
-time step. Waves too high or too steep: a warning once a target, with a material that would do.
+Waves too high or too steep: a warning once a target, with a material that would do.
 """
 
 import math
@@ -176,8 +175,7 @@ def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so()
     model = mujoco.MjModel.from_xml_string(link.replace('0.25"/>', '0.25"/></body>', 1))
     with pytest.warns(RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit=\(1, m/s"):
         Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         Ripples(model, {"target": Material.suited(1.0, (1.0, 2.0))}, resolution=8, backend="cpu")
 
 
@@ -332,14 +330,14 @@ def test_what_is_named_is_whole_where_the_model_chose_the_material() -> None:
     data, ripples = still_ripples(Material())
     ripples.poke("target", [0, 0, 0.5], 200.0, 0.1)
     with pytest.warns(RippleWarning) as caught:
-        run(data, ripples, 80)
+        ripples.mj_step(data, nstep=80)
     heavier, chosen = advised(str(caught[0].message)), ripples["target"].material
     for name in ("speed", "damping", "stiffness"):
         assert getattr(heavier, name) == pytest.approx(getattr(chosen, name), rel=1e-3)
     data, ripples = still_ripples(heavier)
     ripples.poke("target", [0, 0, 0.5], 200.0, 0.1)
     with warnings.catch_warnings(action="error"):
-        run(data, ripples, 80)
+        ripples.mj_step(data, nstep=80)
 
 
 @pytest.mark.parametrize(
@@ -348,9 +346,9 @@ def test_what_is_named_is_whole_where_the_model_chose_the_material() -> None:
 def test_a_crest_of_any_step_is_reported(before: int, after: int, end: str) -> None:
     """With an old material too, and at a reset, though nobody has looked yet."""
     data, ripples = still_ripples()
-    run(data, ripples, before)
+    ripples.mj_step(data, nstep=before)
     ripples["target"].height = 0.4
-    run(data, ripples, after)
+    ripples.mj_step(data, nstep=after)
     if end == "new material":
         ripples.change_material("target", damping=2.0)
     with pytest.warns(RippleWarning, match="0.4 m at .* radius is 0.5 m"):
@@ -358,7 +356,7 @@ def test_a_crest_of_any_step_is_reported(before: int, after: int, end: str) -> N
             ripples.reset()
         else:
             ripples["target"].height = 0.0
-            run(data, ripples, 40)
+            ripples.mj_step(data, nstep=40)
 
 
 def test_gl_is_looked_at_too(opengl: None) -> None:
@@ -372,17 +370,12 @@ def still_ripples(material: Material = WEAK) -> tuple[mujoco.MjData, Ripples]:
     return mujoco.MjData(model), Ripples(model, {"target": material}, resolution=32, backend="cpu")
 
 
-def run(data: mujoco.MjData, ripples: Ripples, steps: int) -> None:
-    for _ in range(steps):
-        ripples.mj_step(data)
-
-
 def test_steep_waves_are_reported_although_they_are_low() -> None:
     data, ripples = still_ripples(Material(speed=1e-3, damping=0.0, stiffness=0.0, density=1.0))
     z = ripples["target"].atlas.positions[..., 2]
     ripples["target"].height = (0.05 * np.sin(40 * z)).astype(np.float32)
     with pytest.warns(RippleWarning, match="too steep: a slope of 1.* on "):
-        run(data, ripples, 80)
+        ripples.mj_step(data, nstep=80)
 
 
 def test_a_target_may_have_any_height_if_that_is_wanted() -> None:
@@ -390,7 +383,7 @@ def test_a_target_may_have_any_height_if_that_is_wanted() -> None:
     ripples.allow_any_height("target")
     ripples["target"].height = 0.4
     with warnings.catch_warnings(action="error"):
-        run(data, ripples, 80)
+        ripples.mj_step(data, nstep=80)
 
 
 def test_of_a_map_a_factor_is_named() -> None:
@@ -398,7 +391,7 @@ def test_of_a_map_a_factor_is_named() -> None:
     ripples.change_material("target", density=np.full(ripples["target"].atlas.areas.shape, 2.0))
     ripples["target"].height = 0.4
     with pytest.warns(RippleWarning) as caught:
-        run(data, ripples, 80)
+        ripples.mj_step(data, nstep=80)
     [message] = [str(each.message) for each in caught]
     call = re.search(r"would do: (ripples\.change_material\('target', density=[\d.]+ \* .*)$", message)
     assert call is not None, message

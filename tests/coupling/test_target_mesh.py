@@ -1,16 +1,11 @@
-"""Primitive geoms ripple on their own surface.
-
-Height fields: the triangles that MuJoCo collides, and waves on them.
-
-Triangles on primitives lie on the surface that MuJoCo collides, and nowhere else.
-"""
+"""Primitive geoms and height fields ripple on their own surface: its triangles lie where MuJoCo collides it."""
 
 import mujoco
 import numpy as np
 import pytest
 import trimesh
 from hits import Run
-from mujoco_models import add_ball, model_of
+from mujoco_models import add_ball, forwarded, model_of
 
 from ripple_sim.coupling import height_field_triangles, primitive_triangles, target_atlas
 from ripple_sim.solver import AtlasError
@@ -52,8 +47,7 @@ def land(rows: int, columns: int) -> mujoco.MjSpec:
 
 def test_triangles_lie_where_mujocos_rays_meet_the_field_and_face_up() -> None:
     model = land(9, 12).compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    data = forwarded(model)
     V, F = height_field_triangles(model, 0)
     rng = np.random.default_rng(0)
     for corners in V[F[rng.permutation(len(F))[:60]]] + model.geom_pos[0]:
@@ -114,9 +108,7 @@ def mesh_of(kind: str, size: tuple[float, ...]) -> trimesh.Trimesh:
 
 
 @every_solid
-def test_short_edges_cover_the_exact_surface_which_is_closed_and_faces_outwards(
-    kind: str, size: tuple[float, ...]
-) -> None:
+def test_short_edges_cover_the_exact_closed_surface_outwards(kind: str, size: tuple[float, ...]) -> None:
     V, F = triangles(kind, size)
     np.testing.assert_allclose(distances(kind, size, V), 0, atol=1e-12)
     edges = np.linalg.norm(V[F] - V[np.roll(F, -1, axis=1)], axis=2)

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
-from mujoco_models import BALL, model_of
+from hits import Run
+from mujoco_models import BALL, forwarded, model_of
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning
 
@@ -34,10 +35,9 @@ def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None
         '<body pos="3 0 0" euler="0 0 90"><geom name="target" type="ellipsoid" size="0.3 0.2 0.2" pos="1 0 0" '
         'euler="0 90 0"/><site name="end" pos="1 0 -0.3"/></body>'
     )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
-    geom, end = data.geom("target"), model.site("end").pos
+    run = Run(model, "target", resolution=16, conserve_volume=True)
+    mujoco.mj_forward(model, data := run.data)
+    ripples, geom, end = run.ripples, data.geom("target"), model.site("end").pos
     if place == "poke":
         with pytest.warns(RippleWarning, match=r"a poke of 'target' is 2\.7 m off its surface \(450% of its size\)"):
             ripples.poke("target", [1.0, 0.0, -3.0], 0.0)
@@ -55,8 +55,8 @@ def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None
 
 def ball_on_sphere(material: Material) -> tuple[mujoco.MjData, Ripples]:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.6"))
-    ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu", conserve_volume=False)
-    return mujoco.MjData(model), ripples
+    run = Run(model, "target", material=material, resolution=16)
+    return run.data, run.ripples
 
 
 @pytest.mark.parametrize(
@@ -87,13 +87,11 @@ def test_a_dent_outlives_a_change_of_the_material(change: Callable[[Ripples], No
 def test_texels_without_waves_do_not_drift_under_a_body_at_rest() -> None:
     """They were given their velocity, and a share in the forces to come, before they became rigid."""
     data, ripples = ball_on_sphere(Material(density=50.0, stiffness=50.0, damping=5.0))
-    for _ in range(1500):
-        ripples.mj_step(data)
+    ripples.mj_step(data, nstep=1500)
     z = ripples["target"].atlas.positions[..., 2]
     ripples.change_material("target", speed=np.where(z > 0.4, 0.0, 1.0), stiffness=0.0, damping=0.0)
     before = ripples["target"].height
-    for _ in range(1000):
-        ripples.mj_step(data)
+    ripples.mj_step(data, nstep=1000)
     rigid = ~ripples["target"].operator.movable
     assert rigid[z > 0.4].all()
     assert (ripples["target"].height == before)[rigid].all()
@@ -102,17 +100,12 @@ def test_texels_without_waves_do_not_drift_under_a_body_at_rest() -> None:
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda ripples: pickle.loads(pickle.dumps(ripples))])
 def test_copied_ripples_go_on_as_the_original(copied: Callable[[Ripples], Ripples]) -> None:
     model = model_of('<geom name="target" type="box" size="0.5 0.5 0.5"/>' + BALL.format("0 0 0.6"))
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
-    for _ in range(150):
-        ripples.mj_step(data)
-    twin, twin_data = copied(ripples), copy.copy(data)
-    for each, state in ((ripples, data), (twin, twin_data)):
-        for _ in range(50):
-            mujoco.mj_step(model, state)
-            each.step(state)
-    assert np.abs(ripples["target"].height).max() > 0
-    assert (twin["target"].height == ripples["target"].height).all()
+    run = Run(model, "target", resolution=16, conserve_volume=True).until(0.15)
+    twin, twin_data = copied(run.ripples), copy.copy(run.data)
+    twin.mj_step(twin_data, nstep=50)
+    height = run.until(0.2).ripples["target"].height
+    assert np.abs(height).max() > 0
+    assert (twin["target"].height == height).all()
 
 
 def test_the_rim_of_the_surfaces_is_handed_on_and_outlives_changes() -> None:
@@ -131,9 +124,8 @@ def test_a_sensor_on_a_site_goes_on_when_the_material_changes() -> None:
         'pos="1 0 0" euler="0 90 0"/><body euler="0 0 20"><site name="end" pos="0.94 -0.34 -0.3"/></body></body>'
         '<body name="b"><freejoint/><geom size="0.1"/><site name="off"/></body>'
     )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
+    data = forwarded(model)
+    ripples = Run(model, "target", resolution=16, conserve_volume=True).ripples
     sensor, geom = ripples["target"].sensor("end", "velocity", 1000.0), data.geom("target")
     world = sensor.points @ geom.xmat.reshape(3, 3).T + geom.xpos
     assert np.linalg.norm(world - data.site("end").xpos) < 0.02

@@ -1,15 +1,12 @@
-"""Two-way coupling: a passing ripple kicks a resting ball, and what one gains the other loses.
-
-Geoms within reach of a risen surface are pushed, and others are not.
-
-Support points of geoms against the definition: no point of the geom lies farther in the direction.
-"""
+"""Two-way coupling: what a risen surface reaches is pushed, and what one gains the other loses; support points."""
 
 from collections.abc import Callable
 
 import mujoco
 import numpy as np
 import pytest
+from hits import Run
+from mujoco_models import posed
 
 from ripple_sim import Material, Ripples
 from ripple_sim.coupling import support_point
@@ -17,7 +14,7 @@ from ripple_sim.coupling import support_point
 GRAVITY = 9.81
 
 
-def run(
+def ring(
     two_way: bool, speed: float = 2.0, target: str = "", mass: float = 0.2, gap: float = -1e-4, gravity: float = GRAVITY
 ):
     """Let a ring run to a ball on a block, or above it: heights, and over time both momenta and the speed under it."""
@@ -28,29 +25,26 @@ def run(
         <body name="ball" pos="0 0 {0.05 + gap}"><freejoint/><geom name="ball" size="0.05" mass="{mass}"/></body>
         </worldbody></mujoco>"""
     )
-    data = mujoco.MjData(model)
-    material = Material(speed=1.0, density=20.0)
-    ripples = Ripples(model, {"block": material}, resolution=48, backend="cpu", conserve_volume=False, two_way=two_way)
-    waves = ripples["block"]
+    run = Run(model, "block", material=Material(speed=1.0, density=20.0), resolution=48, two_way=two_way)
+    data, waves = run.data, run.ripples["block"]
     # a ring on its way to the ball
     place = waves.atlas.positions
     away = np.hypot(place[..., 0], place[..., 1])
     waves.velocity = speed * np.exp(-(((away - 0.12) / 0.03) ** 2)) * (place[..., 2] > 0.19)
     heights, total = [], []
     while data.time < 0.3:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+        run.step()
         joints = data.qvel[2::6] if target else data.qvel[2:3]
         masses = [5.0, mass] if target else [mass]
         heights.append(float(data.body("ball").xpos[2]) - 0.05)
         under = float(waves.velocity[(away < 0.03) & (place[..., 2] > 0.19)].max())
         total.append((data.time, float(np.dot(masses, joints)), waves.momentum(), under))
-    return np.array(heights), np.array(total), waves
+    return np.array(heights), np.array(total)
 
 
 def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
-    still, _, _ = run(two_way=False, speed=4.0, mass=0.05)
-    kicked, _, _ = run(two_way=True, speed=4.0, mass=0.05)
+    still, _ = ring(two_way=False, speed=4.0, mass=0.05)
+    kicked, _ = ring(two_way=True, speed=4.0, mass=0.05)
     assert np.abs(still).max() < 1e-3
     assert kicked.max() > 0.01
     # not before the ring is there, 0.1 m away at 1 m/s less its width
@@ -58,7 +52,7 @@ def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
 
 
 def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
-    _, total, _ = run(two_way=True)
+    _, total = ring(two_way=True)
     time, ball, surface, _ = total.T
     # gravity is all that acts from outside: no springs, no damping. Until 0.1 s no long contact has a deficit.
     early = time < 0.1
@@ -72,34 +66,37 @@ def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
 
 def test_free_target_recoils() -> None:
     """The rigid bodies alone keep their momentum: what the ball gains, the block under it loses."""
-    _, total, _ = run(two_way=True, target="<freejoint/>")
+    _, total = ring(two_way=True, target="<freejoint/>")
     time, bodies, _, _ = total.T
     np.testing.assert_allclose(bodies, -5.2 * GRAVITY * time, atol=2e-3)
 
 
 def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
-    _, total, _ = run(two_way=True, speed=3.0, mass=0.001)
+    _, total = ring(two_way=True, speed=3.0, mass=0.001)
     fastest, surface = total[:, 1].max() / 0.001, total[:, 3].max()
     assert 0.5 * surface < fastest < surface
 
 
+def touching(geoms: str, gravity: float = -GRAVITY, **options: object) -> Run:
+    """A body on a block that may push back."""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 {gravity}"/><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
+        <body name="ball" pos="0 0 0.2499"><freejoint/>{geoms}</body></worldbody></mujoco>"""
+    )
+    return Run(model, "block", resolution=16, two_way=True, **options)
+
+
 def pushed(force: Callable[[mujoco.MjData], None]) -> tuple[mujoco.MjData, Ripples]:
     """A ball on a block whose surface comes up, and the same forces of others at each step."""
-    model = mujoco.MjModel.from_xml_string(
-        """<mujoco><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
-        <body name="ball" pos="0 0 0.2499"><freejoint/><geom size="0.05" mass="0.2"/></body></worldbody></mujoco>"""
-    )
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True)
-    ripples["block"].velocity = np.ones((6, 16, 16))
-    highest = 0.0
-    data.xfrc_applied[1] = FORCE
+    run, highest = touching('<geom size="0.05" mass="0.2"/>', density=20.0, conserve_volume=True), 0.0
+    run.ripples["block"].velocity = np.ones((6, 16, 16))
+    run.data.xfrc_applied[1] = FORCE
     for _ in range(100):
-        force(data)
-        ripples.mj_step(data)
-        highest = max(highest, data.qpos[2])
+        force(run.data)
+        run.step()
+        highest = max(highest, run.data.qpos[2])
     assert highest > 0.2505  # it was pushed
-    return data, ripples
+    return run.data, run.ripples
 
 
 FORCE = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -136,28 +133,20 @@ def test_a_body_that_touches_twice_is_pushed_once() -> None:
     """Two of its geoms on the same patch together do not make it faster than the surface, nor than one of them."""
     speeds = []
     for geoms in ('<geom size="0.05" mass="0.002"/>', 2 * '<geom size="0.05" mass="0.001"/>'):
-        model = mujoco.MjModel.from_xml_string(
-            f"""<mujoco><option gravity="0 0 0"/><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
-            <body name="ball" pos="0 0 0.2499"><freejoint/>{geoms}</body></worldbody></mujoco>"""
-        )
-        data = mujoco.MjData(model)
-        ripples = Ripples(
-            model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True, conserve_volume=False
-        )
-        ripples["block"].velocity = np.ones((6, 16, 16))
-        ripples.mj_step(data, nstep=10)
-        speeds.append(data.qvel[2])
+        run = touching(geoms, gravity=0.0, density=20.0)
+        run.ripples["block"].velocity = np.ones((6, 16, 16))
+        speeds.append(run.until(0.02).data.qvel[2])
     assert 0.9 < min(speeds) <= max(speeds) <= 1.0
     assert speeds[0] == pytest.approx(speeds[1], rel=0.02)
 
 
 def test_ripple_reaches_a_ball_above_it_only_as_high_as_the_wave() -> None:
     """MuJoCo sees no contact; the ball is met by the displaced surface, and what it gains the surface loses."""
-    heights, total, _ = run(two_way=True, speed=4.0, mass=0.05, gap=0.004, gravity=0.0)
+    heights, total = ring(two_way=True, speed=4.0, mass=0.05, gap=0.004, gravity=0.0)
     assert heights[-1] > 0.05
     _, ball, surface, _ = total.T
     np.testing.assert_allclose((ball + surface)[1:], surface[0], rtol=1e-4)
-    missed, _, _ = run(two_way=True, speed=4.0, mass=0.05, gap=0.5, gravity=0.0)
+    missed, _ = ring(two_way=True, speed=4.0, mass=0.05, gap=0.5, gravity=0.0)
     np.testing.assert_array_equal(missed, missed[0])
 
 
@@ -165,19 +154,13 @@ def test_a_surface_that_has_moved_gives_way_as_one_that_was_there_from_the_start
     """Twice as long and wide it has a quarter of the texels under a ball: it gives way more."""
     heights = []
     for steps_before in (3, 0):
-        model = mujoco.MjModel.from_xml_string(
-            """<mujoco><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
-            <body pos="0 0 0.2499"><freejoint/><geom size="0.05" mass="2"/></body></worldbody></mujoco>"""
-        )
-        data = mujoco.MjData(model)
         material = Material(1.0, density=20.0, stiffness=100.0)
-        ripples = Ripples(model, {"block": material}, resolution=16, backend="cpu", two_way=True)
-        ripples.mj_step(data, nstep=steps_before)
-        ripples.reset()
-        mujoco.mj_resetData(model, data)
-        ripples["block"].move(ripples["block"].atlas.mesh.V * [2.0, 2.0, 1.0])
-        ripples.mj_step(data, nstep=40)
-        heights.append(data.qpos[2])
+        run = touching('<geom size="0.05" mass="2"/>', material=material, conserve_volume=True)
+        run.ripples.mj_step(run.data, nstep=steps_before)
+        run.ripples.reset()
+        mujoco.mj_resetData(run.model, run.data)
+        run.ripples["block"].move(run.ripples["block"].atlas.mesh.V * [2.0, 2.0, 1.0])
+        heights.append(run.until(0.08).data.qpos[2])
     assert heights[0] == pytest.approx(heights[1], rel=1e-9)
 
 
@@ -191,8 +174,8 @@ GEOMS = {
 }
 
 
-def geom_model(kind: str) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(
+def geom_model(kind: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    return posed(
         f"""<mujoco><asset><mesh name="tetrahedron" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset>
         <worldbody><geom {GEOMS[kind]}/></worldbody></mujoco>"""
     )
@@ -200,9 +183,7 @@ def geom_model(kind: str) -> mujoco.MjModel:
 
 @pytest.mark.parametrize("kind", GEOMS)
 def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
-    model = geom_model(kind)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = geom_model(kind)
     rotation, origin = data.geom_xmat[0].reshape(3, 3), data.geom_xpos[0]
     rng, geom = np.random.default_rng(3), np.zeros(1, dtype=np.int32)
 
@@ -223,6 +204,6 @@ def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
 
 def test_middle_of_a_face_that_lies_flat() -> None:
     down = np.array([0.005, -0.004, -1.0])
-    np.testing.assert_allclose(support_point(geom_model("box"), 0, down), [0, 0, -0.1])
-    np.testing.assert_allclose(support_point(geom_model("cylinder"), 0, down), [0, 0, -0.3])
-    np.testing.assert_allclose(support_point(geom_model("capsule"), 0, np.array([0.0, 1.0, 0.01])), [0, 0.1, 0.001])
+    np.testing.assert_allclose(support_point(geom_model("box")[0], 0, down), [0, 0, -0.1])
+    np.testing.assert_allclose(support_point(geom_model("cylinder")[0], 0, down), [0, 0, -0.3])
+    np.testing.assert_allclose(support_point(geom_model("capsule")[0], 0, np.array([0.0, 1.0, 0.01])), [0, 0.1, 0.001])

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from PIL import Image
+from scene_files import write_scene
 
 from ripple_sim import VideoOptions, load_scene
 from ripple_sim.cycles import PYTHON, check_cycles, render_cycles
@@ -47,11 +48,8 @@ for number in range(settings["frames"]):
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "scene.xml").write_text(MODEL)
-    (tmp_path / "scene.toml").write_text(
-        'model = "scene.xml"\nduration = 0.1\n[[ripple]]\ngeom = "egg"\nresolution = 8\nlook = "jelly"\n'
-        "material = {speed = 0.3, density = 1000.0}\n"
-    )
+    table = 'model = "scene.xml"\nduration = 0.1\n[[ripple]]\ngeom = "egg"\nresolution = 8\nlook = "jelly"\n'
+    write_scene(tmp_path, MODEL, table + "material = {speed = 0.3, density = 1000.0}\n")
     return tmp_path
 
 
@@ -128,9 +126,7 @@ def test_options_of_ours_alone_are_refused(given: dict, said: str, tmp_path: Pat
         check_cycles(VideoOptions(**given), tmp_path / "a.webp")
 
 
-def test_a_missing_blender_and_one_that_cannot_be_used_are_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_blender_that_cannot_be_used_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(said: str) -> None:
         with pytest.raises(VideoError, match=said) as refusal:
             check_cycles(VideoOptions(), tmp_path / "a.mp4")

@@ -1,7 +1,4 @@
-"""Clips and stills: what is encoded in parts is decoded as one video, frame by frame at its time.
-
-MP4, WebM and Matroska, GIFs with one palette for all frames, and animated WebP.
-"""
+"""Clips and stills: what is encoded in parts is decoded as one, each frame at its time."""
 
 import struct
 from fractions import Fraction

@@ -11,9 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco_models import posed
-from programs import ended
 from sphere_height_maps import cube_charts
-from unfinished_videos import contents, egg_scene, interrupting_at
+from unfinished_videos import contents, egg_scene, interrupting_at, written_until_full
 
 from ripple_sim.cli import main as cli
 from ripple_sim.encode import PassFiles, check_passes, open_writer
@@ -33,8 +32,6 @@ BODIES = """<body pos="1 0 0"><geom type="box" size=".3 .3 .5" rgba=".1 .2 .7 1"
 <body pos="-1 0 .2"><geom size=".4" rgba=".8 .3 .1 1"/></body>"""
 FLOOR = '<geom type="plane" size="0 0 1" pos="0 0 -.5"/>'
 OPTIONS = {"size": (WIDTH, HEIGHT), "fps": 30, "frame_format": "exr"}
-
-
 pytestmark = pytest.mark.usefixtures("signals_as_found")
 
 
@@ -87,31 +84,16 @@ def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(tm
 
 @pytest.mark.usefixtures("exr")
 def test_bytes_for_the_screen_are_no_linear_light(tmp_path: Path) -> None:
-    with (
-        pytest.raises(VideoError, match=r"frame is uint8 .*; valid is float16 \[48, 64, 3\]"),
-        open_writer(tmp_path / "frames", width=WIDTH, height=HEIGHT, fps=24, frame_format="exr") as writer,
-    ):
+    refused = pytest.raises(VideoError, match=r"frame is uint8 .*; valid is float16 \[48, 64, 3\]")
+    size = {"width": WIDTH, "height": HEIGHT, "fps": 24}
+    with refused, open_writer(tmp_path / "frames", **size, frame_format="exr") as writer:
         writer.write(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
 
 
 @pytest.mark.usefixtures("exr")
 def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(tmp_path: Path) -> None:
     """Half a frame of noise cannot be packed into less than it is: the file's end is cut off."""
-    program = (
-        "import resource, signal, sys\n"
-        "import numpy as np\n"
-        "from ripple_sim.errors import EncodingError\n"
-        "from ripple_sim.encode import open_writer\n"
-        "noise = np.random.default_rng(0).integers(0, 31743, (60, 60, 3), np.uint16).view(np.float16)\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (noise.nbytes - 1000,) * 2)\n"
-        "try:\n"
-        "    with open_writer(sys.argv[1], width=60, height=60, fps=25, frame_format='exr') as writer:\n"
-        "        writer.write(noise)\n"
-        "except EncodingError as error:\n"
-        "    print(error)\n"
-    )
-    said = ended("-c", program, tmp_path / "frames", check=True).stdout
+    said = written_until_full(tmp_path / "frames", 60 * 60 * 3 * 2 - 1000, 60, 60, 1, frame_format="exr")
     assert said == f"cannot write the video {tmp_path / 'frames'}: File too large\n"
     assert list(tmp_path.iterdir()) == []
 
@@ -245,8 +227,8 @@ def test_npz_files_hold_the_passes_bit_for_bit_and_are_the_same_each_time(tmp_pa
 def test_exr_files_hold_the_passes_as_channels(tmp_path: Path) -> None:
     openexr = pytest.importorskip("OpenEXR")
     pass_files(tmp_path / "frames", "exr").write(0, PASSES)
-    path = tmp_path / "frames.passes" / "passes_00000.exr"
-    channels = openexr.File(str(path), separate_channels=True).channels()
+    path = str(tmp_path / "frames.passes" / "passes_00000.exr")
+    channels = openexr.File(path, separate_channels=True).channels()
     assert set(channels) == {"depth", "flow.X", "flow.Y", "segmentation"}
     assert np.array_equal(channels["flow.Y"].pixels, -DEPTH)
     assert channels["segmentation"].pixels.dtype == np.uint32

@@ -28,21 +28,12 @@ def test_the_last_ending_of_a_name_is_its_format(tmp_path: Path, name: str, form
     assert video_format(tmp_path / name, "exr") == ("exr" if form == "png" else form)
 
 
-@pytest.mark.parametrize(
-    ("name", "size", "fps"),
-    [
-        ("new/clip.mp4", (16, 8192), 240),
-        ("clip.gif", (8191, 17), 50),
-        ("clip.webp", (17, 17), 1),
-        ("frames", (8192, 16), 240),
-    ],
-)
-def test_the_limits_themselves_and_default_rates_are_valid(
-    tmp_path: Path, name: str, size: tuple[int, int], fps: int
-) -> None:
-    check_output(tmp_path / name, *size, fps)
-    check_output(tmp_path / name, *size, default_fps(tmp_path / name))
-    assert (default_fps(tmp_path / name) == 60) == (name != "clip.gif")
+def test_the_limits_themselves_and_default_rates_are_valid(tmp_path: Path) -> None:
+    limits = ("new/clip.mp4", 16, 8192, 240), ("clip.gif", 8191, 17, 50), ("clip.webp", 17, 17, 1)
+    for name, width, height, fps in (*limits, ("frames", 8192, 16, 240)):
+        check_output(tmp_path / name, width, height, fps)
+        check_output(tmp_path / name, width, height, default_fps(tmp_path / name))
+        assert (default_fps(tmp_path / name) == 60) == (name != "clip.gif")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -105,16 +96,14 @@ def test_a_link_to_a_folder_of_frames_is_refused_before_anything_is_rendered(tmp
 
 
 def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(tmp_path: Path) -> None:
-    frame = np.zeros((16, 16, 3), np.uint8)
-    with open_writer(tmp_path / "frames", width=16, height=16, fps=25) as writer:
+    frame, folder = np.zeros((16, 16, 3), np.uint8), tmp_path / "frames"
+    with open_writer(folder, width=16, height=16, fps=25) as writer:
         writer.write(frame)
-    with (
-        pytest.raises(EncodingError, match=r"holds other files \(notes\.txt\)"),
-        open_writer(tmp_path / "frames", width=16, height=16, fps=25) as writer,
-    ):
+    refused = pytest.raises(EncodingError, match=r"holds other files \(notes\.txt\)")
+    with refused, open_writer(folder, width=16, height=16, fps=25) as writer:
         writer.write(frame)
-        (tmp_path / "frames" / "notes.txt").write_text("mine")
-    assert sorted(path.name for path in (tmp_path / "frames").iterdir()) == ["frame_00000.png", "notes.txt"]
+        (folder / "notes.txt").write_text("mine")
+    assert sorted(path.name for path in folder.iterdir()) == ["frame_00000.png", "notes.txt"]
 
 
 def test_frames_beyond_the_highest_level_of_h264_are_refused_where_others_hold_them(tmp_path: Path) -> None:

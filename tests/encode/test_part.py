@@ -1,7 +1,4 @@
-"""Interrupted videos: whatever kills them, what is left is whole, and they go on to the very same bytes.
-
-Their record tells whether they may.
-"""
+"""Interrupted videos: what a kill leaves is whole, and they go on to the very same bytes."""
 
 import fcntl
 import os
@@ -17,8 +14,7 @@ import av
 import numpy as np
 import pytest
 from PIL import Image
-from programs import ended
-from unfinished_videos import contents
+from unfinished_videos import contents, written_until_full
 
 from ripple_sim.encode import FRAMES_IN_CLIP, FrameWriter, open_writer
 from ripple_sim.errors import VideoError
@@ -168,27 +164,9 @@ def test_two_processes_do_not_write_the_same_video(interrupted):
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
-    """Files may not grow beyond a few kilobytes: what a full disk does, without filling one."""
-    program = (
-        "import resource, signal, sys\n"
-        "from pathlib import Path\n"
-        "import numpy as np\n"
-        "from ripple_sim.errors import EncodingError\n"
-        "from ripple_sim.encode import open_writer\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
-        "rng = np.random.default_rng(0)\n"
-        "try:\n"
-        f"    with open_writer(sys.argv[1], width=160, height=90, fps=25, settings={SETTINGS!r}) as writer:\n"
-        "        for number in range(60):\n"
-        "            writer.write(rng.integers(0, 256, (90, 160, 3), np.uint8))\n"
-        "except EncodingError as error:\n"
-        "    print(error)\n"
-    )
-    result = ended("-c", program, tmp_path / f"clip{ending}", check=True)
-    assert result.stdout.startswith(f"cannot write the video {tmp_path / f'clip{ending}'}: ")
-    assert "File too large" in result.stdout
-    assert result.stdout.count("\n") == 1
-    assert "Traceback" not in result.stderr
+    path = tmp_path / f"clip{ending}"
+    said = written_until_full(path, 20_000, 160, 90, 60, settings=SETTINGS)
+    assert said.startswith(f"cannot write the video {path}: ")
+    assert "File too large" in said and said.count("\n") == 1
     left = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert all(path.name in ("settings.json", "states.txt") or path.name.startswith("frame") for path in left)

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from ripple_sim.encode import FORMATS, Format, FrameWriter, Segments, Stream, open_writer
+from ripple_sim.encode import FORMATS, Format, Segments, Stream, open_writer
 from ripple_sim.encode.writer import QUEUE_FRAMES
 from ripple_sim.errors import EncodingError, SimulationError, VideoError
 
 WIDTH, HEIGHT, FPS = 96, 64, 25
+SIZE = {"width": WIDTH, "height": HEIGHT, "fps": FPS}
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 
 
@@ -29,11 +30,10 @@ def frames(count: int) -> list[np.ndarray]:
     return result
 
 
-def write(path: Path, count: int = 12) -> FrameWriter:
-    with open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
-        for frame in frames(count):
+def write(path: Path) -> None:
+    with open_writer(path, **SIZE) as writer:
+        for frame in frames(12):
             writer.write(frame)
-    return writer
 
 
 def read(path: Path) -> list[np.ndarray]:
@@ -62,9 +62,8 @@ def test_frames_come_back_in_order_and_in_their_colours(tmp_path, ending):
 @pytest.mark.parametrize("colour", [(200, 40, 40), (40, 200, 40), (40, 40, 200), (255, 255, 255), (0, 0, 0)])
 def test_a_plain_colour_survives_bt709(tmp_path, ending, colour):
     path = tmp_path / f"plain{ending}"
-    frame = np.full((HEIGHT, WIDTH, 3), colour, dtype=np.uint8)
-    with open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
-        writer.write(frame)
+    with open_writer(path, **SIZE) as writer:
+        writer.write(np.full((HEIGHT, WIDTH, 3), colour, dtype=np.uint8))
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         image = next(container.decode(video=0))
@@ -100,7 +99,7 @@ def test_mp4_is_what_browsers_play(tmp_path):
 
 def test_transparent_frames_keep_their_opacity_in_a_folder(tmp_path):
     frame = np.arange(4 * HEIGHT * WIDTH, dtype=np.uint32).astype(np.uint8).reshape(HEIGHT, WIDTH, 4)
-    with open_writer(tmp_path / "frames", width=WIDTH, height=HEIGHT, fps=30, transparent=True) as writer:
+    with open_writer(tmp_path / "frames", **SIZE, transparent=True) as writer:
         writer.write(frame)
     np.testing.assert_array_equal(read(tmp_path / "frames")[0], frame)
 
@@ -125,11 +124,8 @@ def test_an_error_while_rendering_leaves_nothing_but_the_video_that_was_there(tm
     for path in older:
         path.write_bytes(b"yesterday's")
     error = SimulationError if settings else KeyboardInterrupt
-    size = {"width": WIDTH, "height": HEIGHT, "fps": FPS}
-    with (
-        pytest.raises(error),
-        open_writer(tmp_path / f"clip{ending}", **size, settings=settings, overwrite=True) as writer,
-    ):
+    path = tmp_path / f"clip{ending}"
+    with pytest.raises(error), open_writer(path, **SIZE, settings=settings, overwrite=True) as writer:
         for frame in frames(QUEUE_FRAMES + 2):  # more than can wait: of single images one is stored
             writer.write(frame)
         raise error
@@ -138,13 +134,12 @@ def test_an_error_while_rendering_leaves_nothing_but_the_video_that_was_there(tm
 
 
 def test_a_frame_may_be_overwritten_after_it_was_handed_over(tmp_path):
-    path = tmp_path / "frames"
     buffer = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
-    with open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
+    with open_writer(tmp_path / "frames", **SIZE) as writer:
         for level in range(20):
             buffer[:] = level
             writer.write(buffer)
-    assert [int(image.max()) for image in read(path)] == list(range(20))
+    assert [int(image.max()) for image in read(tmp_path / "frames")] == list(range(20))
 
 
 class Gate:
@@ -181,8 +176,7 @@ def gate(monkeypatch) -> Gate:
 
 
 def test_rendering_waits_for_a_slow_encoder(tmp_path, gate):
-    writer = open_writer(tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT, fps=FPS)
-    frame = frames(1)[0]
+    writer, frame = open_writer(tmp_path / "clip.mp4", **SIZE), frames(1)[0]
 
     def render() -> None:
         for _ in range(100):
@@ -204,17 +198,14 @@ def test_rendering_waits_for_a_slow_encoder(tmp_path, gate):
 def test_after_an_error_of_the_encoder_whole_segments_can_be_resumed(tmp_path, gate, fails_at):
     gate.open.set()
     gate._fails_at = fails_at
-    (tmp_path / "clip.mp4").touch()
-    size = {"width": WIDTH, "height": HEIGHT, "fps": FPS}
-    with (
-        pytest.raises(EncodingError, match=r"clip\.mp4: no space left"),
-        open_writer(tmp_path / "clip.mp4", **size, settings={"a": 1}) as writer,
-    ):
+    path, options = tmp_path / "clip.mp4", {**SIZE, "settings": {"a": 1}}
+    path.touch()
+    with pytest.raises(EncodingError, match=r"clip\.mp4: no space left"), open_writer(path, **options) as writer:
         for _ in range(1000):  # more than the queue holds: it must not block for ever
             writer.write(frames(1)[0])
-    assert (tmp_path / "clip.mp4").read_bytes() == b""
+    assert path.read_bytes() == b""
     gate._fails_at = None
-    with open_writer(tmp_path / "clip.mp4", **size, settings={"a": 1}, resume=True) as writer:
+    with open_writer(path, **options, resume=True) as writer:
         assert writer.frames == fails_at // 4 * 4
         writer.write(frames(1)[0])
 
@@ -226,16 +217,13 @@ def test_an_error_while_joining_leaves_the_older_video_and_every_segment(tmp_pat
 
     gate.open.set()
     monkeypatch.setitem(FORMATS, ".mp4", dataclasses.replace(FORMATS[".mp4"], join=torn))
-    (tmp_path / "clip.mp4").write_bytes(b"older")
-    size = {"width": WIDTH, "height": HEIGHT, "fps": FPS, "settings": {"a": 1}}
-    with (
-        pytest.raises(EncodingError, match="No space"),
-        open_writer(tmp_path / "clip.mp4", **size, overwrite=True) as w,
-    ):
+    path, options = tmp_path / "clip.mp4", {**SIZE, "settings": {"a": 1}, "overwrite": True}
+    path.write_bytes(b"older")
+    with pytest.raises(EncodingError, match="No space"), open_writer(path, **options) as writer:
         for _ in range(5):
-            w.write(frames(1)[0])
-    assert (tmp_path / "clip.mp4").read_bytes() == b"older"
-    with open_writer(tmp_path / "clip.mp4", **size, resume=True, overwrite=True) as writer:
+            writer.write(frames(1)[0])
+    assert path.read_bytes() == b"older"
+    with open_writer(path, **options, resume=True) as writer:
         assert writer.frames == 5
         writer.discard()
 
@@ -245,23 +233,19 @@ def test_an_error_while_joining_leaves_the_older_video_and_every_segment(tmp_pat
     [np.zeros((WIDTH, HEIGHT, 3), np.uint8), np.zeros((HEIGHT, WIDTH, 4), np.uint8), np.zeros((HEIGHT, WIDTH, 3))],
 )
 def test_a_frame_of_another_shape_or_type_is_refused(tmp_path, frame):
-    with (
-        pytest.raises(VideoError, match="uint8"),
-        open_writer(tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT, fps=FPS) as writer,
-    ):
+    with pytest.raises(VideoError, match="uint8"), open_writer(tmp_path / "clip.mp4", **SIZE) as writer:
         writer.write(frame)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_video_without_frames_is_refused(tmp_path):
     with pytest.raises(VideoError, match="no frame"):
-        open_writer(tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT, fps=FPS).close()
+        open_writer(tmp_path / "clip.mp4", **SIZE).close()
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_odd_size_is_fine_where_colour_is_not_subsampled(tmp_path):
-    for name in ("clip.gif", "frames"):
-        path = tmp_path / name
-        with open_writer(path, width=33, height=17, fps=10) as writer:
-            writer.write(np.zeros((17, 33, 3), np.uint8))
-        assert read(path)[0].shape == (17, 33, 3)
+@pytest.mark.parametrize("name", ["clip.gif", "frames"])
+def test_an_odd_size_is_fine_where_colour_is_not_subsampled(tmp_path, name):
+    with open_writer(tmp_path / name, width=33, height=17, fps=10) as writer:
+        writer.write(np.zeros((17, 33, 3), np.uint8))
+    assert read(tmp_path / name)[0].shape == (17, 33, 3)

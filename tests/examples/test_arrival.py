@@ -1,7 +1,6 @@
 """Times of arrival: against exact geodesics, and the same for the same object however it lies, is scaled or meshed.
 
-Front and first crest are found in signals whose crests are known, calibration finds a known speed, and the bump's wave
-on the plane is that of another way to compute it: Poisson's integral of the initial value problem.
+The bump's wave on the plane is that of another way to compute it: Poisson's integral of the initial value problem.
 """
 
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""Every file of examples is imported, which does nothing else; examples and plots run, in small where they take long.
-
-What makes pictures makes those that it promises, without a warning.
-"""
+"""Every file of examples is imported, which does nothing else; they run, in small where they take long."""
 
 import importlib.util
 import json

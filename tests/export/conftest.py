@@ -4,6 +4,7 @@ from pathlib import Path
 
 import mujoco
 import pytest
+from scene_files import write_scene
 
 from ripple_sim import Material, Ripples
 from ripple_sim.scene import Scene, load_scene
@@ -35,10 +36,7 @@ material = {speed = 0.3, density = 1500.0}
 
 @pytest.fixture(scope="session")
 def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder: Path = tmp_path_factory.mktemp("scene")
-    (folder / "scene.xml").write_text(MJCF)
-    (folder / "scene.toml").write_text(TOML)
-    return folder / "scene.toml"
+    return write_scene(tmp_path_factory.mktemp("scene"), MJCF, TOML)
 
 
 @pytest.fixture(scope="session")

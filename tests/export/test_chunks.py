@@ -46,9 +46,7 @@ def files(path: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("name", ["run.usdc", "run.usda"])
-def test_chunks_hold_the_run_also_between_the_frames_at_their_borders(
-    scene: Scene, whole: Path, tmp_path: Path, name: str
-) -> None:
+def test_chunks_hold_the_run_also_between_their_frames(scene: Scene, whole: Path, tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     assert export_scene(scene, path, OPTIONS).frames == 11
     assert {each.name for each in tmp_path.iterdir()} == {name, "run.chunks", "run.textures"}

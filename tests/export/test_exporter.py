@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 import pytest
+from mujoco_models import forwarded
 
 from ripple_sim import Exporter, RippleError, Ripples
 
@@ -14,10 +15,8 @@ pytest.importorskip("pxr")
 
 
 def export(ripples: Ripples, path: Path, **options: Any) -> None:
-    data = mujoco.MjData(ripples.model)
-    mujoco.mj_forward(ripples.model, data)
     with Exporter(ripples.model, ripples, path, tessellation="own", **options) as exporter:
-        exporter.write(data)
+        exporter.write(forwarded(ripples.model))
 
 
 @pytest.mark.parametrize("name", ["run.obj", "run", ".usdc"])
@@ -27,9 +26,7 @@ def test_unknown_endings_name_the_valid_ones(ripples: Ripples, tmp_path: Path, n
     assert not list(tmp_path.iterdir())
 
 
-def test_missing_packages_are_named_with_the_command_that_brings_them(
-    ripples: Ripples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_packages_are_named(ripples: Ripples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(RippleError, match=r"pip install 'ripple-sim\[usd\]'"):
         export(ripples, tmp_path / "run.usdc")

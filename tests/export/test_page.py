@@ -6,7 +6,6 @@ import html
 import io
 import json
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,8 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from chromium import PATIENCE, browsing, launched
+from mujoco_models import forwarded
 from PIL import Image
 
 from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, export_scene
@@ -24,12 +25,7 @@ from ripple_sim.render.surfaces import memory_order
 from ripple_sim.scene import Scene
 from ripple_sim.simulation import Simulation
 
-playwright = pytest.importorskip("playwright.sync_api")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-browsing = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (on Debian: apt-get install chromium)")
-
 SIZE, FPS, FRAMES, SEEN = (320, 180), 100, 20, 18
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
 
 
 @pytest.fixture(scope="module")
@@ -56,17 +52,15 @@ def ours(scene: Scene, opengl: None) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS, timeout=180_000)  # [ms]
-        yield browser
-        browser.close()
+    with launched("--use-angle=swiftshader", "--enable-unsafe-swiftshader") as made:
+        yield made
 
 
 @contextlib.contextmanager
 def opened(browser: Any, page: Path) -> Iterator[Any]:
     """A page in a browser, in which nothing may go wrong."""
     tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
-    tab.set_default_timeout(180_000)  # [ms]; the machine may be busy
+    tab.set_default_timeout(1000 * PATIENCE)  # [ms]
     faults: list[str] = []
     tab.on("pageerror", lambda error: faults.append(str(error)))
     tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)
@@ -120,10 +114,8 @@ def test_a_pages_lamps_have_highlights_as_weak_as_ours(page: Path) -> None:
 
 
 def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp_path: Path) -> None:
-    data = mujoco.MjData(scene.model)
-    mujoco.mj_forward(scene.model, data)
     with Exporter(scene.model, ripples, tmp_path / "run.html") as exporter:
-        exporter.write(data)
+        exporter.write(forwarded(scene.model))
         assert "not complete" in exporter._repr_html_()
     shown = exporter._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
@@ -133,8 +125,7 @@ def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp
 @browsing
 def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Ripples, tmp_path: Path) -> None:
     """Of an exporter, and of a renderer what it rendered last."""
-    data = mujoco.MjData(ripples.model)
-    mujoco.mj_forward(ripples.model, data)
+    data = forwarded(ripples.model)
     with Exporter(ripples.model, ripples, tmp_path / "run.html", size=SIZE) as exporter:
         exporter.write(data)
     renderer = RippleRenderer(ripples.model, ripples, width=SIZE[0], height=SIZE[1])
@@ -184,8 +175,7 @@ def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> N
 def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
     browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
 ) -> None:
-    data = mujoco.MjData(soft_model)
-    mujoco.mj_forward(soft_model, data)
+    data = forwarded(soft_model)
     waves, looks = Material(speed=0.3, density=1500.0), {"egg": "rubber", "jelly": "jelly"}
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")
     with Exporter(soft_model, ripples, tmp_path / "run.html", size=SIZE, looks=looks) as exporter:
@@ -247,9 +237,7 @@ def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
 
 
 @browsing
-def test_the_browser_has_every_point_of_surfaces_that_move(
-    browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
-) -> None:
+def test_the_browser_has_moving_surfaces(browser: Any, soft_model: mujoco.MjModel, tmp_path: Path) -> None:
     """A soft body that moves from the first frame, and a geom that is moved by hand within the second chunk."""
     data, waves = mujoco.MjData(soft_model), Material(speed=0.3, density=1500.0)
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")

@@ -1,7 +1,4 @@
-"""Frames of a model with ripples in somebody's own loop, where `mujoco.Renderer` was.
-
-Depth and segmentation are held against that one's, where there are no ripples.
-"""
+"""Frames of a model with ripples in somebody's own loop, where `mujoco.Renderer` was, which draws the rest alike."""
 
 import copy
 import os
@@ -51,8 +48,7 @@ def test_waves_that_no_picture_showed_are_told_of_at_the_end(egg, impulse, lines
     ripples["egg"].step(0.1)
     renderer.render(data, "side")
     ripples.reset()
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as told:
         renderer.close()
         renderer.close()
     assert ["no wave on 'egg' was higher than a pixel" in str(each.message) for each in told] == [True] * lines

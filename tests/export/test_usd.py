@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import forwarded
 
 from ripple_sim import Exporter, ExportOptions, Material, RippleError, Ripples, export_scene
 from ripple_sim.cycles import python_with_bpy
@@ -25,8 +26,7 @@ SURFACE = "/World/bodies/nest/egg"
 def run(request: pytest.FixtureRequest, ripples: Ripples, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A stage, and what was at each frame: points, velocities, and the stone's pose."""
     path = tmp_path_factory.mktemp("run") / f"run{request.param}"
-    model, data = ripples.model, mujoco.MjData(ripples.model)
-    mujoco.mj_forward(model, data)
+    model, data = ripples.model, forwarded(ripples.model)
     ripples.reset()
     mesh, seen = MovingMesh(ripples["egg"].atlas), []
     camera = CameraEntry(name="side", aperture=0.02, focus=1.5, shutter=180.0)

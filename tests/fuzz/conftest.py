@@ -1,6 +1,5 @@
 """Fuzzing leaves signals and warnings as it found them."""
 
-import signal
 import warnings
 from collections.abc import Iterator
 
@@ -8,9 +7,6 @@ import pytest
 
 
 @pytest.fixture(autouse=True)
-def _left_as_found() -> Iterator[None]:
-    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+def _left_as_found(signals_as_found: None) -> Iterator[None]:
     with warnings.catch_warnings(action="ignore"):
         yield
-    for number, handler in kept.items():
-        signal.signal(number, handler)

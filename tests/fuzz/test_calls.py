@@ -1,7 +1,4 @@
-"""Calls and command lines with anything in them work, or raise our error, which is one line on the command line.
-
-Calls change nothing that is not finite; command lines end with status 0 or 2.
-"""
+"""Calls and command lines with anything in them work, or raise our error, or end with status 0 or 2."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,13 +1,4 @@
-"""The diverging colour map: even steps, a bright middle, for every colour vision.
-
-The runs of a comparison.
-
-A heatmap's texels, its range and the grid.
-
-Bounded histories.
-
-Limits that hold still, and short numbers.
-"""
+"""Colour map and heatmaps, baselines, grids, bounded histories, limits that hold still, short numbers."""
 
 import numpy as np
 import pytest

@@ -149,9 +149,7 @@ def mark(
 
 @pytest.mark.parametrize(("impulse", "length"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (1.4, 1.4), (9.0, 1.5)])
 @pytest.mark.parametrize("distance", [0.0, 40.0])
-def test_an_arrow_across_the_view_is_as_long_as_its_impulse_at_any_distance(
-    impulse: float, length: float, distance: float
-) -> None:
+def test_an_arrow_is_as_long_as_its_impulse_at_any_distance(impulse: float, length: float, distance: float) -> None:
     [(tip, tail, _)] = overlay.place_marks([mark(2 * impulse, place=(0, distance, 0))], 2.0, LAYOUT, FRONT, *state())
     np.testing.assert_allclose(tip, [320, 240], atol=1e-9)
     np.testing.assert_allclose(tail, [320 + length * LAYOUT.arrow_length, 240], atol=1e-9)

@@ -1,7 +1,4 @@
-"""The first frame is as good as any, and any as the first: nothing is read from the GPU before it is drawn.
-
-Frames that come back late are the same frames: in their order, bit for bit, whatever is drawn meanwhile.
-"""
+"""Any frame is as good as the first, and frames that come back late are the same, bit for bit, in their order."""
 
 import contextlib
 import dataclasses

@@ -1,7 +1,4 @@
-"""Frames against geometry that is known in closed form.
-
-And against a brute-force reference: geometry displaced in float64, very fine, drawn large and shrunk.
-"""
+"""Frames against geometry known in closed form, and against a brute-force reference, drawn large and shrunk."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,4 @@
-"""What a renderer creates on the GPU is released with it, but for programs: the next one takes them.
-
-The block of uniforms and the contract with the shaders: nothing stands twice, and the driver reads what is meant.
-Textures of sRGB pixels read as linear light, the right way up, and repeat.
-"""
+"""Resources of the GPU are released, uniforms read as they were set, textures as linear light."""
 
 import gc
 

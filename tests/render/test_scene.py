@@ -1,12 +1,10 @@
-"""What is drawn of a model: targets, geoms and sites; their bounds, their order, and messages.
-
-What lights a scene: the lights and skybox of the MJCF, or the studio.
-"""
+"""What is drawn of a model, its bounds and order; the lights and skybox of the MJCF, or the studio."""
 
 import mujoco
 import numpy as np
 import pytest
 from drawn import BALL, FLOOR, FRONT, SPOT, SUN, ball_surface, frame_of
+from mujoco_models import forwarded
 
 from ripple_sim.render import Camera, DrawnScene, Resources
 from ripple_sim.render.visuals import Assets, visuals_of
@@ -24,10 +22,6 @@ HEIGHT_MAP = np.zeros((6, 10, 10, 4), np.float32)
 POSE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0).pose()  # seen from -y
 
 
-class Owner:
-    pass
-
-
 @pytest.fixture(scope="module")
 def model():
     return mujoco.MjModel.from_xml_string(XML)
@@ -35,17 +29,14 @@ def model():
 
 @pytest.fixture
 def data(model):
-    made = mujoco.MjData(model)
-    mujoco.mj_forward(model, made)
-    return made
+    return forwarded(model)
 
 
 @pytest.fixture(scope="module", params=["clay", "water"])
 def scene(request, gl, model):
     """A scene whose target is opaque, and one whose target is transparent."""
-    owner = Owner()
     with gl:
-        resources = Resources(gl, owner)
+        resources = Resources(gl, owner=gl)
         target = model.geom("target").id
         surfaces = {target: ball_surface(request.param)}
         made = DrawnScene(Assets(model, resources), surfaces, (32, 24))
@@ -60,13 +51,11 @@ def updated(gl, scene, data, height=0.0):
         return scene.update(ctx, data, {0: height_map}, POSE)
 
 
-def test_transparent_things_come_with_the_furthest_first(gl, scene, data, model, request):
+def test_transparent_things_come_with_the_furthest_first(gl, scene, data):
     updated(gl, scene, data)
     layers = scene.layers(data, POSE)
-    away = [np.linalg.norm(balls[:, :3].mean(axis=0) - POSE.eye) for balls, _ in layers]
-    assert away == sorted(away, reverse=True)
     y = [round(float(balls[:, 1].mean()), 1) for balls, _ in layers]
-    assert y == [5.0, 2.0, 0.0, -1.0] if len(layers) == 4 else [5.0, 2.0, -1.0]
+    assert y in ([5.0, 2.0, 0.0, -1.0], [5.0, 2.0, -1.0])
     assert len({layer.numbers[0] for _, layer in layers}) == len(layers)
 
 

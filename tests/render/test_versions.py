@@ -9,9 +9,9 @@ from typing import Any
 
 import glcontext
 import moderngl
-import mujoco
 import numpy as np
 import pytest
+from mujoco_models import posed
 from numpy.typing import NDArray
 from programs import ended
 
@@ -44,9 +44,7 @@ def drawn() -> Iterator[NDArray]:
     height_map = HeightMap(atlas.texels)(heights.astype(np.float32))
     camera = Camera((0.0, 0.0, 0.4), 2.4, 60.0, -20.0)
     for look, sky, reflectance in (("rubber", "2d", 0.0), ("water", "2d", 0.0), ("model", "skybox", 0.4)):
-        model = mujoco.MjModel.from_xml_string(MODEL.format(sky=sky, reflectance=reflectance))
-        data = mujoco.MjData(model)
-        mujoco.mj_forward(model, data)
+        model, data = posed(MODEL.format(sky=sky, reflectance=reflectance))
         surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), look)
         with Renderer(shared_context(), model, {1: surface}, size=(200, 160)) as renderer:
             yield renderer.render(data, {1: height_map}, camera)

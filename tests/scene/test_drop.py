@@ -1,11 +1,4 @@
-"""The default scene around a mesh stands upright on the floor, whatever the file's axes and units.
-
-The picture of a mesh file is found and reaches the film.
-
-The image on a target arrives in MuJoCo's model, the right way up.
-
-Which way is up depends on the format of the file alone.
-"""
+"""The default scene of a mesh stands upright on the floor, whatever the file's axes, in the mesh's own colours."""
 
 import dataclasses
 from pathlib import Path

@@ -1,14 +1,10 @@
-"""Bodies of a default scene wait out of reach, and drop above the surface onto what is open to the sky.
-
-Falling bodies of all shapes are about as large as the ball they stand for.
-
-Bodies vary by a seed within their ranges, and nothing else does.
-"""
+"""Bodies of a default scene, about as large as a ball, wait out of reach, drop, and vary by a seed."""
 
 import mujoco
 import numpy as np
 import pytest
 import trimesh
+from mujoco_models import forwarded
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene import BODY_SHAPES, DropEntry, RandomEntry, drop_model, randomize
@@ -49,8 +45,7 @@ def test_no_body_drops_into_the_one_before_on_a_narrow_post() -> None:
 
 def test_bodies_take_turns_in_shape_and_wait_where_none_touches_another() -> None:
     model, drops = compiled(12, 3)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    data = forwarded(model)
     kinds = [int(kind) for kind, _ in BODY_SHAPES.values()]
     for i, drop in enumerate(drops):
         assert drop.body == f"body_{i}"

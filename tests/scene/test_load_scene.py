@@ -1,7 +1,4 @@
-"""Scene files and models are found, edited, varied and refused with the reason, in one line.
-
-Models that MuJoCo would wait for, or take though they are senseless, are refused too.
-"""
+"""Scene files and models are found, edited, varied, or refused in one line if they are senseless or never end."""
 
 import os
 import re
@@ -13,6 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scene_files import write_scene
 
 from ripple_sim import RippleError
 from ripple_sim.errors import RippleWarning, SceneError
@@ -123,12 +121,9 @@ LINK = """<mujoco><worldbody><body name="link">
 
 
 def test_a_scene_names_geoms_by_their_place_and_those_that_collide_for_a_target(tmp_path: Path) -> None:
-    (tmp_path / "link.xml").write_text(LINK)
-    (tmp_path / "link.toml").write_text(
-        'model = "link.xml"\n[[ripple]]\ngeom = "link/0"\nresolution = 8\ncontacts = ["core"]\n'
-        '[[poke]]\ngeom = "link/0"\ntime = 0.0\npoint = [0, 0, 0.3]\nimpulse = 0.1\n'
-    )
-    simulation = Simulation(load_scene(tmp_path / "link.toml"), backend="cpu")
+    target = 'model = "scene.xml"\n[[ripple]]\ngeom = "link/0"\nresolution = 8\ncontacts = ["core"]\n'
+    poke = '[[poke]]\ngeom = "link/0"\ntime = 0.0\npoint = [0, 0, 0.3]\nimpulse = 0.1\n'
+    simulation = Simulation(load_scene(write_scene(tmp_path, LINK, target + poke)), backend="cpu")
     assert list(simulation.ripples) == ["shell"]
     while simulation.data.time < 0.2:
         simulation.advance_frame()
@@ -136,10 +131,9 @@ def test_a_scene_names_geoms_by_their_place_and_those_that_collide_for_a_target(
 
 
 def test_collision_geoms_that_cannot_be_are_named_when_the_scene_is_read(tmp_path: Path) -> None:
-    (tmp_path / "link.xml").write_text(LINK)
-    (tmp_path / "link.toml").write_text('model = "link.xml"\n[[ripple]]\ngeom = "shell"\ncontacts = ["ball"]\n')
+    path = write_scene(tmp_path, LINK, 'model = "scene.xml"\n[[ripple]]\ngeom = "shell"\ncontacts = ["ball"]\n')
     with pytest.raises(RippleError, match="names geom 'ball' on body 'ball', which moves by itself"):
-        load_scene(tmp_path / "link.toml")
+        load_scene(path)
 
 
 BALL = '<worldbody><body><freejoint/><geom name="ball" type="sphere" size="1"/></body></worldbody>'
@@ -153,9 +147,7 @@ def _no_hang() -> Iterator[None]:
 
 
 def ball_scene(folder: Path, model: str) -> Path:
-    (folder / "model.xml").write_text(f"<mujoco>{model}</mujoco>")
-    (folder / "scene.toml").write_text('model = "model.xml"\n[[ripple]]\ngeom = "ball"\n')
-    return folder / "scene.toml"
+    return write_scene(folder, f"<mujoco>{model}</mujoco>", 'model = "scene.xml"\n[[ripple]]\ngeom = "ball"\n')
 
 
 @pytest.mark.parametrize(
@@ -198,28 +190,23 @@ def test_a_flex_that_mujoco_takes_long_to_set_up_is_told_of(tmp_path: Path, coun
     assert all(each.category is RippleWarning for each in told)
 
 
-@pytest.mark.parametrize("step", ["0", "-0.002", "inf", "nan", "1e300"])
-def test_a_senseless_time_step_is_refused(tmp_path: Path, step: str) -> None:
-    with pytest.raises(SceneError, match=r"timestep is .* s; valid is a number greater than 0 and up to 1"):
-        load_scene(ball_scene(tmp_path, f'<option timestep="{step}"/>{BALL}'))
+STEP = r"timestep is .* s; valid is a number greater than 0 and up to 1"
+KEY = '<keyframe><key/><key name="start" {}/></keyframe>'
 
 
-def test_a_keyframe_of_another_size_is_refused(tmp_path: Path) -> None:
-    key = '<keyframe><key name="start" qpos="{}"/></keyframe>'
-    with pytest.raises(SceneError, match=r"keyframe 'start' .* has 2 positions \(qpos\); valid are 7"):
-        load_scene(ball_scene(tmp_path, BALL + key.format("1 2")))
-    assert load_scene(ball_scene(tmp_path, BALL + key.format("0 0 2 1 0 0 0"))).model.nkey == 1
-
-
-def test_a_keyframe_that_is_not_finite_is_refused(tmp_path: Path) -> None:
-    key = '<keyframe><key/><key qvel="0 0 nan 0 0 0"/></keyframe>'
-    with pytest.raises(SceneError, match=r"keyframe 1 of .* holds NaN or inf; valid are finite numbers"):
-        load_scene(ball_scene(tmp_path, BALL + key))
-
-
-def test_more_memory_than_there_is_names_the_setting(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r'allocate memory; name in the MJCF how much .* <size memory="4G"/>'):
-        load_scene(ball_scene(tmp_path, f'<size memory="100000000G"/>{BALL}'))
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        *((f'<option timestep="{step}"/>', STEP) for step in ("0", "-0.002", "inf", "nan", "1e300")),
+        (KEY.format('qpos="1 2"'), r"keyframe 'start' .* has 2 positions \(qpos\); valid are 7"),
+        ('<keyframe><key/><key qvel="0 0 nan 0 0 0"/></keyframe>', r"keyframe 1 of .* holds NaN or inf; valid are fin"),
+        ('<size memory="100000000G"/>', r'allocate memory; name in the MJCF how much .* <size memory="4G"/>'),
+    ],
+)
+def test_a_model_with_a_senseless_setting_is_refused(tmp_path: Path, setting: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        load_scene(ball_scene(tmp_path, setting + BALL))
+    assert load_scene(ball_scene(tmp_path, BALL + KEY.format('qpos="0 0 2 1 0 0 0"'))).model.nkey == 2
 
 
 def test_a_scene_file_that_is_a_fifo_is_named_as_what_it_is(tmp_path: Path) -> None:
@@ -238,7 +225,7 @@ def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(
     # an error of ours is told alone
     with warnings.catch_warnings(action="error"), pytest.raises(SceneError, match="timestep"):
         load_scene(ball_scene(tmp_path, f'<option timestep="nan"/>{BALL}'))
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["model.xml", "scene.toml"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["scene.toml", "scene.xml"]
     assert capfd.readouterr() == ("", "")
 
 

@@ -1,13 +1,11 @@
-"""Scripted events happen when and where the scene says, in MuJoCo's own state and on the waves.
-
-Bodies are held, dropped, thrown and placed; the hook is called at every step.
-"""
+"""Scripted events happen when and where the scene says, in MuJoCo's own state and on the waves."""
 
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from scene_files import write_scene
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene import DropEntry, Events, PlaceEntry, Script, ThrowEntry, load_scene
@@ -146,9 +144,8 @@ material = {speed = 0.5, density = 10.0, stiffness = 100.0}
 
 
 def simulation(folder: Path, script: str, **options) -> Simulation:
-    (folder / "scene.xml").write_text(SCENE)
-    (folder / "scene.toml").write_text(TOML + script)
-    return Simulation(load_scene(folder / "scene.toml"), fps=100, backend="cpu", **options)
+    scene = load_scene(write_scene(folder, SCENE, TOML + script))
+    return Simulation(scene, fps=100, backend="cpu", **options)
 
 
 def test_changed_material_keeps_the_waves_and_changes_what_follows(tmp_path: Path) -> None:

@@ -1,8 +1,4 @@
-"""A scene's table: every value arrives, and what is wrong by itself or against the model is named with its place.
-
-Cameras that the model does not have, and exposures that cannot be or have no effect, are refused with what is valid, as
-are overlays. TOML files of any content become a table or one line that says what is wrong.
-"""
+"""A scene's table: every value arrives, and what is wrong, by itself or against the model, is named with its place."""
 
 import dataclasses
 from pathlib import Path
@@ -10,6 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scene_files import write_scene
 
 from ripple_sim import scene
 from ripple_sim.errors import RippleWarning, SceneError
@@ -202,13 +199,6 @@ velocity = [0.5, 0.0, 0.0]
 """
 
 
-def write(folder: Path, toml: str = TOML, mjcf: str = MJCF) -> Path:
-    (folder / "scene.xml").write_text(mjcf)
-    path = folder / "scene.toml"
-    path.write_text(toml)
-    return path
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -219,13 +209,13 @@ def write(folder: Path, toml: str = TOML, mjcf: str = MJCF) -> Path:
 )
 def test_a_file_is_checked_in_itself_against_its_model_and_in_its_events(tmp_path, old, new, message) -> None:
     with pytest.raises(RippleError, match=message) as error:
-        scene.load_scene(write(tmp_path, TOML.replace(old, new)))
+        scene.load_scene(write_scene(tmp_path, MJCF, TOML.replace(old, new)))
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("fps", [24, 60, 1000])
 def test_a_whole_number_of_physics_steps_makes_a_frame(tmp_path: Path, fps: int) -> None:
-    simulation = Simulation(scene.load_scene(write(tmp_path)), fps=fps, backend="cpu")
+    simulation = Simulation(scene.load_scene(write_scene(tmp_path, MJCF, TOML)), fps=fps, backend="cpu")
     for _ in range(5):
         simulation.advance_frame()
     assert simulation.data.time == pytest.approx(5 / fps, rel=1e-9)

@@ -1,7 +1,4 @@
-"""The shipped scenes: what is to be hit is hit, ripples can be seen and are not absurd, and no step is too long.
-
-The toys of the duck scene hit it one after the other, and never get into it.
-"""
+"""The shipped scenes: what is to be hit is hit, ripples are seen and not absurd, and no toy gets into the duck."""
 
 import importlib.resources
 import warnings

@@ -1,8 +1,4 @@
-"""What lies inside a target of a scene file, and the shape that its surface begins with.
-
-Inside: its thickness, wherever the geom is. Shapes: an expression of position, an image, a saved field; expressions
-take the arithmetic that they promise, and nothing of Python beside it.
-"""
+"""What lies inside a target of a scene file, and the shape that its surface begins with."""
 
 from pathlib import Path
 

@@ -10,16 +10,21 @@ from ripple_sim import Impulse, Material, Ripples
 class Run:
     """A model in motion, the waves of its targets, and the impulses of every step, `hits`.
 
-    The density is that of the material [kg/m^2]; the options are those of `Ripples`.
+    The material may be given by its density [kg/m^2] alone; the options are those of `Ripples`.
     """
 
     def __init__(
-        self, model: mujoco.MjModel | mujoco.MjSpec, *targets: str, density: float = 50.0, **options: object
+        self,
+        model: mujoco.MjModel | mujoco.MjSpec,
+        *targets: str,
+        density: float = 50.0,
+        material: Material | None = None,
+        **options: object,
     ) -> None:
         self.model = model.compile() if isinstance(model, mujoco.MjSpec) else model
         self.data = mujoco.MjData(self.model)
         options = {"resolution": 12, "backend": "cpu", "conserve_volume": False, **options}
-        self.ripples = Ripples(self.model, dict.fromkeys(targets, Material(density=density)), **options)
+        self.ripples = Ripples(self.model, dict.fromkeys(targets, material or Material(density=density)), **options)
         self.hits: list[list[Impulse]] = []
 
     def step(self) -> list[Impulse]:

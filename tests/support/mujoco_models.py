@@ -34,9 +34,14 @@ def model_of(worldbody: str, asset: str = "", option: str = "") -> mujoco.MjMode
 def posed(xml: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A model and its data at the beginning."""
     model = mujoco.MjModel.from_xml_string(xml)
+    return model, forwarded(model)
+
+
+def forwarded(model: mujoco.MjModel) -> mujoco.MjData:
+    """Data at the beginning, with all that follows from it."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    return model, data
+    return data
 
 
 def mesh_spec(

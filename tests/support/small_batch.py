@@ -3,6 +3,7 @@
 from concurrent.futures import Executor, Future
 from pathlib import Path
 
+from scene_files import write_scene
 from unfinished_videos import contents
 
 from ripple_sim.batch import BatchFolder, Plan, keep_plan, read_plan, stored
@@ -54,8 +55,7 @@ class Here(Executor):
 
 
 def write_files(folder: Path) -> None:
-    (folder / "scene.xml").write_text(MJCF)
-    (folder / "scene.toml").write_text(SCENE)
+    write_scene(folder, MJCF, SCENE)
 
 
 def small_plan(folder: Path, more: str = "", text: str = PLAN) -> Plan:

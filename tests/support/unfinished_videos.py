@@ -1,7 +1,11 @@
 """What tests of videos share: an egg under a stone."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
+
+from programs import ended
+from scene_files import write_scene
 
 from ripple_sim.scene import Scene, load_scene
 
@@ -18,9 +22,8 @@ material = {{speed = 0.3, density = {}}}
 
 def egg_scene(folder: Path, floor: str = "", duration: float = 2.0, density: float = 1500.0) -> Scene:
     """A scene that is written to a folder and loaded."""
-    (folder / "scene.xml").write_text(MJCF.replace("</worldbody>", floor + "</worldbody>"))
-    (folder / "scene.toml").write_text(TOML.format(duration, density))
-    return load_scene(folder / "scene.toml")
+    model = MJCF.replace("</worldbody>", floor + "</worldbody>")
+    return load_scene(write_scene(folder, model, TOML.format(duration, density)))
 
 
 def interrupting_at(frame: int) -> Callable[[int, int], None]:
@@ -35,3 +38,32 @@ def interrupting_at(frame: int) -> Callable[[int, int], None]:
 
 def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+FULL = """
+import json, resource, signal, sys
+import numpy as np
+from ripple_sim.errors import EncodingError
+from ripple_sim.encode import open_writer
+path, limit, width, height, count, options = sys.argv[1], *map(int, sys.argv[2:6]), json.loads(sys.argv[6])
+noise = np.random.default_rng(0).integers(0, 31743, (count, height, width, 3), np.uint16).view(np.float16)
+noise = noise if options.get("frame_format") == "exr" else (noise.view(np.uint16) % 256).astype(np.uint8)
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+try:
+    with open_writer(path, width=width, height=height, fps=25, **options) as writer:
+        for frame in noise:
+            writer.write(frame)
+except EncodingError as error:
+    print(error)
+"""
+
+
+def written_until_full(path: Path, limit: int, width: int, height: int, count: int, **options: object) -> str:
+    """What is said where so many frames of noise are written, but no file may grow beyond a limit.
+
+    That is what a full disk does, without filling one.
+    """
+    result = ended("-c", FULL, path, *map(str, (limit, width, height, count)), json.dumps(options), check=True)
+    assert "Traceback" not in result.stderr
+    return result.stdout

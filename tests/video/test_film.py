@@ -4,11 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from bouncing_stone import MJCF, TOML
 from mujoco_models import posed
+from scene_files import write_scene
 from sphere_height_maps import cube_charts
 from unfinished_videos import interrupting_at
 
@@ -44,12 +44,7 @@ pytestmark = pytest.mark.usefixtures("opengl")
 
 @pytest.fixture
 def make_scene(tmp_path: Path) -> Callable[..., Scene]:
-    def make(toml: str = TOML) -> Scene:
-        (tmp_path / "scene.xml").write_text(MJCF)
-        (tmp_path / "scene.toml").write_text(toml)
-        return load_scene(tmp_path / "scene.toml")
-
-    return make
+    return lambda toml=TOML: load_scene(write_scene(tmp_path, MJCF, toml))
 
 
 def film_of(scene: Scene, words: list[str], size: tuple[int, int], baseline: str | None = None) -> Film:
@@ -113,11 +108,10 @@ def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) ->
     width, height_px = 320, 180
     frame = np.full((height_px, width, 3), 255, np.uint8)
     projection = Projection(camera.pose(), width, height_px)
-    bare = mujoco.MjModel.from_xml_string("<mujoco/>")
-    data = mujoco.MjData(bare)
-    mujoco.mj_forward(bare, data)
     layout = Layout(width, height_px)
-    draw_marks(frame, place_marks(gathered, 1e9, layout, projection, bare, data), layout)  # nothing but its dot
+    draw_marks(
+        frame, place_marks(gathered, 1e9, layout, projection, *posed("<mujoco/>")), layout
+    )  # nothing but its dot
     dark = (255.0 - frame.min(axis=2)).round()
     rows, columns = np.indices(dark.shape)
     centre = np.array([(dark * (columns + 0.5)).sum(), (dark * (rows + 0.5)).sum()]) / dark.sum()

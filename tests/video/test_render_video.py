@@ -1,7 +1,4 @@
-"""Interrupted renders go on to the same video, or say why not; passes beside the frames, and the summary.
-
-A stage that runs ahead: the same items in the same order, no more of them than may wait, and its errors.
-"""
+"""Interrupted renders go on to the same video or say why not; passes; a stage that runs ahead."""
 
 import dataclasses
 import json
@@ -55,8 +52,7 @@ def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_show
     def rendered(density: float, **options: object) -> list[str]:
         target = msgspec.structs.replace(scene.targets[0], material=MaterialEntry(density=density, stiffness=1e3))
         changed = dataclasses.replace(scene, targets=(target,))
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as told:
             render_video(changed, tmp_path / "frames", VideoOptions(**OPTIONS, overwrite=True, **options))
         return [str(each.message) for each in told if "higher than a pixel" in str(each.message)]
 
@@ -72,8 +68,7 @@ def test_a_target_that_nothing_touches_in_the_whole_scene_is_told_of(tmp_path, o
     text = (tmp_path / "scene.xml").read_text()
     (tmp_path / "scene.xml").write_text(text.replace('pos="0.05 0 0.3"', f'pos="{0.05 + beside} 0 0.3"'))
     scene, options = load_scene(tmp_path / "scene.toml"), VideoOptions(**OPTIONS, duration=duration)
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as told:
         render_video(scene, tmp_path / "frames", options)
     assert ["no wave on 'egg': nothing touched it" in str(each.message) for each in told] == [True] * lines
 

@@ -1,7 +1,4 @@
-"""Screenshots and videos are numbered and whole, and leave nothing where they fail.
-
-The orbiting camera stays level and off the vertical.
-"""
+"""Screenshots and videos are numbered and whole, or leave nothing; the orbiting camera stays level."""
 
 from pathlib import Path
 

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from programs import ended
+from scene_files import write_scene
 
 from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene import Scene, load_scene
@@ -14,6 +15,9 @@ from ripple_sim.solver import SolverError
 from ripple_sim.viewer import BALLS, FLIGHT, OPERATORS, Balls, Session, add_balls, open_scene
 
 RADIUS, MIDDLE = 0.5, np.array([0.0, 0.0, 0.5])  # of the scene "sphere" [m]
+MJCF = """<mujoco>{}<worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
+<body pos="0 0 1"><freejoint/><geom size="0.05"/></body></worldbody></mujoco>"""
+TOML = 'model = "scene.xml"\n[[ripple]]\ngeom = "egg"\n'
 
 
 def run(session: Session, frames: int) -> None:
@@ -114,11 +118,9 @@ def test_colours_follow_the_waves_at_once_and_fade_slowly(session: Session) -> N
 
 def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.xml").write_text("""<mujoco><option gravity="0 0 -9e9"/><worldbody>
-      <geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-      <body pos="0 0 1"><freejoint/><geom size="0.05"/></body></worldbody></mujoco>""")
-    (tmp_path / "scene.toml").write_text('model = "scene.xml"\n[[ripple]]\ngeom = "egg"\n')
-    session = Session(open_scene(tmp_path / "scene.toml"), resolution=8)
+    session = Session(
+        open_scene(write_scene(tmp_path, MJCF.format('<option gravity="0 0 -9e9"/>'), TOML)), resolution=8
+    )
     with pytest.raises(SimulationError):
         run(session, 50)
     assert session.paused
@@ -242,11 +244,8 @@ def test_the_oldest_ball_is_used_again_and_a_reset_calls_all_back(session: Sessi
 
 
 def test_balls_change_neither_the_view_nor_a_keyframe(tmp_path: Path) -> None:
-    (tmp_path / "scene.xml").write_text("""<mujoco><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-      <body pos="0 0 1"><freejoint/><geom size="0.05"/></body></worldbody>
-      <keyframe><key qpos="0.1 0.2 0.9 1 0 0 0"/></keyframe></mujoco>""")
-    (tmp_path / "scene.toml").write_text('model = "scene.xml"\n[[ripple]]\ngeom = "egg"\n')
-    scene, plain = open_scene(tmp_path / "scene.toml"), load_scene(tmp_path / "scene.toml")
+    path = write_scene(tmp_path, MJCF.format('<keyframe><key qpos="0.1 0.2 0.9 1 0 0 0"/></keyframe>'), TOML)
+    scene, plain = open_scene(path), load_scene(path)
     assert scene.model.stat.extent == plain.model.stat.extent
     np.testing.assert_array_equal(scene.model.stat.center, plain.model.stat.center)
     session = Session(scene, resolution=8)

@@ -3,7 +3,6 @@
 import io
 import os
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -19,14 +18,10 @@ from PIL import Image
 
 for name in ("trame", "trame_vtk"):
     pytest.importorskip(name)
-playwright = pytest.importorskip("playwright.sync_api")
+from chromium import PATIENCE, browsing, launched  # noqa: E402
 
 Page = Any  # playwright's
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (on Debian: apt-get install chromium)")
-
-PATIENCE = 180.0  # [s]; kernels that no test has used yet are compiled meanwhile
+pytestmark = browsing
 MIDDLE = (200, 130)  # of the sphere in the picture [pixels]
 
 
@@ -54,14 +49,8 @@ def address() -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        made = driver.chromium.launch(
-            executable_path=CHROMIUM,
-            args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
-            timeout=1000 * PATIENCE,  # [ms]
-        )
+    with launched("--disable-gpu") as made:
         yield made
-        made.close()
 
 
 @pytest.fixture

@@ -1,7 +1,4 @@
-"""The viewer's window, off screen and on a virtual screen; each in a process of its own.
-
-`ripple-sim view`: its help, its mistakes in one line, what it says where there is no display.
-"""
+"""The viewer's window, in processes of its own, and `ripple-sim view`, with a display and without."""
 
 import ctypes
 import importlib.util

@@ -1,7 +1,4 @@
-"""The surface of a target: its colour, its heatmap, and both of its sides where it has a rim.
-
-A mesh is cut at the borders of its charts: nothing is lost, no gap opens, and every triangle has one chart.
-"""
+"""The surface of a target: its colour, its heatmap, both of its sides, and its mesh, cut at charts."""
 
 from types import SimpleNamespace
 

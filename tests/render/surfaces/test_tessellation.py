@@ -1,7 +1,4 @@
-"""Tessellation: static, which is round where smooth and keeps creases; and by what waves a frame shows.
-
-No gap opens, only where waves are sharp are there more triangles, and on the GPU they are those of the host.
-"""
+"""Tessellation, static and by what waves a frame shows: no gap opens, on the host or the GPU."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""The vertices that a target is drawn with: on its surface, split where they must be, and looked up in one place.
-
-A mesh cut for its charts is drawn as round as it was, and as sharp.
-"""
+"""The vertices that a target is drawn with: as round and sharp as it is, and looked up in one place."""
 
 import mujoco
 import numpy as np

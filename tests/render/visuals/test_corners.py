@@ -1,7 +1,4 @@
-"""Normals of a mesh's corners, and vertices split where they jump.
-
-Ambient occlusion and thickness of solids on which both are known.
-"""
+"""Normals of a mesh's corners; ambient occlusion and thickness of solids on which both are known."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""Geoms and sites that are drawn, their materials, and what is not drawn.
-
-Capsules in place of geoms: their sizes, which of them count, and how much of the sky they hide.
-"""
+"""Geoms and sites that are drawn, their materials, and how much of the sky capsules in their place hide."""
 
 import warnings
 
@@ -9,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from drawn import ABOVE, BALL, FLOOR, FRONT, SIZE, frame_of, posed
-from mujoco_models import mesh_spec
+from mujoco_models import forwarded, mesh_spec
 from shader_functions import evaluated
 from textured import textured_model
 
@@ -172,8 +169,8 @@ def test_tendons_flexes_and_skins_are_drawn_and_what_has_no_surface_is_told_once
     cable = sheet.replace("3 3 1", "3 1 1").replace('dim="2"', 'dim="1" radius=".05"')
     for body, rest in ((TENDON, spatial), (sheet, ""), (cable, "")):
         model, data = posed(f"<mujoco><worldbody>{FLOOR}{body}</worldbody>{rest}</mujoco>")
-        with warnings.catch_warnings(), Renderer(gl, model, {}, size=SIZE) as renderer:
-            warnings.simplefilter("error", RippleWarning)
+        unwarned = warnings.catch_warnings(action="error", category=RippleWarning)
+        with unwarned, Renderer(gl, model, {}, size=SIZE) as renderer:
             red, green, _ = np.moveaxis(renderer.render(data, {}, ABOVE).astype(int), 2, 0)
         assert (red - green > 60).sum() > 50
     ray = '<sensor><rangefinder site="s"/></sensor>'
@@ -193,8 +190,6 @@ def test_flexes_that_stand_for_geoms_are_not_drawn(gl):
         if drawn:
             spec.add_flex(name="other", dim=2, vertbody=["base"], vert=1.1 * V.ravel(), elem=F.ravel())
         model = spec.compile()
-        data = mujoco.MjData(model)
-        mujoco.mj_forward(model, data)
         with Renderer(gl, model, {}, size=SIZE) as renderer:
-            image = renderer.surfaces(data, {}, Camera(tuple(model.stat.center), 0.3, 90.0, -20.0))
+            image = renderer.surfaces(forwarded(model), {}, Camera(tuple(model.stat.center), 0.3, 90.0, -20.0))
         assert {-1, int(FLEX if drawn else GEOM)} == set(np.unique(image.identity[..., 1]))

@@ -1,7 +1,4 @@
-"""Lights of the MJCF, in linear light.
-
-The studio: its lights turn with the camera, and the background takes on the floor's colour.
-"""
+"""Lights of the MJCF, in linear light, and the studio's, which turn with the camera."""
 
 import numpy as np
 import pytest

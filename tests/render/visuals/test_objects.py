@@ -1,7 +1,4 @@
-"""Round geoms are as finely tessellated as the frame needs, and their poses are MuJoCo's.
-
-The table of objects as shaders read it.
-"""
+"""Round geoms are as finely tessellated as the frame needs, stand where MuJoCo's do, and shaders read their table."""
 
 import numpy as np
 import pytest

@@ -1,9 +1,4 @@
-"""Shapes and sizes of geoms: what is drawn is as large as what MuJoCo says.
-
-Meshes and height fields of a model.
-
-Tessellated primitives against their areas.
-"""
+"""Shapes of geoms, meshes and height fields are as large as MuJoCo says, closed, and of the right area."""
 
 import mujoco
 import numpy as np

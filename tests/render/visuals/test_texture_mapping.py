@@ -5,6 +5,7 @@ import os
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import forwarded
 from programs import ended
 from scipy.ndimage import maximum_filter, minimum_filter
 from sphere_height_maps import cube_charts
@@ -19,10 +20,8 @@ FROM_X = Camera((0.0, 0.0, 0.0), 4.0, 180.0, 0.0, 20.0)  # the frame's right is 
 
 def names(gl, model, places, camera=FROM_X, targets=None) -> str:
     """Names of the colours at points of the frame, x to the right and y upwards from its middle, in pixels."""
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     with Renderer(gl, model, targets or {}, size=(SIZE, SIZE), lighting="studio") as renderer:
-        frame = renderer.render(data, {}, camera).astype(float)
+        frame = renderer.render(forwarded(model), {}, camera).astype(float)
     found = ""
     for x, y in places:
         column, row = SIZE // 2 + x, SIZE // 2 - y
@@ -123,10 +122,8 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
     if done.returncode:
         pytest.skip(f"MuJoCo's renderer does not run here: {done.stderr[-200:]}")
     for model, theirs, variant in zip(models, np.load(tmp_path / "theirs.npy"), variants, strict=True):
-        data = mujoco.MjData(model)
-        mujoco.mj_forward(model, data)
         with Renderer(gl, model, {}, size=(320, 240), lighting="studio") as renderer:
-            ours = renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.2, 70.0, -50.0, 45.0))
+            ours = renderer.render(forwarded(model), {}, Camera((0.0, 0.0, 0.0), 4.2, 70.0, -50.0, 45.0))
         theirs_shows, ours_shows = colours(theirs), colours(ours)
         # away from edges, where they show a clear colour
         bright = theirs.max(axis=2).astype(int) - theirs.min(axis=2) > 150

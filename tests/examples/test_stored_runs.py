@@ -1,0 +1,42 @@
+"""The tables in the documentation are those of a whole run of their benchmarks, by today's operator."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from eigenvalues import cases, mean_error, of_polyhedron
+from plates import PLATES, atlas_of, frequencies
+
+from ripple_sim.solver import build_atlas
+
+DOCS = Path(__file__).parents[2] / "docs"
+RUNS = {name: (DOCS / "runs" / f"{name}.txt").read_text("utf-8") for name in ("eigenvalues", "plates")}
+
+
+@pytest.mark.parametrize(("run", "page"), [("eigenvalues", "accuracy"), ("plates", "validation")])
+def test_the_printed_table_is_the_stored_run(run: str, page: str) -> None:
+    assert f"```\n{RUNS[run]}```" in (DOCS / f"{page}.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", ["hemisphere, fixed", "square, free"])
+def test_eigenvalues_are_of_todays_operator(name: str) -> None:
+    [row] = (line for line in RUNS["eigenvalues"].splitlines() if line.startswith(name))
+    texels, error, *_ = row.removeprefix(name).split()
+    case = cases()[name]
+    atlas = build_atlas(case.mesh(), 32, layout="patches")
+    assert f"{atlas.areas.size:,}" == texels
+    assert mean_error(atlas, case) == pytest.approx(float(error), rel=0.01)
+
+
+def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
+    case = cases()["square, free"]
+    np.testing.assert_allclose(of_polyhedron(case.mesh(), 0)[1:], np.sort(case.exact)[1:20], rtol=5e-5)
+
+
+@pytest.mark.parametrize(
+    "name", ["free [Hz], NAFEMS FV12", "cantilever, lambda^2, Barton", "disk, clamped, lambda^2, Leissa"]
+)
+def test_frequencies_of_plates_are_of_todays_operator(name: str) -> None:
+    stored = RUNS["plates"].partition(f"\n{name}")[2].splitlines()[1].removeprefix("  N = 32").split()
+    plate = PLATES[name]
+    np.testing.assert_allclose(frequencies(plate, atlas_of(plate, 32)), np.array(stored, float), rtol=1e-3)

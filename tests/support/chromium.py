@@ -1,0 +1,23 @@
+"""A headless browser for pages."""
+
+import contextlib
+import shutil
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api")
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+browsing = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (on Debian: apt-get install chromium)")
+PATIENCE = 180.0  # [s]; the machine may be busy, and kernels that no test has used yet are compiled meanwhile
+
+
+@contextlib.contextmanager
+def launched(*flags: str) -> Iterator[Any]:
+    options = ["--no-sandbox", "--disable-background-networking", *flags]
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=options, timeout=1000 * PATIENCE)  # [ms]
+        yield browser
+        browser.close()
