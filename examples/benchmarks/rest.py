@@ -56,8 +56,10 @@ def run(model: mujoco.MjModel, seconds: float, act=lambda data: None) -> np.ndar
         act(data)
         mujoco.mj_step(model, data)
         ripples.step(data)
+        contacts.skip()
         contacts.loads(data, dt)
-        unfiltered.step(dt, load=Load.together([touch.load for touch in contacts.touches]))
+        given = [done.on_texels for done in contacts.since_skip]
+        unfiltered.step(dt, load=Load.together([Load(each.texels, each.forces) for each in given]))
         history.append((velocity(ripples["target"]), velocity(unfiltered)))
     return np.array(history)
 

@@ -20,7 +20,7 @@ from tyro.conf import Positional, arg
 
 from ripple_sim.errors import VideoError
 from ripple_sim.export.options import ExportOptions
-from ripple_sim.video.options import VideoOptions
+from ripple_sim.video.options import SceneOptions, VideoOptions
 
 from .arguments import (
     Aperture,
@@ -52,18 +52,25 @@ if TYPE_CHECKING:
     from ripple_sim.viewer.window import Window
 
 
+# Fields, defaults and help of commands are those of the options; what is not here is read as its type says.
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ExportCommand(ExportOptions):
+class _SceneCommand(SceneOptions):
+    size: Size = SceneOptions.size
+    duration: Duration = SceneOptions.duration
+    slow_motion: Factor = SceneOptions.slow_motion
+    resolution: Resolution = SceneOptions.resolution
+    layout: SceneLayout = SceneOptions.layout
+    rim: Rim = SceneOptions.rim
+    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
+    """Camera of the MJCF."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ExportCommand(_SceneCommand, ExportOptions):
     """Simulate a scene, and write it to the file of another program."""
 
     fps: Count = ExportOptions.fps
-    duration: Duration = ExportOptions.duration
-    slow_motion: Factor = ExportOptions.slow_motion
     triangles: Count = ExportOptions.triangles
-    size: Size = ExportOptions.size
-    resolution: Resolution = ExportOptions.resolution
-    layout: SceneLayout = ExportOptions.layout
-    rim: Rim = ExportOptions.rim
     chunk: Limit = ExportOptions.chunk
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...), on which bodies
@@ -71,8 +78,6 @@ class ExportCommand(ExportOptions):
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file; its ending says what is written: .usdc, .usda or .usdz (the moving scene), .html (a player),
     .zarr (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or what is heard)."""
-    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
-    """Camera of the MJCF."""
     seed: SceneSeed = None
     """Seed of the scene's random variation, or of the bodies that drop on a mesh."""
 
@@ -157,12 +162,8 @@ def frame_progress(title: str, total: int | None = None) -> Iterator[Report | No
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class _VideoCommand(VideoOptions):
-    # the fields, defaults and help of the options; those that are not here are read as their types say
-    size: Size = VideoOptions.size
+class _VideoCommand(_SceneCommand, VideoOptions):
     fps: FrameRate = VideoOptions.fps
-    duration: Duration = VideoOptions.duration
-    slow_motion: Factor = VideoOptions.slow_motion
     supersample: Supersample = VideoOptions.supersample
     shutter: Shutter = VideoOptions.shutter
     aperture: Aperture = VideoOptions.aperture
@@ -171,13 +172,8 @@ class _VideoCommand(VideoOptions):
     passes: Passes = ()
     overlay: Overlay = None
     compare: Baseline = VideoOptions.compare
-    resolution: Resolution = VideoOptions.resolution
-    layout: SceneLayout = VideoOptions.layout
-    rim: Rim = VideoOptions.rim
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file ending in .mp4, .webm, .gif or .webp, or a name without ending for a folder of frames."""
-    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
-    """Camera of the MJCF to render from."""
     device: Device = None
     """EGL device to render on, by number, where there are several."""
     renderer: Literal["gl", "cycles"] = "gl"

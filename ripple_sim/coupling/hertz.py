@@ -26,6 +26,7 @@ from ripple_sim.solver.errors import POSITIVE, shown
 from ripple_sim.solver.kernel import Floats, Ints
 
 from .contacts import ColliderIds, Contacts, normal_rows
+from .energy import impedance
 from .geoms import ByGeom, find_any, for_each
 from .model import CoupledModel
 
@@ -132,18 +133,10 @@ class PulsedLoad(Load):
             yield substeps - last, held
 
 
-def decided(solimp: Floats, depth: float) -> float:
-    """Share of an acceleration that MuJoCo's contact decides at a depth [m]: its impedance, by its documentation."""
-    least, most, width, middle, power = solimp.tolist()
-    x = min(max(depth, 0.0) / max(width, 1e-15), 1.0)
-    y = x**power / middle ** (power - 1) if x <= middle else 1 - (1 - x) ** power / (1 - middle) ** (power - 1)
-    return least + y * (most - least)
-
-
 class Approach(NamedTuple):
     """How two bodies meet: effective mass [kg], speed [m/s], what pulls them together [m/s^2], and MuJoCo's contact.
 
-    That is a spring [1/s^2] and a damper [1/s] at a depth [m], and `solimp`, see `decided`.
+    That is a spring [1/s^2] and a damper [1/s] at a depth [m], and `solimp`, see `impedance`.
     """
 
     mass: float
@@ -180,7 +173,7 @@ class Approach(NamedTuple):
         """What it takes to turn the bodies round as MuJoCo's contact does in steps of dt [s], but for what pulls."""
         speed, depth = self.speed, self.depth
         for _ in range(_STEPS):
-            decides = decided(self.solimp, depth)
+            decides = impedance(self.solimp, max(depth, 0.0))
             push = decides * (self.damping * speed + self.stiffness * decides * depth + self.pull)
             if push <= max(self.pull, 0.0):
                 break

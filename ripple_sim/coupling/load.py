@@ -1,6 +1,6 @@
 """From the contacts of a physics step to the loads on the texels of all targets.
 
-What the contacts did is kept for those who ask: impulses for the user, touches for two-way coupling.
+What the contacts did is kept, from which the user's records of impulses are made when they are asked for.
 Bodies that MuJoCo lets sleep have no contacts in its data; they still press on what they lie on.
 """
 
@@ -124,28 +124,6 @@ class Impulse:
     inner: bool = False
 
 
-class Touch(NamedTuple):
-    """A target and a geom that touches it.
-
-    Attributes
-    ----------
-    target, other : int
-        Geom id, and collider id, see `CoupledModel`.
-    point : float64 [3]
-        Force-weighted contact point in the world [m].
-    normal : float64 [3]
-        Unit normal in the world, from the target to the other geom.
-    load : Load
-        Forces on the texels of the target.
-    """
-
-    target: int
-    other: int
-    point: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    load: Load
-
-
 class StepContacts(NamedTuple):
     """What touched a target in a step, and what its surface got, before the rest filter.
 
@@ -217,17 +195,6 @@ class StepContacts(NamedTuple):
         told = zip(others.tolist(), points, (forces * timestep).tolist(), at, inner.tolist(), strict=True)
         for other, point, impulse, texel, behind in told:
             yield Impulse(geom, names[other], point, impulse, texel, behind)
-
-    def touches(self) -> Iterator[Touch]:
-        """One record for each geom that touches."""
-        ends, begins = [*self.starts[1:].tolist(), None], self.on_texels.begins.tolist()
-        for i, (first, last) in enumerate(zip(self.starts.tolist(), ends, strict=True)):
-            contacts, under = self.contacts.rows(slice(first, last)), slice(begins[i], begins[i + 1])
-            forces = np.abs(contacts.forces)
-            normal = forces @ contacts.normals
-            load = Load(self.on_texels.texels[under], self.on_texels.forces[under])
-            other, point = int(contacts.others[0]), forces @ contacts.points / forces.sum()
-            yield Touch(self.target, other, point, normal / np.linalg.norm(normal), load)
 
 
 class TargetLoad:
@@ -355,6 +322,11 @@ class ContactLoads:
         Geom id of every target to its waves. Looked at again by `waves_changed` and `clear`.
     hits : mapping, optional
         Geom id of targets whose hits have the pulse of Hertz's law.
+
+    Attributes
+    ----------
+    since_skip : list of StepContacts
+        What touched the targets since `skip`, step by step.
     """
 
     def __init__(
@@ -386,8 +358,7 @@ class ContactLoads:
 
     def skip(self) -> None:
         """Forget the latest steps: nothing was given since."""
-        self._since_skip: list[StepContacts] = []
-        self._latest: list[StepContacts] = []
+        self.since_skip: list[StepContacts] = []
         self._impulses: list[Impulse] | None = None
 
     def waves_changed(self, geom: int) -> None:
@@ -400,7 +371,7 @@ class ContactLoads:
         Bodies that sleep press as before.
         """
         loads = {}
-        self._impulses, self._latest = None, []
+        self._impulses = None
         self._timestep = self._coupled.model.opt.timestep
         contacts = self._contacts.read(data)
         if self._coupled.model.opt.enableflags & SLEEP:
@@ -415,8 +386,7 @@ class ContactLoads:
                 target.follow(self._waves[geom].atlas)
                 pose = target_pose(data, geom)
                 loads[geom], done = target.touched(contacts[geom], pose, self._timestep, elapsed, data)
-                self._since_skip.append(done)
-                self._latest.append(done)
+                self.since_skip.append(done)
             else:
                 loads[geom] = target.untouched(elapsed)
         return loads
@@ -428,12 +398,7 @@ class ContactLoads:
             names, owners = self._coupled.names, self._coupled.owners
             self._impulses = [
                 impulse
-                for done in self._since_skip
+                for done in self.since_skip
                 for impulse in done.impulses(names, owners, self._waves[done.target].atlas, self._timestep)
             ]
         return self._impulses
-
-    @property
-    def touches(self) -> list[Touch]:
-        """The pairs that touched in the latest step."""
-        return [touch for done in self._latest for touch in done.touches()]

@@ -1,16 +1,14 @@
 """`CoupledModel`: what a MuJoCo model says about what collides, computed once and shared by all steps.
 
-Which geoms and flexes MuJoCo lets touch each other (`ContactMasks`), and what collides in place of a mesh geom: geoms
-of its convex parts (convex colliders), or a rigid flex of its triangles (flex collider). Of a soft flex each vertex
-touches for itself. The contacts of flex colliders are loads by the sum of
-their whole forces, in place of that of normal ones.
+Which geoms and flexes MuJoCo lets touch each other, and what collides in place of a mesh geom: geoms of its convex
+parts (convex colliders), or a rigid flex of its triangles (flex collider). Of a soft flex each vertex touches for
+itself. The contacts of flex colliders are loads by the sum of their whole forces, in place of that of normal ones.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -25,66 +23,6 @@ from .soft import SoftSurface, is_soft, soft_names
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
 SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
-
-
-class ContactMasks:
-    """The contact masks of a model's geoms, and its predefined pairs.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
-    flex_colliders : mapping
-        Geom id to the id of its flex collider, whose masks are the geom's.
-    convex_colliders : mapping
-        Geom id to the ids of its convex colliders, whose masks are the geom's alone.
-
-    Attributes
-    ----------
-    contype, conaffinity : int32 [ngeom]
-        Of what collides: the geom, its flex, or its convex colliders.
-    collides : bool [ngeom]
-        Whether anything at all may touch a geom.
-    """
-
-    def __init__(
-        self, model: mujoco.MjModel, flex_colliders: Mapping[int, int], convex_colliders: Mapping[int, Sequence[int]]
-    ) -> None:
-        self._model = model
-        self.contype, self.conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()
-        for geom, flex in flex_colliders.items():
-            self.contype[geom], self.conaffinity[geom] = model.flex_contype[flex], model.flex_conaffinity[flex]
-        for geom, parts in convex_colliders.items():
-            self.contype[geom], self.conaffinity[geom] = model.geom_contype[parts[0]], model.geom_conaffinity[parts[0]]
-            self.contype[parts] = self.conaffinity[parts] = 0
-        self._soft = np.setdiff1d(np.arange(model.nflex), list(flex_colliders.values()))
-        paired = np.isin(np.arange(model.ngeom), [model.pair_geom1, model.pair_geom2])
-        self.collides = (self.contype | self.conaffinity).astype(np.bool_) | paired
-
-    def match(self, geoms: Sequence[int]) -> NDArray[np.bool_]:
-        """Geoms, [ngeom], that MuJoCo collides with one of these by their masks, or as a pair."""
-        found, pairs = np.zeros(self._model.ngeom, dtype=np.bool_), (self._model.pair_geom1, self._model.pair_geom2)
-        for geom in geoms:
-            found |= (self.contype[geom] & self.conaffinity | self.contype & self.conaffinity[geom]) != 0
-            for one, two in (pairs, pairs[::-1]):
-                found[two[one == geom]] = True
-        return found
-
-    def apart(self, geom: int) -> NDArray[np.bool_]:
-        """Geoms, [ngeom], on bodies not welded to that of this one."""
-        weld = self._model.body_weldid[self._model.geom_bodyid]
-        return np.asarray(weld != weld[geom])
-
-    def out_of_touch(self, geom: int, colliders: Sequence[int]) -> bool:
-        """Whether there are geoms or flexes that collide, but none that meets those that collide for this geom."""
-        meets = (self.match(colliders) & self.apart(geom)).any() or len(self.soft_flexes(colliders))
-        return not meets and bool(len(self._soft) or (self.collides & self.apart(geom)).any())
-
-    def soft_flexes(self, geoms: Sequence[int]) -> NDArray[np.int64]:
-        """Flexes other than flex colliders that MuJoCo collides with one of these geoms."""
-        model, soft, of = self._model, self._soft, list(geoms)
-        types, affinities = model.flex_contype[soft, None], model.flex_conaffinity[soft, None]
-        return soft[((self.contype[of] & affinities | types & self.conaffinity[of]) != 0).any(axis=1)]
-
 
 _VISIBLE = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF))
 
@@ -142,8 +80,6 @@ _NOT_CONVEX = (int(_GEOM.mjGEOM_SDF), int(_GEOM.mjGEOM_HFIELD))
 # by an eighth of its radius.
 _FOOTPRINT = 0.5
 
-_NONE_NAMED: Mapping[int, Sequence[int]] = MappingProxyType({})
-
 
 class CoupledModel:
     """The geoms of a MuJoCo model as the coupling sees them.
@@ -159,7 +95,7 @@ class CoupledModel:
     model : mujoco.MjModel
     targets : iterable of int
         Geom ids, and of soft targets.
-    named : mapping
+    named : mapping, optional
         Of some targets' ids to those of their collision geoms.
 
     Attributes
@@ -187,16 +123,12 @@ class CoupledModel:
         Footprint radius of a contact with each collider [m]; of a pair the smaller one counts.
     convex : bool [c]
         Whether what touches at two points touches between them too.
-    masks : ContactMasks
     soft : dict of int to SoftSurface
         The soft targets.
     """
 
     def __init__(
-        self,
-        model: mujoco.MjModel,
-        targets: Iterable[int] = (),
-        named: Mapping[int, Sequence[int]] = _NONE_NAMED,
+        self, model: mujoco.MjModel, targets: Iterable[int] = (), named: Mapping[int, Sequence[int]] | None = None
     ) -> None:
         self.model = model
         geoms, softs = range(model.ngeom), model.nflex + model.nskin
@@ -210,8 +142,18 @@ class CoupledModel:
         self.has_flex[list(self.flex_colliders)] = True
         extents = np.where(np.isin(model.geom_type, _ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
         self.collider_extents, self.solref = extents.copy(), model.geom_solref.copy()
+        # the masks of what collides: the geom, its flex, or its convex colliders
+        contype, conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()
         for geom, flex in self.flex_colliders.items():
             self.collider_extents[geom], self.solref[geom] = flex_thickness(model, flex), model.flex_solref[flex]
+            contype[geom], conaffinity[geom] = model.flex_contype[flex], model.flex_conaffinity[flex]
+        for geom, parts in self.convex_colliders.items():
+            contype[geom], conaffinity[geom] = model.geom_contype[parts[0]], model.geom_conaffinity[parts[0]]
+            contype[parts] = conaffinity[parts] = 0
+        self._contype, self._conaffinity = contype, conaffinity
+        self._collides = (contype | conaffinity).astype(np.bool_)
+        self._collides |= np.isin(np.arange(model.ngeom), [model.pair_geom1, model.pair_geom2])
+        self._soft_flexes = np.setdiff1d(np.arange(model.nflex), list(self.flex_colliders.values()))
         edges = zip(model.flex_edgeadr, model.flex_edgenum, strict=True)
         lengths = [model.flexedge_length0[i : i + count].mean() if count else 0.0 for i, count in edges]
         spacing = np.array(lengths)[vertex_flexes(model)]
@@ -221,25 +163,46 @@ class CoupledModel:
         convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex
         convex[[geom for geom, parts in self.convex_colliders.items() if len(parts) > 1]] = False
         self.convex = np.concatenate([convex, np.zeros(model.nflexvert + softs, dtype=np.bool_)])
-        self.masks = ContactMasks(model, self.flex_colliders, self.convex_colliders)
         targets = list(targets)
         self.soft = {each: SoftSurface(model, each) for each in targets if is_soft(model, each)}
         for target, surface in self.soft.items():
             self.footprint_radii[target] = surface.spacing
         geoms_alone = [each for each in targets if each not in self.soft]
-        self._collision_geoms = find_collision_geoms(model, self.masks.collides, geoms_alone, named)
+        self._collision_geoms = find_collision_geoms(model, self._collides, geoms_alone, named or {})
 
     def collision_geoms(self, geom: int) -> tuple[int, ...]:
         """Geoms whose contacts are those of this one: itself, or of a target those that collide for it."""
         return self._collision_geoms.get(geom, (geom,))
 
     def masks_match(self, geom: int) -> NDArray[np.bool_]:
-        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it."""
-        return self.masks.match(self.collision_geoms(geom))
+        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it, also as a pair."""
+        model, types, affinities = self.model, self._contype, self._conaffinity
+        found, pairs = np.zeros(model.ngeom, dtype=np.bool_), (model.pair_geom1, model.pair_geom2)
+        for each in self.collision_geoms(geom):
+            found |= (types[each] & affinities | types & affinities[each]) != 0
+            for one, two in (pairs, pairs[::-1]):
+                found[two[one == each]] = True
+        return found
 
     def can_collide(self, geom: int) -> NDArray[np.bool_]:
         """The same on bodies that are not welded to that of this geom."""
-        return self.masks_match(geom) & self.masks.apart(geom)
+        return self.masks_match(geom) & self._apart(geom)
+
+    def out_of_touch(self, geom: int) -> bool:
+        """Whether there are geoms or flexes that collide, but none that meets those that collide for this geom."""
+        meets = self.can_collide(geom).any() or len(self.soft_flexes(geom))
+        return not meets and bool(len(self._soft_flexes) or (self._collides & self._apart(geom)).any())
+
+    def soft_flexes(self, geom: int) -> NDArray[np.int64]:
+        """Flexes other than flex colliders that MuJoCo collides with those that collide for this geom."""
+        model, soft, of = self.model, self._soft_flexes, list(self.collision_geoms(geom))
+        types, affinities = model.flex_contype[soft, None], model.flex_conaffinity[soft, None]
+        return soft[((self._contype[of] & affinities | types & self._conaffinity[of]) != 0).any(axis=1)]
+
+    def _apart(self, geom: int) -> NDArray[np.bool_]:
+        """Geoms, [ngeom], on bodies not welded to that of this one."""
+        weld = self.model.body_weldid[self.model.geom_bodyid]
+        return np.asarray(weld != weld[geom])
 
 
 # Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: geoms that

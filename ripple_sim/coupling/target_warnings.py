@@ -95,7 +95,7 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
     if message is not None:
         yield message
     passive = getattr(coupled.model, "flex_passive", np.zeros(coupled.model.nflex))  # not in MuJoCo's older versions
-    for flex in coupled.masks.soft_flexes(coupled.collision_geoms(geom)).tolist():
+    for flex in coupled.soft_flexes(geom).tolist():
         if passive[flex]:
             name = coupled.names[coupled.model.ngeom + flex]
             yield (
@@ -106,7 +106,7 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
 
 def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
     colliders = coupled.collision_geoms(geom)
-    if coupled.masks.out_of_touch(geom, colliders):
+    if coupled.out_of_touch(geom):
         return _touch_warning(coupled, geom)
     if any(each != geom for each in colliders) or geom in coupled.convex_colliders:
         return _gap_warning(coupled, geom, atlas)
@@ -162,8 +162,7 @@ def _hull_warning(name: str, atlas: Atlas) -> str | None:
 def _flex_warning(coupled: CoupledModel, geom: int) -> str | None:
     """Warning of geoms that a flex collider meets badly, or not at all."""
     model, name = coupled.model, coupled.names[geom]
-    body, weld = int(model.geom_bodyid[geom]), model.body_weldid[model.geom_bodyid]
-    meets = coupled.masks_match(geom) & (weld != weld[geom])
+    meets, body = coupled.can_collide(geom), int(model.geom_bodyid[geom])
     thickness = flex_thickness(model, coupled.flex_colliders[geom])
     reasons = (
         (

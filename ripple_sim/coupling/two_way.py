@@ -4,14 +4,14 @@ MuJoCo's contact problem knows rigid surfaces alone. Here it is solved again wit
 gap counts from the displaced surface, and a unit of its force moves that surface as the waves say. What is found
 replaces the forces of the step, and the bodies' motion in it.
 
-MuJoCo sees a body over a risen surface apart from it. `Reach` finds such bodies by their support points, and they are
-given the force after which both move alike.
+MuJoCo sees a body over a risen surface apart from it. `within_reach` finds such bodies by their support points, and
+they are given the force after which both move alike.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas, Load, WaveSolver
+from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
 from .contacts import ColliderIds, pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
-from .load import Touch
 from .model import CoupledModel
 
 _GEOM = mujoco.mjtGeom
@@ -75,68 +75,51 @@ _SOLID = tuple(
 )
 
 
-class Reach:
-    """Finds geoms above targets, lower than their waves are high.
+def reachable(coupled: CoupledModel, targets: Iterable[int]) -> dict[int, list[int]]:
+    """Geoms that may come within reach of each target, by its geom id; see `within_reach`."""
+    model = coupled.model
+    moving = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _SOLID)
+    return {target: np.flatnonzero(moving & coupled.can_collide(target)).tolist() for target in targets}
+
+
+def within_reach(
+    coupled: CoupledModel, data: mujoco.MjData, pair: Key, waves: WaveSolver, height: Floats32, highest: float
+) -> tuple[Load, NDArray[np.float64], NDArray[np.float64]] | None:
+    """Where a geom is above a target, lower than its waves of a height, [C n n], are at their highest [m], if it is.
 
     A geom is within reach where its lowest point is less above the undeformed surface than the surface has risen there.
     That point is found by turns: the surface point nearest to the geom's point, and the geom's point deepest along the
     normal there.
 
-    Parameters
-    ----------
-    coupled : CoupledModel
-    targets : iterable of int
-        Geom ids.
+    Returns
+    -------
+    load : Load
+        A unit force on the footprint.
+    point, normal : float64 [3]
+        Of the surface, in the world [m].
     """
-
-    def __init__(self, coupled: CoupledModel, targets: Iterable[int]) -> None:
-        self._coupled, model = coupled, coupled.model
-        moving = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _SOLID)
-        self._others = {target: np.flatnonzero(moving & coupled.can_collide(target)).tolist() for target in targets}
-
-    def reached(
-        self, data: mujoco.MjData, waves: Mapping[int, WaveSolver], touching: Collection[tuple[int, int]]
-    ) -> Iterator[Touch]:
-        """Find the geoms within reach, but for the pairs (target, other) that touch already.
-
-        Their loads are unit forces on the footprints.
-        """
-        for target, others in self._others.items():
-            height = waves[target].height.reshape(-1)
-            highest = float(height.max())
-            for other in others:
-                if highest > 0 and (target, other) not in touching:
-                    touch = self._touch(data, (target, other), waves[target], height, highest)
-                    if touch is not None:
-                        yield touch
-
-    def _touch(
-        self, data: mujoco.MjData, pair: Key, waves: WaveSolver, height: NDArray[np.float32], highest: float
-    ) -> Touch | None:
-        """The touch of a pair, if it is within reach of the target's waves of a height [m], [C n n]."""
-        model, (target, other), atlas = self._coupled.model, pair, waves.atlas
-        rotation = data.geom_xmat[target].reshape(3, 3)
-        to_target = rotation.T @ data.geom_xmat[other].reshape(3, 3)
-        centre = (data.geom_xpos[other] - data.geom_xpos[target]) @ rotation
-        reach = float(model.geom_rbound[other]) + highest
-        box_centre, box_size = model.geom_aabb[target, :3], model.geom_aabb[target, 3:]
-        if np.linalg.norm(np.maximum(np.abs(centre - box_centre) - box_size, 0.0)) > reach:
+    model, (target, other), atlas = coupled.model, pair, waves.atlas
+    rotation = data.geom_xmat[target].reshape(3, 3)
+    to_target = rotation.T @ data.geom_xmat[other].reshape(3, 3)
+    centre = (data.geom_xpos[other] - data.geom_xpos[target]) @ rotation
+    reach = float(model.geom_rbound[other]) + highest
+    box_centre, box_size = model.geom_aabb[target, :3], model.geom_aabb[target, 3:]
+    if np.linalg.norm(np.maximum(np.abs(centre - box_centre) - box_size, 0.0)) > reach:
+        return None
+    point = centre
+    for _ in range(_ROUNDS):
+        (place,), (texel,) = atlas.nearest(point)
+        if np.linalg.norm(point - place) > reach:
             return None
-        point = centre
-        for _ in range(_ROUNDS):
-            (place,), (texel,) = atlas.nearest(point)
-            if np.linalg.norm(point - place) > reach:
-                return None
-            normal = atlas.normals.reshape(-1, 3)[texel]
-            point = centre + to_target @ support_point(model, other, -normal @ to_target)
-        if (point - place) @ normal >= height[texel]:
-            return None
-        radii = self._coupled.footprint_radii
-        where = footprint(atlas, place, min(radii[target], radii[other]))
-        movable = waves.operator.movable.reshape(-1)[where.texels]
-        movable_area = atlas.areas.reshape(-1)[where.texels] * movable
-        in_world = data.geom_xpos[target] + rotation @ place
-        return Touch(target, other, in_world, rotation @ normal, Load(where.texels, where.weights * movable_area))
+        normal = atlas.normals.reshape(-1, 3)[texel]
+        point = centre + to_target @ support_point(model, other, -normal @ to_target)
+    if (point - place) @ normal >= height[texel]:
+        return None
+    where = footprint(atlas, place, float(coupled.footprint_radii[[target, other]].min()))
+    movable = waves.operator.movable.reshape(-1)[where.texels]
+    movable_area = atlas.areas.reshape(-1)[where.texels] * movable
+    load = Load(where.texels, where.weights * movable_area)
+    return load, data.geom_xpos[target] + rotation @ place, rotation @ normal
 
 
 # A footprint is reused while its points move by less than this share of a texel.
@@ -187,7 +170,7 @@ class TwoWay:
 
     def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
         self._coupled, self._waves = coupled, waves
-        self._colliders, self._reach = ColliderIds(coupled), Reach(coupled, waves)
+        self._colliders, self._reachable = ColliderIds(coupled), reachable(coupled, waves)
         self._targets_of: dict[int, list[int]] = {}
         for target in waves:
             for geom in coupled.collision_geoms(target):
@@ -226,12 +209,11 @@ class TwoWay:
         known, self._places = self._places, {}
         for key, touched in contacts.items():
             self._places[key] = self._place(key, touched, known.get(key))
-        reached = list(self._reach.reached(solved, self._waves, self._places.keys()))
-        for touch in reached:
-            atlas = self._waves[touch.target].atlas
-            load = touch.load.merged(atlas.areas.size)
-            place = _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(touch.target, load))
-            self._places[touch.target, touch.other] = place
+        reached = list(self._reached(solved))
+        for (target, other), load, _, _ in reached:
+            atlas = self._waves[target].atlas
+            load = load.merged(atlas.areas.size)
+            self._places[target, other] = _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(target, load))
         asleep = [key for key in known if key not in self._places and self._force_stays(solved, key)]
         self._places |= {key: known[key] for key in asleep}
         self._heights = {target: self._waves[target].height for target, _ in self._places}
@@ -247,9 +229,8 @@ class TwoWay:
             forces |= problem.solve(self._paid)
             self._move(data, self._velocity_change(solved, *old, pending=pending), dt, pending=pending)
             self._work = problem.works()
-        for touch in reached:
-            key = touch.target, touch.other
-            forces[key] = self._push(data, solved, touch, pairs[key], dt, pending=pending)
+        for key, _, point, normal in reached:
+            forces[key] = self._push(data, solved, pairs[key], point, normal, dt, pending=pending)
         self._forces = forces
         self._velocity_change.note(data)
         self._before = self._heights
@@ -289,6 +270,17 @@ class TwoWay:
             _, target, point, outward = min(choices, key=lambda choice: choice[0])
             found.setdefault((target, other), []).append((i, point, outward))
         return found
+
+    def _reached(self, data: mujoco.MjData) -> Iterator[tuple[Key, Load, NDArray[np.float64], NDArray[np.float64]]]:
+        """Pairs within reach that do not touch, and what `within_reach` says of them."""
+        for target, others in self._reachable.items():
+            height = self._waves[target].height.reshape(-1)
+            highest = float(height.max())
+            for other in others if highest > 0 else ():
+                if (target, other) not in self._places:
+                    found = within_reach(self._coupled, data, (target, other), self._waves[target], height, highest)
+                    if found is not None:
+                        yield (target, other), *found
 
     def _place(self, key: Key, touched: Sequence[tuple[int, NDArray, NDArray]], known: _Place | None) -> _Place:
         (target, other), atlas = key, self._waves[key[0]].atlas
@@ -382,15 +374,16 @@ class TwoWay:
             data.qacc_warmstart[:] = data.qacc
 
     def _push(
-        self, data: mujoco.MjData, solved: mujoco.MjData, touch: Touch, pair: Pair, dt: float, *, pending: bool
-    ) -> float:
+        self, data: mujoco.MjData, solved: mujoco.MjData, pair: Pair, point: NDArray[np.float64],
+        normal: NDArray[np.float64], dt: float, *, pending: bool,
+    ) -> float:  # fmt: skip
         """Push a body that the risen surface has reached, so that they part no slower than they meet; the force [N]."""
         model, bodies = self._coupled.model, self._coupled.bodies
         along = np.zeros(model.nv)
-        for sign, geom in ((1, touch.other), (-1, touch.target)):
+        for sign, geom in zip((-1, 1), pair.key, strict=True):
             jacobian = np.zeros((3, model.nv))
-            mujoco.mj_jac(model, solved, jacobian, None, touch.point, int(bodies[geom]))
-            along += sign * touch.normal @ jacobian
+            mujoco.mj_jac(model, solved, jacobian, None, point, int(bodies[geom]))
+            along += sign * normal @ jacobian
         response = np.zeros((1, model.nv))
         mujoco.mj_solveM(model, solved, response, along[None])
         light = float(along @ response[0])

@@ -1,4 +1,4 @@
-"""`VideoOptions`: every option of a video, listed once for Python and for the command line.
+"""`VideoOptions`: every option of a video, listed once for Python and for the command line; exports share some.
 
 It imports nothing heavy, so that the help of a command comes at once; `settings` checks options and settles them.
 """
@@ -25,20 +25,43 @@ IN_ANY_CASE = {
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class VideoOptions:
-    """How a scene is rendered to a video.
-
-    The docstring of a field is its help on the command line. None leaves an option to the scene or to the output.
-    """
+class SceneOptions:
+    """How a scene is run for a video or an export: options that both have."""
 
     size: tuple[int, int] = (1280, 720)
     """Frame size in pixels."""
     fps: int | None = None
     """Frames per second."""
     duration: float | None = None
-    """Seconds of the scene to render."""
+    """Seconds of the scene."""
     slow_motion: float = 1.0
-    """Seconds of video per second of the scene: 4 is four times slower."""
+    """Seconds of the output per second of the scene: 4 is four times slower."""
+    resolution: int | None = None
+    """Texels along the edge of a cube's chart; more resolve finer waves and take longer."""
+    layout: str | None = None
+    """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
+    rim: str | None = None
+    """What the rims of open surfaces do: free, supported, clamped, or fixed as that of a drum's skin."""
+    backend: Backend = "auto"
+    """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
+    overwrite: bool = False
+    """Replace an output that ripple-sim has not made."""
+
+    @property
+    def rate(self) -> float:
+        """Frames in a second of the scene's time."""
+        if self.fps is None:
+            raise ValueError("the frame rate depends on the output: settle the options first")
+        return self.fps * self.slow_motion
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class VideoOptions(SceneOptions):
+    """How a scene is rendered to a video.
+
+    The docstring of a field is its help on the command line. None leaves an option to the scene or to the output.
+    """
+
     supersample: int = 1
     """Render at this many times the width and height and average: finer edges and highlights."""
     shutter: float | None = None
@@ -66,18 +89,8 @@ class VideoOptions:
     """Add what is heard at the camera to the video (.mp4 and .webm)."""
     compare: str | None = None
     """Also run the scene with this wave operator and show both side by side."""
-    resolution: int | None = None
-    """Texels along the edge of a cube's chart; more resolve finer waves and take longer."""
-    layout: str | None = None
-    """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
-    rim: str | None = None
-    """What the rims of open surfaces do: free, supported, clamped, or fixed as that of a drum's skin."""
-    backend: Backend = "auto"
-    """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     resume: bool = False
     """Continue an interrupted render of the same scene with the same options."""
-    overwrite: bool = False
-    """Replace an output that ripple-sim has not made."""
 
     def __post_init__(self) -> None:
         check_fields(
@@ -89,13 +102,6 @@ class VideoOptions:
             exposures=whole(1),
             **IN_ANY_CASE,
         )
-
-    @property
-    def rate(self) -> float:
-        """Frames in a second of the scene's time."""
-        if self.fps is None:
-            raise ValueError("the frame rate depends on the output: settle the options first")
-        return self.fps * self.slow_motion
 
     @property
     def linear(self) -> bool:

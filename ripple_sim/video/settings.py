@@ -11,7 +11,7 @@ import functools
 import hashlib
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import msgspec
 import mujoco
@@ -27,12 +27,12 @@ from ripple_sim.scene.scene import Scene, check_duration, parse_request
 from ripple_sim.solver.backends.backend import auto_backend
 from ripple_sim.solver.gl import GLContext
 
-from .options import Backend, VideoOptions
+from .options import Backend, SceneOptions, VideoOptions
 
 _PACKAGES = ("numpy", "numba", "moderngl", "av", "pillow")
 
 
-def origin(scene: Scene, options: Any) -> dict[str, str | int]:
+def origin(scene: Scene, options: SceneOptions) -> dict[str, str | int]:
     """What the options of a video or an export change of a scene's waves, its fingerprint, and versions of packages."""
     return {
         "the resolution": options.resolution or "the scene's",
@@ -156,7 +156,7 @@ def check_options(options: VideoOptions, output: Path) -> None:
             raise VideoError("passes cannot be written with --compare; leave one of the two out")
 
 
-def frame_count(options: Any, scene: Scene | None = None) -> int:
+def frame_count(options: SceneOptions, scene: Scene | None = None) -> int:
     """Frames of a video with settled options, or of an export of a scene.
 
     Raises `SceneError` if the duration or the slow motion is out of range.

@@ -178,9 +178,8 @@ def world() -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def test_the_free_camera_looks_at_the_middle_of_the_model(world):
-    model, data = world
-    pose = viewpoint(model, data, CameraEntry(distance=2.0), 0.0).pose()
-    np.testing.assert_allclose(pose.focus, model.stat.center)
+    pose = viewpoint(*world, CameraEntry(distance=2.0), 0.0).pose()
+    np.testing.assert_allclose(pose.focus, world[0].stat.center)
     assert np.linalg.norm(pose.position - pose.focus) == pytest.approx(2.0)
 
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import warnings
+from unittest.mock import Mock
 
 import pytest
 from programs import ended
@@ -134,10 +135,7 @@ def noted(ending: BaseException) -> BaseException:
     ],
 )
 def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, error, status, line):
-    def run(self):
-        raise error
-
-    monkeypatch.setattr(reports.InfoCommand, "run", run)
+    monkeypatch.setattr(reports.InfoCommand, "run", Mock(side_effect=error))
     assert cli.main(["info"]) == status
     assert capsys.readouterr().err == f"ripple-sim: {line}\n"
 
@@ -155,10 +153,7 @@ def test_little_address_space_is_told_at_once_with_what_is_needed(tmp_path, word
 
 
 def test_an_unexpected_error_is_not_hidden(monkeypatch):
-    def run(self):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(reports.InfoCommand, "run", run)
+    monkeypatch.setattr(reports.InfoCommand, "run", Mock(side_effect=ZeroDivisionError))
     with pytest.raises(ZeroDivisionError):
         cli.main(["info"])
 

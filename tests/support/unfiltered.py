@@ -31,6 +31,8 @@ class WithAndWithout:
         """After each `mj_step`."""
         dt = self._model.opt.timestep
         self._ripples.step(data)
+        self._contacts.skip()
         self._contacts.loads(data, dt)
-        self.unfiltered.step(dt, load=Load.together([touch.load for touch in self._contacts.touches]))
+        given = [done.on_texels for done in self._contacts.since_skip]
+        self.unfiltered.step(dt, load=Load.together([Load(each.texels, each.forces) for each in given]))
         self.history.append((rms(self.filtered), rms(self.unfiltered)))

@@ -164,12 +164,9 @@ def test_a_ray_finds_the_nearest_of_two_turned_and_moved_surfaces() -> None:
     left, right = (data.geom_xpos[ids[name]] for name in ("left", "right"))
     along = (right - left) / np.linalg.norm(right - left)
     for start, way, name in ((left - 2 * along, along, "left"), (right + 2 * along, -along, "right")):
-        hit = session.pick(start, way)
-        assert hit is not None
-        found, point, distance = hit
+        found, point, distance = session.pick(start, way)
         assert found == name
-        atlas = session.simulation.ripples[name].atlas
-        closest, _ = atlas.project(point)
+        closest, _ = session.simulation.ripples[name].atlas.project(point)
         assert np.linalg.norm(closest[0] - point) < 1e-3  # triangles in a ball
         # carried back to the world the point lies on the ray
         world = data.geom_xpos[ids[name]] + data.geom_xmat[ids[name]].reshape(3, 3) @ point
