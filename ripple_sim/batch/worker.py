@@ -39,7 +39,7 @@ from ripple_sim.video.render_video import render_video
 from ripple_sim.video.settings import frame_count, settled
 
 from .finished import FACTS, HEIGHTS, IMPULSES, POSITIONS, SENSORS, TIMES, FinishedScene, facts_hash
-from .folder import BatchFolder, clear, load_plan
+from .folder import BatchFolder, clear, load_stored
 from .plan import Plan, StoreEntry, options_of, video_name
 from .variation import Variation
 
@@ -194,7 +194,7 @@ def make_scene(folder: str, number: int) -> Outcome:
         if place is None:
             return Outcome(number, "there" if batch.is_finished(number) else "busy")
         try:
-            facts = _make(load_plan(batch.plan), number, place, batch)
+            facts = _make(load_stored(batch.plan).plan, number, place, batch)
             seconds = time.perf_counter() - start
             times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
             _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
