@@ -19,13 +19,7 @@ from gymnasium.envs.mujoco import MujocoEnv  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning  # noqa: E402
-from ripple_sim.gymnasium import (  # noqa: E402
-    RippleWrapper,
-    depth_buffer,
-    environment_camera,
-    frame_size,
-    model_and_data,
-)
+from ripple_sim.gymnasium import RippleWrapper, depth_buffer, environment_camera, frame_size, model_and_data  # noqa: E402
 from ripple_sim.render import find_viewpoint  # noqa: E402
 
 N = 16
@@ -135,13 +129,11 @@ def test_frames_show_the_ripples_in_the_size_of_the_environment(path: Path, mode
     env.ripples["block"].step(0.02)
     rippled = frames()
     for before, after in zip(flat, rippled, strict=True):
-        assert before.shape == after.shape
         if before.dtype == np.uint8:
-            assert before.shape == (48, 64, 3)
+            assert before.shape == after.shape == (48, 64, 3)
             assert np.abs(after.astype(int) - before).mean() > 1
         else:
-            assert before.shape == (48, 64)
-            assert before.dtype == np.float32
+            assert before.shape == after.shape == (48, 64) and before.dtype == np.float32
             assert 1e-5 < np.abs(after - before).max() < 0.1
     assert len(flat) == 1 + (mode == "rgbd_tuple")
     env.close()
@@ -165,14 +157,8 @@ def test_modes_without_ripples_say_so(path: Path) -> None:
 def test_make_vec_makes_ripples_in_this_process_and_in_another(mode: str, count: int, keywords: dict[str, Any]) -> None:
     materials, feel = {"torso_geom": Material(density=100.0)}, {"geom": "torso_geom", "at": [0, 0, 1.0], "rate": 1000}
     wrapper = functools.partial(RippleWrapper, materials=materials, sensors={"feel": feel}, **OPTIONS)
-    envs = gymnasium.make_vec(
-        "Ant-v5",
-        num_envs=count,
-        vectorization_mode=mode,
-        vector_kwargs=keywords,
-        wrappers=[wrapper],
-        max_episode_steps=3,
-    )
+    how = {"num_envs": count, "vectorization_mode": mode, "vector_kwargs": keywords}
+    envs = gymnasium.make_vec("Ant-v5", **how, wrappers=[wrapper], max_episode_steps=3)
     _, info = envs.reset(seed=1)
     assert info["heights"]["torso_geom"].shape == (count, 6, N, N)
     for _ in range(3):
@@ -226,23 +212,15 @@ def test_record_video_gets_every_frame_with_its_ripples(path: Path, monkeypatch:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_gymnasium_finds_no_fault_with_its_own_ant() -> None:
+def test_gymnasium_finds_no_fault_with_its_own_ant_which_is_made_anew_by_spec_or_pickle() -> None:
     env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS)
     check_env(env, skip_render_check=True)
-    made = gymnasium.make(env.spec)
-    assert isinstance(made, RippleWrapper)
-    assert list(made.ripples) == ["torso_geom"]
-
-
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_pickled_environment_begins_anew() -> None:
-    env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS)
     env.reset(seed=0)
     env.step(env.action_space.sample())
-    again = pickle.loads(pickle.dumps(env))
-    assert list(again.ripples) == ["torso_geom"]
-    assert again.ripples["torso_geom"].atlas.areas.shape[-1] == N
-    assert again.ripples["torso_geom"].time == 0.0 < env.ripples["torso_geom"].time
+    for again in (gymnasium.make(env.spec), pickle.loads(pickle.dumps(env))):
+        assert isinstance(again, RippleWrapper) and list(again.ripples) == ["torso_geom"]
+        assert again.ripples["torso_geom"].atlas.areas.shape[-1] == N
+        assert again.ripples["torso_geom"].time == 0.0 < env.ripples["torso_geom"].time
 
 
 def test_environments_without_a_model_are_refused() -> None:
@@ -261,6 +239,7 @@ def test_without_gymnasium_the_message_names_the_extra(monkeypatch: pytest.Monke
 VIEWED = """<mujoco><visual><global fovy="38"/></visual><worldbody><geom type="plane" size="2 2 1"/>
 <body pos="0.3 -0.2 1"><freejoint/><geom size="0.1"/><geom size="0.1" pos="0.2 0 0"/>
 <camera name="track" mode="trackcom" pos="0 -3 0.3" xyaxes="1 0 0 0 0 1" fovy="50"/></body></worldbody></mujoco>"""
+TRACKING = {"trackbodyid": 1, "lookat": np.array([0.0, 0.1, 2.0]), "elevation": -20.0, "azimuth": 30.0}
 
 
 def pose_of_mujoco(
@@ -280,14 +259,7 @@ def pose_of_mujoco(
 
 
 @pytest.mark.parametrize("camera_id", [-1, 0])
-@pytest.mark.parametrize(
-    "config",
-    [
-        {},
-        {"distance": 4.0},
-        {"trackbodyid": 1, "lookat": np.array([0.0, 0.1, 2.0]), "elevation": -20.0, "azimuth": 30.0},
-    ],
-)
+@pytest.mark.parametrize("config", [{}, {"distance": 4.0}, TRACKING])
 def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
     model, data = posed(VIEWED)
     viewer = types.SimpleNamespace(camera_id=camera_id, default_cam_config=config or None, width=320, height=200)
@@ -303,8 +275,7 @@ def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> 
 
 
 def test_environments_that_do_not_say_have_defaults() -> None:
-    model = mujoco.MjModel.from_xml_string(VIEWED)
-    data = mujoco.MjData(model)
+    model, data = posed(VIEWED)
     wrapped = types.SimpleNamespace(model=types.SimpleNamespace(ptr=model), data=types.SimpleNamespace(ptr=data))
     env = types.SimpleNamespace(physics=wrapped)
     assert model_and_data(env) == (model, data)

@@ -38,13 +38,9 @@ def test_same_scene_twice_gives_the_same_fields_and_frames(scene: Scene, backend
 
 
 def test_video_has_the_frames_that_were_asked_for(scene: Scene, tmp_path: Path) -> None:
-    calls = []
-    summary = render_video(
-        scene,
-        tmp_path / "out" / "a.mp4",
-        VideoOptions(size=(160, 90), fps=20),
-        progress=lambda done, total: calls.append((done, total)),
-    )
+    calls, options = [], VideoOptions(size=(160, 90), fps=20)
+    progress = lambda *frames: calls.append(frames)  # noqa: E731
+    summary = render_video(scene, tmp_path / "out" / "a.mp4", options, progress=progress)
     assert summary.frames == 10
     assert calls == [(i + 1, 10) for i in range(10)]
     with av.open(summary.output) as container:
@@ -72,10 +68,8 @@ def test_slow_motion_shows_the_same_simulation_more_often(scene: Scene, tmp_path
 def test_supersampled_frames_have_softer_edges_of_the_same_brightness(scene: Scene) -> None:
     simulation = Simulation(scene, fps=30, backend="cpu")
     (state,) = snapshots(simulation, 1)
-    plain, fine = (
-        FrameSource(simulation, width=96, height=54, supersample=factor).render(state).astype(float)
-        for factor in (1, 3)
-    )
+    sources = (FrameSource(simulation, width=96, height=54, supersample=factor) for factor in (1, 3))
+    plain, fine = (source.render(state).astype(float) for source in sources)
     assert fine.shape == plain.shape
     assert 0 < np.abs(fine - plain).mean() < 3
     assert np.abs(fine.mean() - plain.mean()) < 1

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ripple_sim.render.surfaces.adaptive import spline_weights
 from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, UV, tessellated
+from ripple_sim.render.surfaces.tessellation import COORDINATES, DIRECTION, NORMAL, POSITION, UV
+from ripple_sim.render.surfaces.vertices import tessellated
 from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
 from ripple_sim.solver import Atlas, HeightMap
 from ripple_sim.solver.kernel import Floats32, Ints32, kernel

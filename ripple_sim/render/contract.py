@@ -76,6 +76,14 @@ class MappingKind(IntEnum):
     CAPSULE_IMAGE = 6
 
 
+class CasterMap(IntEnum):
+    """What of objects is drawn where a light or the floor sees them; `NAME_MAP` in GLSL."""
+
+    DEPTH = 0
+    ALBEDO = 1  # linear colour
+    TRANSMISSION = 2  # what something transparent takes from a light
+
+
 # Depths that stand for what a pixel shows, exact in every depth buffer; `NAME_LEVEL` in GLSL.
 LEVELS = {
     "OPEN": 1.0,  # background that is smooth
@@ -192,6 +200,7 @@ DEFINES: dict[str, object] = {
     **numbered(Unit, "_UNIT"),
     **numbered(Binding, "_BINDING"),
     **numbered(MappingKind),
+    **numbered(CasterMap, "_MAP"),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
     **LIGHT.defines(),
     **SHADOW.defines(),

@@ -14,7 +14,8 @@ from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation, DeviceTessellation, Displacement
 from ripple_sim.render.surfaces.moving import MovingOcclusion, MovingVertices
 from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearance
-from ripple_sim.render.surfaces.vertices import BAKED, DIRECTION, NORMAL, POSITION, mapped_coordinates, surface_vertices
+from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION
+from ripple_sim.render.surfaces.vertices import mapped_coordinates, surface_vertices
 from ripple_sim.render.visuals.geoms import Instances, instances_of
 from ripple_sim.render.visuals.objects import Assets, Occluders
 from ripple_sim.render.visuals.shapes import NamedShape
@@ -22,7 +23,7 @@ from ripple_sim.render.visuals.visual import Visual, ball_of, geom_visual
 from ripple_sim.solver.errors import RippleError
 
 from .camera import Pose, balls_about
-from .contract import MappingKind
+from .contract import CasterMap, MappingKind
 from .resources import AnyHeightMap, HeightMapTextures, MovedHeightMap
 
 _PIXELS = 5.6  # length of an edge where the target fills the frame's height
@@ -115,20 +116,15 @@ class SurfaceMesh:
         )
         # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
         whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse))
-        solid, passing = (
-            int(not self._open),
-            look.transparency * rgb,
-        )  # linear colour of the light that passes through it
-        self._depth, self._albedo, self._transmission = (
-            resources.vertex_array(
-                resources.program("passes/casters", MOVED=1, ALBEDO_MAP=albedo, TRANSMISSION_MAP=passed, SOLID=solid),
-                [moved],
-                triangles,
+        solid, passing = int(not self._open), look.transparency * rgb  # linear colour of the light that passes
+        self._casters = {
+            seen: resources.vertex_array(
+                resources.program("passes/casters", MOVED=1, MAP=seen, SOLID=solid), [moved], triangles
             )
-            for albedo, passed, triangles in ((0, 0, whole), (1, 0, coarse), (0, 1, self._indices))
-        )
-        self._albedo.program["color"] = tuple(rgb - passing)
-        self._transmission.program["transmission"] = tuple(passing)
+            for seen, triangles in zip(CasterMap, (whole, coarse, self._indices), strict=True)
+        }
+        self._casters[CasterMap.ALBEDO].program["color"] = tuple(rgb - passing)
+        self._casters[CasterMap.TRANSMISSION].program["transmission"] = tuple(passing)
 
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
         """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.
@@ -219,24 +215,15 @@ class SurfaceMesh:
         self._program["color"] = self._color
         self._render(self._solid, self._count)
 
-    def draw_depth(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth of the unsplit triangles, under a matrix of 16 numbers, column by column."""
-        self._depth.program["matrix"] = view_projection
-        self._render(self._depth)
+    def cast(self, seen: CasterMap, **uniforms: Any) -> None:
+        """Draw into a map of a light or of the floor; see `DrawnScene.cast`."""
+        casters = self._casters[seen]
+        for name, value in uniforms.items():
+            casters.program[name] = value
+        self._render(casters, self._count if seen == CasterMap.TRANSMISSION else -1)
 
-    def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
-        """Draw few triangles of the same shape in their linear colour, likewise."""
-        self._albedo.program["matrix"] = view_projection
-        self._render(self._albedo)
-
-    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
-        """Draw into the transmission map of a light, likewise."""
-        program = self._transmission.program
-        program["matrix"], program["light"] = view_projection, light
-        self._render(self._transmission, self._count)
-
-    def _render(self, triangles: moderngl.VertexArray, count: int | moderngl.Buffer = -1) -> None:
-        """Render so many indices, by default all; where back faces are culled, both sides of an open surface."""
+    def _render(self, triangles: moderngl.VertexArray, count: int | moderngl.Buffer) -> None:
+        """Render so many indices, -1: all; where back faces are culled, both sides of an open surface."""
         with self._gl as ctx:
             if self._open:
                 ctx.disable(moderngl.CULL_FACE)
@@ -262,7 +249,7 @@ class DrawnScene:
     ----------
     targets : list of SurfaceMesh
     opaque, transparent : list of SurfaceMesh and Instances
-        Each can draw itself: into the G-buffer, or its depth, colour or transmission under a matrix.
+        Each can draw itself: into the G-buffer, or what a map of a light or of the floor has of it.
     """
 
     def __init__(self, assets: Assets, targets: Mapping[int, Surface], size: tuple[int, int]) -> None:
@@ -290,7 +277,11 @@ class DrawnScene:
         drawn: list[SurfaceMesh | Instances] = [*surfaces, *self._instances]
         self.opaque = [each for each in drawn if not each.transparent]
         self.transparent = [each for each in drawn if each.transparent]
-        self._occluding = [each for each in drawn if each.occludes]
+        self._casters = {
+            CasterMap.DEPTH: [each for each in self.opaque if each.casts],
+            CasterMap.ALBEDO: [each for each in drawn if each.occludes],
+            CasterMap.TRANSMISSION: [each for each in self.transparent if each.casts],
+        }
 
     def target(self, geom: int) -> SurfaceMesh:
         """The target of a geom; raises `RippleError` if the geom is no target."""
@@ -337,22 +328,13 @@ class DrawnScene:
         for each in self.opaque:
             each.draw()
 
-    def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth of everything opaque, which casts shadows, under a matrix of 16 numbers, column by column."""
-        for each in self.opaque:
-            if each.casts:
-                each.draw_depth(view_projection)
+    def cast(self, seen: CasterMap, **uniforms: Any) -> None:
+        """Draw into a map what belongs there: of opaque casters, of all that occludes the sky, of transparent casters.
 
-    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
-        """Draw everything transparent into the transmission map of a light, likewise."""
-        for each in self.transparent:
-            if each.casts:
-                each.draw_transmission(view_projection, light)
-
-    def draw_occluders(self, view_projection: tuple[float, ...]) -> None:
-        """Draw everything that occludes the sky in its linear colour, likewise."""
-        for each in self._occluding:
-            each.draw_albedo(view_projection)
+        Uniforms are those of casters.glsl: `matrix`, 16 numbers, column by column, and the `light` of a transmission.
+        """
+        for each in self._casters[seen]:
+            each.cast(seen, **uniforms)
 
     def layers(self, data: Any, pose: Pose) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
         """Everything transparent with the balls about it, the furthest first."""

@@ -333,11 +333,11 @@ class Renderer:
         scene, shadows = self._scene, self._shadows
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.depth_func = "<="
-        shadows.draw(scene.draw_shadow)
-        self._occlusion.look_up(ctx, scene.draw_occluders)
+        shadows.draw(scene.cast)
+        self._occlusion.look_up(ctx, scene.cast)
         shadows.find_blockers(ctx)
         if self._transmission is not None:
-            self._transmission.draw(shadows.views, scene.draw_transmission)
+            self._transmission.draw(shadows.views, scene.cast)
             self._transmission.bind()
         self._occlusion.shade(ctx, shadows)
 

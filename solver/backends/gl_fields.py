@@ -136,6 +136,11 @@ class FieldLayout:
         with self._gl:
             buffer.write(self._with_halo(field))
 
+    def clear(self, buffer: moderngl.Buffer) -> None:
+        """Make a field 0."""
+        with self._gl:
+            buffer.clear()
+
     def _with_halo(self, *fields: NDArray | np.float32) -> NDArray[np.float32]:
         places = np.zeros((len(fields), *self._places), np.float32)
         for around, field in zip(places, fields, strict=True):

@@ -119,10 +119,7 @@ def test_frames_and_passes_are_read_from_a_tar_file(packed):
     assert frames[0].std() > 5
     passes = list(scene.passes())
     assert len(passes) == 4
-    assert {name: array.shape for name, array in passes[0].items()}.items() >= {
-        "depth": (48, 64),
-        "flow": (48, 64, 2),
-    }.items()
+    assert (passes[0]["depth"].shape, passes[0]["flow"].shape) == ((48, 64), (48, 64, 2))
     with pytest.raises(BatchError, match=r"has no file 'clip\.mp4'; it has "):
         scene.read("clip.mp4")
 

@@ -19,9 +19,14 @@ from ripple_sim.solver.layouts.cube.convention import check_memory
 from ripple_sim.solver.operator import PRESETS
 
 
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
+def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
+    """What is told on a terminal from now on."""
+    told = io.StringIO()
+    told.isatty = lambda: True  # type: ignore[method-assign]
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setattr(sys, "stderr", told)
+    return told
 
 
 def test_a_pipe_stays_silent(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,35 +37,23 @@ def test_a_pipe_stays_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     assert pipe.getvalue() == ""
 
 
-def test_a_terminal_shows_title_and_frames_done(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("COLUMNS", "100")
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
+def test_a_terminal_shows_title_and_frames_done(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    told = terminal(monkeypatch)
     with frame_progress("llvmpipe [red] (LLVM 15), waves cpu") as report:
         report(3, 120)
         report(60, 120)
-    text = terminal.getvalue()
-    assert "llvmpipe [red] (LLVM 15), waves cpu" in text
-    assert "60/120" in text
+    assert all(each in told.getvalue() for each in ("llvmpipe [red] (LLVM 15), waves cpu", "60/120"))
     assert capsys.readouterr().out == ""
 
 
 def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.setattr(sys, "stderr", Terminal())
-    kernels = "ripple_sim.solver.backends.kernels"
+    told, kernels = terminal(monkeypatch), "ripple_sim.solver.backends.kernels"
     monkeypatch.setattr("ripple_sim.solver.kernel.compiling", lambda: kernels)
     times = {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0}
     monkeypatch.setattr("ripple_sim.solver.kernel.compile_times", lambda: times)
     with frame_progress("renderer", 120):
         pass
-    text = sys.stderr.getvalue()
-    assert "compiling the wave step (once): 12 s" in text
-    assert "0/120" in text
+    assert all(each in told.getvalue() for each in ("compiling the wave step (once): 12 s", "0/120"))
 
 
 def test_what_takes_long_is_logged_and_printed_as_a_line(
@@ -83,8 +76,7 @@ def test_what_takes_long_is_logged_and_printed_as_a_line(
 
 
 def test_an_error_goes_on_through_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(sys, "stderr", Terminal())
+    terminal(monkeypatch)
     with pytest.raises(KeyboardInterrupt), frame_progress("renderer"):
         raise KeyboardInterrupt
 

@@ -7,21 +7,20 @@ import igl
 import mujoco
 import numpy as np
 import pytest
+from hits import Run
 from mujoco_models import BALL, forwarded, limbed_asset, model_of
 
 from ripple_sim import Material, Ripples
 
 
 def impulses(model: mujoco.MjModel, geom: str, seconds: float, **options):
-    """Run; return the ripples, the data, and every impulse with the data's pose of the target at that moment."""
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {geom: Material(speed=0.5, density=50.0)}, backend="cpu", **options)
-    record = []
-    while data.time < seconds:
-        ripples.mj_step(data)
-        pose = data.geom(geom).xpos.copy(), data.geom(geom).xmat.reshape(3, 3).copy()
-        record += [(impulse, pose, data.body("ball").xpos.copy()) for impulse in ripples.last_impulses]
-    return ripples, data, record
+    """Run; return the ripples, and every impulse with the data's pose of the target at that moment."""
+    run, record = Run(model, geom, material=Material(speed=0.5, density=50.0), conserve_volume=True, **options), []
+    while run.data.time < seconds:
+        hits, placed = run.step(), run.data.geom(geom)
+        pose = placed.xpos.copy(), placed.xmat.reshape(3, 3).copy()
+        record += [(hit, pose, run.data.body("ball").xpos.copy()) for hit in hits]
+    return run.ripples, record
 
 
 def texels_apart(ripples: Ripples, geom: str, texel: tuple[int, int, int], point: np.ndarray) -> float:
@@ -56,7 +55,7 @@ def test_ball_on_a_concave_mesh_hits_the_surface_under_it(transform: str, placin
     near = world[np.linalg.norm(world[:, :2] - middle[:2], axis=1) < 0.03]
     top = near[near[:, 2].argmax()]
     model = model_of(geom + BALL.format(f"{top[0]} {top[1]} {top[2] + 0.15}"), asset)
-    ripples, _, record = impulses(model, "target", 0.4, resolution=64)
+    ripples, record = impulses(model, "target", 0.4, resolution=64)
     assert record
     for impulse, (position, rotation), ball in record[:3]:
         local = (impulse.point - position) @ rotation
@@ -107,17 +106,15 @@ def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> 
 
 def test_second_step_at_the_same_time_does_nothing() -> None:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.549"))
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
-    for _ in range(3):
-        ripples.mj_step(data)
+    run = Run(model, "target", material=Material(), resolution=8, conserve_volume=True).until(0.003)
+    ripples, waves = run.ripples, run.ripples["target"]
     assert ripples.last_impulses
-    height, velocity = ripples["target"].height, ripples["target"].velocity
-    ripples.step(data)
+    height, velocity = waves.height, waves.velocity
+    ripples.step(run.data)
     assert not ripples.last_impulses
-    np.testing.assert_array_equal(ripples["target"].height, height)
-    np.testing.assert_array_equal(ripples["target"].velocity, velocity)
-    assert ripples["target"].time == pytest.approx(data.time)
+    np.testing.assert_array_equal(waves.height, height)
+    np.testing.assert_array_equal(waves.velocity, velocity)
+    assert waves.time == pytest.approx(run.data.time)
 
 
 @pytest.mark.filterwarnings("ignore:MuJoCo. compiler attribute 'settotalmass'")

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from hits import Run
 from numpy.testing import assert_allclose
 
 from ripple_sim import Ripples
@@ -52,17 +53,9 @@ def skinned() -> str:
 face="{" ".join(str(each) for triangle in F for each in triangle)}">{bones}</skin></deformable></mujoco>"""
 
 
-def run(xml: str, name: str, steps: int, **options: object) -> tuple[Ripples, mujoco.MjData, float, float]:
-    """Step a model: ripples, data, impulse of the ball on the target, and the ball's upward momentum gained."""
+def begun(xml: str, name: str) -> Run:
     model = mujoco.MjModel.from_xml_string(xml)
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {name: SOFT}, resolution=8, backend="cpu", **options)
-    impulse, dof = 0.0, model.body("ball").dofadr[0] + 2
-    for _ in range(steps):
-        ripples.mj_step(data)
-        impulse += sum(each.impulse for each in ripples.last_impulses if each.other == "ball")
-    gained = float(model.body("ball").mass[0] * (data.qvel[dof] + 9.81 * data.time))
-    return ripples, data, impulse, gained
+    return Run(model, name, material=SOFT, resolution=8, conserve_volume=True)
 
 
 TARGETS = {"3d": (JELLY, "jelly"), "2d": (CLOTH, "cloth"), "skin": (skinned(), "arm")}
@@ -70,13 +63,15 @@ TARGETS = {"3d": (JELLY, "jelly"), "2d": (CLOTH, "cloth"), "skin": (skinned(), "
 
 @pytest.mark.parametrize("xml, name", TARGETS.values(), ids=TARGETS)
 def test_the_balls_momentum_reaches_the_surface(xml, name, recwarn):
-    ripples, _, impulse, gained = run(xml, name, 350)
+    run = begun(xml, name).until(0.35)
     assert not any("wraps" in str(each.message) for each in recwarn)
+    ball, waves = run.model.body("ball"), run.ripples[name]
+    gained = ball.mass[0] * (run.data.qvel[ball.dofadr[0] + 2] + 9.81 * run.data.time)
     assert gained > 0.2
-    assert impulse == pytest.approx(gained, rel=0.06)
-    assert np.abs(ripples[name].height).max() > 1e-3
-    assert np.isfinite(ripples[name].height).all()
-    assert ripples[name].atlas.layout == ("patches" if name == "cloth" else "cube")
+    given = sum(hit.impulse for hits in run.hits for hit in hits if hit.other == "ball")
+    assert given == pytest.approx(gained, rel=0.06)
+    assert 1e-3 < np.abs(waves.height).max() < np.inf
+    assert waves.atlas.layout == ("patches" if name == "cloth" else "cube")
 
 
 HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
@@ -88,13 +83,10 @@ HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
 
 def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses(recwarn):
     """Forces on its slopes cancel as vectors, and those are exact; the surface gets the amounts of the normal ones."""
-    model = mujoco.MjModel.from_xml_string(HAMMOCK)
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {"cloth": SOFT}, resolution=8, backend="cpu")
-    impulse, amounts, whole, force = 0.0, 0.0, np.zeros(3), np.zeros(6)
+    run = begun(HAMMOCK, "cloth")
+    model, data, amounts, whole, force = run.model, run.data, 0.0, np.zeros(3), np.zeros(6)
     for _ in range(400):
-        ripples.mj_step(data)
-        impulse += sum(each.impulse for each in ripples.last_impulses)
+        run.step()
         for i in range(data.ncon):
             mujoco.mj_contactForce(model, data, i, force)
             amounts += 0.001 * force[0]
@@ -102,27 +94,25 @@ def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses(
             whole += 0.001 * on_ball * force[:3] @ data.contact.frame[i].reshape(3, 3)
     dof, gained = model.body("ball").dofadr[0], np.array([0.0, 0.0, 0.1 * 9.81 * data.time])
     assert_allclose(whole, 0.1 * data.qvel[dof : dof + 3] + gained, atol=1e-6)
-    assert impulse == pytest.approx(amounts, rel=1e-6)
-    assert impulse > 1.1 * np.linalg.norm(whole)
-    assert [str(each.message)[:32] for each in recwarn if "wraps" in str(each.message)] == [
-        "flex 'cloth' wraps round 'ball':"
-    ]
+    assert run.given() == pytest.approx(amounts, rel=1e-6)
+    assert run.given() > 1.1 * np.linalg.norm(whole)
+    told = [str(each.message) for each in recwarn if "wraps" in str(each.message)]
+    assert [each[:32] for each in told] == ["flex 'cloth' wraps round 'ball':"]
 
 
 def test_texels_lie_where_the_flex_is():
-    ripples, data, _, _ = run(JELLY, "jelly", 100)
-    corners = data.flexvert_xpos
-    V = ripples["jelly"].vertices
-    assert all(np.linalg.norm(corners - each, axis=1).min() < 1e-12 for each in V)
-    assert_allclose(V[ripples["jelly"].atlas.mesh.F].min(axis=(0, 1)), corners.min(axis=0))
+    run = begun(JELLY, "jelly").until(0.1)
+    corners, waves = run.data.flexvert_xpos, run.ripples["jelly"]
+    assert all(np.linalg.norm(corners - each, axis=1).min() < 1e-12 for each in waves.vertices)
+    assert_allclose(waves.vertices[waves.atlas.mesh.F].min(axis=(0, 1)), corners.min(axis=0))
 
 
 def test_a_skin_follows_its_bones():
-    ripples, data, _, _ = run(skinned(), "arm", 1)
-    before = ripples["arm"].rest.mesh.V
-    data.qpos[0] = np.pi / 2
-    ripples.mj_step(data)
-    after = ripples["arm"].vertices
+    run = begun(skinned(), "arm").until(0.001)
+    before = run.ripples["arm"].rest.mesh.V
+    run.data.qpos[0] = np.pi / 2
+    run.step()
+    after = run.ripples["arm"].vertices
     near, far = before[:, 0] < -0.2, before[:, 0] > 0.2
     assert_allclose(after[near], before[near], atol=1e-6)
     assert_allclose(after[far][:, 1], before[far][:, 0], atol=2e-3)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from exposed_scene import linear
 
 from ripple_sim import overlay
 from ripple_sim.errors import SceneError
@@ -15,11 +16,6 @@ RGB_TO_XYZ = np.array(
 )
 
 
-def linear_rgb(srgb: np.ndarray) -> np.ndarray:
-    value = srgb / 255
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-
-
 def lab(rgb: np.ndarray) -> np.ndarray:
     xyz = np.clip(rgb, 0, 1) @ RGB_TO_XYZ.T / [0.95047, 1.0, 1.08883]
     f = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
@@ -28,7 +24,7 @@ def lab(rgb: np.ndarray) -> np.ndarray:
 
 
 def test_colors_diverge_evenly_from_a_bright_middle() -> None:
-    table = lab(linear_rgb(overlay.color_table().astype(float)))
+    table = lab(linear(overlay.color_table().astype(float)))
     middle = overlay.SIZE // 2
     assert table[middle, 0] > 95
     assert np.abs(table[middle, 1:]).max() < 1
@@ -43,7 +39,7 @@ def test_colors_diverge_evenly_from_a_bright_middle() -> None:
 
 @pytest.mark.parametrize("vision", [np.eye(3), DEUTAN, PROTAN])
 def test_signs_are_told_apart_by_every_eye(vision: np.ndarray) -> None:
-    seen = lab(linear_rgb(overlay.color_table().astype(float)) @ vision.T)
+    seen = lab(linear(overlay.color_table().astype(float)) @ vision.T)
     apart = np.linalg.norm(seen - seen[::-1], axis=1)
     middle = overlay.SIZE // 2
     assert apart[middle + middle // 4] > 15  # a difference of 2 to 3 is just seen

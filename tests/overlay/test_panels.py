@@ -3,7 +3,6 @@
 import itertools
 from types import SimpleNamespace
 
-import mujoco
 import numpy as np
 import pytest
 from mujoco_models import posed
@@ -16,6 +15,7 @@ from ripple_sim.scene import NAMES, parse_request
 from ripple_sim.solver import sphere_atlas
 
 SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
+SCALE = 1.0, 1.0
 
 
 @pytest.fixture
@@ -81,8 +81,7 @@ def test_a_comparison_fits(size: tuple[int, int], written: list) -> None:
     titles = [overlay.TITLES["fem"], overlay.TITLES["dynamic-paint"]]
     painter = Painter(parse_request(NAMES[1:]), Layout(*size), duration=5.0, spacing=8, titles=titles)
     curve = np.linspace(0, 5, 9), np.ones(9)
-    scale = 1.0, 1.0
-    panels = painter._panels(Notes(1.0, [], scale, [], scale, [curve, curve], scale))
+    panels = painter._panels(Notes(1.0, [], SCALE, [], SCALE, [curve, curve], SCALE))
     left, middle, right = (panels[corner][0].width for corner in ("top left", "top", "top right"))
     assert max(left, right) + middle / 2 < size[0] / 2 - Layout(*size).margin
     assert panels["bottom left"][0].width + panels["bottom right"][0].width < size[0]
@@ -97,10 +96,8 @@ def test_a_comparison_fits(size: tuple[int, int], written: list) -> None:
 @pytest.mark.parametrize("size", [(16, 16), (32, 400), (400, 32), (160, 90)])
 def test_a_tiny_frame_has_no_panels(size: tuple[int, int]) -> None:
     frame = np.zeros((*size[::-1], 3), np.uint8)
-    scale = 1.0, 1.0
-    Painter(parse_request(["time"]), Layout(*size), duration=5.0).paint(
-        frame, Notes(1, [], scale, [], scale, [], scale)
-    )
+    notes = Notes(1.0, [], SCALE, [], SCALE, [], SCALE)
+    Painter(parse_request(["time"]), Layout(*size), duration=5.0).paint(frame, notes)
     assert not frame.any()
 
 
@@ -124,9 +121,7 @@ def test_bar_has_the_colors_of_its_values() -> None:
     bar.over(frame, 0, 0)
     row = frame[round(2.25 * layout.em)].astype(int)
     for value in (-0.02, -0.01, 0.0, 0.005, 0.0199):
-        expected = overlay.colors(value, 0.02).astype(int)
-        nearest = np.abs(row - expected).max(axis=1)
-        assert nearest.min() <= 2
+        assert np.abs(row - overlay.colors(value, 0.02).astype(int)).max(axis=1).min() <= 2
     middle = np.abs(row - overlay.colors(0.0, 0.02).astype(int)).sum(axis=1)
     assert abs(int(np.argmin(middle)) - bar.width / 2) < 3
 
@@ -137,8 +132,8 @@ EMPTY = '<mujoco><worldbody><geom size=".1" pos="0 0 -9"/>{}</worldbody></mujoco
 FRONT = Projection(Camera((0, 0, 0), 5.0, 90.0, 0.0).pose(), *SIZE)
 
 
-def state(body: str = "") -> tuple[mujoco.MjModel, mujoco.MjData]:
-    return posed(EMPTY.format(body))
+def placed(marks: list[Mark], body: str = "", largest: float = 1.0) -> list:
+    return overlay.place_marks(marks, largest, LAYOUT, FRONT, *posed(EMPTY.format(body)))
 
 
 def mark(
@@ -150,25 +145,22 @@ def mark(
 @pytest.mark.parametrize(("impulse", "length"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (1.4, 1.4), (9.0, 1.5)])
 @pytest.mark.parametrize("distance", [0.0, 40.0])
 def test_an_arrow_is_as_long_as_its_impulse_at_any_distance(impulse: float, length: float, distance: float) -> None:
-    [(tip, tail, _)] = overlay.place_marks([mark(2 * impulse, place=(0, distance, 0))], 2.0, LAYOUT, FRONT, *state())
+    [(tip, tail, _)] = placed([mark(2 * impulse, place=(0, distance, 0))], largest=2.0)
     np.testing.assert_allclose(tip, [320, 240], atol=1e-9)
     np.testing.assert_allclose(tail, [320 + length * LAYOUT.arrow_length, 240], atol=1e-9)
 
 
 def test_an_arrow_along_the_view_is_foreshortened_and_one_behind_the_camera_left_out() -> None:
     marks = [mark(1.0, axis=(0, -1, 0), place=(0.5, 0, 0)), mark(1.0, place=(0, -9, 0))]
-    [(tip, tail, _)] = overlay.place_marks(marks, 1.0, LAYOUT, FRONT, *state())
+    [(tip, tail, _)] = placed(marks)
     assert np.linalg.norm(tail - tip) < 0.2 * LAYOUT.arrow_length
 
 
 def test_hidden_parts_are_faint_and_fading_marks_fainter() -> None:
     box = '<geom type="box" size=".2 .1 1" pos=".2 -1 0"/>'
     reach = 0.4 / FRONT.metres(np.zeros(3)) / LAYOUT.arrow_length
-    [(_, _, opacity)] = overlay.place_marks(
-        [mark(reach, place=(0.2, 0, 0), opacity=0.5)], 1.0, LAYOUT, FRONT, *state(box)
-    )
-    assert opacity[0] == pytest.approx(0.15)
-    assert opacity[-1] == pytest.approx(0.5)
+    [(_, _, opacity)] = placed([mark(reach, place=(0.2, 0, 0), opacity=0.5)], box)
+    assert opacity[[0, -1]] == pytest.approx([0.15, 0.5])
     assert set(np.round(opacity, 9)) == {0.15, 0.5}
 
 

@@ -37,6 +37,12 @@ def run(model: mujoco.MjModel, entries: list, seconds: float) -> mujoco.MjData:
     return data
 
 
+def applied(model: mujoco.MjModel, entry: DropEntry | ThrowEntry | PlaceEntry) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    script(model, entry).apply(data, {})
+    return data
+
+
 def velocity(data: mujoco.MjData, name: str) -> np.ndarray:
     """Angular and linear velocity of a body in the world."""
     found = np.zeros(6)
@@ -47,13 +53,9 @@ def velocity(data: mujoco.MjData, name: str) -> np.ndarray:
 
 @pytest.mark.parametrize("entry", [DropEntry, ThrowEntry])
 def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(model, entry: type) -> None:
-    data = mujoco.MjData(model)
     turn = (0.5, -1.5, 2.0, 1.0)
-    motions = script(
-        model,
-        entry("stone", 0.0, position=(1, 2, 3), orientation=turn, velocity=(4, 5, 6), angular_velocity=(-1, 2, 3)),
-    )
-    motions.apply(data, {})
+    motion = {"velocity": (4, 5, 6), "angular_velocity": (-1, 2, 3)}
+    data = applied(model, entry("stone", 0.0, position=(1, 2, 3), orientation=turn, **motion))
     np.testing.assert_allclose(velocity(data, "stone"), [-1, 2, 3, 4, 5, 6], atol=1e-12)
     np.testing.assert_allclose(data.body("stone").xpos, [1, 2, 3])
     np.testing.assert_allclose(data.body("stone").xquat, np.array(turn) / np.linalg.norm(turn))
@@ -61,8 +63,7 @@ def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(model
 
 
 def test_without_place_and_orientation_a_throw_begins_where_the_body_is(model) -> None:
-    data = mujoco.MjData(model)
-    script(model, ThrowEntry("stone", 0.0, velocity=(1, 0, 0), angular_velocity=(0, 0, 7))).apply(data, {})
+    data = applied(model, ThrowEntry("stone", 0.0, velocity=(1, 0, 0), angular_velocity=(0, 0, 7)))
     np.testing.assert_allclose(velocity(data, "stone"), [0, 0, 7, 1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(data.body("stone").xpos, [0, 0, 3])
     np.testing.assert_allclose(data.body("stone").xquat, [0.6, 0, 0.8, 0])

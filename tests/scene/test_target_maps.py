@@ -31,6 +31,11 @@ preset = {name = "layer", modulus = 500, density = 1000}
 """
 
 
+def simulation_of(folder: Path, table: str) -> Simulation:
+    (folder / "egg.toml").write_text(table)
+    return Simulation(load_scene(folder / "egg.toml"), backend="cpu")
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A scene of a sphere that stands apart and turned in its body, and its core in millimetres and in voxels."""
@@ -52,11 +57,9 @@ def folder(tmp_path: Path) -> Path:
     ids=["mesh", "volume"],
 )
 def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside: str) -> None:
-    (folder / "egg.toml").write_text(TOML + f"[[ripple.inside]]\n{inside}\n")
-    simulation = Simulation(load_scene(folder / "egg.toml"), backend="cpu")
+    simulation = simulation_of(folder, TOML + f"[[ripple.inside]]\n{inside}\n")
     waves = simulation.ripples["egg"]
-    along = np.array([SHIFT, 2.0, 0.0])
-    middle = simulation.ripples.to_geom("egg", along)  # where the core is in the frame of the geom
+    middle = simulation.ripples.to_geom("egg", [SHIFT, 2.0, 0.0])  # where the core is in the frame of the geom
     to, n = middle - waves.atlas.positions, -waves.atlas.normals
     near = (to * n).sum(axis=-1)
     exact = near - np.sqrt(CORE**2 - (to**2).sum(axis=-1) + near**2)
@@ -67,12 +70,10 @@ def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside:
 
 
 def test_limits_hold(folder: Path) -> None:
-    limits = "thickness_limits = [0.15, 0.25]"
-    toml = TOML.replace("resolution = 24", f"resolution = 24\n{limits}")
-    (folder / "egg.toml").write_text(toml + "[[ripple.inside]]\nmesh = 'core.stl'\nscale = 1e-3\n")
-    density = np.asarray(Simulation(load_scene(folder / "egg.toml"), backend="cpu").ripples["egg"].material.density)
-    assert density.min() == pytest.approx(0.665 * DENSITY * 0.15)
-    assert density.max() == pytest.approx(0.665 * DENSITY * 0.25)
+    toml = TOML.replace("resolution = 24", "resolution = 24\nthickness_limits = [0.15, 0.25]")
+    simulation = simulation_of(folder, toml + "[[ripple.inside]]\nmesh = 'core.stl'\nscale = 1e-3\n")
+    density = np.asarray(simulation.ripples["egg"].material.density)
+    assert [density.min(), density.max()] == pytest.approx([0.665 * DENSITY * limit for limit in (0.15, 0.25)])
 
 
 @pytest.mark.parametrize(
@@ -101,9 +102,8 @@ def test_senseless_entries_are_refused(entry: dict, message: str) -> None:
     ids=["without-preset", "no-layer", "limits"],
 )
 def test_a_scene_without_a_layer_is_refused(folder: Path, toml: str, message: str) -> None:
-    (folder / "egg.toml").write_text(toml + "[[ripple.inside]]\nmesh = 'core.stl'\n")
     with pytest.raises(RippleError, match=message):
-        load_scene(folder / "egg.toml")
+        simulation_of(folder, toml + "[[ripple.inside]]\nmesh = 'core.stl'\n")
 
 
 def test_files_are_told_apart_by_their_endings(folder: Path) -> None:
@@ -111,9 +111,8 @@ def test_files_are_told_apart_by_their_endings(folder: Path) -> None:
         load_inside(folder / "core.npy")
     with pytest.raises(RippleError, match="is a mesh, which takes no threshold"):
         load_inside(folder / "core.stl", 0.5)
-    assert np.ptp(load_inside(folder / "core.npy", 0.0, VOXEL, scale=2.0).surface()[0][:, 0]) == pytest.approx(
-        4 * CORE, rel=0.02
-    )
+    V, _ = load_inside(folder / "core.npy", 0.0, VOXEL, scale=2.0).surface()
+    assert np.ptp(V[:, 0]) == pytest.approx(4 * CORE, rel=0.02)
 
 
 X, Y = np.linspace(-1, 1, 12).reshape(3, 4), np.linspace(0, 2, 12).reshape(3, 4)
@@ -186,8 +185,7 @@ material = {density = 10.0}
 
 def simulated(folder: Path, height: str) -> Simulation:
     (folder / "egg.xml").write_text(MJCF)
-    (folder / "egg.toml").write_text(BEGIN + f"[ripple.height]\n{height}\n")
-    return Simulation(load_scene(folder / "egg.toml"), backend="cpu")
+    return simulation_of(folder, BEGIN + f"[ripple.height]\n{height}\n")
 
 
 def test_an_expression_is_of_the_position_in_the_frame_of_the_body(tmp_path: Path) -> None:
@@ -224,8 +222,8 @@ def test_an_image_is_taken_in_the_mesh_s_own_coordinates(tmp_path: Path) -> None
     )
     heights = []
     for shape in ("map = 'ramp.png'\nlow = -0.01\nhigh = 0.01", "expression = '0.02 * x'"):
-        (tmp_path / "square.toml").write_text(BEGIN.replace("egg.xml", "square.xml") + f"[ripple.height]\n{shape}\n")
-        heights.append(Simulation(load_scene(tmp_path / "square.toml"), backend="cpu").ripples["egg"].height)
+        table = BEGIN.replace("egg.xml", "square.xml") + f"[ripple.height]\n{shape}\n"
+        heights.append(simulation_of(tmp_path, table).ripples["egg"].height)
     # the image repeats, so that its two ends meet within a pixel of the sides
     assert np.quantile(np.abs(heights[0] - heights[1]), 0.9) < 1e-4
     assert np.ptp(heights[1]) > 0.019
@@ -264,10 +262,8 @@ def plate(folder: Path, rim: str) -> Simulation:
         <geom name="plate" type="mesh" mesh="plate" pos="0 2 0" euler="0 0 90" contype="0"
         conaffinity="0"/></body></worldbody></mujoco>"""
     )
-    (folder / "plate.toml").write_text(
-        f'model = "plate.xml"\n[[ripple]]\ngeom = "plate"\nresolution = 12\nrim = {rim}\nmaterial.preset = "plate"\n'
-    )
-    return Simulation(load_scene(folder / "plate.toml"), backend="cpu")
+    table = f'[[ripple]]\ngeom = "plate"\nresolution = 12\nrim = {rim}\nmaterial.preset = "plate"\n'
+    return simulation_of(folder, 'model = "plate.xml"\n' + table)
 
 
 def test_rims_are_what_they_are_said_to_be_where_the_conditions_hold(tmp_path: Path) -> None:
@@ -304,6 +300,5 @@ def test_rims_that_cannot_be_are_refused(tmp_path: Path, rim: str, message: str)
 
 def test_a_closed_surface_has_no_rims_by_region(folder: Path) -> None:
     toml = TOML.replace("resolution = 24", "resolution = 8\nlayout = 'patches'\nrim = {clamped = 'x < 0'}")
-    (folder / "egg.toml").write_text(toml)
     with pytest.raises(SceneError, match="it is closed; leave rim out"):
-        Simulation(load_scene(folder / "egg.toml"), backend="cpu")
+        simulation_of(folder, toml)

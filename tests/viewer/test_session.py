@@ -118,9 +118,8 @@ def test_colours_follow_the_waves_at_once_and_fade_slowly(session: Session) -> N
 
 def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    session = Session(
-        open_scene(write_scene(tmp_path, MJCF.format('<option gravity="0 0 -9e9"/>'), TOML)), resolution=8
-    )
+    path = write_scene(tmp_path, MJCF.format('<option gravity="0 0 -9e9"/>'), TOML)
+    session = Session(open_scene(path), resolution=8)
     with pytest.raises(SimulationError):
         run(session, 50)
     assert session.paused
@@ -164,12 +163,9 @@ def test_a_ray_finds_the_nearest_of_two_turned_and_moved_surfaces() -> None:
     left, right = (data.geom_xpos[ids[name]] for name in ("left", "right"))
     along = (right - left) / np.linalg.norm(right - left)
     for start, way, name in ((left - 2 * along, along, "left"), (right + 2 * along, -along, "right")):
-        hit = session.pick(start, way)
-        assert hit is not None
-        found, point, distance = hit
+        found, point, distance = session.pick(start, way)
         assert found == name
-        atlas = session.simulation.ripples[name].atlas
-        closest, _ = atlas.project(point)
+        closest, _ = session.simulation.ripples[name].atlas.project(point)
         assert np.linalg.norm(closest[0] - point) < 1e-3  # triangles in a ball
         # carried back to the world the point lies on the ray
         world = data.geom_xpos[ids[name]] + data.geom_xmat[ids[name]].reshape(3, 3) @ point

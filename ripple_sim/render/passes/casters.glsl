@@ -1,6 +1,5 @@
 #version 410
-// Objects as a light or the floor sees them: their depth, with ALBEDO_MAP their linear colour, with TRANSMISSION_MAP what
-// something transparent takes from a light (see soft_shadows.glsl). With MOVED vertices are those of a target, displaced.
+// Objects as a light or the floor sees them: MAP says what of them (see contract.py, soft_shadows.glsl). With MOVED vertices are those of a target, displaced.
 #include "glsl/frame.glsl"
 
 VARYING vec3 albedo;
@@ -40,7 +39,7 @@ void main()
 #endif
 
 #stage fragment
-#if TRANSMISSION_MAP
+#if MAP == TRANSMISSION_MAP
 uniform int light;
 uniform vec3 transmission;  // share of the light that passes, where it meets a refracting surface head on
 
@@ -70,7 +69,7 @@ void main()
     vec3 taken = 1.0 - passes;
     fragment = vec4(taken, dot(taken, vec3(1.0 / 3.0)) * light_distance(shadows[light].depth, gl_FragCoord.z));
 }
-#elif ALBEDO_MAP
+#elif MAP == ALBEDO_MAP
 out vec4 fragment;
 
 void main()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.camera import orthographic, perspective
-from ripple_sim.render.contract import MappingKind, Unit
+from ripple_sim.render.contract import CasterMap, MappingKind, Unit
 from ripple_sim.render.resources import FrameUniforms, Resources
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.lights import Light
@@ -82,14 +82,14 @@ class ShadowMaps:
             self.views.append(tuple(matrix.T.ravel()))
         return casting
 
-    def draw(self, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
-        """Draw all maps; `draw_depth` draws the casters' depth under a matrix of 16 numbers."""
+    def draw(self, cast: Callable[..., None]) -> None:
+        """Draw all maps, with the scene's `cast`."""
         for index, view in enumerate(self.views):
             self._target.viewport = (index * self.size, 0, self.size, self.size)
             self._target.use()
             if index == 0:
                 self._target.clear(depth=1.0)
-            draw_depth(view)
+            cast(CasterMap.DEPTH, matrix=view)
 
     def find_blockers(self, ctx: moderngl.Context) -> None:
         """Prefilter the maps for the search for blockers."""
@@ -161,9 +161,6 @@ def _view(rotation: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np
     return view
 
 
-Matrix = tuple[float, ...]
-
-
 class TransmissionMaps:
     """Square maps in colour, side by side, of the transparent objects of a scene as the lights see them.
 
@@ -180,14 +177,14 @@ class TransmissionMaps:
         self._maps = resources.clamped_texture((count * size, size), 4, mipmaps=True, dtype="f2")
         self._target = resources.framebuffer([self._maps], resources.depth_renderbuffer((count * size, size)))
 
-    def draw(self, views: Sequence[Matrix], draw: Callable[[Matrix, int], None]) -> None:
-        """Draw all maps; `draw` draws what is transparent under a matrix of 16 numbers, for a light."""
+    def draw(self, views: Sequence[tuple[float, ...]], cast: Callable[..., None]) -> None:
+        """Draw all maps, of the lights' `ShadowMaps.views`, with the scene's `cast`."""
         self._target.viewport = (0, 0, *self._target.size)
         self._target.use()
         self._target.clear(depth=1.0)
         for light, view in enumerate(views):
             self._target.viewport = (light * self._size, 0, self._size, self._size)
-            draw(view, light)
+            cast(CasterMap.TRANSMISSION, matrix=view, light=light)
         self._maps.build_mipmaps()
 
     def bind(self) -> None:
@@ -334,8 +331,8 @@ class FloorOcclusion:
         ]
         self._map_framebuffer = resources.framebuffer(maps)
 
-    def look_up(self, ctx: moderngl.Context, draw_albedo: Callable[[tuple[float, ...]], None]) -> None:
-        """Draw what is above the floor from below."""
+    def look_up(self, ctx: moderngl.Context, cast: Callable[..., None]) -> None:
+        """Draw what is above the floor from below, with the scene's `cast`."""
         floor = self._floor
         if floor is None:
             return
@@ -348,7 +345,7 @@ class FloorOcclusion:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "cw"
         self._ceiling_framebuffer.clear(alpha=1.0, depth=1.0)
-        draw_albedo(tuple(matrix.T.ravel()))
+        cast(CasterMap.ALBEDO, matrix=tuple(matrix.T.ravel()))
         ctx.front_face = "ccw"
 
     def shade(self, ctx: moderngl.Context, shadows: ShadowMaps) -> None:

@@ -17,18 +17,18 @@ from .surface import (
     target_color as target_color,
 )
 from .tessellation import (
-    coarse_mesh as coarse_mesh,
-    midpoints as midpoints,
-    tessellate as tessellate,
-    welded as welded,
-)
-from .vertices import (
     BAKED as BAKED,
     COORDINATES as COORDINATES,
     DIRECTION as DIRECTION,
     NORMAL as NORMAL,
     POSITION as POSITION,
     UV as UV,
+    coarse_mesh as coarse_mesh,
+    midpoints as midpoints,
+    tessellate as tessellate,
+    welded as welded,
+)
+from .vertices import (
     SurfaceVertices as SurfaceVertices,
     mapped_coordinates as mapped_coordinates,
     memory_order as memory_order,

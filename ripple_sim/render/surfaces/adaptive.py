@@ -16,7 +16,8 @@ from ripple_sim.render.resources import Resources
 from ripple_sim.solver.kernel import Floats, Floats32, Ints32, kernel
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .vertices import BAKED, DIRECTION, NORMAL, POSITION, SurfaceVertices
+from .tessellation import BAKED, DIRECTION, NORMAL, POSITION
+from .vertices import SurfaceVertices
 
 
 def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

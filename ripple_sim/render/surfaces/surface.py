@@ -23,6 +23,8 @@ from ripple_sim.solver.mesh.topology import undirected
 from ripple_sim.solver.texels.chart_map import ChartMap
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
+from .tessellation import COORDINATES, NORMAL, POSITION
+
 _ON_BORDER = 1e-9  # of a chart
 _BITS = 36  # of the attributes of cut points: round-off is within their last one
 
@@ -55,9 +57,6 @@ class Charts(NamedTuple):
 def split_at_charts(
     mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]],
     charts: Charts,
-    position: slice,
-    normal: slice,
-    coordinates: slice,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Cut the triangles of a mesh where they leave a chart.
 
@@ -67,8 +66,6 @@ def split_at_charts(
     ----------
     mesh : (F, attributes, same)
         See `tessellate`.
-    position, normal, coordinates : slice
-        Columns of the attributes: what cut points share where they are one, unit normals, map coordinates.
 
     Returns
     -------
@@ -79,16 +76,16 @@ def split_at_charts(
         Of each vertex.
     """
     F, attributes, same = mesh
-    triangle, barycentrics, chart = charts.map.split(attributes[F][:, :, coordinates])
+    triangle, barycentrics, chart = charts.map.split(attributes[F][:, :, COORDINATES])
     whole, corner = barycentrics.max(axis=2) == 1, barycentrics.argmax(axis=2)
     vertex = np.take_along_axis(F[triangle], corner, axis=1)
     part, place = np.nonzero(~whole)
     cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
-    cut[:, normal] /= np.maximum(np.linalg.norm(cut[:, normal], axis=1, keepdims=True), 1e-12)
+    cut[:, NORMAL] /= np.maximum(np.linalg.norm(cut[:, NORMAL], axis=1, keepdims=True), 1e-12)
     # without the round-off by which two triangles differ in a point that they share
     step = np.ldexp(1.0, np.frexp(np.abs(attributes).max(axis=0))[1] - _BITS)
     cut = np.round(cut / step) * step
-    _, point = np.unique(np.hstack([cut[:, position], cut[:, normal]]), axis=0, return_inverse=True)
+    _, point = np.unique(np.hstack([cut[:, POSITION], cut[:, NORMAL]]), axis=0, return_inverse=True)
     _, distinct = np.unique(cut, axis=0, return_inverse=True)
     source, alike = np.where(whole, vertex, 0), np.where(whole, vertex, 0)
     source[part, place] = len(attributes) + np.arange(len(cut))

@@ -11,14 +11,18 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.topology import Edges, edges_of, undirected
 
+# columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
+# chart map
+POSITION, NORMAL, COORDINATES, DIRECTION, BAKED, UV = (
+    slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 17),
+)  # fmt: skip
+
 
 def tessellate(
     F: NDArray,
     attributes: NDArray,
     same: NDArray,
     *,
-    position: slice,
-    normal: slice,
     max_length: float,
     max_faces: int,
     crease_length: float | None = None,
@@ -35,11 +39,9 @@ def tessellate(
     F : array, shape [m, 3]
         Triangles.
     attributes : array, shape [n, k]
-        Of the vertices.
+        Of the vertices, in the columns above, of which those from COORDINATES on may be missing.
     same : array, shape [n]
         Whole numbers, equal for vertices that differ in their texture coordinates at most: a seam is no crease.
-    position, normal : slice
-        The three columns of `attributes` that hold the position [m] and the unit normal.
     max_length : float
         [m]
     max_faces : int
@@ -59,7 +61,7 @@ def tessellate(
     while len(F) < most:
         edges = edges_of(F)
         weld, inner = welded(edges, F, same)
-        length = _length(attributes[edges.ends[:, 0], position] - attributes[edges.ends[:, 1], position])
+        length = _length(attributes[edges.ends[:, 0], POSITION] - attributes[edges.ends[:, 1], POSITION])
         marked = _longest(length, max_length, max_faces - len(F))
         if crease_length is not None and not marked.any():
             marked = _longest(np.where(inner, 0.0, length), crease_length, most - len(F))
@@ -68,8 +70,8 @@ def tessellate(
         midpoint = np.full(len(marked), -1)
         midpoint[marked] = len(attributes) + np.arange(marked.sum())
         same = np.concatenate([same, same.max() + 1 + weld[marked]])
-        attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes, position, normal)[marked]])
-        F = _split(F, midpoint[edges.of], attributes[:, position])
+        attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes)[marked]])
+        F = _split(F, midpoint[edges.of], attributes[:, POSITION])
     return F, attributes, same
 
 
@@ -85,24 +87,20 @@ def welded(edges: Edges, F: NDArray[np.int64], same: NDArray[np.int64]) -> tuple
     return weld, np.bincount(weld_of_side)[weld] == 2
 
 
-def midpoints(
-    ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray, position: slice, normal: slice
-) -> NDArray[np.float64]:
+def midpoints(ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray) -> NDArray[np.float64]:
     """Attributes of the midpoints of all edges, [k, ...]; see `tessellate`."""
     a, b = attributes[ends[:, 0]], attributes[ends[:, 1]]
     middle = (a + b) / 2
-    middle[:, position] += bulges(ends, inner, attributes, position, normal)
-    middle[:, normal] /= np.maximum(_length(middle[:, normal]), 1e-12)[:, None]
+    middle[:, POSITION] += bulges(ends, inner, attributes)
+    middle[:, NORMAL] /= np.maximum(_length(middle[:, NORMAL]), 1e-12)[:, None]
     return middle
 
 
-def bulges(
-    ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray, position: slice, normal: slice
-) -> NDArray[np.float64]:
+def bulges(ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray) -> NDArray[np.float64]:
     """How far the midpoints of all edges move out [m], [k, 3]; see `tessellate`."""
     a, b = attributes[ends[:, 0]], attributes[ends[:, 1]]
-    half = (b[:, position] - a[:, position]) / 2
-    above_a, above_b = (np.einsum("ij,ij->i", half, end[:, normal])[:, None] * end[:, normal] for end in (a, b))
+    half = (b[:, POSITION] - a[:, POSITION]) / 2
+    above_a, above_b = (np.einsum("ij,ij->i", half, end[:, NORMAL])[:, None] * end[:, NORMAL] for end in (a, b))
     return inner[:, None] * ((above_b - above_a) / 4)
 
 

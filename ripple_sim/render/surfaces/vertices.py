@@ -20,7 +20,7 @@ from ripple_sim.solver.mesh.topology import Edges, edges_of
 from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
 
 from .surface import Charts, Surface, shared_places, split_at_charts
-from .tessellation import bulges, coarse_mesh, midpoints, tessellate, welded
+from .tessellation import COORDINATES, DIRECTION, POSITION, UV, bulges, coarse_mesh, midpoints, tessellate, welded
 
 _ALIKE = 1e-4  # normals at a vertex that differ by less are one
 
@@ -48,7 +48,7 @@ def _bulges_of_sides(mesh: Mesh) -> NDArray[np.float64]:
     attributes = np.concatenate([mesh.V[vertices], normals], axis=1)
     edges = edges_of(F)
     _, inner = welded(edges, F, np.arange(len(attributes)))
-    return bulges(edges.ends, inner, attributes, slice(0, 3), slice(3, 6))[edges.of]
+    return bulges(edges.ends, inner, attributes)[edges.of]
 
 
 def _unified(F: NDArray[np.int64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,11 +102,6 @@ def morton_order(points: NDArray) -> NDArray[np.int64]:
 _LEAST_FACES, _MOST_FACES = 8_000, 400_000
 # Creases are split down to half a texel, as heights have no finer detail, but to no less than a quarter of other edges.
 _CREASE, _CREASE_PARTS = 0.5, 4
-# columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
-# chart map
-POSITION, DIRECTION, COORDINATES, NORMAL, BAKED, UV = (
-    slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 17),
-)  # fmt: skip
 
 
 def tessellated(
@@ -136,7 +131,7 @@ def tessellated(
     Returns
     -------
     F, attributes, same
-        As for `tessellate`; the attributes' columns are named above.
+        As for `tessellate`.
     """
     parts, V, normals = rounded_parts(mesh, charts.map)
     F = parts.F
@@ -148,13 +143,11 @@ def tessellated(
         at_parts[F] = parts.carry(np.concatenate([smooth, baked], axis=1)[mesh.F])
         smooth, baked = normalized(at_parts[:, :3]), at_parts[:, 3:]
     _, same = np.unique(np.column_stack([each, normals]), axis=0, return_inverse=True)
-    attributes = [V[each], smooth[each], coordinates, normals, baked[each], uv]
+    attributes = [V[each], normals, coordinates, smooth[each], baked[each], uv]
     return tessellate(
         split_F,
         np.concatenate(attributes, axis=1),
         same.ravel(),
-        position=POSITION,
-        normal=NORMAL,
         max_length=max_length,
         max_faces=max_faces,
         crease_length=crease_length,
@@ -169,7 +162,7 @@ class SurfaceVertices(NamedTuple):
     F : int64 [m, 3]
         Triangles.
     attributes : float64 [n + k, ...]
-        See the columns above.
+        See `tessellate`.
     edges : Edges
         k of them.
     places : float64 [n + k, 2]
@@ -207,18 +200,18 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
         baked=bake(V, F, smooth),
         corner_uv=uv[F] if uv.ndim == 2 else uv,
     )
-    faces, attributes, same, chart = split_at_charts(finer, charts, POSITION, NORMAL, COORDINATES)
+    faces, attributes, same, chart = split_at_charts(finer, charts)
     faces, order, _ = memory_order(faces, attributes[:, POSITION])
     attributes, same, chart = attributes[order], same[order], chart[order]
     edges = edges_of(faces)
     _, inner = welded(edges, faces, same)
-    attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes, POSITION, NORMAL)])
+    attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes)])
     length = np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True)
     attributes[:, DIRECTION] /= np.maximum(length, 1e-12)
     chart = np.concatenate([chart, chart[edges.ends[:, 0]]])
     chart_uv = charts.map.uv(attributes[:, COORDINATES], chart)
     places = charts.page.places(chart, chart_uv)
-    points = attributes[:, [*range(POSITION.start, DIRECTION.stop)]]
+    points = np.hstack([attributes[:, POSITION], attributes[:, DIRECTION]])
     lookups = shared_places(chart_uv, places, points)
     corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of])
     balls = balls_about(attributes[:, POSITION][corners], _BALLS)

@@ -6,7 +6,7 @@ Many of one shape are one draw call, as finely tessellated as the frame needs.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 
 import moderngl
@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.contract import CasterMap
 from ripple_sim.render.resources import Resources
 
 from .objects import Assets, Occluders
@@ -67,8 +68,8 @@ class Instances:
 
     Parameters
     ----------
-    programs : tuple of moderngl.Program
-        For the G-buffer, for depth alone, for the colour alone, and for transmission.
+    programs : mapping of moderngl.Program
+        None: for the G-buffer.
     members : list of (Visual, int)
         Either geoms, sites or others, each with its number in the table of objects; see `hold`.
 
@@ -89,11 +90,15 @@ class Instances:
     """
 
     def __init__(
-        self, assets: Assets, level: Levels, programs: tuple[moderngl.Program, ...], members: list[tuple[Visual, int]]
+        self,
+        assets: Assets,
+        level: Levels,
+        programs: Mapping[CasterMap | None, moderngl.Program],
+        members: list[tuple[Visual, int]],
     ) -> None:
         self._assets, self._level, self._programs = assets, level, programs
         self._buffer = assets.resources.buffer(reserve=INSTANCE.itemsize * len(members), dynamic=True)
-        self._arrays: dict[tuple[int, int], moderngl.VertexArray] = {}
+        self._arrays: dict[tuple[CasterMap | None, int], moderngl.VertexArray] = {}
         self._segments = _LEVELS[-1]
         self.hold(members)
 
@@ -165,38 +170,29 @@ class Instances:
         """Draw into the G-buffer."""
         if self._image is not None:
             self._image.use(self._unit)
-        self._render(0, self._segments)
+        self._render(None, self._segments)
 
-    def draw_depth(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth only, under a matrix of 16 numbers, column by column."""
-        self._programs[1]["matrix"] = view_projection
-        self._render(1, self._segments)
+    def cast(self, seen: CasterMap, **uniforms: Any) -> None:
+        """Draw into a map of a light or, coarsely, of the floor; see `DrawnScene.cast`."""
+        if seen == CasterMap.TRANSMISSION:
+            uniforms["transmission"] = (1.0 - self._visual.opacity,) * 3
+        for name, value in uniforms.items():
+            self._programs[seen][name] = value
+        self._render(seen, _LEVELS[0] if seen == CasterMap.ALBEDO else self._segments)
 
-    def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
-        """Draw coarsely in the linear colour, likewise."""
-        self._programs[2]["matrix"] = view_projection
-        self._render(2, _LEVELS[0])
-
-    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
-        """Draw into the transmission map of a light, likewise."""
-        program = self._programs[3]
-        program["matrix"], program["light"] = view_projection, light
-        program["transmission"] = (1.0 - self._visual.opacity,) * 3
-        self._render(3, self._segments)
-
-    def _render(self, program: int, segments: int) -> None:
+    def _render(self, seen: CasterMap | None, segments: int) -> None:
         segments = segments if self._corners < 0 else 0
-        if (program, segments) not in self._arrays:
+        if (seen, segments) not in self._arrays:
             vertices, indices = self._level(segments)
             content = [
                 (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
                 (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
             ]
             # what a program does not use is optimised away
-            self._arrays[program, segments] = self._assets.resources.vertex_array(
-                self._programs[program], content, indices, skip_errors=True
+            self._arrays[seen, segments] = self._assets.resources.vertex_array(
+                self._programs[seen], content, indices, skip_errors=True
             )
-        self._arrays[program, segments].render(vertices=self._corners, instances=len(self._records))
+        self._arrays[seen, segments].render(vertices=self._corners, instances=len(self._records))
 
 
 def visuals_of(model: Any, geoms: Iterable[int]) -> list[tuple[Visual, NamedShape]]:
@@ -232,14 +228,13 @@ def instances_of(
     def program(kind: int, own: bool) -> moderngl.Program:
         return resources.program("visuals/geom", MAPPING=kind, OWN=int(own))
 
-    casters = tuple(
-        resources.program("passes/casters", MOVED=0, ALBEDO_MAP=albedo, TRANSMISSION_MAP=transmission)
-        for albedo, transmission in ((0, 0), (1, 0), (0, 1))
-    )
+    casters: dict[CasterMap | None, moderngl.Program] = {
+        seen: resources.program("passes/casters", MOVED=0, MAP=seen) for seen in CasterMap
+    }
     for key, ((name, make), mapping, members) in groups.items():
         if key in made:
             made[key].hold(members)
         else:
             level = assets.levels.setdefault(name, levels_of(resources, make))
-            made[key] = Instances(assets, level, (program(mapping.kind, mapping.own), *casters), members)
+            made[key] = Instances(assets, level, casters | {None: program(mapping.kind, mapping.own)}, members)
     return [made[key] for key in groups]

@@ -22,7 +22,7 @@ from .layout import PatchMap, patch_map
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
 from .samples import centres, untangled
-from .seamless import SeamlessMap, follow, places_seen_from
+from .seamless import Complex, SeamlessMap, follow, places_seen_from
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -169,8 +169,8 @@ def _place_corners(patches: PatchMap, topology: TexelTopology, beyond: NDArray[n
     held[surface.edges.ends[surface.edges.rim]] = True
     held &= seamless.freedom == FIXED
     triangle, k = np.nonzero(held[surface.F])
-    column, row = seamless.shift[triangle, k].T * (beyond.shape[1] - 1)
-    chart = seamless.frame[triangle]
+    place = seamless.shift[triangle, k] * (beyond.shape[1] - 1)
+    chart, row, column = seamless.frame[triangle], place.imag.astype(np.int64), place.real.astype(np.int64)
     alone = topology.rim[chart, row, column]
     beyond[chart[alone], row[alone], column[alone]] = surface.V[surface.F[triangle, k]][alone]
 
@@ -182,7 +182,7 @@ def _draw_rims(
     sides: Ints,
     corner: Ints,
     homes: Ints,
-    places: Floats,
+    places: Complex,
     beyond: Floats,
 ) -> None:
     """Put the points of sides at a rim beyond the texels opposite to them; see `places_seen_from`."""
@@ -192,15 +192,17 @@ def _draw_rims(
         a, b = seamless.F[f, k], seamless.F[f, (k + 1) % 3]
         anchor, p = corner[side], places[side]
         v = seamless.F[f, anchor]
-        axis = 0 if seamless.freedom[v] == COLUMN else 1
-        low, high = p[k, axis], p[(k + 1) % 3, axis]
+        along_row = seamless.freedom[v] == COLUMN
+        a_place, b_place = p[k], p[(k + 1) % 3]
+        low, high = (a_place.real, b_place.real) if along_row else (a_place.imag, b_place.imag)
         first = int(np.ceil(min(low, high) * n - 0.5 - 1e-9))
         last = int(np.floor(max(low, high) * n - 0.5 + 1e-9))
         for i in range(first, last + 1):
             along = (i + 0.5) / n
             t = min(max((along - low) / (high - low), 0.0), 1.0)
-            qx, qy = (along, p[anchor, 1]) if axis == 0 else (p[anchor, 0], along)
-            chart, _, _, _, x, y = follow(seamless, homes[side], p[anchor, 0], p[anchor, 1], qx, qy)
+            opposite = complex(along, p[anchor].imag) if along_row else complex(p[anchor].real, along)
+            chart, _, z = follow(seamless, homes[side], p[anchor], opposite)
+            x, y = z.real, z.imag
             row, column = int(np.floor(y * n)) + 1, int(np.floor(x * n)) + 1
             if abs(y) < 1e-9:
                 row = 0

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...kernel import Bools, Floats, Ints, kernel
 from ..energy import FIXED, FREE
-from .seamless import SeamlessMap, after, corner_place, frame_of, inverse, stars, turned
+from .seamless import Complex, SeamlessMap, after, corner_place, frame_of, inverse, square, stars, turned, wedge
 from .surface import TriangleSurface
 
 _FLATTEST = 0.05  # double area over squared length of a triangle on the charts after a collapse
@@ -28,7 +28,7 @@ Parents = tuple[Ints, Floats]
 @kernel
 def _targets(seamless: SeamlessMap, parents: Parents, cut: Bools, at_rim: Bools) -> tuple[Floats, Ints]:
     """How good the best collapse of each vertex is, above 0 [n], and a corner 3 triangle + k: to where it goes."""
-    n = len(seamless.x)
+    n = len(seamless.z)
     worth, target, seen = np.zeros(n), np.full(n, -1), np.full(n, -1)
     for u in range(n):
         first, last = seamless.star_start[u], seamless.star_start[u + 1]
@@ -80,10 +80,8 @@ def _worth(seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: in
     held = seamless.freedom[v] == FIXED
     if held and at_rim[v]:
         return 0.0  # the frames round a corner of a rim stay as they are
-    to_u = inverse(frame_of(seamless, f, k))
-    vx, vy = corner_place(seamless, f, m)
-    vx, vy = turned(vx, vy, to_u[0])
-    vx, vy = vx + to_u[1], vy + to_u[2]
+    turn, shift = inverse(frame_of(seamless, f, k))
+    goal = turned(corner_place(seamless, f, m), turn) + shift
     flattest = np.inf
     for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
         g, c = seamless.star[i] // 3, seamless.star[i] % 3
@@ -96,14 +94,11 @@ def _worth(seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: in
             return 0.0
         if not _inside(seamless, parents, g, p, q, v):
             return 0.0
-        to_u = inverse(frame_of(seamless, g, c))
-        ax, ay = corner_place(seamless, g, p)
-        bx, by = corner_place(seamless, g, q)
-        ax, ay = turned(ax, ay, to_u[0])
-        bx, by = turned(bx, by, to_u[0])
-        ax, ay, bx, by = ax + to_u[1] - vx, ay + to_u[2] - vy, bx + to_u[1] - vx, by + to_u[2] - vy
-        longest = max(ax * ax + ay * ay, bx * bx + by * by, (ax - bx) ** 2 + (ay - by) ** 2)
-        flattest = min(flattest, (ax * by - ay * bx) / longest)
+        turn, shift = inverse(frame_of(seamless, g, c))
+        to_a = turned(corner_place(seamless, g, p), turn) + shift - goal
+        to_b = turned(corner_place(seamless, g, q), turn) + shift - goal
+        longest = max(square(to_a), square(to_b), square(to_a - to_b))
+        flattest = min(flattest, wedge(to_a, to_b) / longest)
     return flattest if flattest > _FLATTEST else 0.0
 
 
@@ -133,7 +128,7 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
         F, turn, shift, inside = seamless.F.copy(), seamless.turn.copy(), seamless.shift.copy(), parents[1].copy()
         left = _collapse(seamless, parents, chosen, target, F, turn, shift, inside)
         F, frame, turn, shift = F[left], seamless.frame[left], turn[left], shift[left]
-        start, star = stars(F, len(seamless.x))
+        start, star = stars(F, len(seamless.z))
         seamless = seamless._replace(F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star)
         parents = parents[0][left], inside[left]
     used, F = np.unique(seamless.F, return_inverse=True)
@@ -142,7 +137,7 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
     seamless = seamless._replace(
         F=F,
         chart=seamless.chart[used],
-        x=seamless.x[used],
+        z=seamless.z[used],
         freedom=seamless.freedom[used],
         star_start=start,
         star=star,
@@ -182,7 +177,7 @@ def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> 
 
 @kernel
 def _collapse(
-    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints, F: Ints, turn: Ints, shift: Ints,
+    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints, F: Ints, turn: Ints, shift: Complex,
     inside: Floats,
 ) -> Bools:  # fmt: skip
     """Change copies of the triangles' vertices, of the changes to their frames, and of where in their parents they lie.
@@ -204,8 +199,8 @@ def _collapse(
             continue
         at_u = 0 if seamless.F[g, 0] == u else (1 if seamless.F[g, 1] == u else 2)
         through_u = after(inverse(frame_of(seamless, g, at_u)), frame_of(seamless, f, k))
-        change = after(frame_of(seamless, g, m), through_u)
-        F[f, k], turn[f, k], shift[f, k, 0], shift[f, k, 1] = v, change[0], change[1], change[2]
+        F[f, k] = v
+        turn[f, k], shift[f, k] = after(frame_of(seamless, g, m), through_u)
         for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
             h, c = seamless.star[i] // 3, seamless.star[i] % 3
             if parents[0][h] == parents[0][f]:

@@ -30,7 +30,7 @@ from ...mesh.topology import edges_of
 from ...mesh.vectors import cross, dot, subtract
 from ..energy import ARMIJO, COLUMN, FIXED, FREE, MOST_TRIALS, REACH
 from ..newton import CG_TOLERANCE, System, conjugate_gradients, descend_by_newton, line_search
-from .seamless import SeamlessMap, corner_place, rehome, rehome_vertex, turned
+from .seamless import Complex, SeamlessMap, corner_place, rehome, rehome_vertex, square, turned, wedge
 
 FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
 _POWER = 2  # p
@@ -77,16 +77,11 @@ def energy_of(seamless: SeamlessMap, shapes: ChartShapes, triangles: Ints) -> fl
     """Energy of some triangles [k]; infinite if one is folded."""
     total = 0.0
     for f in triangles:
-        ax, ay = corner_place(seamless, f, 0)
-        bx, by = corner_place(seamless, f, 1)
-        cx, cy = corner_place(seamless, f, 2)
-        ux, uy, vx, vy, wx, wy = bx - ax, by - ay, cx - ax, cy - ay, cx - bx, cy - by
-        area, cotangent = 0.5 * (ux * vy - uy * vx), shapes.cotangent[f]
+        a, b, c = corner_place(seamless, f, 0), corner_place(seamless, f, 1), corner_place(seamless, f, 2)
+        area, cotangent = 0.5 * wedge(b - a, c - a), shapes.cotangent[f]
         if not area > FOLDED:
             return np.inf
-        dirichlet = (
-            cotangent[0] * (wx * wx + wy * wy) + cotangent[1] * (vx * vx + vy * vy) + cotangent[2] * (ux * ux + uy * uy)
-        )
+        dirichlet = cotangent[0] * square(c - b) + cotangent[1] * square(c - a) + cotangent[2] * square(b - a)
         dirichlet, jacobian = dirichlet / (2.0 * shapes.area[f]), area / shapes.area[f]
         total += shapes.area[f] * density(dirichlet, jacobian)
     return total
@@ -119,36 +114,35 @@ def assemble(
 ) -> None:
     """Add the triangles to the system, in the vertices' own frames. `edge` [m, 3] are their edges, `ends` [e, 2]."""
     gradient, diagonal, blocks = system
-    slopes, modes, curvature = np.empty((3, 2)), np.empty((4, 3, 2)), np.empty(4)
+    slopes, modes, curvature = np.empty(3, np.complex128), np.empty((4, 3), np.complex128), np.empty(4)
     for f in range(len(seamless.F)):
         _triangle(seamless, shapes, f, slopes, modes, curvature)
         for k in range(3):
             v, back = seamless.F[f, k], (4 - seamless.turn[f, k]) % 4
-            x, y = turned(slopes[k, 0], slopes[k, 1], back)
-            gradient[v, 0] += x
-            gradient[v, 1] += y
+            slope = turned(slopes[k], back)
+            gradient[v, 0] += slope.real
+            gradient[v, 1] += slope.imag
             for m in range(4):
-                x, y = turned(modes[m, k, 0], modes[m, k, 1], back)
-                modes[m, k, 0], modes[m, k, 1] = x, y
-                diagonal[v, 0] += curvature[m] * x * x
-                diagonal[v, 1] += curvature[m] * x * y
-                diagonal[v, 2] += curvature[m] * y * y
+                mode = modes[m, k] = turned(modes[m, k], back)
+                diagonal[v, 0] += curvature[m] * mode.real * mode.real
+                diagonal[v, 1] += curvature[m] * mode.real * mode.imag
+                diagonal[v, 2] += curvature[m] * mode.imag * mode.imag
         for k in range(3):
             e, j = edge[f, k], (k + 1) % 3
             p, q = (k, j) if ends[e, 0] == seamless.F[f, k] else (j, k)
             for m in range(4):
                 a, b = modes[m, p], modes[m, q]
-                blocks[e, 0] += curvature[m] * a[0] * b[0]
-                blocks[e, 1] += curvature[m] * a[0] * b[1]
-                blocks[e, 2] += curvature[m] * a[1] * b[0]
-                blocks[e, 3] += curvature[m] * a[1] * b[1]
+                blocks[e, 0] += curvature[m] * a.real * b.real
+                blocks[e, 1] += curvature[m] * a.real * b.imag
+                blocks[e, 2] += curvature[m] * a.imag * b.real
+                blocks[e, 3] += curvature[m] * a.imag * b.imag
 
 
 @kernel
 def _triangle(
-    seamless: SeamlessMap, shapes: ChartShapes, f: int, slopes: Floats, modes: Floats, curvature: Floats
+    seamless: SeamlessMap, shapes: ChartShapes, f: int, slopes: Complex, modes: Complex, curvature: Floats
 ) -> None:
-    """Gradient [3, 2] at the corners of a triangle, and its Hessian: the sum of c m m', modes [4, 3, 2]."""
+    """Gradient [3] at the corners of a triangle, and its Hessian: the sum of c m m', modes [4, 3]."""
     area, cotangent = shapes.area[f], shapes.cotangent[f]
     # a flat copy of the triangle, by its cotangents: side ab along x
     total = cotangent[0] + cotangent[1]
@@ -156,15 +150,13 @@ def _triangle(
     height = 2.0 * area / length
     foot = cotangent[0] * height
     # gradients of the corners' hat functions
-    hats = np.empty((3, 2))
-    hats[1, 0], hats[1, 1] = 1.0 / length, -foot / (length * height)
-    hats[2, 0], hats[2, 1] = 0.0, 1.0 / height
-    hats[0, 0], hats[0, 1] = -hats[1, 0] - hats[2, 0], -hats[1, 1] - hats[2, 1]
+    second, third = complex(1.0 / length, -foot / (length * height)), complex(0.0, 1.0 / height)
+    hats = -second - third, second, third
     a = b = c = d = 0.0
     for k in range(3):
-        x, y = corner_place(seamless, f, k)
-        a, b = a + x * hats[k, 0], b + x * hats[k, 1]
-        c, d = c + y * hats[k, 0], d + y * hats[k, 1]
+        place, hat = corner_place(seamless, f, k), hats[k]
+        a, b = a + place.real * hat.real, b + place.real * hat.imag
+        c, d = c + place.imag * hat.real, d + place.imag * hat.imag
     # singular values of (a b; c d) = U S V', rotations by half sums and differences of two angles
     sum_length, sum_angle = np.hypot(a + d, c - b) / 2, np.arctan2(c - b, a + d)
     rest_length, rest_angle = np.hypot(a - d, c + b) / 2, np.arctan2(c + b, a - d)
@@ -183,12 +175,11 @@ def _triangle(
     ca, sa = np.cos(angle), np.sin(angle)
     for k in range(3):
         # the hat's gradient along the right singular vectors
-        p, q = cr * hats[k, 0] + sr * hats[k, 1], -sr * hats[k, 0] + cr * hats[k, 1]
-        slopes[k, 0] = area * (cl * f1 * p - sl * f2 * q)
-        slopes[k, 1] = area * (sl * f1 * p + cl * f2 * q)
+        p, q = cr * hats[k].real + sr * hats[k].imag, -sr * hats[k].real + cr * hats[k].imag
+        slopes[k] = complex(area * (cl * f1 * p - sl * f2 * q), area * (sl * f1 * p + cl * f2 * q))
         # changes (first: along U; second: across) of S for the four modes
         for m, u, v in ((0, ca * p, sa * q), (1, -sa * p, ca * q), (2, -q, p), (3, q, p)):
-            modes[m, k, 0], modes[m, k, 1] = cl * u - sl * v, sl * u + cl * v
+            modes[m, k] = complex(cl * u - sl * v, sl * u + cl * v)
 
 
 @kernel
@@ -206,10 +197,10 @@ def sweep(
     fall = 0.0
     for v in vertices:
         if seamless.freedom[v] != FIXED:
-            x, y = seamless.x[v, 0], seamless.x[v, 1]
+            before = seamless.z[v]
             fall += relax_vertex(seamless, shapes, v, star)
             if follow_at_once:
-                rehome_vertex(seamless, v, x, y)
+                rehome_vertex(seamless, v, before)
     return fall
 
 
@@ -217,7 +208,7 @@ def sweep(
 def relax_vertex(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Floats) -> float:
     """Move one vertex by a Newton step inside its star; return by how much the energy fell. `star` is room."""
     degree = gather(seamless, shapes, v, star)
-    x, y, freedom = seamless.x[v, 0], seamless.x[v, 1], seamless.freedom[v]
+    x, y, freedom = seamless.z[v].real, seamless.z[v].imag, seamless.freedom[v]
     energy, gx, gy, hxx, hxy, hyy = star_slopes(star, degree, x, y)
     if not energy < np.inf:
         return 0.0
@@ -243,7 +234,7 @@ def relax_vertex(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Float
                     step, lower = 2 * step, least
                 else:
                     break
-            seamless.x[v, 0], seamless.x[v, 1] = x + step * sx, y + step * sy
+            seamless.z[v] = complex(x + step * sx, y + step * sy)
             return energy - lower
         step *= 0.35
     return 0.0
@@ -256,10 +247,9 @@ def gather(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Floats) -> 
     for i in range(first, last):
         f, k = seamless.star[i] // 3, seamless.star[i] % 3
         back = (4 - seamless.turn[f, k]) % 4
-        dx, dy = float(seamless.shift[f, k, 0]), float(seamless.shift[f, k, 1])
         for j in (1, 2):
-            px, py = corner_place(seamless, f, (k + j) % 3)
-            star[i - first, 2 * j - 2], star[i - first, 2 * j - 1] = turned(px - dx, py - dy, back)
+            place = turned(corner_place(seamless, f, (k + j) % 3) - seamless.shift[f, k], back)
+            star[i - first, 2 * j - 2], star[i - first, 2 * j - 1] = place.real, place.imag
         star[i - first, 4] = shapes.cotangent[f, (k + 1) % 3]
         star[i - first, 5] = shapes.cotangent[f, (k + 2) % 3]
         # with the cotangent of the vertex itself the triangle is known: it follows from the other two
@@ -337,7 +327,7 @@ def scratch(seamless: SeamlessMap) -> Floats:
 
 def sweep_all(seamless: SeamlessMap, shapes: ChartShapes, backwards: bool) -> float:
     """Move every vertex once, and follow them into their charts; return by how much the energy fell."""
-    before, vertices = seamless.x.copy(), np.arange(len(seamless.x))
+    before, vertices = seamless.z.copy(), np.arange(len(seamless.z))
     if backwards:
         vertices = vertices[::-1].copy()
     fall = sweep(seamless, shapes, vertices, scratch(seamless), False)
@@ -368,7 +358,7 @@ def newton_step(
     Whole steps have length 1; 0 where no step lowers the energy. `edge` [m, 3] are the edges ab, bc, ca of the
     triangles, and `ends` [e, 2] their vertices.
     """
-    system = System.zeros(len(seamless.x), len(ends))
+    system = System.zeros(len(seamless.z), len(ends))
     energy = total_energy(seamless, shapes)
     assemble(seamless, shapes, edge, ends, system)
     _hold(seamless.freedom, ends, system)
@@ -376,16 +366,15 @@ def newton_step(
     slope = float((system.gradient * step).sum())
     if not slope < 0:
         return 0.0, 0.0
-    before = seamless.x.copy()
-    longest = float(np.sqrt((step * step).sum(axis=1).max()))
-    bound = min(0.9 * _time_of_first_fold(seamless, step), _LONGEST_STEP / longest)
+    before, way = seamless.z.copy(), step @ (1, 1j)
+    bound = min(0.9 * _time_of_first_fold(seamless, way), _LONGEST_STEP / float(np.sqrt(square(way).max())))
 
     def energy_at(t: float) -> float:
-        seamless.x[:] = before + t * step
+        seamless.z[:] = before + t * way
         return total_energy(seamless, shapes)
 
     t, lower = line_search(energy, slope, bound, energy_at)
-    seamless.x[:] = before + t * step
+    seamless.z[:] = before + t * way
     rehome(seamless, before)
     return energy - lower, t
 
@@ -403,20 +392,17 @@ def _hold(freedom: Ints, ends: Ints32, system: System) -> None:
 
 
 @kernel
-def _time_of_first_fold(seamless: SeamlessMap, step: Floats) -> float:
-    """The first time at which a triangle has no area, if its corners move by `step` in a unit of time."""
+def _time_of_first_fold(seamless: SeamlessMap, way: Complex) -> float:
+    """The first time at which a triangle has no area, if its corners go their ways [n] in a unit of time."""
     first = np.inf
-    x, d = np.empty((3, 2)), np.empty((3, 2))
+    x, d = np.empty(3, np.complex128), np.empty(3, np.complex128)
     for f in range(len(seamless.F)):
         for k in range(3):
-            v = seamless.F[f, k]
-            x[k, 0], x[k, 1] = corner_place(seamless, f, k)
-            d[k, 0], d[k, 1] = turned(step[v, 0], step[v, 1], seamless.turn[f, k])
-        ux, uy, vx, vy = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[2, 0] - x[0, 0], x[2, 1] - x[0, 1]
-        px, py, qx, qy = d[1, 0] - d[0, 0], d[1, 1] - d[0, 1], d[2, 0] - d[0, 0], d[2, 1] - d[0, 1]
-        c = ux * vy - uy * vx
-        b = ux * qy - uy * qx + px * vy - py * vx
-        a = px * qy - py * qx
+            x[k], d[k] = corner_place(seamless, f, k), turned(way[seamless.F[f, k]], seamless.turn[f, k])
+        u, v, p, q = x[1] - x[0], x[2] - x[0], d[1] - d[0], d[2] - d[0]
+        c = wedge(u, v)
+        b = wedge(u, q) + p.real * v.imag - p.imag * v.real
+        a = wedge(p, q)
         # the least positive root of a t^2 + b t + c, with c > 0
         root = b * b - 4 * a * c
         if root < 0 or (a >= 0 and b >= 0):

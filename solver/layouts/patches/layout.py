@@ -21,7 +21,7 @@ from ..energy import FIXED, FREE
 from .collapse import without_cuts
 from .energy import ChartShapes, energy_of, gather, relax_all, scratch, shapes_of, star_energy, sweep, sweep_all
 from .quads import CELLS, Quads, large_quads_of, part_of, quads_of
-from .seamless import SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned
+from .seamless import Frame, SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned, wedge
 from .surface import TriangleSurface
 
 _LAYERS = 3  # of vertices that a tip's move may move
@@ -37,7 +37,7 @@ def move_tips(seamless: SeamlessMap, shapes: ChartShapes, tips: Ints) -> Ints:
 @kernel
 def _move_tips(seamless: SeamlessMap, shapes: ChartShapes, tips: Ints, star: Floats) -> Ints:
     fan = np.empty((2, len(star)), np.int64)
-    mark = np.zeros(len(seamless.x) + len(seamless.F), np.int64)
+    mark = np.zeros(len(seamless.z) + len(seamless.F), np.int64)
     count = stamp = 0
     moved = np.empty(len(tips), np.int64)
     for v in tips:
@@ -79,7 +79,7 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
 
     Nothing if there is another tip among their neighbours. `mark` [n + m] holds older stamps.
     """
-    n = len(seamless.x)
+    n = len(seamless.z)
     vertices, triangles = [v, u], [np.int64(0) for _ in range(0)]
     mark[v] = mark[u] = stamp
     first, last = 0, 2
@@ -114,7 +114,7 @@ def _moved(
 ) -> bool:
     """Try to move a tip; whether it stays there."""
     before = energy_of(seamless, shapes, triangles)
-    x, chart, freedom = seamless.x[vertices], seamless.chart[vertices], seamless.freedom[vertices]
+    z, chart, freedom = seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices]
     turn, shift = seamless.turn[triangles], seamless.shift[triangles]
     v, u = vertices[0], vertices[1]
     _change_frames(seamless, v, u, fan)
@@ -122,9 +122,8 @@ def _moved(
     _put_into_star(seamless, shapes, v, u, star, degree)
     angle = 0.0
     for i in range(degree):
-        px, py = star[i, 0] - seamless.x[v, 0], star[i, 1] - seamless.x[v, 1]
-        qx, qy = star[i, 2] - seamless.x[v, 0], star[i, 3] - seamless.x[v, 1]
-        angle += np.arctan2(px * qy - py * qx, px * qx + py * qy)
+        p, q = complex(star[i, 0], star[i, 1]) - seamless.z[v], complex(star[i, 2], star[i, 3]) - seamless.z[v]
+        angle += np.arctan2(wedge(p, q), p.real * q.real + p.imag * q.imag)
     _enter_chart(seamless, v)
     # round a wide cone's vertex the map may wind twice without a fold
     if angle < 3.0 * np.pi and energy_of(seamless, shapes, triangles) < np.inf:
@@ -132,19 +131,10 @@ def _moved(
             sweep(seamless, shapes, vertices, star, True)
         if energy_of(seamless, shapes, triangles) < (1.0 - _WORTH) * before:
             return True
-    for i in range(len(vertices)):
-        w = vertices[i]
-        seamless.x[w, 0], seamless.x[w, 1], seamless.chart[w], seamless.freedom[w] = (
-            x[i, 0],
-            x[i, 1],
-            chart[i],
-            freedom[i],
-        )
+    seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices] = z, chart, freedom
     for i in range(len(triangles)):
         for k in range(3):
-            seamless.turn[triangles[i], k] = turn[i, k]
-            for j in range(2):
-                seamless.shift[triangles[i], k, j] = shift[i, k, j]
+            seamless.turn[triangles[i], k], seamless.shift[triangles[i], k] = turn[i, k], shift[i, k]
     return False
 
 
@@ -152,47 +142,42 @@ def _moved(
 def _put_into_star(seamless: SeamlessMap, shapes: ChartShapes, u: int, v: int, star: Floats, degree: int) -> None:
     """Put u, in the frame that it begins with, on a way from v, where its star's energy is least and nothing folded."""
     start = seamless.star_start[u]
-    x = y = left_x = left_y = right_x = right_y = middle_x = middle_y = 0.0
+    z = left = right = middle = 0j
     for i in range(degree):
         f, k = seamless.star[start + i] // 3, seamless.star[start + i] % 3
-        a, b = seamless.F[f, (k + 1) % 3], seamless.F[f, (k + 2) % 3]
-        middle_x += (star[i, 0] + star[i, 2]) / (2 * degree)
-        middle_y += (star[i, 1] + star[i, 3]) / (2 * degree)
-        if a == v:
-            x, y, left_x, left_y = star[i, 0], star[i, 1], star[i, 2], star[i, 3]
-        elif b == v:
-            x, y, right_x, right_y = star[i, 2], star[i, 3], star[i, 0], star[i, 1]
-    inward_x, inward_y = _inward(x, y, left_x, left_y, right_x, right_y)
-    least, best_x, best_y = np.inf, x, y
+        p, q = complex(star[i, 0], star[i, 1]), complex(star[i, 2], star[i, 3])
+        middle += (p + q) / (2 * degree)
+        if seamless.F[f, (k + 1) % 3] == v:
+            z, left = p, q
+        elif seamless.F[f, (k + 2) % 3] == v:
+            z, right = q, p
+    inward = _inward(left - z, right - z)
+    least, best = np.inf, z
     for way in range(2):
-        goal_x, goal_y = (middle_x, middle_y) if way == 0 else (x + inward_x, y + inward_y)
-        share, trials = (0.65, 16) if way == 0 else (0.4, 40)
+        goal, share, trials = (middle, 0.65, 16) if way == 0 else (z + inward, 0.4, 40)
         t = 0.65
         for _ in range(trials):
-            px, py = x + t * (goal_x - x), y + t * (goal_y - y)
-            energy = star_energy(star, degree, px, py)
+            p = z + t * (goal - z)
+            energy = star_energy(star, degree, p.real, p.imag)
             if energy < least:
-                least, best_x, best_y = energy, px, py
+                least, best = energy, p
             elif least < np.inf:
                 break
             t *= share
         if least < np.inf:
             break
-    seamless.x[u, 0], seamless.x[u, 1] = best_x, best_y
+    seamless.z[u] = best
 
 
 @kernel
-def _inward(x: float, y: float, lx: float, ly: float, rx: float, ry: float) -> tuple[float, float]:
+def _inward(a: complex, b: complex) -> complex:
     """Direction between those to two neighbours, as long as the shorter."""
-    ax, ay, bx, by = lx - x, ly - y, rx - x, ry - y
-    a, b = np.hypot(ax, ay), np.hypot(bx, by)
+    shorter = min(abs(a), abs(b))
     # the normals of the two sides, inwards
-    sx, sy = by / b - ay / a, ax / a - bx / b
-    length = np.hypot(sx, sy)
-    if not length > 1e-9:
-        return ax, ay
-    size = min(a, b) / length
-    return sx * size, sy * size
+    inward = 1j * (a / abs(a) - b / abs(b))
+    if not abs(inward) > 1e-9:
+        return a
+    return inward * (shorter / abs(inward))
 
 
 @kernel
@@ -209,15 +194,12 @@ def _enter_chart(seamless: SeamlessMap, u: int) -> None:
             break
     w = seamless.F[f, (k + j) % 3]
     change = after(frame_of(seamless, f, k), inverse(frame_of(seamless, f, (k + j) % 3)))
-    qx, qy = turned(seamless.x[u, 0], seamless.x[u, 1], change[0])
-    qx, qy = qx + change[1], qy + change[2]
-    chart, turn, sx, sy, px, py = follow(seamless, seamless.chart[w], seamless.x[w, 0], seamless.x[w, 1], qx, qy)
-    change = after(change, (turn, sx, sy))
-    seamless.chart[u], seamless.x[u, 0], seamless.x[u, 1] = chart, px, py
-    back = inverse(change)
+    goal = turned(seamless.z[u], change[0]) + change[1]
+    seamless.chart[u], onward, seamless.z[u] = follow(seamless, seamless.chart[w], seamless.z[w], goal)
+    back = inverse(after(change, onward))
     for i in range(first, last):
         f, k = seamless.star[i] // 3, seamless.star[i] % 3
-        seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1] = after(back, frame_of(seamless, f, k))
+        seamless.turn[f, k], seamless.shift[f, k] = after(back, frame_of(seamless, f, k))
 
 
 @kernel
@@ -226,13 +208,13 @@ def _change_frames(seamless: SeamlessMap, v: int, u: int, fan: Ints) -> None:
     degree = seamless.star_start[v + 1] - seamless.star_start[v]
     around = seamless.star_start[u + 1] - seamless.star_start[u]
     h = fan[0, 0]
-    tip_x, tip_y = seamless.shift[h // 3, h % 3]
+    tip = seamless.shift[h // 3, h % 3]
     # v takes the frame of its first triangle, and carries it round without crossing the edge to u
-    frame = 0, 0, 0
+    frame = 0, 0j
     for i in range(degree):
         h = fan[0, i]
         f, k = h // 3, h % 3
-        seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1] = frame
+        seamless.turn[f, k], seamless.shift[f, k] = frame
         g = fan[0, (i + 1) % degree]
         frame = after(frame, _change(seamless, f, (k + 2) % 3, g // 3, (g % 3 + 1) % 3))
     # the triangles of u see the tip, clockwise from the first, which was v's too
@@ -241,16 +223,14 @@ def _change_frames(seamless: SeamlessMap, v: int, u: int, fan: Ints) -> None:
         f, k = h // 3, h % 3
         if i > 0:
             before = fan[1, (around - i + 1) % around]
-            change = _change(seamless, before // 3, (before % 3 + 1) % 3, f, (k + 2) % 3)
-            px, py = turned(float(tip_x), float(tip_y), change[0])
-            tip_x, tip_y = int(px) + change[1], int(py) + change[2]
-        seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1] = 0, tip_x, tip_y
-    seamless.x[u, 0] = seamless.x[u, 1] = 0.0
-    seamless.freedom[u], seamless.freedom[v] = FIXED, FREE
+            turn, shift = _change(seamless, before // 3, (before % 3 + 1) % 3, f, (k + 2) % 3)
+            tip = turned(tip, turn) + shift
+        seamless.turn[f, k], seamless.shift[f, k] = 0, tip
+    seamless.z[u], seamless.freedom[u], seamless.freedom[v] = 0.0, FIXED, FREE
 
 
 @kernel
-def _change(seamless: SeamlessMap, f: int, k: int, g: int, m: int) -> tuple[int, int, int]:
+def _change(seamless: SeamlessMap, f: int, k: int, g: int, m: int) -> Frame:
     """From the frame of triangle f to that of g, which share a free vertex: corner k of one and m of the other."""
     return after(inverse(frame_of(seamless, f, k)), frame_of(seamless, g, m))
 

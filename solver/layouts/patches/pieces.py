@@ -42,7 +42,8 @@ class Pieces(NamedTuple):
 def chart_pieces(patches: PatchMap) -> Pieces:
     """Cut a map's triangles where they leave a chart."""
     seamless = patches.seamless
-    corner, homes, places = places_on_charts(seamless)
+    corner, homes, z = places_on_charts(seamless)
+    places = np.stack([z.real, z.imag], axis=-1)
     # squares of the plane that each reaches into, from one to that before another; whole numbers lie on borders
     first = np.floor(places.min(axis=1) + 1e-12).astype(np.int64)
     last = np.maximum(np.ceil(places.max(axis=1) - 1e-12).astype(np.int64), first + 1)
@@ -93,10 +94,10 @@ def _cut_at_borders(
                 corners = clip(spare, corners, 0.0, j + 1.0, 0.0, -1.0, 1, square)
                 if corners < 3 or _area(square, corners) < LEAST:
                     continue
-                x = y = 0.0
+                middle = 0j
                 for c in range(corners):
-                    x, y = x + square[c, 0], y + square[c, 1]
-                target, turn, sx, sy, _, _ = follow(seamless, homes[f], p[k, 0], p[k, 1], x / corners, y / corners)
+                    middle += complex(square[c, 0], square[c, 1])
+                target, (turn, shift), _ = follow(seamless, homes[f], complex(p[k, 0], p[k, 1]), middle / corners)
                 for c in range(1, corners - 1):
                     if count < room:
                         origin[count], chart[count] = f, target
@@ -104,8 +105,8 @@ def _cut_at_borders(
                             of = c + to - 1 if to > 0 else 0
                             for m in range(3):
                                 weights[count, to, m] = square[of, 2 + m]
-                            x, y = turned(square[of, 0], square[of, 1], turn)
-                            places[count, to, 0], places[count, to, 1] = x + sx, y + sy
+                            place = turned(complex(square[of, 0], square[of, 1]), turn) + shift
+                            places[count, to, 0], places[count, to, 1] = place.real, place.imag
                     count += 1
     return count
 

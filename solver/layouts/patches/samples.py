@@ -18,7 +18,7 @@ from ...kernel import Bools, Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.topology import TexelTopology
 from .layout import PatchMap
-from .seamless import SeamlessMap, follow, places_on_charts
+from .seamless import Complex, SeamlessMap, follow, places_on_charts, wedge
 
 _MARGIN = 0.1  # sine of a corner that is wide enough
 
@@ -121,7 +121,7 @@ def _draw(
     chosen: Ints,
     corner: Ints,
     homes: Ints,
-    places: Floats,
+    places: Complex,
     number: Ints,
     triangles: Ints,
     barycentrics: Floats,
@@ -131,23 +131,21 @@ def _draw(
     n, slack = best.shape[1], 1e-9
     for f in chosen:
         home, k, p = homes[f], corner[f], places[f]
-        ux, uy, vx, vy = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[2, 0] - p[0, 0], p[2, 1] - p[0, 1]
-        area = ux * vy - uy * vx
-        first = int(np.ceil((min(p[0, 1], p[1, 1], p[2, 1]) - slack) * n - 0.5))
-        last = int(np.floor((max(p[0, 1], p[1, 1], p[2, 1]) + slack) * n - 0.5))
-        left = int(np.ceil((min(p[0, 0], p[1, 0], p[2, 0]) - slack) * n - 0.5))
-        right = int(np.floor((max(p[0, 0], p[1, 0], p[2, 0]) + slack) * n - 0.5))
+        u, v = p[1] - p[0], p[2] - p[0]
+        area = wedge(u, v)
+        first = int(np.ceil((min(p[0].imag, p[1].imag, p[2].imag) - slack) * n - 0.5))
+        last = int(np.floor((max(p[0].imag, p[1].imag, p[2].imag) + slack) * n - 0.5))
+        left = int(np.ceil((min(p[0].real, p[1].real, p[2].real) - slack) * n - 0.5))
+        right = int(np.floor((max(p[0].real, p[1].real, p[2].real) + slack) * n - 0.5))
         for i in range(first, last + 1):
-            y = (i + 0.5) / n
             for j in range(left, right + 1):
-                x = (j + 0.5) / n
-                s = ((x - p[0, 0]) * vy - (y - p[0, 1]) * vx) / area
-                t = (ux * (y - p[0, 1]) - uy * (x - p[0, 0])) / area
+                z = complex((j + 0.5) / n, (i + 0.5) / n)
+                s, t = wedge(z - p[0], v) / area, wedge(u, z - p[0]) / area
                 least = min(s, t, 1 - s - t)
                 if least < -1e-6:
                     continue
-                found, _, _, _, u, v = follow(seamless, home, p[k, 0], p[k, 1], x, y)
-                chart, row, column = number[found], int(np.floor(v * n)), int(np.floor(u * n))
+                found, _, place = follow(seamless, home, p[k], z)
+                chart, row, column = number[found], int(np.floor(place.imag * n)), int(np.floor(place.real * n))
                 if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
                     continue
                 best[chart, row, column] = least

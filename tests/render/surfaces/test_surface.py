@@ -40,7 +40,7 @@ def test_a_colour_is_the_given_one_or_the_models_or_the_looks(geom, given, shown
 
 
 def cut_at_charts(mesh, charts) -> SimpleNamespace:
-    parts = split_at_charts(mesh, charts, slice(0, 3), slice(3, 6), slice(6, 9))
+    parts = split_at_charts(mesh, charts)
     return SimpleNamespace(**dict(zip(("F", "attributes", "same", "chart"), parts, strict=True)))
 
 

@@ -6,7 +6,16 @@ from mujoco_models import posed
 from sphere_height_maps import N, constant_height_map, cube_charts, height_map_of
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.surfaces import AdaptiveTessellation, SurfaceVertices, adaptive, midpoints, tessellate, welded
+from ripple_sim.render.surfaces import (
+    COORDINATES,
+    POSITION,
+    AdaptiveTessellation,
+    SurfaceVertices,
+    adaptive,
+    midpoints,
+    tessellate,
+    welded,
+)
 from ripple_sim.render.visuals import shapes, triangle_normals
 from ripple_sim.solver import HeightMap, sphere_atlas
 from ripple_sim.solver.backends import DeviceField
@@ -18,7 +27,7 @@ from ripple_sim.solver.texels import ChartPage
 def refine(V, F, normals, same=None, **limits):
     attributes = np.concatenate([V, normals, 2 * V], axis=1)
     same = np.arange(len(V)) if same is None else same
-    F, finer, _ = tessellate(F, attributes, same, position=slice(0, 3), normal=slice(3, 6), **limits)
+    F, finer, _ = tessellate(F, attributes, same, **limits)
     return F, finer, attributes
 
 
@@ -62,9 +71,6 @@ def test_subdivision_stops_at_the_budget():
     assert 2500 < len(F) <= 5000
 
 
-POSITION, NORMAL, SPHERE = slice(0, 3), slice(3, 6), slice(6, 9)
-
-
 def ball(tolerance, min_length=0.0):
     """A ball whose triangles share no vertices, so that each edge is a seam: its refinement, and all vertices."""
     shape = shapes.ball(12)
@@ -74,9 +80,9 @@ def ball(tolerance, min_length=0.0):
     attributes, F = np.concatenate([V, V, V], axis=1), np.arange(len(V)).reshape(-1, 3)
     edges = edges_of(F)
     _, inner = welded(edges, F, same.ravel())
-    vertices = np.concatenate([attributes, midpoints(edges.ends, inner, attributes, POSITION, NORMAL)])
+    vertices = np.concatenate([attributes, midpoints(edges.ends, inner, attributes)])
     page = ChartPage(6, N)
-    chart, row, column = cube_chart_points(vertices[:, SPHERE], N)
+    chart, row, column = cube_chart_points(vertices[:, COORDINATES], N)
     places = page.places(chart, (np.stack([column, row], axis=1) + 0.5) / N)
     made = SurfaceVertices(F, vertices, edges, places, places, np.zeros((0, 4)), F)
     adaptive = AdaptiveTessellation(made, page, tolerance, min_length)
@@ -144,11 +150,11 @@ def test_edges_are_split_where_waves_depart_from_them():
     _, used = refine(height_map_of(height, np.zeros_like))
     base = refine.base_count
     ends = edges_of(np.arange(base).reshape(-1, 3)).ends
-    at = height(vertices[:, SPHERE] / np.linalg.norm(vertices[:, SPHERE], axis=1, keepdims=True))
+    at = height(vertices[:, COORDINATES] / np.linalg.norm(vertices[:, COORDINATES], axis=1, keepdims=True))
     departure = np.abs(at[base:] - at[ends].mean(axis=1))
     split = np.isin(base + np.arange(len(ends)), used)
     # along the cube's edges grid lines kink, and the spline of so coarse a height map is further from the wave
-    across = np.sort(np.abs(vertices[base:, SPHERE]), axis=1)
+    across = np.sort(np.abs(vertices[base:, COORDINATES]), axis=1)
     inside = across[:, 1] < 0.8 * across[:, 2]
     assert departure[inside & split].min() > 0.8 * tolerance
     assert departure[inside & ~split].max() < 1.2 * tolerance
