@@ -4,6 +4,7 @@ import grp
 import importlib.metadata
 import json
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,22 +58,19 @@ def test_no_vendor_file(tmp_path: Path) -> None:
     assert "apt-get install libegl-mesa0" in report["advice"]
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("{", " is damaged"),
-        (
-            '{"file_format_version": "1.0.0", "ICD": {"library_path": "libEGL_nvidia_gone.so.0"}}',
-            " names libEGL_nvidia_gone.so.0, which cannot be loaded: apt-get install libnvidia-gl-",
-        ),
-    ],
-)
-def test_a_vendor_file_that_is_damaged_or_whose_library_is_missing(tmp_path, monkeypatch, text: str, said: str) -> None:
-    file = tmp_path / "10_nvidia.json"
-    file.write_text(text)
+def test_a_vendor_file_that_is_damaged_or_whose_library_is_missing(tmp_path, monkeypatch) -> None:
+    file, gone = tmp_path / "10_nvidia.json", "libEGL_nvidia_gone.so.0"
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
-    [finding] = find_problems(None, tmp_path)
-    assert f"{file}{said}" in finding
+    for text, said in (
+        ("{", "is damaged"),
+        (
+            f'{{"ICD": {{"library_path": "{gone}"}}}}',
+            f"names {gone}, which cannot be loaded: apt-get install libnvidia",
+        ),
+    ):
+        file.write_text(text)
+        [finding] = find_problems(None, tmp_path)
+        assert f"{file} {said}" in finding
 
 
 def test_a_broken_library(tmp_path: Path) -> None:
@@ -82,7 +80,7 @@ def test_a_broken_library(tmp_path: Path) -> None:
     report = info(LD_LIBRARY_PATH=str(tmp_path))
     assert report["opengl"] is None
     assert f"the library {library} cannot be loaded" in report["advice"]
-    assert f"apt-get install --reinstall {library.partition('.')[0].lower()}1" in report["advice"]
+    assert "apt-get install --reinstall libgl1" in report["advice"]
 
 
 def test_a_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,8 +91,7 @@ def test_a_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_software_where_there_is_no_gpu(tmp_path: Path) -> None:
     [finding] = find_problems(True, tmp_path)
-    assert "OpenGL runs in software" in finding
-    assert "there is no GPU" in finding
+    assert "OpenGL runs in software" in finding and "there is no GPU" in finding
 
 
 def test_no_permission_on_the_render_node(devices: Path, plain_user: None) -> None:
@@ -157,18 +154,14 @@ def test_without_egl_info_says_what_to_install(capsys, no_egl):
     assert (got["opengl"], got["backend"]) == (None, "cpu")
     assert "libegl1" in got["advice"]
     assert cli.main(["info"]) == 0
-    out = capsys.readouterr().out
-    assert "none: rendering is impossible" in out
-    assert "apt-get install" in out
+    assert re.search(r"none: rendering is impossible[\s\S]*apt-get install", capsys.readouterr().out)
 
 
 def test_mujocos_version_is_that_which_runs_also_where_its_package_is_mujoco_core(monkeypatch):
     installed = importlib.metadata.version
 
     def without_mujoco(name: str) -> str:
-        if name == "mujoco":
-            raise importlib.metadata.PackageNotFoundError(name)
-        return installed(name)
+        return installed("no such package" if name == "mujoco" else name)
 
     monkeypatch.setattr(importlib.metadata, "version", without_mujoco)
     monkeypatch.setattr(settings, "version", without_mujoco)

@@ -19,13 +19,7 @@ from gymnasium.envs.mujoco import MujocoEnv  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning  # noqa: E402
-from ripple_sim.gymnasium import (  # noqa: E402
-    RippleWrapper,
-    depth_buffer,
-    environment_camera,
-    frame_size,
-    model_and_data,
-)
+from ripple_sim.gymnasium import RippleWrapper, depth_buffer, environment_camera, frame_size, model_and_data  # noqa: E402
 from ripple_sim.render import find_viewpoint  # noqa: E402
 
 N = 16
@@ -135,13 +129,11 @@ def test_frames_show_the_ripples_in_the_size_of_the_environment(path: Path, mode
     env.ripples["block"].step(0.02)
     rippled = frames()
     for before, after in zip(flat, rippled, strict=True):
-        assert before.shape == after.shape
         if before.dtype == np.uint8:
-            assert before.shape == (48, 64, 3)
+            assert before.shape == after.shape == (48, 64, 3)
             assert np.abs(after.astype(int) - before).mean() > 1
         else:
-            assert before.shape == (48, 64)
-            assert before.dtype == np.float32
+            assert before.shape == after.shape == (48, 64) and before.dtype == np.float32
             assert 1e-5 < np.abs(after - before).max() < 0.1
     assert len(flat) == 1 + (mode == "rgbd_tuple")
     env.close()
@@ -165,14 +157,8 @@ def test_modes_without_ripples_say_so(path: Path) -> None:
 def test_make_vec_makes_ripples_in_this_process_and_in_another(mode: str, count: int, keywords: dict[str, Any]) -> None:
     materials, feel = {"torso_geom": Material(density=100.0)}, {"geom": "torso_geom", "at": [0, 0, 1.0], "rate": 1000}
     wrapper = functools.partial(RippleWrapper, materials=materials, sensors={"feel": feel}, **OPTIONS)
-    envs = gymnasium.make_vec(
-        "Ant-v5",
-        num_envs=count,
-        vectorization_mode=mode,
-        vector_kwargs=keywords,
-        wrappers=[wrapper],
-        max_episode_steps=3,
-    )
+    how = {"num_envs": count, "vectorization_mode": mode, "vector_kwargs": keywords}
+    envs = gymnasium.make_vec("Ant-v5", **how, wrappers=[wrapper], max_episode_steps=3)
     _, info = envs.reset(seed=1)
     assert info["heights"]["torso_geom"].shape == (count, 6, N, N)
     for _ in range(3):
@@ -253,6 +239,7 @@ def test_without_gymnasium_the_message_names_the_extra(monkeypatch: pytest.Monke
 VIEWED = """<mujoco><visual><global fovy="38"/></visual><worldbody><geom type="plane" size="2 2 1"/>
 <body pos="0.3 -0.2 1"><freejoint/><geom size="0.1"/><geom size="0.1" pos="0.2 0 0"/>
 <camera name="track" mode="trackcom" pos="0 -3 0.3" xyaxes="1 0 0 0 0 1" fovy="50"/></body></worldbody></mujoco>"""
+TRACKING = {"trackbodyid": 1, "lookat": np.array([0.0, 0.1, 2.0]), "elevation": -20.0, "azimuth": 30.0}
 
 
 def pose_of_mujoco(
@@ -272,14 +259,7 @@ def pose_of_mujoco(
 
 
 @pytest.mark.parametrize("camera_id", [-1, 0])
-@pytest.mark.parametrize(
-    "config",
-    [
-        {},
-        {"distance": 4.0},
-        {"trackbodyid": 1, "lookat": np.array([0.0, 0.1, 2.0]), "elevation": -20.0, "azimuth": 30.0},
-    ],
-)
+@pytest.mark.parametrize("config", [{}, {"distance": 4.0}, TRACKING])
 def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
     model, data = posed(VIEWED)
     viewer = types.SimpleNamespace(camera_id=camera_id, default_cam_config=config or None, width=320, height=200)

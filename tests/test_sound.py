@@ -110,9 +110,8 @@ def test_the_track_of_a_video_is_what_was_given(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("opengl")
 def test_a_video_with_sound(tmp_path: Path) -> None:
     options = VideoOptions(size=(32, 32), fps=10, duration=0.3, slow_motion=2.0, sound=True, overlay=())
-    with pytest.warns(
-        UserWarning, match="is hardly heard: waves of .* m and longer sound at .* Hz at most, below hearing"
-    ):
+    said = "is hardly heard: waves of .* m and longer sound at .* Hz at most, below hearing"
+    with pytest.warns(UserWarning, match=said):
         render_video(egg_scene(tmp_path), tmp_path / "a.mp4", options)
     with av.open(str(tmp_path / "a.mp4")) as file:
         assert float(file.streams.audio[0].duration * file.streams.audio[0].time_base) == pytest.approx(0.6, abs=0.03)

@@ -77,7 +77,7 @@ class Chunks:
             resume=chunking.resume,
             overwrite=True,
         )
-        if damaged := [segment.name for segment, _ in self._part.segments() if not made_here(segment)]:
+        if damaged := [segment.name for segment, _ in self._part.segments if not made_here(segment)]:
             self._part.keep()
             raise VideoError(
                 f"cannot resume {chunking.output}: {damaged[0]} is damaged; leave --resume out to start again"
@@ -112,7 +112,7 @@ class Chunks:
         if self._layer is not None:
             self._end()
         part, self._part = self._part, None
-        names = [(segment.name, first) for segment, first in part.segments()]
+        names = [(segment.name, first) for segment, first in part.segments]
         part.hand_over(folder)
         first_layer = Sdf.Layer.FindOrOpen(str(folder / names[0][0]))
         manifest = Usd.ClipsAPI.GenerateClipManifestFromLayers([first_layer], self._path)

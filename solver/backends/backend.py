@@ -25,7 +25,8 @@ from ..layouts.cube.convention import cube_topology
 from ..operator.deep_water import FluidOperator
 from ..operator.wave_operator import WaveOperator, damped_step
 from ..texels.stencil import Stencil
-from .cpu import CPUBackend
+from .cpu import CPUBackend, RowLayout
+from .field_backend import FieldBackend
 from .gl import GLBackend
 from .kernels import Amplitude, Probes
 
@@ -34,61 +35,26 @@ BACKENDS = ("auto", "gl", "cpu")
 _TYPICAL = 6 * 128**2  # texels of a video's target
 
 
-class FluidBackend:
+class FluidBackend(FieldBackend):
     """Surfaces with deep fluid below: shifted sparse solves on the CPU, whatever draws the frames; see `Backend`.
 
     The fluid keeps its volume, asked to or not.
     """
 
     name = "cpu"
+    _operator: FluidOperator
 
     def __init__(self, operator: FluidOperator, *, keeps_volume: bool = False) -> None:
         self._operator = operator
         self.keeps_volume = keeps_volume
-        self._h, self._v, self._dent = np.zeros((3, *operator.mass.shape), np.float32)
+        self._fields = RowLayout(operator.topology)
+        self._h, self._v = self._fields.zeros(), self._fields.zeros()
         self._forces = np.zeros(operator.mass.size)
-        self._crests = np.zeros_like(self._h)
         self._probes: Probes | None = None
-        self._sums: list[NDArray] = []
-
-    def height(self) -> NDArray[np.float32]:
-        """Copy of the height [m], [C, n, n]."""
-        return self._h + self._dent
-
-    def snapshot(self) -> NDArray[np.float32]:
-        """The same as `height`."""
-        return self.height()
-
-    def elastic(self) -> NDArray[np.float32]:
-        """Copy of the part of the height that springs back [m], [C, n, n]."""
-        return self._h.copy()
-
-    def dent(self) -> NDArray[np.float32]:
-        """The part of the height that another material has left [m], [C, n, n]."""
-        return self._dent.copy()
-
-    def velocity(self) -> NDArray[np.float32]:
-        """Copy of the velocity [m/s], [C, n, n]."""
-        return self._v.copy()
 
     def move(self, operator: WaveOperator) -> None:
         """Refuse: this backend cannot move; see `MovingOperator`."""
         raise NotImplementedError
-
-    def crests(self) -> NDArray[np.float32]:
-        """Greatest size of the height after any `advance` since the last call, or now [m], [C, n, n]."""
-        crests = np.maximum(self._crests, np.abs(self.height()))
-        self._crests[:] = 0
-        return crests
-
-    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
-        """Replace the elastic height, and the permanent one: 0 unless given."""
-        self._h[:] = height
-        self._dent[:] = 0 if dent is None else dent
-
-    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
-        """Replace the velocity."""
-        self._v[:] = velocity
 
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
         """Add momenta to some texels, given as the velocities [m/s] that their own mass would have.
@@ -97,7 +63,8 @@ class FluidBackend:
         """
         momentum = np.zeros(self._operator.mass.size)
         momentum[texels] = velocities * self._operator.mass.reshape(-1)[texels]
-        self._v += self._operator.acceleration(momentum.reshape(self._v.shape))
+        change = self._operator.acceleration(momentum.reshape(self._operator.mass.shape))
+        self._fields.write(self._v, self.velocity() + change)
 
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
         """Hold forces [N] on some texels until the next call."""
@@ -106,37 +73,27 @@ class FluidBackend:
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
-        operator, loads = self._operator, self._forces.reshape(self._v.shape)
+        operator, loads = self._operator, self._forces.reshape(self._operator.mass.shape)
         decay, span = damped_step(operator, dt)
-        h, v = self._h.astype(np.float64), self._v.astype(np.float64)
+        h, v, dent = self.elastic().astype(np.float64), self.velocity().astype(np.float64), self.dent()
         h += dt / 2 * v
-        self._sums = []
+        self._sums = np.zeros((substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32)
         for step in range(substeps):
             change = operator.acceleration(operator.elastic_force(h) + loads)
             if operator.viscosity_stencil is not None:
                 change += operator.viscosity_stencil(v) / operator.mass * operator.free
             v = decay * v + span * change
             if self._probes is not None:
-                self._sums.append(self._probes.of(h + dt / 2 * v + self._dent, v))
+                self._sums[step] = self._probes.of(h + dt / 2 * v + dent, v)
             h += (dt if step < substeps - 1 else dt / 2) * v
-        self._h[:], self._v[:] = h, v
-        np.maximum(self._crests, np.abs(self.height()), out=self._crests)
+        self._fields.write(self._h, h)
+        self._fields.write(self._v, v)
+        if self._crests is not None:
+            self._raise_crests()
 
     def probe(self, probes: Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
         self._probes = probes
-
-    def probed(self) -> NDArray[np.float32]:
-        """The sums of the latest `advance`, [substeps, k]."""
-        return np.array(self._sums, np.float32)
-
-    def wait(self) -> None:
-        """Return when all steps are done: at once, they are."""
-
-    def finite(self) -> bool:
-        """Whether all heights are finite."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return bool(np.isfinite(self._h.sum()))
 
 
 Backend: TypeAlias = CPUBackend | GLBackend | FluidBackend

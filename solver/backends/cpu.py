@@ -14,9 +14,10 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import StepCoefficients, WaveOperator, number_or_field, step_coefficients
-from ..texels.stencil import NO_LINKS, Stencil
+from ..texels.stencil import Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
+from .field_backend import FieldBackend
 from .kernels import NO_BALANCE, NO_FEATURES, NO_WEIGHTS, Amplitude, Balance, Coefficient, Kick, Links, Weights
 
 # Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of them. On charts of
@@ -98,8 +99,7 @@ class RowLayout:
         else:
             beside = rows.reshape(4, self.n + 1, count + 1, self.n + 2)
             beside[:, :, :count, : self.n + 1] = stencil.weights.transpose(1, 2, 0, 3)
-        links = stencil.irregular if stencil.irregular is not None else NO_LINKS
-        addresses = self.addresses
+        links, addresses = stencil.irregular, self.addresses
         return Weights(
             rows,
             self.columns,
@@ -118,6 +118,19 @@ class RowLayout:
             return field[:, 1:-1, 1 : self.n + 1]
         beside = field.reshape(self.n + 2, self._charts + 1, self.n + 2)
         return beside[1:-1, : self._charts, 1:-1].transpose(1, 0, 2)
+
+    def read(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Copy of a field's texels, [C, n, n]."""
+        return self.texels(field).copy()
+
+    def write(self, field: NDArray[np.float32], values: NDArray) -> None:
+        """Replace a field's texels; all else becomes 0, also what was no number between charts."""
+        field[:] = 0
+        self.texels(field)[:] = values
+
+    def clear(self, field: NDArray[np.float32]) -> None:
+        """Make a field 0."""
+        field[:] = 0
 
     def _address(self, address: NDArray[np.int64]) -> NDArray[np.int64]:
         """From an address in [C, n + 2, n + 2] to one in a field here."""
@@ -168,8 +181,8 @@ def volume_balance(operator: WaveOperator, dt: float, fields: RowLayout) -> Bala
     )
 
 
-class CPUBackend:
-    """Height and velocity in float32 charts with halo; see `backends.Backend`."""
+class CPUBackend(FieldBackend):
+    """Height and velocity in float32 charts with halo."""
 
     name = "cpu"
 
@@ -179,7 +192,6 @@ class CPUBackend:
         # the processor takes a store to one field and a load from another at the same place of a page for a conflict:
         # each field begins elsewhere in its page
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
-        self._dent: NDArray[np.float32] | None = None
         self._stencil, self._features = NO_WEIGHTS, NO_FEATURES
         if operator.laplace_stencil is not None:
             self._features = self._features._replace(moment=fields.zeros().reshape(-1))
@@ -195,59 +207,9 @@ class CPUBackend:
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
-        self._crests: NDArray[np.float32] | None = None
         self._probes: kernels.Probes | None = None
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
-
-    def height(self) -> NDArray[np.float32]:
-        """Copy of the height [m], [C, n, n]."""
-        elastic = self.elastic()
-        return elastic if self._dent is None else elastic + self.dent()
-
-    def snapshot(self) -> NDArray[np.float32]:
-        """The same as `height`."""
-        return self.height()
-
-    def elastic(self) -> NDArray[np.float32]:
-        """Copy of the part of the height that springs back [m], [C, n, n]."""
-        return self._fields.texels(self._h).copy()
-
-    def dent(self) -> NDArray[np.float32]:
-        """The part of the height that stays [m], [C, n, n]."""
-        if self._dent is None:
-            return np.zeros(self._operator.mass.shape, np.float32)
-        return self._fields.texels(self._dent).copy()
-
-    def velocity(self) -> NDArray[np.float32]:
-        """Copy of the velocity [m/s], [C, n, n]."""
-        self._add_shift()
-        return self._fields.texels(self._v).copy()
-
-    def crests(self) -> NDArray[np.float32]:
-        """Greatest size of the height after any `advance` since the last call, or now [m], [C, n, n]."""
-        if self._crests is None:
-            self._crests = self._fields.zeros()
-        self._raise_crests(self._crests)
-        crests = self._fields.texels(self._crests).copy()
-        self._crests[:] = 0
-        return crests
-
-    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
-        """Replace the elastic height, and the permanent one: 0 unless given."""
-        self._h[:] = 0  # what is no number between charts too
-        self._fields.texels(self._h)[:] = height
-        if self._dent is None and dent is not None and dent.any():
-            # what another material has left, in a surface that does not yield itself
-            self._dent = self._fields.zeros()
-        if self._dent is not None:
-            self._fields.texels(self._dent)[:] = 0 if dent is None else dent
-
-    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
-        """Replace the velocity."""
-        self._v[:] = 0
-        self._fields.texels(self._v)[:] = velocity
-        self._shift = None
 
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
         """Add velocities [m/s] to some texels (each named once), and one to all, as they respond.
@@ -267,7 +229,7 @@ class CPUBackend:
         k, balance = self._prepare(dt), self._balance
         acceleration = self._pressure(self._acceleration) if balance is None else balance.pressure
         kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
-        self._add_shift()
+        self._apply_kicks()
         features = self._features
         drags = self._plain and len(features.viscosity.rows) > 0
         self._sums = np.zeros((substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32)
@@ -287,15 +249,11 @@ class CPUBackend:
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
         if self._crests is not None:
-            self._raise_crests(self._crests)
+            self._raise_crests()
 
     def probe(self, probes: kernels.Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
         self._probes = probes and probes._replace(texels=self._fields.addresses[probes.texels])
-
-    def probed(self) -> NDArray[np.float32]:
-        """The sums of the latest `advance`, [substeps, k]."""
-        return self._sums
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
@@ -312,26 +270,20 @@ class CPUBackend:
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
-    def wait(self) -> None:
-        """Return when all steps are done: at once, they are."""
-
-    def finite(self) -> bool:
-        """Whether all heights are finite."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return bool(np.isfinite(self._h.sum()))
-
-    def _raise_crests(self, crests: NDArray[np.float32]) -> None:
+    def _raise_crests(self) -> None:
         # the next height is but scratch between steps
         height = self._h if self._dent is None else np.add(self._h, self._dent, out=self._h_next)
-        np.maximum(crests, np.abs(height, out=self._h_next), out=crests)
+        np.maximum(self._crests, np.abs(height, out=self._h_next), out=self._crests)
 
-    def _add_shift(self) -> None:
-        """Add the shift that was noted."""
+    def _apply_kicks(self) -> None:
         if self._shift is not None:
             shift = self._pressure(self._shift) * self._response
             velocities = self._v[:, 1:-1, 1 : self._fields.columns + 1]
             velocities += shift.reshape(velocities.shape) if shift.ndim else shift
             self._shift = None
+
+    def _drop_kicks(self) -> None:
+        self._shift = None
 
     def _pressure(self, amplitude: Amplitude) -> Coefficient:
         """An amplitude, one for all or one for each part, as the loops take it: a number, or a flat field."""

@@ -15,9 +15,10 @@ from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
 from ..texels import cells
 from ..texels.moving import MovedStencil, Ride
-from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
+from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
+from .field_backend import FieldBackend
 from .gl_dispatch import DeviceProbes, Dispatch, Pressure
 from .gl_fields import DeviceField, FieldLayout, TexelList, bind_buffers, link_buffers
 from .kernels import Amplitude, Probes
@@ -60,7 +61,7 @@ class DeviceStiffness:
         law = {name: float(getattr(cells, name)) for name in _LAW}
         self._shaders["quads"] = dispatch.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
 
-    def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks | None:
+    def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
         """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
         V, (quads, _) = stencil.places.V, stencil.coefficient
         self._around[:, stencil.cells.special_places] = self._special.at(V)
@@ -80,9 +81,8 @@ class DeviceStiffness:
             stencil.known_fastest = self._fastest(irregular, buffer)
         return irregular
 
-    def _fastest(self, irregular: IrregularLinks | None, buffer: moderngl.Buffer) -> float:
+    def _fastest(self, links: IrregularLinks, buffer: moderngl.Buffer) -> float:
         """Gershgorin's bound for what was made last."""
-        links = irregular if irregular is not None else NO_LINKS
         if len(links.texels):
             beside = np.zeros(self._mass.size, np.float32)
             beside[links.texels] = np.add.reduceat(np.abs(links.weights), links.begins[:-1])
@@ -218,8 +218,8 @@ class ExtraForces:
             self._dispatch.run_list(self._irregular, count)
 
 
-class GLBackend:
-    """Height and velocity in float32 storage buffers; see `backends.Backend`."""
+class GLBackend(FieldBackend):
+    """Height and velocity in float32 storage buffers."""
 
     name = "gl"
 
@@ -229,7 +229,7 @@ class GLBackend:
         self._operator = operator
         self._fields = fields = FieldLayout(self._gl, operator.topology)
         self._dispatch = Dispatch(self._gl, fields)
-        self._dent = self._yield = None
+        self._yield: moderngl.Buffer | None = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = StencilBuffer(self._gl, fields, self._dispatch, operator.stencil)
         self._response = fields.upload(operator.response)
@@ -245,16 +245,10 @@ class GLBackend:
         self._kick, self._irregular_kick = self._dispatch.shader("kick"), self._dispatch.shader("irregular", KICK=1)
         self._drift = self._dispatch.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
         self._shift: Amplitude = 0.0
-        self._crests: moderngl.Buffer | None = None
         self._probes: DeviceProbes | None = None
         self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
-
-    def height(self) -> NDArray[np.float32]:
-        """Copy of the height [m], [C, n, n]."""
-        elastic = self.elastic()
-        return elastic if self._dent is None else elastic + self.dent()
 
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
         """Copy of the height [m], [C, n, n], on the GPU; where the driver is software, in the host's memory."""
@@ -262,48 +256,6 @@ class GLBackend:
             return self.height()
         fields = [self._h, *([] if self._dent is None else [self._dent])]
         return DeviceField.gathered(self._gl, self._operator.mass.shape, self._fields.texel_addresses, *fields)
-
-    def elastic(self) -> NDArray[np.float32]:
-        """Copy of the part of the height that springs back [m], [C, n, n]."""
-        return self._fields.read(self._h)
-
-    def dent(self) -> NDArray[np.float32]:
-        """The part of the height that stays [m], [C, n, n]."""
-        return np.zeros(self._operator.mass.shape, np.float32) if self._dent is None else self._fields.read(self._dent)
-
-    def velocity(self) -> NDArray[np.float32]:
-        """Copy of the velocity [m/s], [C, n, n]."""
-        with self._gl:
-            self._start(0.0)
-        return self._fields.read(self._v)
-
-    def crests(self) -> NDArray[np.float32]:
-        """Greatest size of the height after any `advance` since the last call, or now [m], [C, n, n].
-
-        They are kept on the GPU.
-        """
-        if self._crests is None:
-            self._crests = self._fields.zeros()
-        with self._gl:
-            self._raise_crests(self._crests)
-        crests = self._fields.read(self._crests)
-        with self._gl:
-            self._crests.clear()
-        return crests
-
-    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
-        """Replace the elastic height, and the permanent one: 0 unless given."""
-        self._fields.write(self._h, height)
-        if self._dent is None and dent is not None and dent.any():
-            # what another material has left, in a surface that does not yield itself
-            self._dent = self._fields.zeros()
-        if self._dent is not None:
-            self._fields.write(self._dent, np.zeros_like(height) if dent is None else dent)
-
-    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
-        """Replace the velocity."""
-        self._fields.write(self._v, velocity)
-        self._waiting, self._shift = [], 0.0
 
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
         """Add velocities [m/s] to some texels, and one to all, as they respond.
@@ -344,7 +296,7 @@ class GLBackend:
                     self._probes.take(step, drift - dt / 2, self._h, self._v, self._dent)
                 self._flow()
             if self._crests is not None:
-                self._raise_crests(self._crests)
+                self._raise_crests()
 
     def probe(self, probes: Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
@@ -396,10 +348,18 @@ class GLBackend:
             bind_buffers(self._h, self._dent, self._yield)
             self._dispatch.run_texels(self._yielding)
 
-    def _raise_crests(self, crests: moderngl.Buffer) -> None:
-        shader = self._dispatch.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
-        bind_buffers(self._h, crests, self._dent)
-        self._dispatch.run_texels(shader)
+    def _raise_crests(self) -> None:
+        with self._gl:
+            shader = self._dispatch.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
+            bind_buffers(self._h, self._crests, self._dent)
+            self._dispatch.run_texels(shader)
+
+    def _apply_kicks(self) -> None:
+        with self._gl:
+            self._start(0.0)
+
+    def _drop_kicks(self) -> None:
+        self._waiting, self._shift = [], 0.0
 
     def _kick_irregular(self, dt: float) -> None:
         """What the irregular links add to a substep."""

@@ -103,9 +103,8 @@ def test_a_camera_that_goes_round_blurs_what_stands_still(make_scene):
 def test_shadows_of_many_exposures_are_smoother(make_scene):
     bodies = '<geom type="plane" size="5 5 0.1" pos="0 0 -0.6"/><geom size="0.25" pos="0.3 0 0"/>'
     scene = make_scene(bodies, "", elevation=-50.0)
-    one, few, many = (
-        last_frame(with_exposure(scene, aperture=1e-9, exposures=count)).astype(float) for count in (1, 8, 64)
-    )
+    scenes = (with_exposure(scene, aperture=1e-9, exposures=count) for count in (1, 8, 64))
+    one, few, many = (last_frame(each).astype(float) for each in scenes)
     assert 0 < np.abs(few - many).mean() < 0.5 * np.abs(one - many).mean()
 
 

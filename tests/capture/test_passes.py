@@ -65,7 +65,7 @@ def seen(
 
 
 def test_segmentation_names_every_pixel(seen: list[tuple[Sighting, np.ndarray]]) -> None:
-    [passes] = [passes_of(seen[0][0], None, ("segmentation",))]
+    passes = passes_of(seen[0][0], None, ("segmentation",))
     counts = np.bincount(passes["segmentation"].ravel(), minlength=4)
     assert (counts[[0, FLOOR, EGG, BALL]] > 500).all()
     assert counts.sum() == counts[:4].sum()
@@ -96,9 +96,8 @@ def nearest_points(sighting: Sighting, points: np.ndarray) -> tuple[np.ndarray, 
     inside = (column >= 0) & (column < WIDTH) & (row >= 0) & (row < HEIGHT)
     found = np.flatnonzero(inside)
     at = sighting.positions_seen[row[found], column[found]]
-    near = (np.linalg.norm(at - points[found], axis=1) < 0.02) & (
-        sighting.image.geom[row[found], column[found]] == EGG - 1
-    )
+    near = np.linalg.norm(at - points[found], axis=1) < 0.02
+    near &= sighting.image.geom[row[found], column[found]] == EGG - 1
     return found[near], row[found[near]], column[found[near]]
 
 

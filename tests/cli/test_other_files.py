@@ -32,9 +32,9 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_what_was_made_here_is_replaced_by_the_next_job(tmp_path: Path, ending: str) -> None:
-    write(tmp_path / f"clip{ending}", count=3)
-    write(tmp_path / f"clip{ending}", count=2)
     made = tmp_path / f"clip{ending}"
+    write(made, count=3)
+    write(made, count=2)
     assert all(map(made_here, made.iterdir())) if made.is_dir() else made_here(made)
     assert [each.name for each in tmp_path.iterdir()] == [made.name]
 
@@ -51,9 +51,8 @@ def test_exr_frames_are_known_again(tmp_path: Path) -> None:
 def test_anothers_file_is_replaced_only_when_told_to(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"holiday{ending}"
     path.write_bytes(b"precious")
-    with pytest.raises(
-        VideoError, match=r"exists and was not made by ripple-sim; name another file, or add --overwrite"
-    ):
+    said = "exists and was not made by ripple-sim; name another file, or add --overwrite"
+    with pytest.raises(VideoError, match=said):
         check_output(path, 32, 16, 25)
     with pytest.raises(VideoError, match="--overwrite"):
         write(path)

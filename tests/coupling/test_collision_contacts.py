@@ -246,10 +246,8 @@ def test_target_that_nothing_can_touch_says_so(link: str, contacts: dict, messag
     ],
 )
 def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: float | None) -> None:
-    model = model_of(
-        LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}'),
-        '<hfield name="flat" nrow="2" ncol="2" size="1 1 0.1 0.1"/>',
-    )
+    link = LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}')
+    model = model_of(link, '<hfield name="flat" nrow="2" ncol="2" size="1 1 0.1 0.1"/>')
     contacts = {"shell": ["core"]} if "plane" in core or "hfield" in core else None
     with warnings.catch_warnings(record=True, action="always") as caught:
         Ripples(model, {"shell": Material()}, contacts=contacts, resolution=16, backend="cpu")

@@ -22,28 +22,23 @@ class Run:
 
     def __init__(
         self,
-        pulse: str = "hertz",
-        *,
         target: str = BLOCK,
         other: str = BALL,
         height: float = 0.1 + RADIUS + FALL,
         speed: float = 0.0,
         gravity: float = 9.81,
         solref: str = "0.02 1",
-        modulus: float | None = 1e8,
-        backend: str = "cpu",
         **options: object,
     ) -> None:
-        xml = (
-            f'<mujoco><option timestep="0.002" gravity="0 0 {-gravity}"/><worldbody>{target}'
-            f'<body pos="0 0 {height}"><freejoint/>{other}</body></worldbody></mujoco>'
-        )
+        xml = f"""<mujoco><option timestep="0.002" gravity="0 0 {-gravity}"/><worldbody>{target}
+            <body pos="0 0 {height}"><freejoint/>{other}</body></worldbody></mujoco>"""
         model = mujoco.MjModel.from_xml_string(xml.format(solref=solref))
         self.data = mujoco.MjData(model)
         self.data.qvel[2] = -speed
         material = Material(speed=300.0, density=20.0, damping=20.0)
-        options = {"resolution": 16, "conserve_volume": False, **options}
-        self.ripples = Ripples(model, {"target": material}, pulse=pulse, modulus=modulus, backend=backend, **options)
+        fixed = {"resolution": 16, "conserve_volume": False}
+        hertz = {"pulse": "hertz", "modulus": 1e8, "backend": "cpu"}
+        self.ripples = Ripples(model, {"target": material}, **fixed, **{**hertz, **options})
         self.given: list[tuple[float, float]] = []  # times [s] and forces [N] over them
         self.impulse = 0.0  # of MuJoCo's contacts
 
@@ -126,7 +121,7 @@ def test_the_target_gets_what_mujoco_gives_to_the_last_digits(solref):
 
 @pytest.mark.parametrize("speed", [0.0, 0.5])
 def test_resting_and_sliding_contacts_stay_as_they_are(speed):
-    runs = [Run(pulse, height=0.1 + RADIUS) for pulse in ("hertz", "contact")]
+    runs = [Run(pulse=pulse, height=0.1 + RADIUS) for pulse in ("hertz", "contact")]
     for run in runs:
         run.data.qvel[0] = speed
         run.steps(100)
@@ -139,7 +134,7 @@ def test_what_is_not_round_keeps_the_contacts_pulse_and_says_so_once():
     with pytest.warns(RippleWarning, match="'other' on 'target' keeps MuJoCo's contact pulse") as told:
         run = Run(other=cube, solref=ELASTIC).steps(220)  # two bounces
     assert sum("contact pulse" in str(each.message) for each in told) == 1
-    assert run.given == Run("contact", other=cube, solref=ELASTIC).steps(220).given
+    assert run.given == Run(pulse="contact", other=cube, solref=ELASTIC).steps(220).given
 
 
 def test_gpu_and_processor_agree_and_a_reset_ends_the_pulse():

@@ -85,9 +85,8 @@ def test_impulses_of_several_steps_are_those_of_each(loop: Loop) -> None:
 def test_missed_steps_are_counted_and_told_once() -> None:
     ripples, model, data = bounce()
     given = 0.0
-    with pytest.warns(
-        RippleWarning, match=r"5 physics steps .* other 4; call `ripples.mj_step\(data, nstep=5\)`"
-    ) as told:
+    said = r"5 physics steps .* other 4; call `ripples.mj_step\(data, nstep=5\)`"
+    with pytest.warns(RippleWarning, match=said) as told:
         for _ in range(30):
             mujoco.mj_step(model, data, nstep=5)
             ripples.step(data)

@@ -38,9 +38,8 @@ class Hit:
         again = steps // 2 if random.restarted else None
         self.balance = MomentumBalance(scene.model, random.targets)
         with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
-            ripples = self.ripples = Ripples(
-                scene.model, materials, resolution=RESOLUTION, backend="cpu", conserve_volume=False
-            )
+            options = {"resolution": RESOLUTION, "backend": "cpu", "conserve_volume": False}
+            ripples = self.ripples = Ripples(scene.model, materials, **options)
             heights = {name: WaveHeights(ripples[name].atlas) for name in ripples}
             self.off, self.facing = 0.0, 1.0
             self.highest: dict[str, float] = collections.defaultdict(float)
@@ -71,9 +70,8 @@ class Hit:
         atlas, geom = self.ripples[impulse.geom].atlas, data.geom(impulse.geom)
         rotation = geom.xmat.reshape(3, 3)
         local = (impulse.point - geom.xpos) @ rotation
-        self.off = max(
-            self.off, np.linalg.norm(atlas.project(local)[0][0] - local) / np.ptp(atlas.mesh.V, axis=0).max()
-        )
+        off = np.linalg.norm(atlas.project(local)[0][0] - local)
+        self.off = max(self.off, off / np.ptp(atlas.mesh.V, axis=0).max())
         pair = impulse.geom, impulse.other
         push = self.balance.pushes[pair]
         pressed = sum(each.impulse for each in self.ripples.last_impulses if (each.geom, each.other) == pair)

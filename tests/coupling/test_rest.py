@@ -98,9 +98,8 @@ def test_surface_under_a_stack_and_its_neighbours_becomes_still(target: str, dt:
     _, top = TARGETS[target]
     places = [("box", 0.0, 0.1), ("box", 0.0, 0.2)]
     places += [("capsule", -0.3, 0.05), ("ball", 0.3, 0.06)] * (target == "box")
-    bodies = "".join(
-        f'<body pos="{x} 0 {top + z}"><freejoint/><geom {BODIES[kind]} mass="0.5"/></body>' for kind, x, z in places
-    )
+    body = '<body pos="{} 0 {}"><freejoint/><geom {} mass="0.5"/></body>'
+    bodies = "".join(body.format(x, top + z, BODIES[kind]) for kind, x, z in places)
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{dt}" sdf_initpoints="10"/><default><geom friction="1 0.05 0.05" condim="6"/>
         </default><asset>{limbed_asset()}</asset><worldbody>{TARGETS[target][0]}{bodies}</worldbody></mujoco>"""
@@ -224,10 +223,8 @@ class LoadedSphere:
         where = footprint(self.atlas, point, self.radius)
         forces = force * where.weights * self.atlas.areas.reshape(-1)[where.texels]
         rows = np.array([0, len(forces)])
-        present = TexelForces(
-            np.zeros(1, np.int64), point[None], np.array([self.radius / 2]), rows, where.texels, forces
-        )
-        return self.filter(present, self.dt)
+        geoms, radii = np.zeros(1, np.int64), np.array([self.radius / 2])
+        return self.filter(TexelForces(geoms, point[None], radii, rows, where.texels, forces), self.dt)
 
 
 def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:

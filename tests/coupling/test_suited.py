@@ -15,6 +15,7 @@ import msgspec
 import mujoco
 import numpy as np
 import pytest
+from hits import Run
 from mujoco_models import limbed_asset
 
 from ripple_sim import Material, Ripples, Simulation, load_scene
@@ -87,9 +88,8 @@ def test_waves_suit_the_target_at_every_scale(size: float) -> None:
 def test_density_is_the_bodys_mass_over_the_targets_area_where_nothing_can_touch_it() -> None:
     xml = """<mujoco><worldbody><geom name="still" type="sphere" size="0.3" contype="2" conaffinity="2"/>
     <body pos="0 0 2"><freejoint/><geom name="free" type="sphere" size="0.5" mass="7"/></body></worldbody></mujoco>"""
-    ripples = Ripples(
-        mujoco.MjModel.from_xml_string(xml), {"still": Material(), "free": Material()}, resolution=8, backend="cpu"
-    )
+    model, chosen = mujoco.MjModel.from_xml_string(xml), Material()
+    ripples = Ripples(model, {"still": chosen, "free": chosen}, resolution=8, backend="cpu")
     assert ripples["free"].material.density == pytest.approx(7 / (4 * np.pi * 0.25), rel=0.01)
     # the world has no mass: 1000 kg/m^3 times volume over area
     assert ripples["still"].material.density == pytest.approx(1000 * 0.3 / 3, rel=0.01)
@@ -145,10 +145,8 @@ def test_heights_stay_within_a_quarter_of_the_radius_at_every_time_step(
     make: Callable[[float], mujoco.MjModel], targets: Sequence[str], seconds: float, dt: float
 ) -> None:
     model, rng = make(dt), np.random.default_rng(3)
-    data, ripples = (
-        mujoco.MjData(model),
-        Ripples(model, dict.fromkeys(targets, Material()), resolution=16, backend="cpu"),
-    )
+    run = Run(model, *targets, material=Material(), resolution=16, conserve_volume=True)
+    data, ripples = run.data, run.ripples
     for name in targets:
         ripples.allow_any_height(name)
         ripples[name].crests()

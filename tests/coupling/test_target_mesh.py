@@ -39,9 +39,8 @@ def land(rows: int, columns: int) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.001
     spec.add_hfield(name="land", nrow=rows, ncol=columns, size=[1.2, 0.8, 0.3, 0.1], userdata=heights.ravel())
-    spec.worldbody.add_geom(
-        name="land", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="land", pos=[0.1, 0.2, 0.3], condim=1
-    )
+    kind, pos = mujoco.mjtGeom.mjGEOM_HFIELD, [0.1, 0.2, 0.3]
+    spec.worldbody.add_geom(name="land", type=kind, hfieldname="land", pos=pos, condim=1)
     return spec
 
 

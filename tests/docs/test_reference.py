@@ -65,12 +65,8 @@ def test_the_page_has_every_public_name() -> None:
 def test_parameters_that_share_a_line_share_a_default(path: str) -> None:
     """The page gives all names on a line the first one's default: an operator once was \"auto\", a height 1280."""
     thing = named(path)
-    own = (
-        [thing]
-        if not inspect.isclass(thing)
-        else [thing, *(m for _, m in inspect.getmembers(thing, inspect.isroutine))]
-    )
-    for each in own:
+    methods = inspect.getmembers(thing, inspect.isroutine) if inspect.isclass(thing) else []
+    for each in [thing, *(method for _, method in methods)]:
         try:
             parameters = inspect.signature(each).parameters
         except (TypeError, ValueError):

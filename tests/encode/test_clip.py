@@ -1,5 +1,6 @@
 """Clips and stills: what is encoded in parts is decoded as one, each frame at its time."""
 
+import itertools
 import struct
 from fractions import Fraction
 from pathlib import Path
@@ -28,10 +29,7 @@ def in_parts(
 ) -> list[tuple[Path, int]]:
     """Clips of so many frames each, with the number of their first."""
     first = np.cumsum([0, *counts]).tolist()
-    return [
-        (encode(folder / f"{a}.part", codec, frames[a : a + count], stream), a)
-        for a, count in zip(first, counts, strict=False)
-    ]
+    return [(encode(folder / f"{a}.part", codec, frames[a:b], stream), a) for a, b in itertools.pairwise(first)]
 
 
 def decode(path: Path) -> tuple[list[np.ndarray], list[Fraction]]:

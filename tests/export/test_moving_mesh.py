@@ -39,14 +39,9 @@ def height_at(atlas: Atlas, field: np.ndarray, point: np.ndarray) -> float:
         d = abs(distance)
         return 0.75 - d**2 if d <= 0.5 else 0.5 * (1.5 - d) ** 2 if d <= 1.5 else 0.0
 
-    size = range(RESOLUTION + 2)
-    return sum(
-        weight(r - 1 - row) * weight(c - 1 - column) * around[chart, r, c]
-        for r in size
-        if weight(r - 1 - row)
-        for c in size
-        if weight(c - 1 - column)
-    )
+    centres = np.arange(around.shape[1]) - 1  # of texels, with the halo
+    in_rows, in_columns = ([weight(centre - at) for centre in centres] for at in (row, column))
+    return float(in_rows @ around[chart] @ in_columns)
 
 
 def test_own_vertices_are_raised_by_the_spline_along_the_smooth_normals(atlas: Atlas) -> None:

@@ -66,9 +66,8 @@ def test_points_and_velocities_are_ours_at_every_frame_to_a_millionth(run: Any) 
         assert np.abs(np.array(mesh.GetVelocitiesAttr().Get(frame)) - velocities).max() < 1e-6
         assert len(mesh.GetNormalsAttr().Get(frame)) == len(points)
     assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
-    assert UsdGeom.Mesh.ValidateTopology(
-        mesh.GetFaceVertexIndicesAttr().Get(), mesh.GetFaceVertexCountsAttr().Get(), len(seen[0][0])
-    )[0]
+    indices, counts = mesh.GetFaceVertexIndicesAttr().Get(), mesh.GetFaceVertexCountsAttr().Get()
+    assert UsdGeom.Mesh.ValidateTopology(indices, counts, len(seen[0][0]))[0]
 
 
 def test_bodies_and_surfaces_stand_where_mujoco_has_them(run: Any) -> None:
@@ -98,14 +97,9 @@ def test_camera_has_the_angle_of_view_the_lens_and_the_shutter(run: Any) -> None
 def test_lamps_light_the_middle_as_strongly_as_ours(run: Any) -> None:
     stage, _ = run
     lamps = [UsdLux.LightAPI(prim) for prim in stage.Traverse() if prim.HasAPI(UsdLux.LightAPI)]
-    kinds = {lamp.GetPrim().GetTypeName() for lamp in lamps}
-    assert {"DistantLight", "SphereLight", "DomeLight"} == kinds  # headlight, spot lamp, ambient light
     gloss = {lamp.GetPrim().GetTypeName(): lamp.GetSpecularAttr().Get() for lamp in lamps}
-    assert gloss == {
-        "DistantLight": 1,
-        "DomeLight": 1,
-        "SphereLight": pytest.approx(0.137, abs=1e-3),
-    }  # sRGB 0.1 over 0.3, as light
+    weak = pytest.approx(0.137, abs=1e-3)  # sRGB 0.1 over 0.3, as light
+    assert gloss == {"DistantLight": 1, "DomeLight": 1, "SphereLight": weak}  # headlight, ambient light, spot lamp
     (far,) = (prim for prim in stage.Traverse() if prim.GetTypeName() == "DistantLight")
     degrees = np.degrees(far.GetAttribute("userProperties:angle").Get())  # which Blender doubles
     assert degrees == pytest.approx(UsdLux.DistantLight(far).GetAngleAttr().Get())
@@ -137,11 +131,10 @@ def test_velocities_of_a_scene_are_the_rates_of_its_points(scene: Scene, tmp_pat
     velocities = np.array([mesh.GetVelocitiesAttr().Get(frame) for frame in range(summary.frames)])
     assert summary.frames == 40
     differences = (points[2:] - points[:-2]) * 250 / 2  # a second of the file
-    quiet = slice(-10, None)  # after the stone has left
     peak = np.linalg.norm(differences, axis=2).max()
     assert peak > 1e-4
-    error = np.linalg.norm(differences - velocities[1:-1], axis=2)[quiet]
-    assert error.max() < 0.01 * peak
+    quiet = np.linalg.norm(differences - velocities[1:-1], axis=2)[-10:]  # after the stone has left
+    assert quiet.max() < 0.01 * peak
 
 
 SEEN, SURFACES = 7, ("egg", "jelly")

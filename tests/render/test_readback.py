@@ -30,11 +30,7 @@ REST = BALL + GLASS + WATER  # lit by the studio's single light, whose shaders a
 SCENES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "smooth background": (FLOOR + REST, "", {}),
     "mirror": (REFLECTING + REST, TILES + MIRROR, {}),
-    "transparent background, linear light, one sample": (
-        FLOOR + REST,
-        "",
-        {"alpha": True, "linear": True, "samples": 0},
-    ),
+    "transparent, linear, one sample": (FLOOR + REST, "", {"alpha": True, "linear": True, "samples": 0}),
 }
 
 
@@ -165,12 +161,8 @@ def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(
         if order == "in turn":
             monkeypatch.setattr(Film, "render_all", lambda self, shots, ahead: render_all(self, shots))
             monkeypatch.setattr(rendering, "prefetched", lambda shots, waiting: contextlib.nullcontext(shots))
-        render_video(
-            scene,
-            tmp_path / order,
-            VideoOptions(size=(64, 48), fps=30, backend=backend, **options),
-            progress=lambda frames, total: done.append(frames),
-        )
+        asked = VideoOptions(size=(64, 48), fps=30, backend=backend, **options)
+        render_video(scene, tmp_path / order, asked, progress=lambda frames, total: done.append(frames))
     assert done == 2 * list(range(1, 13))
     for one, other in zip(*(sorted((tmp_path / order).iterdir()) for order in ("ahead", "in turn")), strict=True):
         assert one.read_bytes() == other.read_bytes()

@@ -23,14 +23,11 @@ def test_octahedral_codes_fill_the_unit_square_and_directions_come_back(gl):
     """From sixteen bits, too: a step of the code turns a normal by less than a hundredth of a degree."""
     given, encode = directions(), "octahedral_encode(x.xyz)"
     code = evaluated(gl, FILE, f"vec4({encode}, 0.0, 0.0)", given)[:, :2]
-    assert code.min() >= 0.0
-    assert code.max() <= 1.0
+    assert 0.0 <= code.min() <= code.max() <= 1.0
     filled, *_ = np.histogram2d(*code.T, bins=8, range=[[0, 1], [0, 1]])
     assert filled.min() > 0
-    exact, rounded = (
-        evaluated(gl, FILE, f"vec4(octahedral_decode({each}), 0.0)", given)[:, :3]
-        for each in (encode, f"round({BITS}.0 * {encode}) / {BITS}.0")
-    )
+    codes = encode, f"round({BITS}.0 * {encode}) / {BITS}.0"
+    exact, rounded = (evaluated(gl, FILE, f"vec4(octahedral_decode({each}), 0.0)", given)[:, :3] for each in codes)
     np.testing.assert_allclose(exact, given, atol=2e-6)
     assert np.degrees(2 * np.arcsin(np.linalg.norm(rounded - given, axis=1).max() / 2)) < 0.01
 
@@ -48,9 +45,8 @@ def test_every_pair_of_bytes_comes_back_from_one_channel(gl):
 def test_every_number_of_an_object_comes_back_with_its_side(gl, inner):
     given = np.arange((BITS + 1) // 2)[:, None]
     channel = f"round({BITS}.0 * pack_object(x.x, {inner} == 1)) / {BITS}.0"
-    back = evaluated(
-        gl, FILE, f"vec4(float(unpack_object({channel})), float(unpack_inner({channel})), 0.0, 0.0)", given
-    )
+    unpacked = f"vec4(float(unpack_object({channel})), float(unpack_inner({channel})), 0.0, 0.0)"
+    back = evaluated(gl, FILE, unpacked, given)
     np.testing.assert_array_equal(back[:, 0], given[:, 0])
     np.testing.assert_array_equal(back[:, 1], inner)
 

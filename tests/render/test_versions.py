@@ -96,9 +96,7 @@ def mesa(gl: GLContext) -> None:
 
 @pytest.mark.usefixtures("mesa")
 def test_frames_of_an_older_opengl_are_the_same(tmp_path: Path) -> None:
-    code = (
-        "import sys; sys.path[:0] = sys.argv[2:]; import test_versions; test_versions.draw_in_old_opengl(sys.argv[1])"
-    )
+    code = "import sys; sys.path[:0] = sys.argv[2:]; import test_versions as here; here.draw_in_old_opengl(sys.argv[1])"
     done = ended("-c", code, tmp_path / "frames.npz", Path(__file__).parent, *sys.path, env={**os.environ, **OLDER})
     assert done.returncode == 0, done.stderr
     with np.load(tmp_path / "frames.npz") as frames:

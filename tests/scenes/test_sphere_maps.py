@@ -47,6 +47,5 @@ def test_a_changed_mesh_has_none(meshes: list[Mesh]) -> None:
 def test_a_shipped_scene_takes_it() -> None:
     scene = load_scene("animal")
     geom = find_geom(scene.model, scene.targets[0].geom)
-    np.testing.assert_array_equal(
-        target_atlas(scene.model, geom, 8).sphere, shipped_sphere_map(target_mesh(scene.model, geom))
-    )
+    shipped = shipped_sphere_map(target_mesh(scene.model, geom))
+    np.testing.assert_array_equal(target_atlas(scene.model, geom, 8).sphere, shipped)

@@ -3,7 +3,7 @@
 from mujoco_models import posed
 from sphere_height_maps import cube_charts
 
-from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render import Camera, Renderer, Surface, srgb_to_linear
 from ripple_sim.render.visuals import shapes
 
 SIZE = (160, 120)
@@ -23,6 +23,11 @@ def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=
     surfaces = {model.geom(name).id: surface for name, surface in (targets or {}).items()}
     with Renderer(gl, model, surfaces, size=size, **options) as renderer:
         return renderer.render(data, {}, camera).astype(int)
+
+
+def light_of(gl, body, **options):
+    """The same frame in linear light."""
+    return srgb_to_linear(frame_of(gl, body, **options) / 255)
 
 
 def ball_surface(look: str, radius: float = 0.5) -> Surface:

@@ -146,10 +146,8 @@ def test_a_camera_straight_above_or_below_keeps_what_was_up_in_the_frame(height:
     assert elevation(made) == pytest.approx(np.copysign(88.0, height))
     away = np.array(made.position) - FOCUS
     assert np.linalg.norm(away) == pytest.approx(4.0)
-    right = np.cross(-away, [0, 0, 1])
-    np.testing.assert_allclose(
-        right / np.linalg.norm(right), np.cross([0, 0, -np.sign(height)], [0.6, 0.8, 0]), atol=1e-9
-    )
+    right, expected = np.cross(-away, [0, 0, 1]), np.cross([0, 0, -np.sign(height)], [0.6, 0.8, 0])
+    np.testing.assert_allclose(right / np.linalg.norm(right), expected, atol=1e-9)
 
 
 def test_a_camera_straight_above_without_any_heading_looks_along_y() -> None:

@@ -118,9 +118,8 @@ def test_colours_follow_the_waves_at_once_and_fade_slowly(session: Session) -> N
 
 def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    session = Session(
-        open_scene(write_scene(tmp_path, MJCF.format('<option gravity="0 0 -9e9"/>'), TOML)), resolution=8
-    )
+    path = write_scene(tmp_path, MJCF.format('<option gravity="0 0 -9e9"/>'), TOML)
+    session = Session(open_scene(path), resolution=8)
     with pytest.raises(SimulationError):
         run(session, 50)
     assert session.paused

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from drawn import BALL, FLOOR, FRONT, SUN, ball_surface, frame_of, posed
+from drawn import BALL, FLOOR, FRONT, SUN, ball_surface, frame_of, light_of, posed
 
-from ripple_sim.render import Camera, Renderer, Surface, srgb_to_linear
+from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.passes import TILE, touched_tiles
 from ripple_sim.render.surfaces import Charts
 from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
@@ -82,10 +82,8 @@ def test_a_rough_surface_blurs_the_shadows_that_it_reflects(gl):
     deepest = []
     for roughness in (0.1, 0.6):
         asset = f'<material name="m" rgba=".8 .8 .8 1" metallic="1" roughness="{roughness}"/>'
-        with_shadow, without = (
-            srgb_to_linear(frame_of(gl, body + SUN.format(1.0, flag), asset=asset, camera=FRONT, size=(320, 240)) / 255)
-            for flag in ("true", "false")
-        )
+        seen = {"asset": asset, "camera": FRONT, "size": (320, 240)}
+        with_shadow, without = (light_of(gl, body + SUN.format(1.0, flag), **seen) for flag in ("true", "false"))
         on_wall = np.s_[136:147, 140:200, 1]
         deepest.append((1.0 - with_shadow / without)[on_wall].max())
     assert deepest[1] < 0.355 * deepest[0]
@@ -120,10 +118,8 @@ def test_a_transparent_geom_shows_what_is_behind_it(gl):
     wall = '<geom type="box" size="3 .1 3" pos="0 2 0" rgba="0 0 1 1"/>'
     glass = '<geom type="box" size=".5 .02 .5" pos="0 0 .5" rgba="1 0 0 {}"/>'
     middle = np.s_[55:65, 75:85]
-    red, mixed, blue = (
-        frame_of(gl, wall + pane, camera=FRONT)[middle].mean(axis=(0, 1))
-        for pane in (glass.format(1.0), glass.format(0.5), "")
-    )
+    panes = glass.format(1.0), glass.format(0.5), ""
+    red, mixed, blue = (frame_of(gl, wall + pane, camera=FRONT)[middle].mean(axis=(0, 1)) for pane in panes)
     np.testing.assert_allclose(mixed, (red + blue) / 2, atol=12)
 
 

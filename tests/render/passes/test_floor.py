@@ -6,20 +6,20 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-from drawn import BALL, FLOOR, FRONT, SIZE, SUN, frame_of
+from drawn import BALL, FLOOR, FRONT, SIZE, SUN, frame_of, light_of
 from scipy.ndimage import binary_erosion
 
-from ripple_sim.render import Camera, srgb_to_linear
+from ripple_sim.render import Camera
 from ripple_sim.render.passes import deferred
 from ripple_sim.render.passes.shadows import Floor
+
+CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="{0}" height="{0}"/>
+<material name="c" texture="c" {1}/>"""
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):
     """A repetition of a 2 x 2 checker is 2 m wide and begins at -1 m: squares of 1 m, a corner at the origin."""
-    asset = (
-        '<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="64" height="64"/>'
-        '<material name="c" texture="c" texuniform="true"/>'
-    )
+    asset = CHECKER.format(64, 'texuniform="true"')
     frame = frame_of(gl, '<geom type="plane" size="0 0 .1" material="c"/>', asset=asset)
     pixels = int(0.5 * SIZE[1] / (2 * 4.0 * np.tan(np.radians(20))))  # half a square
     y, x = SIZE[1] // 2, SIZE[0] // 2
@@ -55,9 +55,8 @@ def test_alpha_leaves_the_geoms_and_their_shadows(gl):
 
 
 def test_alpha_leaves_no_texture_of_the_floor(gl):
-    asset = '<texture name="c" type="2d" builtin="checker" width="64" height="64"/><material name="c" texture="c"/>'
     floor = '<geom type="plane" size="0 0 .1" material="c"/>'
-    assert not frame_of(gl, floor, asset=asset, alpha=True).any()
+    assert not frame_of(gl, floor, asset=CHECKER.format(64, ""), alpha=True).any()
 
 
 def test_sites_hide_no_sky(gl):
@@ -78,7 +77,7 @@ def test_a_ceiling_has_the_colour_and_the_light_of_the_floor_below(gl):
     sun = SUN.format(1.0, "true")
     light = {"visual": '<headlight active="0"/>', "lighting": "model"}
     below = Camera((0.0, 0.0, 0.45), 1.2, 90.0, 12.0, 40.0)
-    frame = srgb_to_linear(frame_of(gl, floor + plate + sun, camera=below, **light) / 255)
+    frame = light_of(gl, floor + plate + sun, camera=below, **light)
     ceiling, ground = frame[52:60, 70:90].mean(axis=(0, 1)), frame[-4:].mean(axis=(0, 1))
     assert ceiling[0] > 8 * ceiling[1]
     assert 0.5 * ground[0] < ceiling[0] < ground[0]
@@ -91,8 +90,8 @@ def test_a_ball_throws_its_colour_on_the_floor_most_where_it_is_lit(gl):
     metre = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
     redder = {}
     for rgba in (".9 .1 .1", ".1 .1 .1"):
-        frame = frame_of(gl, floor + ball.format(rgba) + SUN.format(1.0, "true"), lighting="model")
-        red, green, _ = np.moveaxis(srgb_to_linear(frame[58:62] / 255), -1, 0)
+        frame = light_of(gl, floor + ball.format(rgba) + SUN.format(1.0, "true"), lighting="model")
+        red, green, _ = np.moveaxis(frame[58:62], -1, 0)
         for x in (-0.36, 0.36, -1.2):
             column = int(SIZE[0] / 2 + x * metre)
             redder[rgba, x] = (red - green)[:, column - 1 : column + 1].mean()
@@ -145,13 +144,8 @@ def test_interpolated_penumbras_end_where_those_of_each_pixel_do(gl, monkeypatch
 
 def test_the_colour_of_a_large_image_takes_little_memory() -> None:
     """All its texels as numbers would take 2 GB; some of them, of what is mixed evenly, have the same mean."""
-    asset = (
-        '<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="4096" height="4096"/>'
-        '<material name="c" texture="c"/>'
-    )
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><asset>{asset}</asset><worldbody><geom type="plane" size="1 1 1" material="c"/></worldbody></mujoco>'
-    )
+    body = '<worldbody><geom type="plane" size="1 1 1" material="c"/></worldbody>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><asset>{CHECKER.format(4096, '')}</asset>{body}</mujoco>")
     tracemalloc.start()
     floor = Floor(SimpleNamespace(model=model, texture=lambda _: None), 0)
     peak = tracemalloc.get_traced_memory()[1]

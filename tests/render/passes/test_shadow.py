@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn import BALL, FLOOR, FRONT, SIZE, SPOT, SUN, ball_surface, frame_of
+from drawn import BALL, FLOOR, FRONT, SIZE, SPOT, SUN, ball_surface, frame_of, light_of
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
 from ripple_sim.render import srgb_to_linear
@@ -37,13 +37,9 @@ def test_a_near_light_and_a_sun_cast_shadows_side_by_side(gl):
     sun = SUN.format(-1.0, "{}").replace(".8 .8 .8", ".4 .4 .4")
     spot = SPOT.format(-1.0, 0.5).replace("/>", ' castshadow="{}"/>')
     places = [int(SIZE[0] / 2 + x * METRE) for x in (-0.8, 0.75)]
-    frames = {
-        flags: frame_of(gl, FLOOR + BALL + sun.format(flags[0]) + spot.format(flags[1]))
-        for flags in (("false", "false"), ("true", "true"))
-    }
-    plain, shaded = ([frame[56:64, x - 3 : x + 3].mean() for x in places] for frame in frames.values())
-    assert shaded[0] < plain[0] - 6
-    assert shaded[1] < plain[1] - 6
+    frames = (frame_of(gl, FLOOR + BALL + sun.format(casts) + spot.format(casts)) for casts in ("false", "true"))
+    plain, shaded = (np.array([frame[56:64, x - 3 : x + 3].mean() for x in places]) for frame in frames)
+    assert (shaded < plain - 6).all()
 
 
 @pytest.mark.parametrize("below", [FLOOR, SLAB], ids=["floor", "solid"])
@@ -54,12 +50,8 @@ def test_a_penumbra_is_as_wide_as_the_light_and_the_height_make_it(gl, below):
     """
     plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
     size = (640, 480)
-    shaded, plain = (
-        srgb_to_linear(
-            frame_of(gl, below.replace(".8 .8 .8", ".3 .3 .3") + plate + SUN.format(1.0, casts), size=size) / 255
-        )
-        for casts in ("true", "false")
-    )
+    body = below.replace(".8 .8 .8", ".3 .3 .3") + plate + SUN
+    shaded, plain = (light_of(gl, body.format(1.0, casts), size=size) for casts in ("true", "false"))
     taken = (plain - shaded)[: size[1] // 2, size[0] // 2, 1]  # from beyond the shadow to its middle
     share = 1 - taken / taken[-size[1] // 20 :].mean()
     width = (np.argmax(share < 0.1) - np.argmax(share < 0.9)) / (METRE * size[1] / SIZE[1])
@@ -108,11 +100,9 @@ def test_shadows_on_translucent_things_are_softer(gl):
     body += '<geom size=".1" pos="-.5 0 1.5"/>' + FLOOR + SUN.format(1.0, "{}")
     steepest = {}
     for look in ("clay", "skin"):
-        frames = [
-            srgb_to_linear(frame_of(gl, body.format(flag), targets={"b": ball_surface(look)}, size=(320, 240)) / 255)
-            for flag in ("true", "false")
-        ]
-        lit = (frames[0] / frames[1])[118:122, 140:155].mean(axis=0)  # beside the lamp's highlight
+        seen = {"targets": {"b": ball_surface(look)}, "size": (320, 240)}
+        shaded, plain = (light_of(gl, body.format(flag), **seen) for flag in ("true", "false"))
+        lit = (shaded / plain)[118:122, 140:155].mean(axis=0)  # beside the lamp's highlight
         steepest[look] = np.abs(np.diff(lit, axis=0)).max(axis=0) / np.ptp(lit, axis=0)  # whatever else lights it
     assert steepest["skin"][0] < 0.85 * steepest["clay"][0]
 
@@ -122,8 +112,8 @@ def test_a_shadow_on_the_floor_has_the_size_that_geometry_gives_it(gl):
     plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
     far = "".join(f'<geom type="sphere" size=".1" pos="0 {y} .1"/>' for y in (-9, 9))
     size = (320, 240)
-    frame = frame_of(gl, FLOOR + plate + far + SUN.format(1.0, "true"), size=size)
-    along = srgb_to_linear(frame[size[1] // 2, :, 1] / 255)[size[0] // 2 :]  # to the right of the shadow's middle
+    frame = light_of(gl, FLOOR + plate + far + SUN.format(1.0, "true"), size=size)
+    along = frame[size[1] // 2, size[0] // 2 :, 1]  # to the right of the shadow's middle
     share = (along - along[0]) / (along[-20:].mean() - along[0])
     edge = np.interp(0.5, share[:100], np.arange(100) + 0.5) / (METRE * size[1] / SIZE[1])
     assert edge == pytest.approx(0.5 + 0.01, abs=0.015)
@@ -172,20 +162,16 @@ def test_a_transparent_geom_takes_its_opacity_of_the_light(gl, opacity):
 
 def test_a_body_under_glass_keeps_its_shadow(gl):
     """A small plate under a large pane: its shadow is as dark as without the pane, the pane's lighter about it."""
-    body = '<geom type="box" size=".1 .3 .01" pos="-.2 0 .4" rgba=".5 .5 .5 1"/>'
-    bare, covered = (
-        frame_of(gl, DARK_FLOOR + body + pane + SUN.format(1.0, "true")) for pane in ("", PLATE.format(0.4))
-    )
+    body = DARK_FLOOR + '<geom type="box" size=".1 .3 .01" pos="-.2 0 .4" rgba=".5 .5 .5 1"/>' + SUN.format(1.0, "true")
+    bare, covered = (frame_of(gl, body + pane) for pane in ("", PLATE.format(0.4)))
     np.testing.assert_allclose(floor_at(covered, 0.2, half=1), floor_at(bare, 0.2, half=1), atol=0.02)
 
 
 def test_water_is_a_lens(gl):
     """Its shadow is dark towards the rim; the light in the middle has its colour."""
     body = '<geom name="b" type="sphere" size=".5" pos="-1 0 1"/>' + DARK_FLOOR + SUN.format(1.0, "{}")
-    plain, water, clay = (
-        frame_of(gl, body.format(flag), targets={"b": ball_surface(look)})
-        for flag, look in (("false", "clay"), ("true", "water"), ("true", "clay"))
-    )
+    kinds = ("false", "clay"), ("true", "water"), ("true", "clay")
+    plain, water, clay = (frame_of(gl, body.format(flag), targets={"b": ball_surface(look)}) for flag, look in kinds)
     open_floor, middle, dark = (floor_at(frame, 0.0) for frame in (plain, water, clay))
     rim = floor_at(water, 0.0, 0.4)
     assert (rim - dark).max() < 0.3 * (open_floor - dark).max()
@@ -196,9 +182,8 @@ def test_water_is_a_lens(gl):
 def test_no_light_is_taken_beside_a_penumbra(gl):
     """Where a box's shadow shows, what is plainly shaded is a few pixels away."""
     box = '<geom type="box" size=".5 .5 .5" pos="-.5 .2 .5" euler="0 0 40" rgba=".9 .1 .2 .4"/>'
-    shaded, plain = (
-        frame_of(gl, DARK_FLOOR + box + SUN.format(1.0, flag), size=(320, 240)) for flag in ("true", "false")
-    )
+    body, size = DARK_FLOOR + box + SUN, (320, 240)
+    shaded, plain = (frame_of(gl, body.format(1.0, flag), size=size) for flag in ("true", "false"))
     taken = (plain - shaded).max(axis=2)
     assert distance_transform_edt(taken < 5)[taken >= 2].max() < 6
 

@@ -76,12 +76,8 @@ def spline_sum(height_map: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.
 
     centres = np.arange(-1, N + 1)
     column, row = (N * uv - 0.5).T
-    return np.einsum(
-        "ki,kj,kij->k",
-        weight(row[:, None] - centres),
-        weight(column[:, None] - centres),
-        height_map[chart, ..., 3].astype(np.float64),
-    )
+    in_rows, in_columns = weight(row[:, None] - centres), weight(column[:, None] - centres)
+    return np.einsum("ki,kj,kij->k", in_rows, in_columns, height_map[chart, ..., 3].astype(np.float64))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -109,12 +109,8 @@ def test_an_object_has_the_bits_of_all_that_darken_it_by_a_hundredth_but_not_its
     """Whatever is left out hides less than a hundredth of the sky from any point of the object."""
     rng = np.random.default_rng(7)
     places, sizes = rng.uniform(-2, 2, (MAX_OCCLUDERS, 3)), rng.uniform(0.02, 0.2, MAX_OCCLUDERS)
-    model, data = geoms_of(
-        "".join(
-            f'<geom type="capsule" size="{r} {2 * r}" pos="{x} {y} {z}"/>'
-            for r, (x, y, z) in zip(sizes, places, strict=True)
-        )
-    )
+    geom = '<geom type="capsule" size="{0} {1}" pos="{2} {3} {4}"/>'
+    model, data = geoms_of("".join(geom.format(r, 2 * r, *place) for r, place in zip(sizes, places, strict=True)))
     occluders = Occluders(resources, model, np.arange(model.ngeom))
     with gl:
         occluders.bind(data, np.zeros(3))

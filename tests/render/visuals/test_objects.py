@@ -47,9 +47,8 @@ def test_poses_are_those_of_the_data(visuals):
     both = of_kind(drawn, 2)
     np.testing.assert_allclose(both._records["origin"], data.geom_xpos[:2], atol=1e-6)
     # column by column
-    np.testing.assert_allclose(
-        both._records["rotation"], data.geom_xmat[:2].reshape(-1, 3, 3).transpose(0, 2, 1), atol=1e-6
-    )
+    rotations = data.geom_xmat[:2].reshape(-1, 3, 3).transpose(0, 2, 1)
+    np.testing.assert_allclose(both._records["rotation"], rotations, atol=1e-6)
     site = of_kind(drawn, 1, site=True)
     np.testing.assert_allclose(site._records["origin"], data.site_xpos, atol=1e-6)
 

@@ -49,9 +49,8 @@ def test_a_target_has_its_texture_as_other_geoms_do(gl, shape, look):
 
 
 def test_the_first_role_for_colours_is_found_among_layers(gl):
-    layers = (
-        '<material name="m" specular="0"><layer role="normal" texture="n"/><layer role="rgb" texture="t"/></material>'
-    )
+    roles = '<layer role="normal" texture="n"/><layer role="rgb" texture="t"/>'
+    layers = f'<material name="m" specular="0">{roles}</material>'
     flat = '<texture name="n" type="2d" builtin="flat" rgb1=".5 .5 1" width="8" height="8"/>'
     model = textured_model('<geom type="sphere" size=".4" material="m"/>', asset=flat, material=layers)
     assert names(gl, model, corners(9)) == "gryb"
@@ -111,10 +110,8 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
         ("cube", 'texuniform="false"'),
         ("cube", 'texuniform="true"'),
     ]
-    models = [
-        textured_model(SHELF + '<geom type="plane" size="0 0 .1" pos="0 0 -9"/>', text, kind=kind)
-        for kind, text in variants
-    ]
+    body = SHELF + '<geom type="plane" size="0 0 .1" pos="0 0 -9"/>'
+    models = [textured_model(body, text, kind=kind) for kind, text in variants]
     paths = [str(tmp_path / f"{i}.mjb") for i in range(len(models))]
     for model, path in zip(models, paths, strict=True):
         mujoco.mj_saveModel(model, path, None)
