@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.coupling.soft import is_soft
+from ripple_sim.encode.images import riff_chunk
 from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import RippleWarning
 from ripple_sim.simulation import Simulation
@@ -167,14 +168,11 @@ def write_wav(path: Path, signals: NDArray, rate: int) -> None:
     channels = 1 if codes.ndim == 1 else codes.shape[1]
     mark = MARK.encode() + b"\0" * (2 - len(MARK) % 2)
     form = struct.pack("<HHIIHH", 1, channels, rate, 2 * channels * rate, 2 * channels, 16)
-    comment = b"INFO" + _chunk(b"ICMT", mark)
-    content = b"WAVE" + _chunk(b"fmt ", form) + _chunk(b"LIST", comment) + _chunk(b"data", codes.tobytes())
+    comment = b"INFO" + riff_chunk(b"ICMT", mark)
+    parts = ((b"fmt ", form), (b"LIST", comment), (b"data", codes.tobytes()))
+    content = b"WAVE" + b"".join(riff_chunk(*part) for part in parts)
     with atomic_write(path) as unfinished:
-        unfinished.write_bytes(_chunk(b"RIFF", content))
-
-
-def _chunk(name: bytes, content: bytes) -> bytes:
-    return name + struct.pack("<I", len(content)) + content
+        unfinished.write_bytes(riff_chunk(b"RIFF", content))
 
 
 def _warn_if_unheard(name: str, waves: WaveSolver, slow_motion: float) -> None:

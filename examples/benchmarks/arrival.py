@@ -261,7 +261,7 @@ def distance_from_point(
     touched, known = march(grid.halo, grid.positions, seeds, limit, scratch)
     reached = np.sort(scratch.order[:known])
     distance = scratch.distance[reached]
-    clean(scratch.distance, scratch.place, scratch.touched, touched)
+    clean(scratch, touched)
     return reached, distance
 
 

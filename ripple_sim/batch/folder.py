@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import functools
 import hashlib
 import io
 import os
@@ -261,16 +260,6 @@ def load_stored(path: Path) -> StoredPlan:
         return found
     except (OSError, RecursionError, ValueError, SceneError) as error:  # strings that are not UTF-8 are a ValueError
         raise BatchError(f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is") from error
-
-
-@functools.lru_cache(maxsize=4)
-def _load_plan(path: Path, modified: int) -> Plan:
-    return load_stored(path).plan
-
-
-def load_plan(path: Path) -> Plan:
-    """Read the plan that a worker makes scenes by."""
-    return _load_plan(path, path.stat().st_mtime_ns)
 
 
 def _fingerprint(source: str) -> str:

@@ -24,7 +24,7 @@ from ripple_sim.solver.kernel import compile_times
 
 from .executors import DaskExecutor, LocalExecutor, first_alone, usual_workers
 from .finished import pack
-from .folder import BatchFolder, Failure, keep_plan, load_plan, load_stored, stored
+from .folder import BatchFolder, Failure, keep_plan, load_stored, stored
 from .plan import Plan
 from .report import parquet, row, write_index
 from .variation import Variation
@@ -197,7 +197,7 @@ def work(folder: str, number: int) -> Outcome:
     source, which makes the atlases.
     """
     batch = BatchFolder(Path(folder))
-    sources = load_plan(batch.plan).sources
+    sources = load_stored(batch.plan).plan.sources
     with first_alone(batch.work, "machine"), first_alone(batch.work, f"source-{number % len(sources)}"):
         return make_scene(folder, number)
 

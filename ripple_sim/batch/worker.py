@@ -39,7 +39,7 @@ from ripple_sim.video.render_video import render_video
 from ripple_sim.video.settings import frame_count, settled
 
 from .finished import FACTS, HEIGHTS, IMPULSES, POSITIONS, SENSORS, TIMES, FinishedScene, facts_hash
-from .folder import BatchFolder, clear, load_plan
+from .folder import BatchFolder, clear, load_stored
 from .plan import Plan, StoreEntry, options_of, video_name
 from .variation import Variation
 
@@ -47,7 +47,7 @@ _SIZE = 160  # its longer edge [pixels]
 
 
 def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
-    """Write a JPEG of the middle one of a scene's frames; of EXR frames there is none."""
+    """Write a JPEG of the middle one of a scene's frames; where none are drawn, or as EXR, there is none."""
     middle = None
     with contextlib.suppress(BatchError):
         for middle in itertools.islice(scene.frames(), frames // 2 + 1):  # noqa: B007 - the last one counts
@@ -194,7 +194,7 @@ def make_scene(folder: str, number: int) -> Outcome:
         if place is None:
             return Outcome(number, "there" if batch.is_finished(number) else "busy")
         try:
-            facts = _make(load_plan(batch.plan), number, place, batch)
+            facts = _make(load_stored(batch.plan).plan, number, place, batch)
             seconds = time.perf_counter() - start
             times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
             _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
@@ -212,7 +212,7 @@ def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str
     clear(folder)  # of one that was killed
     variation = Variation(plan, number)
     scene, values = variation.load()
-    record, drawn = render_scene(scene, plan.store, folder)
+    record = render_scene(scene, plan.store, folder)
     facts = {
         "number": number,
         "seed": variation.seed,
@@ -225,26 +225,25 @@ def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str
     facts["bytes"] = sum(path.stat().st_size for path in _files(folder))
     facts["hash"] = facts_hash(facts)
     _write_json(folder / FACTS, facts)
-    if drawn:
-        write_thumbnail(FinishedScene(number, folder), record.frame, batch.thumbnail(number))
+    write_thumbnail(FinishedScene(number, folder), record.frame, batch.thumbnail(number))
     return facts
 
 
-def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> tuple[FrameRecord, bool]:
-    """Simulate a scene, render it if it is to be drawn, and record it; return the record, and whether it is drawn."""
+def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> FrameRecord:
+    """Simulate a scene, render it if it is to be drawn, and record it."""
     name = video_name(store)
     path = folder / (name or "frames")
     options = settled(options_of(store), scene, path)
     record = FrameRecord(folder, store, frame_count(options), options.rate)
     if name is not None:
         render_video(scene, path, options, on_frame=record)
-        return record, True
+        return record
     simulation = Simulation.of(scene, options)
     for number in range(frame_count(options)):
         if number:
             simulation.advance_frame()
         record(simulation)
-    return record, False
+    return record
 
 
 def _files(folder: Path) -> list[Path]:

@@ -64,6 +64,12 @@ class _SceneCommand(SceneOptions):
     camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
     """Camera of the MJCF."""
 
+    def seen(self, scene: Scene) -> Scene:
+        """The scene through the camera that is asked for."""
+        from ripple_sim.scene.scene import through_camera
+
+        return scene if self.camera is None else through_camera(scene, self.camera)
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ExportCommand(_SceneCommand, ExportOptions):
@@ -92,14 +98,12 @@ class ExportCommand(_SceneCommand, ExportOptions):
         check_export(self.output, options.overwrite)
 
         from ripple_sim.export.exporter import export_scene
-        from ripple_sim.scene.scene import through_camera
         from ripple_sim.video.settings import frame_count
 
         scene = find_scene(self.scene, seed=self.seed)
         for note in scene.notes:
             print(f"{Path(self.scene).name}: {note}", file=sys.stderr)
-        if self.camera is not None:
-            scene = through_camera(scene, self.camera)
+        scene = self.seen(scene)
         with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
             summary = export_scene(scene, self.output, options, progress=progress)
         size = summary.output.stat().st_size if summary.output.is_file() else 0
@@ -212,7 +216,7 @@ class _VideoCommand(_SceneCommand, VideoOptions):
 
         if self.device is not None:
             select_device(self.device)
-        scene = self._seen()
+        scene = self.seen(self.load())
         options = settled(self.options(), scene, self.output)
         title = f"renderer {shared_context().renderer}, waves {options.backend}"
         with frame_progress(title, frame_count(options)) as progress:
@@ -226,19 +230,12 @@ class _VideoCommand(_SceneCommand, VideoOptions):
 
         from ripple_sim.video.settings import frame_count, settled
 
-        scene = self._seen()
+        scene = self.seen(self.load())
         frames = frame_count(settled(self.options(), scene, self.output))
         with frame_progress(f"renderer Cycles, {self.samples} samples", frames) as progress:
             summary = render_cycles(scene, self.output, self.options(), samples=self.samples, progress=progress)
         print(f"{summary.output}: {summary.frames} frames")
         print(f"stages    simulation and export {summary.simulate_seconds:.1f} s, Cycles {summary.write_seconds:.1f} s")
-
-    def _seen(self) -> Scene:
-        """The scene through the camera that is asked for."""
-        from ripple_sim.scene.scene import through_camera
-
-        scene = self.load()
-        return scene if self.camera is None else through_camera(scene, self.camera)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,6 @@ from .contacts import (
     ContactReader as ContactReader,
     Contacts as Contacts,
     first_rows as first_rows,
-    geom_contacts as geom_contacts,
     places_facing as places_facing,
 )
 from .energy import Energy as Energy, VelocityChange as VelocityChange

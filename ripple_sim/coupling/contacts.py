@@ -170,70 +170,15 @@ def points_outside(data: mujoco.MjData, rows: PairRows, extents: Floats) -> tupl
     return each.pos[contacts] + 1.5 * depths[:, None] * normals, normals
 
 
-def geom_contacts(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    colliders: NDArray[np.integer],
-    is_target: Bools,
-    extents: Floats,
-    pulls: Floats | None = None,
-    has_flex: Bools | None = None,
-) -> dict[int, Contacts]:
-    """Contacts that load each target that is touched, by its geom id in ascending order.
-
-    Where two targets touch, their contacts are reported for each of them. What sticks to a target and pulls more than
-    it pushes has negative forces, at all contacts of the pair.
-
-    Parameters
-    ----------
-    model, data
-    colliders : int [ncon, 2]
-        Collider ids of each contact, see `CoupledModel`.
-    is_target : bool [c]
-        By collider id.
-    extents : float64 [c]
-        Smallest half-extents [m].
-    pulls : float64 [ncon], optional
-        Of the contacts [N]; see `adhesion`.
-    has_flex : bool [c], optional
-        By collider id, whether it collides through a flex. Its triangles push sideways in pairs: the contacts of such a
-        pair add up to the sum of their vectors, as for the flex; see `FlexContacts`.
-    """
-    each = data.contact
-    bears = each.efc_address >= 0
-    if pulls is not None:
-        bears |= pulls > 0  # those within the gap pull without a row in the constraint solver
-    rows = pair_rows(colliders, bears, is_target)
-    if not len(rows.contacts):
-        return {}
-    forces = normal_forces(model, data, rows.contacts)
-    if pulls is not None:
-        forces += pulls[rows.contacts]
-    pushing = forces > 0
-    if not pushing.all():
-        rows, forces = PairRows(*(each[pushing] for each in rows)), forces[pushing]
-    targets, others = rows.targets, rows.others
-    points, normals = points_outside(data, rows, extents)
-    found = Contacts(others, points, forces, normals)
-    if pulls is not None or (has_flex is not None and has_flex[others].any()):
-        factors = _pair_factors(rows, forces, normals, pulls, has_flex)
-        found = found._replace(forces=factors * forces).rows(factors != 0)
-        targets = targets[factors != 0]
-    return by_target(targets, found)
-
-
-def _pair_factors(
-    rows: PairRows, forces: Floats, normals: Floats, pulls: Floats | None, has_flex: Bools | None
-) -> Floats:
+def _pair_factors(rows: PairRows, forces: Floats, normals: Floats, pulls: Floats | None, has_flex: Bools) -> Floats:
     """Factors [k] that make the forces of a pair add up to what it bears: without pulls, and as vectors with a flex."""
     starts = first_rows(rows.targets, rows.others)
     whole = np.add.reduceat(forces, starts)
     factors = np.ones(len(starts))
     if pulls is not None:
         factors -= 2 * np.add.reduceat(pulls[rows.contacts], starts) / whole
-    if has_flex is not None:
-        sums = np.linalg.norm(np.add.reduceat(forces[:, None] * normals, starts), axis=1)
-        factors *= np.where(has_flex[rows.others[starts]], sums / whole, 1.0)
+    sums = np.linalg.norm(np.add.reduceat(forces[:, None] * normals, starts), axis=1)
+    factors *= np.where(has_flex[rows.others[starts]], sums / whole, 1.0)
     return np.repeat(factors, np.diff(np.append(starts, len(forces))))
 
 
@@ -383,13 +328,15 @@ class ContactReader:
             self._is_read[self._flexes.is_target] = False
 
     def read(self, data: mujoco.MjData) -> dict[int, Contacts]:
-        """Contacts of each target that is touched, by geom id."""
-        if not data.ncon:
-            found: dict[int, Contacts] = {}
-        else:
-            model, extents, colliders = self._coupled.model, self._coupled.extents, self._colliders(data)
-            has_flex = None if self._flexes is None else self._has_flex
-            found = geom_contacts(model, data, colliders, self._is_read, extents, adhesion(model, data), has_flex)
+        """Contacts of each target that is touched, by geom id.
+
+        Where two targets touch, their contacts are reported for each of them. What sticks to a target and pulls more
+        than it pushes has negative forces, at all contacts of the pair.
+        """
+        found: dict[int, Contacts] = {}
+        if data.ncon:
+            colliders = self._colliders(data)
+            found = self._geom_contacts(data, colliders)
             if self._flexes is not None:
                 found |= self._flex_contacts(self._flexes, data, colliders)
             if self._targets_of.keys() & found.keys():
@@ -398,10 +345,38 @@ class ContactReader:
         self._check_wraps(found)
         return found
 
+    def _geom_contacts(self, data: mujoco.MjData, colliders: NDArray[np.integer]) -> dict[int, Contacts]:
+        """The same of what collides without a flex, by its own id, in ascending order.
+
+        Triangles of a flex that touches push sideways in pairs: the contacts of such a pair add up to the sum of their
+        vectors, as for the flex; see `FlexContacts`.
+        """
+        model, each, pulls = self._coupled.model, data.contact, adhesion(self._coupled.model, data)
+        bears = each.efc_address >= 0
+        if pulls is not None:
+            bears |= pulls > 0  # those within the gap pull without a row in the constraint solver
+        rows = pair_rows(colliders, bears, self._is_read)
+        if not len(rows.contacts):
+            return {}
+        forces = normal_forces(model, data, rows.contacts)
+        if pulls is not None:
+            forces += pulls[rows.contacts]
+        pushing = forces > 0
+        if not pushing.all():
+            rows, forces = PairRows(*(each[pushing] for each in rows)), forces[pushing]
+        targets, others = rows.targets, rows.others
+        points, normals = points_outside(data, rows, self._coupled.extents)
+        found = Contacts(others, points, forces, normals)
+        if pulls is not None or self._has_flex[others].any():
+            factors = _pair_factors(rows, forces, normals, pulls, self._has_flex)
+            found = found._replace(forces=factors * forces).rows(factors != 0)
+            targets = targets[factors != 0]
+        return by_target(targets, found)
+
     def _flex_contacts(
         self, flexes: FlexContacts, data: mujoco.MjData, colliders: NDArray[np.integer]
     ) -> dict[int, Contacts]:
-        """The same of targets with a flex collider."""
+        """The same of targets with a flex collider, by theirs."""
         model = self._coupled.model
         rows = pair_rows(colliders, data.contact.efc_address >= 0, flexes.is_target)
         if not len(rows.contacts):

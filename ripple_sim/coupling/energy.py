@@ -9,6 +9,7 @@ Ryu, 2002). What new forces change in velocities is told as MuJoCo's own scheme 
 from __future__ import annotations
 
 import copy
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -245,14 +246,14 @@ class ContactProblem:
 
     def works(self) -> list[tuple[Pair, float, float]]:
         """Work that each pair's contacts do on bodies [J], and the force on the surface [N]."""
-        force, work = self._data.efc_force, dict[Key, float]()
+        force, work = self._data.efc_force, defaultdict[Key, float](float)
         means = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
         for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
             along = normal * self._dt * float(means[rows].mean())
             aside = self._dt * float(force[whole] @ means[whole]) - along
-            _add(work, mine[0].key, along + max(aside, 0.0))
+            work[mine[0].key] += along + max(aside, 0.0)
         total = self._total(force)
-        return [(pair, work.get(key, 0.0), total[key]) for key, pair in self._pairs.items()]
+        return [(pair, work[key], total[key]) for key, pair in self._pairs.items()]
 
     def _normal(self, force: Floats) -> list[float]:
         """Normal force of each contact on its bodies, without what adhesion takes of it [N]."""
@@ -260,10 +261,10 @@ class ContactProblem:
 
     def _total(self, force: Floats) -> dict[Key, float]:
         """Force on each target in a pair [N]."""
-        total: dict[Key, float] = {}
+        total = defaultdict[Key, float](float)
         for (*_, mine), normal in zip(self._contacts, self._normal(force), strict=True):
             for pair in mine:
-                _add(total, pair.key, normal)
+                total[pair.key] += normal
         return total
 
     def _along(self, vector: Floats) -> Floats:
@@ -316,11 +317,12 @@ class ContactProblem:
         then against what it has set in motion itself.
         """
         data, dt = self._data, self._dt
-        total, linear, square = self._total(force), dict[Key, float](), dict[Key, float]()
+        total = self._total(force)
+        linear, square = defaultdict[Key, float](float), defaultdict[Key, float](float)
         for pair in self._pairs.values():
             given, added = total[pair.key], pair.mean_mobility * dt
-            _add(linear, pair.purse, -given * dt * (pair.mean + added * pair.held))
-            _add(square, pair.purse, given * dt * added * given)
+            linear[pair.purse] += -given * dt * (pair.mean + added * pair.held)
+            square[pair.purse] += given * dt * added * given
         gained = self._along(data.qacc) - self._smooth
         for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
             purse = mine[0].purse
@@ -333,8 +335,8 @@ class ContactProblem:
             if sum(aside) > 0:
                 # friction that drives must be paid for too
                 works = [work + more for work, more in zip(works, aside, strict=True)]
-            _add(linear, purse, works[0])
-            _add(square, purse, works[1])
+            linear[purse] += works[0]
+            square[purse] += works[1]
         return {
             purse: share
             for purse in linear
@@ -347,10 +349,6 @@ def affordable_share(linear: float, square: float, paid: float) -> float:
     if square <= 0 or linear + square <= paid + _ROUND_OFF * abs(linear):
         return 1.0
     return max(float(np.sqrt(max(linear**2 + 4 * square * paid, 0.0)) - linear) / (2 * square), 0.0)
-
-
-def _add(sums: dict[Key, float], key: Key, value: float) -> None:
-    sums[key] = sums.get(key, 0.0) + value
 
 
 def impedance(solimp: Iterable[float], gap: float) -> float:

@@ -286,7 +286,7 @@ def integrator_warning(model: mujoco.MjModel) -> str | None:
     )
 
 
-_ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 
 def named_collision_geoms(
@@ -340,7 +340,7 @@ def find_collision_geoms(
         Of some targets' ids to the ids that they name.
     """
     targets = list(targets)
-    free = collides & ~np.isin(model.geom_type, _ENDLESS)
+    free = collides & ~np.isin(model.geom_type, ENDLESS)
     free[[*targets, *(geom for geoms in named.values() for geom in geoms)]] = False
     found = {}
     for target in targets:

@@ -18,7 +18,7 @@ from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
-from .geoms import find_collision_geoms, geom_name, rotation_in_body
+from .geoms import ENDLESS, find_collision_geoms, geom_name, rotation_in_body
 from .soft import SoftSurface, is_soft, soft_names
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
@@ -73,7 +73,6 @@ def vertex_flexes(model: mujoco.MjModel) -> NDArray[np.int64]:
 
 
 _GEOM = mujoco.mjtGeom
-_ENDLESS = (int(_GEOM.mjGEOM_PLANE), int(_GEOM.mjGEOM_HFIELD))
 _NOT_CONVEX = (int(_GEOM.mjGEOM_SDF), int(_GEOM.mjGEOM_HFIELD))
 
 # Footprint radius of a contact over the touching geom's smallest half-extent: about the patch of a ball that is sunk in
@@ -140,7 +139,7 @@ class CoupledModel:
         self.convex_colliders = find_convex_colliders(model)
         self.has_flex = np.zeros(model.ngeom, dtype=np.bool_)
         self.has_flex[list(self.flex_colliders)] = True
-        extents = np.where(np.isin(model.geom_type, _ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
+        extents = np.where(np.isin(model.geom_type, ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
         self.collider_extents, self.solref = extents.copy(), model.geom_solref.copy()
         # the masks of what collides: the geom, its flex, or its convex colliders
         contype, conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()

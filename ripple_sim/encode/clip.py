@@ -52,11 +52,6 @@ class Codec:
     pixel_format: str
     options: dict[str, str] = dataclasses.field(default_factory=dict)
 
-    @property
-    def yuv(self) -> bool:
-        """Whether colours are stored as luma and chroma."""
-        return self.pixel_format.startswith("yuv")
-
 
 # What browsers play. mbtree reads beyond its arrays where a row is not a multiple of 8 macroblocks: the same frames
 # would then give another file every time.
@@ -72,7 +67,8 @@ class Clip:
     """A file with one video stream, being written by PyAV."""
 
     def __init__(self, path: Path, codec: Codec, stream: Stream) -> None:
-        self._codec = codec
+        # colours are luma and chroma
+        self._yuv = codec.pixel_format if codec.pixel_format.startswith("yuv") else None
         self._time_base = Fraction(1, stream.fps)
         self._frames = 0
         self._container = open_container(path, codec.container)
@@ -80,7 +76,7 @@ class Clip:
         self._stream.width, self._stream.height, self._stream.pix_fmt = stream.width, stream.height, codec.pixel_format
         context = self._stream.codec_context
         context.thread_count = THREADS
-        if codec.yuv:
+        if self._yuv:
             context.color_primaries, context.color_trc = ColorPrimaries.BT709, ColorTrc.BT709
             context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
 
@@ -90,10 +86,8 @@ class Clip:
 
     def encode(self, image: av.VideoFrame) -> None:
         """Encode one frame of FFmpeg's."""
-        if self._codec.yuv:
-            image = image.reformat(
-                format=self._codec.pixel_format, dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG
-            )
+        if self._yuv:
+            image = image.reformat(format=self._yuv, dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG)
         image.pts, image.time_base = self._frames, self._time_base
         self._frames += 1
         self._container.mux(self._stream.encode(image))

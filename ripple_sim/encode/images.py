@@ -284,7 +284,7 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
     flags = _ANIMATION | _METADATA
     with path.open("wb") as file:
         file.write(bytes(12 + 8 + 10))  # RIFF and VP8X, which come last: they hold the size and the flags
-        file.write(_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
+        file.write(riff_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
         for number, still in enumerate(stills):
             # whole milliseconds, without accumulating the rounding error
             begin, end = (round(1000 * n / stream.fps) for n in (number, number + 1))
@@ -292,12 +292,12 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
             if image.startswith(b"ALPH") or (image.startswith(b"VP8L") and image[12] & 0x10):
                 flags |= _OPACITY
             header = bytes(6) + _canvas(stream) + struct.pack("<I", end - begin)[:3] + bytes([_DO_NOT_BLEND])
-            file.write(_chunk(b"ANMF", header + image))
-        file.write(_chunk(b"XMP ", MARK.encode()))
+            file.write(riff_chunk(b"ANMF", header + image))
+        file.write(riff_chunk(b"XMP ", MARK.encode()))
         size = file.tell()
         file.seek(0)
         file.write(struct.pack("<4sI4s", b"RIFF", size - 8, b"WEBP"))
-        file.write(_chunk(b"VP8X", struct.pack("<I", flags) + _canvas(stream)))
+        file.write(riff_chunk(b"VP8X", struct.pack("<I", flags) + _canvas(stream)))
 
 
 def _image_chunks(still: bytes) -> bytes:
@@ -317,5 +317,6 @@ def _canvas(stream: Stream) -> bytes:
     return struct.pack("<I", stream.width - 1)[:3] + struct.pack("<I", stream.height - 1)[:3]
 
 
-def _chunk(name: bytes, content: bytes) -> bytes:
+def riff_chunk(name: bytes, content: bytes) -> bytes:
+    """A chunk of a RIFF file, of an even length."""
     return struct.pack("<4sI", name, len(content)) + content + bytes(len(content) % 2)

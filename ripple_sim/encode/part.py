@@ -53,6 +53,10 @@ class Part:
 
     Attributes
     ----------
+    unfinished, whole : Path
+        Where the next segment, and the video's file, are written until they are complete.
+    segments : list of (path, int)
+        Complete ones in their order, and the number of each one's first frame.
     frames : int
         How many are stored.
     """
@@ -71,6 +75,7 @@ class Part:
         self.folder = video.with_name(video.name + ".part")
         self._suffix, self._length = suffix, length
         self._segments = self.folder / _FRAMES
+        self.unfinished, self.whole = self._segments / f".unfinished{suffix}", self.folder / _WHOLE
         if self.folder.is_symlink():
             raise VideoError(f"cannot write {video}: its folder {self.folder.name} is a link; move it away")
         if self.folder.exists() and not self.folder.is_dir():
@@ -98,28 +103,22 @@ class Part:
         except BaseException:
             os.close(self._lock)
             raise
-        self.frames = sum(frames for _, _, frames in self._stored())
-
-    @property
-    def unfinished(self) -> Path:
-        """Where the next segment is written until it is complete."""
-        return self._segments / f".unfinished{self._suffix}"
-
-    @property
-    def whole(self) -> Path:
-        """Where the video's file is written until it is complete."""
-        return self.folder / _WHOLE
+        self.segments: list[tuple[Path, int]] = []
+        self.frames = 0
+        for path in sorted(self._segments.iterdir(), key=lambda path: (len(path.name), path.name)):
+            numbers = _SEGMENT.fullmatch(path.stem)
+            if numbers is not None and int(numbers[1]) == self.frames:  # what comes after a gap is made again
+                self.segments.append((path, self.frames))
+                self.frames = int(numbers[2] or numbers[1]) + 1
 
     def store(self, frames: int) -> None:
         """Add the unfinished segment, of that many frames, to the complete ones."""
         first = self.frames
         name = f"frame_{first:05d}" if self._length == 1 else f"frames_{first:05d}-{first + frames - 1:05d}"
-        move(self.unfinished, self._segments / (name + self._suffix))
+        path = self._segments / (name + self._suffix)
+        move(self.unfinished, path)
+        self.segments.append((path, first))
         self.frames += frames
-
-    def segments(self) -> list[tuple[Path, int]]:
-        """The complete segments, and the number of each one's first frame."""
-        return [(path, first) for path, first, _ in self._stored()]
 
     def check_state(self, frame: int, digest: str) -> None:
         """Record the simulation's fingerprint at a frame, or compare it with the one that is known.
@@ -215,15 +214,3 @@ class Part:
     def _drop_unfinished(self) -> None:
         self.unfinished.unlink(missing_ok=True)
         self.whole.unlink(missing_ok=True)
-
-    def _stored(self) -> list[tuple[Path, int, int]]:
-        """Complete segments in their order, with first frame and number of frames, up to the first gap."""
-        stored, expected = [], 0
-        for path in sorted(self._segments.iterdir(), key=lambda path: (len(path.name), path.name)):
-            numbers = _SEGMENT.fullmatch(path.stem)
-            if numbers is None or int(numbers[1]) != expected:
-                continue
-            frames = int(numbers[2] or numbers[1]) + 1 - expected
-            stored.append((path, expected, frames))
-            expected += frames
-        return stored

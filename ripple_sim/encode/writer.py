@@ -191,7 +191,7 @@ class FrameWriter:
         self._store()
         if self._format.join is not None:
             stream = dataclasses.replace(self._stream, sound=self.sound)
-            self._format.join(self._part.segments(), self._part.whole, stream)
+            self._format.join(self._part.segments, self._part.whole, stream)
         if not self._abandoned:
             self._part.finish()
             self._finished = True

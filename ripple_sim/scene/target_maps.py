@@ -235,13 +235,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
         """Raise `SceneError` where keys are missing, too many, or out of range."""
         if (self.mesh is None) == (self.volume is None):
             raise SceneError("a [[ripple.inside]] names neither or both of mesh and volume; valid is one of them")
-        if self.volume is not None and self.threshold is None:
-            raise SceneError(
-                f"the volume {self.volume!r} of a [[ripple.inside]] needs a threshold: its value at the surface of "
-                "what lies inside, about 300 for bone in Hounsfield units"
-            )
-        if self.mesh is not None and (self.threshold is not None or self.spacing is not None):
-            raise SceneError(f"the mesh {self.mesh!r} of a [[ripple.inside]] takes no threshold and no spacing")
+        _check_threshold(self.mesh or self.volume, self.mesh is None, self.threshold, self.spacing)
         for key, value in (("scale", self.scale), ("spacing", self.spacing)):
             if value is not None and not value > 0:
                 raise SceneError(f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater than 0")
@@ -276,15 +270,21 @@ def load_inside(
     SceneError
         If a volume comes without a threshold, or a mesh with one.
     """
-    if not is_volume(path):
-        if threshold is not None or spacing is not None:
-            raise SceneError(f"{str(path)!r} is a mesh, which takes no threshold and no spacing; leave them out")
+    _check_threshold(path, is_volume(path), threshold, spacing)
+    if threshold is None:
         mesh = load_mesh(path)
         return dataclasses.replace(mesh, V=scale * mesh.V)
-    if threshold is None:
-        raise SceneError(
-            f"{str(path)!r} is a volume, which needs a threshold: its value at the surface of what is inside"
-        )
     volume = load_volume(path, threshold, spacing, origin)
     place, between = scale * np.asarray(volume.origin), scale * np.asarray(volume.spacing)
     return volume if scale == 1 else dataclasses.replace(volume, origin=place, spacing=between)
+
+
+def _check_threshold(path: Any, is_volume: bool, threshold: float | None, spacing: float | None) -> None:
+    """Raise `SceneError` if a volume comes without a threshold, or a mesh with one."""
+    if is_volume and threshold is None:
+        raise SceneError(
+            f"{str(path)!r} is a volume, which needs a threshold: its value at the surface of what is inside, about "
+            "300 for bone in Hounsfield units"
+        )
+    if not is_volume and (threshold is not None or spacing is not None):
+        raise SceneError(f"{str(path)!r} is a mesh, which takes no threshold and no spacing; leave them out")

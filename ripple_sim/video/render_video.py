@@ -72,7 +72,7 @@ class Film:
         One, or two that are shown side by side and share the width.
     options : VideoOptions
         Settled. Linear frames are without overlays, and of one run.
-    on_frame : callable, optional
+    on_frame : sequence of callable
         Called with the first simulation at the time of each frame, in the thread that runs `shots`.
     """
 
@@ -81,7 +81,7 @@ class Film:
         simulations: Sequence[Simulation],
         options: VideoOptions,
         frames: int,
-        on_frame: Callable[[Simulation], None] | None = None,
+        on_frame: Sequence[Callable[[Simulation], None]] = (),
     ) -> None:
         self.simulations, self._options, self._frames, self._on_frame = simulations, options, frames, on_frame
         self._request = parse_request(options.overlay or ())
@@ -93,7 +93,6 @@ class Film:
         self._pass_files: PassFiles | None = None
         self._last_seen: tuple[int, Sighting] | None = None  # the number of a frame whose passes are not written yet
         self.seconds = 0.0  # spent on frames so far
-        self.microphone: Microphone | None = None
         operators = compared_operators(options.compare)
         ripples = simulations[0].ripples
         spacings = {grid_spacing(ripples[name].atlas.resolution) for name in ripples}
@@ -146,10 +145,8 @@ class Film:
         for exposures in zip(*runs, strict=True):
             if exposures[0].exposure == 0:
                 notes = self._notebook.follow()
-                if self._on_frame is not None:
-                    self._on_frame(self.simulations[0])
-                if self.microphone is not None:
-                    self.microphone.follow(self.simulations[0])
+                for look in self._on_frame:
+                    look(self.simulations[0])
             yield Shot(exposures, notes)
 
     def render_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
@@ -389,9 +386,9 @@ def render_video(
         resumed_at = writer.frames
         operators = compared_operators(options.compare)
         simulations = [Simulation.of(scene, options, operator=operator, on_step=on_step) for operator in operators]
-        film = Film(simulations, options, frames, on_frame)
         microphone = Microphone(simulations[0].ripples, options.slow_motion) if options.sound else None
-        film.microphone = microphone
+        looks = [look for look in (on_frame, microphone and microphone.follow) if look]
+        film = Film(simulations, options, frames, looks)
         if options.passes:
             film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import threading
+from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel import Floats, Ints, kernel
+from ..kernel import Bools, Floats, Ints, kernel
 from .texel_mesh import TexelMesh
 
 # Rows and columns in a halo table of the eight neighbours of a texel, in order round it
@@ -28,15 +29,14 @@ class Scratch(NamedTuple):
         Infinite where a texel has not been reached.
     touched, order : int64 [T]
         Texels that have been reached, and those whose distance is known, nearest first.
-    front, place : int64 [T]
-        A heap of the texels that have been reached, the nearest first, and where in it each is, or -1.
+    known : bool [T]
+        Whether a texel's distance is.
     """
 
     distance: Floats
     touched: Ints
     order: Ints
-    front: Ints
-    place: Ints
+    known: Bools
 
 
 def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -62,8 +62,8 @@ def _distance_scratch(size: int, thread: int) -> Scratch:
 
 
 def _new_scratch(size: int) -> Scratch:
-    touched, order, front = np.empty((3, size), np.int64)
-    return Scratch(np.full(size, np.inf), touched, order, front, np.full(size, -1))
+    touched, order = np.empty((2, size), np.int64)
+    return Scratch(np.full(size, np.inf), touched, order, np.zeros(size, bool))
 
 
 @kernel(no_cpython_wrapper=True)
@@ -100,39 +100,6 @@ def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -
     return best
 
 
-@kernel(no_cpython_wrapper=True)
-def _comes_first(distance: Floats, a: int, b: int) -> bool:
-    """Whether texel a is nearer than b; of two that are as near, the one of the lower index."""
-    return distance[a] < distance[b] or (distance[a] == distance[b] and a < b)
-
-
-@kernel(no_cpython_wrapper=True)
-def _rise(front: Ints, place: Ints, distance: Floats, i: int, t: int) -> None:
-    """Put a texel into the heap at place i, or nearer to the top."""
-    while i > 0 and _comes_first(distance, t, front[(i - 1) // 2]):
-        front[i] = front[(i - 1) // 2]
-        place[front[i]] = i
-        i = (i - 1) // 2
-    front[i], place[t] = t, i
-
-
-@kernel(no_cpython_wrapper=True)
-def _sink(front: Ints, place: Ints, distance: Floats, count: int) -> None:
-    """Take the first of `count` + 1 texels out of the heap."""
-    t, i, child = front[count], 0, 1
-    place[front[0]] = -1
-    while child < count:
-        if child + 1 < count and _comes_first(distance, front[child + 1], front[child]):
-            child += 1
-        if not _comes_first(distance, front[child], t):
-            break
-        front[i] = front[child]
-        place[front[i]] = i
-        i, child = child, 2 * child + 1
-    if count > 0:
-        front[i], place[t] = t, i
-
-
 @kernel
 def march(halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scratch) -> tuple[int, int]:
     """Fast marching with point-source updates over the triangles of both triangulations of every quad.
@@ -140,36 +107,32 @@ def march(halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scra
     The first of those `touched` are the seeds, whose distances are known; see `seeded`. Returns how many texels have
     been touched, and of how many within the limit the distance is now known.
     """
-    n, distance, touched = halo.shape[1] - 2, scratch.distance, scratch.touched
-    order, front, place = scratch.order, scratch.front, scratch.place
-    around = np.empty(8, np.int64)
-    count, known, waiting = seeds, 0, 0
-    for i in range(seeds):
-        _rise(front, place, distance, i, touched[i])
-        waiting += 1
-    while waiting > 0 and distance[front[0]] <= limit:
-        t = front[0]
-        waiting -= 1
-        _sink(front, place, distance, waiting)
-        order[known] = t
+    distance, touched, order, done = scratch.distance, scratch.touched, scratch.order, scratch.known
+    n, around, count, known = halo.shape[1] - 2, np.empty(8, np.int64), seeds, 0
+    # texels that wait, the nearest first; those that came nearer wait more than once, and of two as near as each other
+    # the one of the lower index comes first
+    front = [(distance[t], t) for t in touched[:seeds]]
+    heapify(front)
+    while len(front) > 0 and front[0][0] <= limit:
+        t = heappop(front)[1]
+        if done[t]:
+            continue
+        order[known], done[t] = t, True
         known += 1
         chart, row, column = t // (n * n), t // n % n, t % n
         for k in range(8):
             around[k] = halo[chart, row + _ROWS[k], column + _COLUMNS[k]]
         for k in range(8):
             a = around[k]
-            if a < 0 or (distance[a] < np.inf and place[a] < 0):  # none, or known
+            if a < 0 or done[a]:
                 continue
             best = _beside(positions, distance, around, k, t)
             if best < distance[a]:
-                at = place[a]
-                if at < 0:
+                if distance[a] == np.inf:
                     touched[count] = a
                     count += 1
-                    at = waiting
-                    waiting += 1
                 distance[a] = best
-                _rise(front, place, distance, at, a)
+                heappush(front, (best, a))
     return count, known
 
 
@@ -190,10 +153,10 @@ def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: 
 
 
 @kernel
-def clean(distance: Floats, place: Ints, touched: Ints, count: int) -> None:
+def clean(scratch: Scratch, count: int) -> None:
     """Leave a scratch as if so many texels had not been touched."""
     for i in range(count):
-        distance[touched[i]], place[touched[i]] = np.inf, -1
+        scratch.distance[scratch.touched[i]], scratch.known[scratch.touched[i]] = np.inf, False
 
 
 @kernel

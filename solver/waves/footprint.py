@@ -67,7 +67,7 @@ def _weigh(
             count, known = march(grid.halo, grid.positions, count, 1.1 * radius, scratch)
             near = scratch.order
         if end + known > len(texels):
-            clean(distance, scratch.place, touched, count)
+            clean(scratch, count)
             return i
         for k in range(known):
             t = near[k]
@@ -82,7 +82,7 @@ def _weigh(
                 texels[end], weights[end] = t, weight
                 total += weight * grid.areas[t]
                 end += 1
-        clean(distance, scratch.place, touched, count)
+        clean(scratch, count)
         for k in range(begins[i], end):
             weights[k] /= total
         begins[i + 1] = end

@@ -8,7 +8,7 @@ from hits import Run
 from mujoco_models import BALL, mesh_asset, model_of
 
 from ripple_sim import make_collidable
-from ripple_sim.coupling import ContactReader, Contacts, CoupledModel, first_rows, geom_contacts, target_atlas
+from ripple_sim.coupling import ContactReader, Contacts, CoupledModel, first_rows, target_atlas
 
 SHAPES = ('type="box" size="0.2 0.2 0.1"', 'type="sphere" size="0.15"', 'type="capsule" size="0.08 0.1"')
 
@@ -39,7 +39,7 @@ def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(con
     model, data = pit(seed, cone)
     is_target = np.zeros(model.ngeom, dtype=bool)
     is_target[[5, 6, 8, 9, 11]] = True
-    found = geom_contacts(model, data, data.contact.geom.astype(int), is_target, CoupledModel(model).extents)
+    found = reader_of(model, *np.flatnonzero(is_target).tolist()).read(data)
     expected: dict[int, dict[int, list[tuple[float, np.ndarray, np.ndarray]]]] = {}
     for i, contact in enumerate(data.contact):
         wrench = np.zeros(6)
@@ -68,10 +68,10 @@ def test_speculative_contact_loads_the_target_where_it_is() -> None:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0.1 0 0.53"))
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
-    is_target, extents = np.array([True, False]), CoupledModel(model).extents
-    [before] = geom_contacts(model, data, data.contact.geom.astype(int), is_target, extents).values()
+    reader = reader_of(model, "target")
+    [before] = reader.read(data).values()
     data.contact.dist[:] = -7.0
-    [after] = geom_contacts(model, data, data.contact.geom.astype(int), is_target, extents).values()
+    [after] = reader.read(data).values()
     np.testing.assert_array_equal(after.forces, before.forces)
     assert np.linalg.norm(after.points - before.points) < 1.5 * 0.05
 
@@ -94,7 +94,7 @@ def slab_and_table(bodies: str, slab: str = "") -> mujoco.MjModel:
     return spec.compile()
 
 
-def reader_of(model: mujoco.MjModel, *targets: str) -> ContactReader:
+def reader_of(model: mujoco.MjModel, *targets: str | int) -> ContactReader:
     geoms = [model.geom(name).id for name in targets]
     return ContactReader(CoupledModel(model), {geom: target_atlas(model, geom, 8) for geom in geoms})
 
