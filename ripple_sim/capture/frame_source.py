@@ -91,7 +91,8 @@ class Sighting:
             if geom in later.height_maps and (image.target[mask] >= 0).all():
                 height_map = later.height_maps[geom]
                 page = ChartPage(len(height_map), height_map.shape[1] - 2)
-                heights = spline_heights(height_map, *spline_samples(page, image.place[mask].astype(np.float64)))
+                places = page.locate(image.place[mask].astype(np.float64))
+                heights = spline_heights(height_map, *spline_samples(*places, page.resolution))
                 direction = image.smooth_normal[mask] @ rotation
                 still = local - image.height[mask, None] * direction
                 still, direction = _taken_along(self.meshes[geom], later.meshes[geom], still, direction)

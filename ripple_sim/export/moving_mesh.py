@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.surfaces.adaptive import spline_weights
+from ripple_sim.render.surfaces.adaptive import spline_samples, spline_weights
 from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.render.surfaces.tessellation import COORDINATES, DIRECTION, NORMAL, POSITION, UV
@@ -76,11 +76,8 @@ class MovingMesh:
         tessellate = _own if tessellation == "own" else _refined
         self.F, self.uv, points, directions, normals, places = tessellate(atlas, triangles)
         self.rest, self.directions = points.astype(np.float32), normalized(directions).astype(np.float32)
-        chart, place = places[0], np.stack(places[1:], axis=1)
-        nearest = np.clip(np.floor(place + 0.5), 0, atlas.resolution - 1)
-        texels = np.column_stack([chart, nearest]).astype(np.int32)
-        offsets, normals = (place - nearest).astype(np.float32), normalized(normals).astype(np.float32)
-        self._normals, self._texels, self._offsets = normals, texels, offsets
+        self._normals = normalized(normals).astype(np.float32)
+        self._texels, self._offsets = spline_samples(*places, atlas.resolution)
         self._height_map = HeightMap.drawn(atlas, limit)
         self._atlas = atlas
 

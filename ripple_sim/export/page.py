@@ -91,7 +91,7 @@ def floor_of(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
 
 def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     """Lamps, soft boxes and ambient light, as the renderer has them at the first frame."""
-    pose, _ = source.pose(data)
+    pose = source.pose(data)
     lighting = lighting_of(source.model, data, pose, source.lighting)
     studio = lighting.studio
     lamps = [
@@ -323,7 +323,7 @@ class PageWriter:
         floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in targets])
         found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
         parts = [*self._targets.values(), *(_solid_part(model, solid) for solid in found)]
-        pose, _ = source.pose(data)
+        pose = source.pose(data)
         floor_meta = None if floor is None else floor_of(model, floor)
         textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])
         meta = {
@@ -346,7 +346,7 @@ class PageWriter:
 
     def _pose(self, data: mujoco.MjData) -> list[list[float]]:
         """Position and quaternion of the camera and of all bodies."""
-        pose, _ = self._source.pose(data)
+        pose = self._source.pose(data)
         quaternion = np.zeros(4)
         mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
         rows = np.concatenate([[[*pose.position, *quaternion]], np.concatenate([data.xpos, data.xquat], axis=1)])

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import mujoco
 
-from ripple_sim.capture.frame_source import focal_distance, viewpoint
+from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.render.camera import Pose
 from ripple_sim.scene.scene_file import CameraEntry
@@ -90,10 +90,9 @@ class Source:
         """The surface of a target."""
         return MovingMesh(self.ripples[name].rest, self.tessellation, self.limited[name], self.triangles)
 
-    def pose(self, data: mujoco.MjData) -> tuple[Pose, float]:
-        """The camera in the world, and its focal distance [m]."""
-        pose = viewpoint(self.model, data, self.camera, data.time).pose()
-        return pose, focal_distance(self.model, data, self.camera, pose)
+    def pose(self, data: mujoco.MjData) -> Pose:
+        """The camera in the world."""
+        return viewpoint(self.model, data, self.camera, data.time).pose()
 
 
 class Writer(Protocol):

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 
+from ripple_sim.capture.frame_source import focal_distance
 from ripple_sim.capture.snapshot import state_digest
 from ripple_sim.coupling.geoms import target_name
 from ripple_sim.coupling.ripples import Impulse
@@ -231,7 +232,7 @@ class UsdWriter:
 
     def _begin(self, data: mujoco.MjData) -> None:
         """Define what stays as it is at the first frame."""
-        pose, _ = self._source.pose(data)
+        pose = self._source.pose(data)
         focal, aperture = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2), self._source.camera.aperture
         placing(self._camera)
         self._camera.CreateFocalLengthAttr(_TENTHS * focal)
@@ -264,10 +265,11 @@ class UsdWriter:
         for body, prim in self._bodies.items():
             if not _stands(self._source.model, body):
                 place(prim, data.xpos[body], data.xquat[body], time)
-        pose, focus = self._source.pose(data)
+        source, pose = self._source, self._source.pose(data)
         quaternion = np.zeros(4)
         mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
         place(self._camera, pose.position, quaternion, time)
+        focus = focal_distance(source.model, data, source.camera, pose)
         self._camera.GetFocusDistanceAttr().Set(float(focus), Usd.TimeCode(time))
         self._lamps.write(data, time)
         for name, (_, mesh) in self._surfaces.items():

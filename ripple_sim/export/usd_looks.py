@@ -119,7 +119,7 @@ class Lamps:
             place(lamp, position, _towards(light.direction), time)
 
     def _lighting(self, data: mujoco.MjData) -> Lighting:
-        pose, _ = self._source.pose(data)
+        pose = self._source.pose(data)
         return lighting_of(self._source.model, data, pose, self._source.lighting)
 
 

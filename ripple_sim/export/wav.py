@@ -33,7 +33,7 @@ class WavWriter(Writer):
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Hear the frame from where the camera stands."""
         if self._microphone is not None:
-            self._microphone.place(data, self._source.pose(data)[0].position)
+            self._microphone.place(data, self._source.pose(data).position)
         self._frames = number
 
     def finish(self) -> None:

@@ -46,12 +46,6 @@ class Sprite:
         self._color = np.zeros((height, width, 3), np.float32)  # times alpha
         self._alpha = np.zeros((height, width, 1), np.float32)
 
-    def copy(self) -> Sprite:
-        """A copy with the same content."""
-        other = Sprite(self.width, self.height)
-        other._color, other._alpha = self._color.copy(), self._alpha.copy()
-        return other
-
     def fill(self, coverage: NDArray[np.floating], color: NDArray | Color, opacity: float = 1.0) -> None:
         """Lay a colour, or an image [height, width, 3], over the share `coverage`, 0 to 1, of each pixel."""
         alpha = (opacity * coverage[..., None]).astype(np.float32)

@@ -7,6 +7,7 @@ them.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import math
@@ -234,15 +235,15 @@ Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times [s], values
 
 COLORS = ((38, 92, 160), (196, 88, 52))  # of the curves
 _GRID = (150, 158, 170)
+_TITLE = "wave energy"
 _LEDGER, _LONGEST_ENTRY = 1.3, "bodies \N{MINUS SIGN}0.88 mJ"  # height of its line, in ems; the longest of its texts
 
 
 class EnergyPlot:
-    """Draws curves over the time of the whole video.
+    """Draws curves of energy over the time of the whole video.
 
     Parameters
     ----------
-    title, unit : str
     duration : float
         [s].
     names : sequence of str
@@ -251,18 +252,8 @@ class EnergyPlot:
         Whether a line of numbers stands under the title.
     """
 
-    def __init__(
-        self,
-        layout: Layout,
-        title: str,
-        unit: str,
-        duration: float,
-        names: Sequence[str] = (),
-        *,
-        ledger: bool = False,
-    ) -> None:
-        self._em, self._title, self._unit = layout.em, title, unit
-        self._duration, self._names = duration, names
+    def __init__(self, layout: Layout, duration: float, names: Sequence[str] = (), *, ledger: bool = False) -> None:
+        self._em, self._duration, self._names = layout.em, duration, names
         em = layout.em
         self._width = layout.panel_width(26 if ledger else 23)
         self._column_width = (self._width - 1.4 * em) / 3
@@ -277,7 +268,7 @@ class EnergyPlot:
         """Draw curves up to the present, from 0 to `limit`, with labels at half and whole of `goal`, and a ledger."""
         if self._axes is None or self._axes[0] != (limit, goal):
             self._axes = (limit, goal), self._draw_axes(limit, goal)
-        sprite = self._axes[1].copy()
+        sprite = copy.deepcopy(self._axes[1])
         for color, (times, values) in zip(COLORS, curves, strict=False):
             self._draw_curve(sprite, times, values, limit, color)
         if ledger is None or not self._has_ledger:
@@ -285,7 +276,7 @@ class EnergyPlot:
         size, inks = round(0.85 * self._em), {"bodies": INK, "waves": COLORS[0], "total": INK}
         for column, (name, ink) in enumerate(inks.items()):
             value = getattr(ledger, name)
-            factor, unit = readable(abs(value), self._unit) if value else (1.0, self._unit)
+            factor, unit = readable(abs(value), "J") if value else (1.0, "J")
             x = 0.7 * self._em + column * self._column_width
             sprite.text(x, 2.75 * self._em, name, size, FAINT if ink == INK else ink)
             x += text_width(name, size) + 0.4 * self._em
@@ -294,10 +285,10 @@ class EnergyPlot:
 
     def _draw_axes(self, limit: float, goal: float) -> Sprite:
         em, small = self._em, round(0.85 * self._em)
-        factor, prefixed = readable(goal, self._unit) if goal else (1.0, self._unit)
+        factor, prefixed = readable(goal, "J") if goal else (1.0, "J")
         sprite = panel(self._width, self._height, em)
-        sprite.text(round(0.7 * em), 1.4 * em, self._title, em)
-        sprite.text(round(0.7 * em) + text_width(self._title, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
+        sprite.text(round(0.7 * em), 1.4 * em, _TITLE, em)
+        sprite.text(round(0.7 * em) + text_width(_TITLE, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
         self._draw_names(sprite, small)
         hair = max(1, round(em / 16))
         half = [goal / 2] if self._bottom - self._top > 2.6 * small else []
@@ -317,7 +308,7 @@ class EnergyPlot:
 
     def _draw_names(self, sprite: Sprite, size: int) -> None:
         x = float(self._width - round(0.7 * self._em))
-        titles = text_width(f"{self._title} {self._unit}", self._em) + self._em
+        titles = text_width(f"{_TITLE} J", self._em) + self._em
         if sum(text_width(name, size) + 0.9 * self._em for name in self._names) > x - titles:
             return  # too narrow; the runs' titles have the curves' colours anyway
         for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
@@ -397,7 +388,7 @@ class Painter:
     ) -> None:
         self._request, self._layout, self._titles = request, layout, titles
         names = [title for title, _ in titles]
-        self._energy_plot = EnergyPlot(self._layout, "wave energy", "J", duration, names, ledger=not names)
+        self._energy_plot = EnergyPlot(self._layout, duration, names, ledger=not names)
         self._spacing, self._duration = spacing, duration
         self._decimals = 2 if duration < 100 else 1
         # a title leaves room for the clock on the seam

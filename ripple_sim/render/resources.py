@@ -146,16 +146,16 @@ def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Te
     """
     pixels = fitted(pixels, _limit(resources, "GL_MAX_TEXTURE_SIZE"))
     height, width, _ = pixels.shape
-    texture = resources.texture((width, height), 4, _opaque(pixels), internal_format=SRGB8_ALPHA8)
-    return _trilinear(texture)
+    opaque = Image.fromarray(pixels).convert("RGBA").tobytes()
+    return _trilinear(resources.texture((width, height), 4, opaque, internal_format=SRGB8_ALPHA8))
 
 
 def srgb_cube(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
     """Cube map with mipmaps, of pixels [6 size, size, 3]: its faces below one another."""
     largest = _limit(resources, "GL_MAX_CUBE_MAP_TEXTURE_SIZE")
     faces = [fitted(face, largest) for face in np.split(pixels, 6)]
-    pixels, size = np.concatenate(faces), faces[0].shape[1]
-    return _trilinear(resources.texture_cube((size, size), 4, _opaque(pixels), internal_format=SRGB8_ALPHA8))
+    opaque, size = Image.fromarray(np.concatenate(faces)).convert("RGBA").tobytes(), faces[0].shape[1]
+    return _trilinear(resources.texture_cube((size, size), 4, opaque, internal_format=SRGB8_ALPHA8))
 
 
 def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
@@ -177,10 +177,6 @@ def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
 def _limit(resources: Resources, name: str) -> int:
     with resources.gl as ctx:
         return int(ctx.info[name])
-
-
-def _opaque(pixels: NDArray[np.uint8]) -> bytes:
-    return np.concatenate([pixels, np.full((*pixels.shape[:2], 1), 255, dtype=np.uint8)], axis=2).tobytes()
 
 
 def _trilinear(texture: Any) -> Any:

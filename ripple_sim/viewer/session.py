@@ -136,7 +136,7 @@ class Session:
         self._balls.park()
         self.simulation.reset()
         if self._material:
-            self._change_material(**self._material)
+            self.set_material(**self._material)
         self.color_range = 0.0
         self.refresh()
 
@@ -148,12 +148,13 @@ class Session:
         self.simulation.ripples.change_operator(operator)
         self.operator = operator
 
-    def set_material(self, **coefficients: float) -> None:
+    def set_material(self, **coefficients: Any) -> None:
         """Change coefficients of all surfaces' material; the waves stay as they are.
 
         Raises `SolverError` for an invalid coefficient.
         """
-        self._change_material(**coefficients)
+        for name in self.simulation.ripples:
+            self.simulation.ripples.change_material(name, **coefficients)
         self._material.update(coefficients)
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> tuple[str, NDArray[np.float64], float] | None:
@@ -205,7 +206,3 @@ class Session:
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Position [m] and rotation matrix of a geom in the world."""
         return target_pose(self.simulation.data, self.simulation.ripples.geom_ids[name])
-
-    def _change_material(self, **coefficients: Any) -> None:
-        for name in self.simulation.ripples:
-            self.simulation.ripples.change_material(name, **coefficients)

@@ -14,7 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import StepCoefficients, WaveOperator, number_or_field, step_coefficients
-from ..texels.stencil import NO_LINKS, Stencil
+from ..texels.stencil import Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
 from .field_backend import FieldBackend
@@ -99,8 +99,7 @@ class RowLayout:
         else:
             beside = rows.reshape(4, self.n + 1, count + 1, self.n + 2)
             beside[:, :, :count, : self.n + 1] = stencil.weights.transpose(1, 2, 0, 3)
-        links = stencil.irregular if stencil.irregular is not None else NO_LINKS
-        addresses = self.addresses
+        links, addresses = stencil.irregular, self.addresses
         return Weights(
             rows,
             self.columns,

@@ -15,7 +15,7 @@ from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
 from ..texels import cells
 from ..texels.moving import MovedStencil, Ride
-from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
+from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
@@ -61,7 +61,7 @@ class DeviceStiffness:
         law = {name: float(getattr(cells, name)) for name in _LAW}
         self._shaders["quads"] = dispatch.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
 
-    def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks | None:
+    def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
         """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
         V, (quads, _) = stencil.places.V, stencil.coefficient
         self._around[:, stencil.cells.special_places] = self._special.at(V)
@@ -81,9 +81,8 @@ class DeviceStiffness:
             stencil.known_fastest = self._fastest(irregular, buffer)
         return irregular
 
-    def _fastest(self, irregular: IrregularLinks | None, buffer: moderngl.Buffer) -> float:
+    def _fastest(self, links: IrregularLinks, buffer: moderngl.Buffer) -> float:
         """Gershgorin's bound for what was made last."""
-        links = irregular if irregular is not None else NO_LINKS
         if len(links.texels):
             beside = np.zeros(self._mass.size, np.float32)
             beside[links.texels] = np.add.reduceat(np.abs(links.weights), links.begins[:-1])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gl import GLContext
-from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil
+from ..texels.stencil import IrregularLinks, Stencil
 from ..texels.topology import TexelTopology
 
 _GROUP = 256
@@ -154,7 +154,7 @@ class FieldLayout:
 
 
 def link_buffers(
-    gl: GLContext, fields: FieldLayout, links: IrregularLinks | None, factors: NDArray
+    gl: GLContext, fields: FieldLayout, links: IrregularLinks, factors: NDArray
 ) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
     """The irregular links of a stencil, with the addresses of their ends, as shaders read them.
 
@@ -168,14 +168,13 @@ def link_buffers(
         (address, first link, one after its last) of each such texel, and the address of each link's other end with the
         bits of its weight.
     """
-    irregular = links if links is not None else NO_LINKS
-    scale = np.repeat(factors.reshape(-1)[irregular.texels], np.diff(irregular.begins))
-    texels = np.stack([fields.texels[irregular.texels], irregular.begins[:-1], irregular.begins[1:]], axis=1)
-    bits = (scale * irregular.weights).astype(np.float32).view(np.int32)
-    others = np.stack([fields.texels[irregular.others].astype(np.int32), bits], axis=1)
+    scale = np.repeat(factors.reshape(-1)[links.texels], np.diff(links.begins))
+    texels = np.stack([fields.texels[links.texels], links.begins[:-1], links.begins[1:]], axis=1)
+    bits = (scale * links.weights).astype(np.float32).view(np.int32)
+    others = np.stack([fields.texels[links.others].astype(np.int32), bits], axis=1)
     with gl as ctx:
         heads, tails = (ctx.buffer(each.astype(np.int32).tobytes() or bytes(4)) for each in (texels, others))
-    return len(irregular.texels), heads, tails
+    return len(links.texels), heads, tails
 
 
 class TexelList:

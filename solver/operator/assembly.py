@@ -17,7 +17,7 @@ from ..errors import SolverError
 from ..texels.atlas import Atlas
 from ..texels.distance import depth_in_region
 from ..texels.moving import MovedPlaces, MovedStencil
-from ..texels.stencil import EAST, LINK_ENDS, NORTH, IrregularLinks, Stencil, crossing_links, link_lengths
+from ..texels.stencil import EAST, LINK_ENDS, NO_LINKS, NORTH, IrregularLinks, Stencil, crossing_links, link_lengths
 from ..texels.texel_mesh import TexelMesh, smoothed, softening
 from .coefficients import LIMITS
 from .deep_water import FluidOperator, over_fluid
@@ -72,7 +72,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
     grip = source_grip(field["speed"] ** 2, field["stiffness"], field["bending"])
     tension = density * field["speed"] ** 2
     stencil, laplace = assemble(tension), assemble(np.ones_like(area)) if bends else None
-    rigidity, links = density * field["bending"] / area if bends else None, None
+    rigidity, links = density * field["bending"] / area if bends else None, NO_LINKS
     if kind == "fem" and not texels.topology.fixed_rim and (conditions > (0 if bends else FREE)).any():
         places = rim_places(texels, conditions)
         springs, held = tension_springs(places, texels, tension.ravel()), places.texels[places.conditions != FREE]
@@ -182,7 +182,7 @@ class MovingOperator:
         if operator.viscosity_stencil is not None:
             self._viscosity_share = _share(field["viscosity"], field["speed"] ** 2, material.tightening)
             self._viscosity = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
-        if operator.laplace_stencil is not None and operator.rim_links is None:
+        if operator.laplace_stencil is not None and not len(operator.rim_links.texels):
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
         around = np.ascontiguousarray(np.moveaxis(texels.halo_positions, -1, 0))
         self._level = atlas.areas / self._cells.moved(around, self._tension)[1]

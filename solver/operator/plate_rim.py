@@ -329,7 +329,7 @@ def _evened(rows: csr_array, owners: Ints, laplace: csr_array, rigidity: Floats,
     return factor[owners]
 
 
-def links_and_springs(matrix: csr_array) -> tuple[IrregularLinks | None, Floats]:
+def links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
     """A symmetric matrix [T, T] as links between texels, and springs [T] from each to where it is at rest [N/m].
 
     Sums that are round-off are no springs.

@@ -16,7 +16,16 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SolverError
-from ..texels.stencil import EAST, NORTH, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
+from ..texels.stencil import (
+    EAST,
+    NO_LINKS,
+    NORTH,
+    IrregularLinks,
+    Stencil,
+    largest_eigenvalue,
+    link_exists,
+    stiffness_matrix,
+)
 from ..texels.topology import TexelTopology
 
 # What joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours.
@@ -116,7 +125,7 @@ class WaveOperator:
         [m]; None where everything is elastic.
     fixed : bool [C, n, n] or None
         Texels that are clamped.
-    rim_links : IrregularLinks or None
+    rim_links : IrregularLinks
         What a plate's rims give to `stencil`; they and L B L stay as they are at rest where the surface moves.
     grip : float64 [C, n, n] or None
         Share of a source that sets a texel in motion, where it is movable; None: 1 everywhere.
@@ -135,7 +144,7 @@ class WaveOperator:
     rigidity: NDArray[np.float64] | None = None
     yield_height: NDArray[np.float64] | None = None
     fixed: NDArray[np.bool_] | None = None
-    rim_links: IrregularLinks | None = None
+    rim_links: IrregularLinks = NO_LINKS
     grip: NDArray[np.float64] | None = None
     density: NDArray[np.float64] | None = None
     bounded: bool = False

@@ -62,7 +62,8 @@ def _distance_scratch(size: int, thread: int) -> Scratch:
 
 
 def _new_scratch(size: int) -> Scratch:
-    return Scratch(np.full(size, np.inf), *np.empty((2, size), np.int64), np.zeros(size, bool))
+    touched, order = np.empty((2, size), np.int64)
+    return Scratch(np.full(size, np.inf), touched, order, np.zeros(size, bool))
 
 
 @kernel(no_cpython_wrapper=True)

@@ -12,7 +12,7 @@ from ..kernel import Floats, Ints, Ints32, kernel
 from ..mesh.closest import closest_points
 from .atlas import Atlas
 from .chart_map import barycentrics_in
-from .stencil import IrregularLinks, Stencil
+from .stencil import NO_LINKS, IrregularLinks, Stencil
 from .stiffness import CellCoefficient, TexelCells
 
 # Rest positions further off their triangles than this, in units of the surface's size, keep that distance.
@@ -146,7 +146,7 @@ class MovedStencil(Stencil):
         coefficient: CellCoefficient,
         places: MovedPlaces,
         multiple: tuple[MovedStencil, float] | None = None,
-        added: IrregularLinks | None = None,
+        added: IrregularLinks = NO_LINKS,
     ) -> None:
         self.topology, self.cells, self.coefficient, self.places = cells.topology, cells, coefficient, places
         self._multiple, self._added = multiple, added
@@ -165,11 +165,11 @@ class MovedStencil(Stencil):
         return self._made[0].weights
 
     @functools.cached_property
-    def irregular(self) -> IrregularLinks | None:  # type: ignore[override]
+    def irregular(self) -> IrregularLinks:  # type: ignore[override]
         """The links beyond the nine points."""
         return self.with_added(self._made[0].irregular)
 
-    def with_added(self, links: IrregularLinks | None) -> IrregularLinks | None:
+    def with_added(self, links: IrregularLinks) -> IrregularLinks:
         """Irregular links of the cells, and those that stay."""
         return IrregularLinks.joined(links, self._added)
 

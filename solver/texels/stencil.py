@@ -44,20 +44,18 @@ class IrregularLinks(NamedTuple):
     weights: Floats
 
     @classmethod
-    def of(cls, ends: NDArray[np.int64], weights: NDArray[np.float64]) -> IrregularLinks | None:
-        """Sort links [k, 2] with weights [k]; None where there are none."""
-        if not len(ends):
-            return None
+    def of(cls, ends: NDArray[np.int64], weights: NDArray[np.float64]) -> IrregularLinks:
+        """Sort links [k, 2] with weights [k]."""
         both, twice = np.concatenate([ends, ends[:, ::-1]]), np.tile(weights, 2)
         order = np.lexsort((both[:, 1], both[:, 0]))
         texels, begins = np.unique(both[order, 0], return_index=True)
         return cls(texels, np.append(begins, len(both)), both[order, 1], twice[order])
 
     @classmethod
-    def joined(cls, first: IrregularLinks | None, second: IrregularLinks | None) -> IrregularLinks | None:
+    def joined(cls, first: IrregularLinks, second: IrregularLinks) -> IrregularLinks:
         """Those of both."""
-        if first is None or second is None:
-            return first or second
+        if not len(second.texels):
+            return first
         ends = np.concatenate([np.repeat(each.texels, np.diff(each.begins)) for each in (first, second)])
         order = np.argsort(ends, kind="stable")
         texels, begins = np.unique(ends[order], return_index=True)
@@ -255,13 +253,13 @@ class Stencil:
     topology : TexelTopology
     weights : float64 [C, 4, n + 1, n + 1]
         Of the nine-point stencil, see the module.
-    irregular : IrregularLinks or None
+    irregular : IrregularLinks
         The links beyond the nine points.
     """
 
     topology: TexelTopology
     weights: NDArray[np.float64]
-    irregular: IrregularLinks | None = None
+    irregular: IrregularLinks = NO_LINKS
 
     def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
@@ -269,17 +267,14 @@ class Stencil:
         for link, start, end in self._links():
             result += self.weights[:, link][start] * (around[end] - field)
         links, h = self.irregular, field.reshape(-1)
-        if links is not None:
-            row = np.repeat(np.arange(len(links.texels)), np.diff(links.begins))
-            forces = links.weights * (h[links.others] - h[links.texels[row]])
-            result.reshape(-1)[links.texels] += np.bincount(row, forces)
+        row = np.repeat(np.arange(len(links.texels)), np.diff(links.begins))
+        forces = links.weights * (h[links.others] - h[links.texels[row]])
+        result.reshape(-1)[links.texels] += np.bincount(row, forces)
         return result
 
     def scaled(self, factor: float) -> Stencil:
         """The same with all weights multiplied by a factor."""
-        links = self.irregular
-        if links is not None:
-            links = links._replace(weights=factor * links.weights)
+        links = self.irregular._replace(weights=factor * self.irregular.weights)
         return Stencil(self.topology, factor * self.weights, links)
 
     def absolute_sums(self) -> NDArray[np.float64]:
@@ -293,10 +288,8 @@ class Stencil:
         if self.topology.fixed_rim:
             texels, ties = rim_ties(self.topology)
             np.subtract.at(sums.reshape(-1), texels, np.abs(self.weights.reshape(-1)[ties]) / 2)
-        if self.irregular is not None:
-            sums.reshape(-1)[self.irregular.texels] += np.add.reduceat(
-                np.abs(self.irregular.weights), self.irregular.begins[:-1]
-            )
+        links = self.irregular
+        sums.reshape(-1)[links.texels] += np.add.reduceat(np.abs(links.weights), links.begins[:-1])
         return sums
 
     def fastest(self, mass: NDArray[np.float64]) -> float:
@@ -337,10 +330,9 @@ def stiffness_matrix(stencil: Stencil) -> csr_array:
             columns.append(topology.halo[other][own])
             weights.append(stencil.weights[:, link][own])
     irregular = stencil.irregular
-    if irregular is not None:
-        rows.append(np.repeat(irregular.texels, np.diff(irregular.begins)))
-        columns.append(irregular.others)
-        weights.append(irregular.weights)
+    rows.append(np.repeat(irregular.texels, np.diff(irregular.begins)))
+    columns.append(irregular.others)
+    weights.append(irregular.weights)
     row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
     size = topology.texel_count
     diagonal = np.bincount(row, weight, size)

@@ -135,7 +135,7 @@ class TexelCells:
         links = self._add_special(around.reshape(3, -1), special, quads.power, weights, areas)
         return Stencil(self.topology, weights, links), areas
 
-    def special(self, around: Floats, coefficient: CellCoefficient) -> tuple[Floats, IrregularLinks | None]:
+    def special(self, around: Floats, coefficient: CellCoefficient) -> tuple[Floats, IrregularLinks]:
         """What all cells but the quads give to the links at `special_links`, and the irregular links.
 
         Only the places at `special_places` of those around are looked at.
@@ -196,7 +196,7 @@ class TexelCells:
 
     def _add_special(
         self, places: Floats, factors: tuple[Floats, ...], power: float, weights: Floats, areas: Floats | None
-    ) -> IrregularLinks | None:
+    ) -> IrregularLinks:
         """Add the special cells to weights and areas, and make the copies of each link agree; the irregular links."""
         flat, irregular, of_polygons = weights.reshape(-1), [np.zeros(0)], []
         for kind, (cells, factor) in enumerate(zip(self._special, factors, strict=True)):
@@ -215,8 +215,6 @@ class TexelCells:
         crossing_links(self.topology).level(weights)
         for link_places, values in of_polygons:
             np.add.at(flat, link_places, values)
-        if self._links is None:
-            return None
         return self._links._replace(weights=np.concatenate(irregular)[self._links.weights.astype(np.int64)])
 
     def _blocks(self) -> Iterator[tuple[slice, slice]]:

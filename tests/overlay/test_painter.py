@@ -121,7 +121,7 @@ def test_panels_of_one_corner_lie_below_one_another() -> None:
 
 
 def test_energy_plot_draws_values_at_their_height_and_grows_with_time() -> None:
-    plot = EnergyPlot(Layout(1280, 720), "energy", "J", 10.0)
+    plot = EnergyPlot(Layout(1280, 720), 10.0)
 
     def curve(value: float, until: float) -> np.ndarray:
         """Pixels that are blue, under a value that holds until a time."""

@@ -38,7 +38,7 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_ledger_stands_beside_nothing_else_or_is_left_out(size: tuple[int, int], written: list) -> None:
     layout = Layout(*size)
-    bare, plot = (overlay.EnergyPlot(layout, "wave energy", "J", 4.0, ledger=each) for each in (False, True))
+    bare, plot = (overlay.EnergyPlot(layout, 4.0, ledger=each) for each in (False, True))
     curve = np.linspace(0, 3, 50), np.ones(50)
     height = bare.draw([curve], 1.0, 1.0).height
     written.clear()
@@ -56,7 +56,7 @@ def test_the_ledger_stands_beside_nothing_else_or_is_left_out(size: tuple[int, i
 def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], written: list) -> None:
     layout = Layout(*size)
     times, taken = np.linspace(0, 3, 200), np.zeros(size[::-1], int)
-    plot = overlay.EnergyPlot(layout, "wave energy", "J", 4.0, ["ripple-sim", "Dynamic Paint"])
+    plot = overlay.EnergyPlot(layout, 4.0, ["ripple-sim", "Dynamic Paint"])
     panels = {
         "top left": overlay.label("t = 12.34 s", layout.em, "slow"),
         "top right": overlay.arrow_key(layout, 0.05, 0.05),

@@ -13,20 +13,20 @@ class Drawing {
     this.makePrograms();
     this.empty = gl.createVertexArray();
     this.images = {};
-    this.blank = textureOf(gl, [[255, 255, 255]]);
-    this.heat = textureOf(gl, meta.heat);
+    this.blank = colorsTexture(gl, [[255, 255, 255]]);
+    this.heat = colorsTexture(gl, meta.heat);
     this.environment = new Environment(gl, meta.light.boxes, meta.light.studio ? 1 : 0.5, meta.light.studio ? 1 : 0);
     const cell = SHADOW_CELL * SHADOW_WIDTH * meta.distance / this.shadowSize;
     this.parts = meta.parts.map(part => partOf(gl, part, cell));
     this.drawn = grouped(gl, this.parts);
     this.arrow = partOf(gl, arrowPart(), cell);
-    const sides = [this.shadowSize, this.shadowSize], linear = {MIN_FILTER: "LINEAR", MAG_FILTER: "LINEAR"};
-    this.shadow = tableOf(gl, "DEPTH_COMPONENT24", ...sides, {...linear, COMPARE_MODE: "COMPARE_REF_TO_TEXTURE"});
-    this.blockers = tableOf(gl, "RG8", ...sides, {...linear, MIN_FILTER: "LINEAR_MIPMAP_LINEAR"}, 8);
+    const sides = [this.shadowSize, this.shadowSize];
+    this.shadow = tableOf(gl, "DEPTH_COMPONENT24", ...sides, {...LINEAR, COMPARE_MODE: "COMPARE_REF_TO_TEXTURE"});
+    this.blockers = tableOf(gl, "RG8", ...sides, {...LINEAR, MIN_FILTER: "LINEAR_MIPMAP_LINEAR"}, 8);
     this.target = framebufferOf(gl, {DEPTH_ATTACHMENT: this.shadow, COLOR_ATTACHMENT0: this.blockers});
-    this.shades = tableOf(gl, "R8", this.shadowSize / 2, this.shadowSize / 2, linear);
+    this.shades = tableOf(gl, "R8", this.shadowSize / 2, this.shadowSize / 2, LINEAR);
     this.shadeTarget = framebufferOf(gl, {COLOR_ATTACHMENT0: this.shades});
-    this.screen = tableOf(gl, "RGBA8", 1, 1, linear, 0);
+    this.screen = tableOf(gl, "RGBA8", 1, 1, LINEAR, 0);
   }
 
   async load() {
@@ -34,7 +34,7 @@ class Drawing {
       const image = new Image();
       image.src = uri;
       await image.decode();
-      this.images[id] = textureOf(this.gl, image, this.software);
+      this.images[id] = imageTexture(this.gl, image, this.software);
     }
     for (const part of this.parts) part.lit = this.software && part.target && !this.imageOf(part) ? new LitPoints(this.gl, part) : null;
   }
@@ -65,9 +65,9 @@ class Drawing {
 
   imageOf(part) { return this.images[part.texture]; }
 
-  displace(part, rest, steps, step, limit) {
+  // Draws a target from now on as `displace` left it.
+  upload(part) {
     const gl = this.gl;
-    displace(part, rest, steps, step, limit);
     for (const i of part.lit ? [0] : [0, 1, 3]) { gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]); gl.bufferSubData(gl.ARRAY_BUFFER, 0, part.data[i]); }
   }
 
@@ -106,8 +106,7 @@ class Drawing {
     gl.disable(gl.DEPTH_TEST); gl.disable(gl.CULL_FACE);
     gl.useProgram(this.smoothing.program);
     this.smoothing.set({image: 1});
-    gl.bindVertexArray(this.empty);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    this.cover();
   }
 
   // Parts with their places, the most opaque first.
@@ -148,18 +147,23 @@ class Drawing {
   }
 
   drawPart({part, model}, heat) {
-    const gl = this.gl;
-    if (part.lit) return part.lit.draw(this.triangles, times(this.shared.viewProjection, model));
-    this.look("surface", part, model, heat);
-    if (part.color) gl.vertexAttrib3fv(COLOR, part.color);
-    this.mesh(part, part.all);
+    if (part.lit) {
+      this.bind(3, part.lit.colors);
+      this.gl.useProgram(this.triangles.program);
+      this.triangles.set({modelProjection: times(this.shared.viewProjection, model), colors: 3});
+    } else {
+      this.look("surface", part, model, heat);
+      if (part.color) this.gl.vertexAttrib3fv(COLOR, part.color);
+    }
+    const drawn = part.lit || part;
+    this.mesh(drawn, drawn.all);
   }
 
   // The program that lights a part, with its look.
   look(kind, part, model, heat) {
     this.bind(1, this.imageOf(part) || this.blank);
     this.bind(7, this.environment.mirrored(Math.max(part.roughness, 0.0632)));
-    return this.use(this.lighting(kind, part, heat), {model, open: Number(part.open), ...(part.color && {color: part.color}),
+    this.use(this.lighting(kind, part, heat), {model, open: Number(part.open), ...(part.color && {color: part.color}),
       base: [part.roughness, part.metallic, part.sheen, part.coat], volume: [part.translucency, part.transparency, part.emission, part.opacity]});
   }
 
@@ -173,7 +177,6 @@ class Drawing {
     this.gl.useProgram(program.program);
     if (!this.ready.has(program)) { this.ready.add(program); program.set(this.shared); }
     program.set(uniforms);
-    return program;
   }
 
   mesh(part, {buffer, count}) {
@@ -198,8 +201,13 @@ class Drawing {
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(0, Math.floor(low), width, Math.ceil(high) - Math.floor(low));
     this.use(this.sky, {rayMiddle: view.ray[0], rayRight: view.ray[1], rayUp: view.ray[2]});
-    gl.bindVertexArray(this.empty);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    this.cover();
     gl.disable(gl.SCISSOR_TEST);
+  }
+
+  // Draws everywhere with the present program.
+  cover() {
+    this.gl.bindVertexArray(this.empty);
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3);
   }
 }

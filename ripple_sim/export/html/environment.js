@@ -22,15 +22,12 @@ class Environment {
   // Directions d lie at d.xy / sqrt(2 + 2 d.z), straight down on the rim.
   map(key, size, light) {
     if (this.maps.has(key)) return this.maps.get(key);
-    const gl = this.gl, data = new Float32Array(4 * size * size), texture = gl.createTexture();
+    const gl = this.gl, data = new Float32Array(4 * size * size), texture = tableOf(gl, "RGBA16F", size, size, LINEAR);
     for (let i = 0; i < size * size; i++) {
       const [x, y] = [i % size, Math.floor(i / size)].map(k => (2 * k + 1) / size - 1), r = Math.min(x * x + y * y, 1), flat = 2 * Math.sqrt(1 - r);
       data.set(light([x * flat, y * flat, 1 - 2 * r]), 4 * i);
     }
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, size, size, 0, gl.RGBA, gl.FLOAT, data);
-    for (const name of ["MIN_FILTER", "MAG_FILTER"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${name}`], gl.LINEAR);
-    for (const side of ["S", "T"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_WRAP_${side}`], gl.CLAMP_TO_EDGE);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, size, size, gl.RGBA, gl.FLOAT, data);
     this.maps.set(key, texture);
     return texture;
   }

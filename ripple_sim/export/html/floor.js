@@ -7,9 +7,8 @@ const ROWS = 24;  // of the picture, each of which the sky is drawn in or not
 
 class Floor {
   constructor(gl, floor, shaders, plain) {
-    const features = plain ? ["PLAIN"] : ["TEXTURED"];
     Object.assign(this, {gl, floor, side: 2 * HALF, row: 2 * HALF + 1});
-    this.programs = [[], ["SHADOW"]].map(more => programOf(gl, ...shaders, [...features, ...more]));
+    this.programs = [[], ["SHADOW"]].map(more => programOf(gl, ...shaders, [...plain ? ["PLAIN"] : [], ...more]));
     this.plane = new Float32Array(2 * this.row ** 2);
     this.outside = new Uint8Array(this.row ** 2);
     this.shadowed = new Uint8Array(this.side ** 2);

@@ -19,16 +19,16 @@ class Group {
     for (const name of SAME_LOOK) this[name] = parts[0][name];
     const counts = parts.map(part => part.source.length), total = counts.reduce((sum, count) => sum + count, 0);
     this.firsts = counts.map((_, i) => counts.slice(0, i).reduce((sum, count) => sum + count, 0));
-    this.data = [new Float32Array(3 * total), new Float32Array(3 * total)];
+    const rest = Float32Array.from(parts.flatMap(part => Array.from(part.data[0])));
+    this.data = [rest, new Float32Array(3 * total)];
     this.index = new Uint32Array(parts.reduce((sum, part) => sum + part.index.length, 0));
-    const joined = of => parts.flatMap((part, i) => Array.from(of(part), vertex => vertex + this.firsts[i]));
-    const coarse = Uint32Array.from(joined(part => part.shadow.index)), colors = Float32Array.from(parts.flatMap((part, i) => Array(counts[i]).fill(part.color).flat()));
+    const coarse = Uint32Array.from(parts.flatMap((part, i) => Array.from(part.shadow.index, vertex => vertex + this.firsts[i])));
+    const colors = Float32Array.from(parts.flatMap((part, i) => Array(counts[i]).fill(part.color).flat()));
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
     this.buffers = [...this.data, colors].map((data, i) => vertexBuffer(gl, i < 2 ? i : COLOR, 3, data, i < 2));
     this.all = indexBuffer(gl, this.index, true);
-    this.shadow = {...indexBuffer(gl, coarse), reaches: {points: Uint32Array.from(joined(part => part.shadow.reaches.points)),
-      far: Float32Array.from(parts.flatMap(part => Array.from(part.shadow.reaches.far)))}};
+    this.shadow = {...indexBuffer(gl, coarse), reaches: reachesOf(rest, coarse)};
     gl.bindVertexArray(null);
   }
 

@@ -1,10 +1,11 @@
 "use strict";
 const SHADOW_WIDTH = 1.5;  // of the shadow map [distances of the camera]
+const DARK = {position: null, size: 0, shadow: false};  // where there is no lamp
 
 // The light of a frame, as the renderer sets it (render/visuals/studio.py): lamps, sky, what the floor sends back. `boxes` is the
 // soft boxes' light on the floor.
 function lightOf(meta, view, boxes, shadowSize) {
-  const {studio, lamps, ambient} = meta.light, floor = meta.floor;
+  const {studio, lamps, ambient} = meta.light, floor = meta.floor, [first = DARK] = lamps;
   const albedo = floor ? floor.mean : [0, 0, 0], up = [0, 0, 1];
   const right = unit([view.right[0], view.right[1], 0]), forward = cross(up, right);
   const ways = lamps.map(lamp => studio ? upwards(right, forward, 92, 44) : lamp.head ? view.back : lamp.direction);
@@ -21,8 +22,8 @@ function lightOf(meta, view, boxes, shadowSize) {
     horizon: tint, zenith, sky, around, bounce, turn: right.slice(0, 2),
     lampWay: pad(ways), lampRadiance: pad(lamps.map(lamp => lamp.radiance)), lampPosition: pad(lamps.map(lamp => lamp.position || [0, 0, 0])),
     lampFalloff: pad(lamps.map(lamp => lamp.falloff)), lampShape: pad(lamps.map(lamp => [lamp.position ? 1 : 0, lamp.cutoff, lamp.exponent])),
-    lampSize: lamps.length ? lamps[0].size : 0, casts: lamps.length && lamps[0].shadow ? 1 : 0, shadowTexel: SHADOW_WIDTH * view.distance / shadowSize,
-    ...shadowMapOf(lamps.length ? ways[0] : up, lamps.length ? lamps[0] : {position: null, size: 0}, view),
+    lampSize: first.size, casts: first.shadow ? 1 : 0, shadowTexel: SHADOW_WIDTH * view.distance / shadowSize,
+    ...shadowMapOf(ways[0] || up, first, view),
   };
 }
 

@@ -2,9 +2,7 @@
 // The renderer's light (render/glsl/lights.glsl, render/passes/deferred.glsl) with a single shadow map and without its occlusion maps.
 // Loops are written out: in software an array at an index that changes takes longer than the sums.
 // With `lamps`: their number, `near`: whether any has a position.
-const lightShader = ({lamps, near}) => `#version 300 es
-precision highp float;
-precision highp sampler2DShadow;
+const lightShader = ({lamps, near}) => `
 uniform vec3 eye, horizon, zenith, sky, around, bounce;  // around: what lights the floor; bounce: what it sends back
 uniform vec2 turn;  // of the environment's maps
 uniform float casts, shadowTexel;

@@ -5,7 +5,7 @@ const COLUMNS = 256;
 
 class LitPoints {
   constructor(gl, part) {
-    this.gl = gl; this.part = part;
+    Object.assign(this, {gl, part, open: part.open});
     const rows = Math.ceil(part.source.length / COLUMNS);
     [this.places, this.normals] = [0, 1].map(() => tableOf(gl, "RGBA32F", COLUMNS, rows));
     this.colors = tableOf(gl, "RGBA8", COLUMNS, rows);
@@ -16,7 +16,7 @@ class LitPoints {
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
     this.points = vertexBuffer(gl, 0, 4, this.data[0], true);
-    indexBuffer(gl, this.triangles, true);
+    this.all = indexBuffer(gl, this.triangles, true);
     gl.bindVertexArray(null);
   }
 
@@ -31,7 +31,7 @@ class LitPoints {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.points);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.data[0], 0, 4 * COLUMNS * this.rows);
     gl.bindVertexArray(this.array);
-    gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, this.triangles.subarray(0, this.count));
+    gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, this.triangles.subarray(0, this.all.count));
   }
 
   // Lights them, with a program that is the present one and has its uniforms.
@@ -41,17 +41,6 @@ class LitPoints {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target);
     gl.viewport(0, 0, COLUMNS, this.rows);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
-  }
-
-  draw(program, modelProjection) {
-    const gl = this.gl;
-    gl.activeTexture(gl.TEXTURE3);
-    gl.bindTexture(gl.TEXTURE_2D, this.colors);
-    gl.useProgram(program.program);
-    program.set({modelProjection, colors: 3});
-    this.part.open ? gl.disable(gl.CULL_FACE) : gl.enable(gl.CULL_FACE);
-    gl.bindVertexArray(this.array);
-    gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
   }
 
   // Puts the points into the table that triangles need which face the eye, all of an open target, and returns how many there are.
@@ -71,7 +60,7 @@ class LitPoints {
       }
       triangles[k] = number[i];
     }
-    this.count = count;
+    this.all.count = count;
     return found;
   }
 }

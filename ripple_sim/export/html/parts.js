@@ -13,7 +13,7 @@ function partOf(gl, part, cell) {
   const coarse = clustered(data[0], index, cell), all = indexBuffer(gl, index);
   const shadow = {...indexBuffer(gl, coarse), index: coarse, reaches: reachesOf(data[0], coarse)};
   gl.bindVertexArray(null);
-  return {...part, array, buffers, data, source, index, all, shadow, local: placed(part.position, part.quaternion)};
+  return Object.assign(part, {array, buffers, data, source, index, all, shadow, local: placed(part.position, part.quaternion)});
 }
 
 // Attributes of the vertices that are bound, `size` numbers each, and their triangles' indices; `moves` if they will change.

@@ -38,11 +38,11 @@ class Player {
   async show(number) {
     this.number = Math.max(0, Math.min(number, this.frames.count - 1));
     this.frame = await this.frames.get(Math.floor(this.number));
-    this.frame.steps.forEach((steps, i) => {
+    this.targets.forEach((part, i) => {
+      const steps = this.frame.steps[i], V = this.frame.vertices[i], step = this.meta.steps[i];
       this.limits[i] = steps.reduce((most, step) => Math.max(most, Math.abs(step)), this.limits[i]);
-      const part = this.drawing.parts.filter(each => each.target)[i], V = this.frame.vertices[i];
-      const rest = V ? this.frames.motions.get(String(i)).at(V) : part;
-      this.drawing.displace(part, rest, steps, this.meta.steps[i], 0.8 * this.limits[i] * this.meta.steps[i]);
+      displace(part, V ? this.frames.motions.get(String(i)).at(V) : part, steps, step, 0.8 * this.limits[i] * step);
+      this.drawing.upload(part);
     });
     this.onCanvas = Math.floor(this.number);
     this.redraw();

@@ -9,10 +9,11 @@ function drawsInSoftware() {
 
 // A program with what is defined, and `set`, which takes its uniforms by their names.
 function programOf(gl, vertex, fragment, defined = []) {
-  const program = gl.createProgram(), lines = ["#version 300 es", ...defined.map(name => `#define ${name}`)].join("\n");
+  const program = gl.createProgram();
+  const head = ["#version 300 es", ...defined.map(name => `#define ${name}`), "precision highp float;", "precision highp sampler2DShadow;"];
   for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
-    gl.shaderSource(shader, source.replace("#version 300 es", lines));
+    gl.shaderSource(shader, head.join("\n") + source);
     gl.compileShader(shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
     gl.attachShader(program, shader);
@@ -32,19 +33,25 @@ function settersOf(gl, program) {
   return values => { for (const [name, value] of Object.entries(values)) if (name in setters) setters[name](value); };
 }
 
-// A texture of an image, or of a row of colours.
-function textureOf(gl, source, software) {
-  const texture = gl.createTexture(), row = Array.isArray(source);
+// A texture of an image, which repeats.
+function imageTexture(gl, image, software) {
+  const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
-  if (row) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, source.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(source.flatMap(c => [...c, 255])));
-  else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, source);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
   gl.generateMipmap(gl.TEXTURE_2D);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, row ? gl.LINEAR : software ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
-  for (const side of ["S", "T"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_WRAP_${side}`], row ? gl.CLAMP_TO_EDGE : gl.REPEAT);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, software ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
   return texture;
 }
 
-// A texture of a format such as RGBA8, without filters where its parameters name none.
+// A row of colours as a texture.
+function colorsTexture(gl, colors) {
+  const texture = tableOf(gl, "RGBA8", colors.length, 1, LINEAR);
+  gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, colors.length, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(colors.flatMap(c => [...c, 255])));
+  return texture;
+}
+
+// A texture of a format such as RGBA8, which stays bound, without filters where its parameters name none.
+const LINEAR = {MIN_FILTER: "LINEAR", MAG_FILTER: "LINEAR"};
 function tableOf(gl, format, width, height, parameters = {}, levels = 1) {
   const texture = gl.createTexture(), all = {MIN_FILTER: "NEAREST", MAG_FILTER: "NEAREST", WRAP_S: "CLAMP_TO_EDGE", WRAP_T: "CLAMP_TO_EDGE", ...parameters};
   gl.bindTexture(gl.TEXTURE_2D, texture);

@@ -2,11 +2,11 @@
 // What is drawn. `light`, `lit` and `floor` are the parts of light_shaders.js.
 
 // A triangle that covers everything.
-const EVERYWHERE_VERTEX = `#version 300 es
+const EVERYWHERE_VERTEX = `
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.5, 1.0); }`;
 
 const COLOR = 4;  // the attribute of vertices with a colour of their own
-const SURFACE_VERTEX = `#version 300 es
+const SURFACE_VERTEX = `
 layout(location = 0) in vec3 inPoint; layout(location = 1) in vec3 inNormal;
 layout(location = 2) in vec2 inUv; layout(location = 3) in float inHeight; layout(location = ${COLOR}) in vec3 inColor;
 uniform mat4 model, viewProjection;
@@ -40,7 +40,7 @@ void main() {
   fragment = shownAt(point, normal, color, place.w);
 }`;
 
-const LIT_POINTS_VERTEX = `#version 300 es
+const LIT_POINTS_VERTEX = `
 layout(location = 0) in vec3 inPoint;
 uniform sampler2D colors; uniform mat4 modelProjection;
 out vec4 shown;
@@ -49,8 +49,7 @@ void main() {
   gl_Position = modelProjection * vec4(inPoint, 1.0);
 }`;
 
-const LIT_POINTS_FRAGMENT = `#version 300 es
-precision highp float;
+const LIT_POINTS_FRAGMENT = `
 in vec4 shown;
 out vec4 fragment;
 void main() { fragment = shown; }`;
@@ -96,20 +95,17 @@ void main() {
   fragment = vec4(sqrt(bright), 1.0);
 #endif
 #else
-  vec3 up = floorFrame[2].xyz, albedo = floorColor;
-#ifdef TEXTURED
-  albedo *= linear(texture(image, plane * floorTiling.xy + floorTiling.zw).rgb);
-#endif
+  vec3 albedo = floorColor * linear(texture(image, plane * floorTiling.xy + floorTiling.zw).rgb);
 #ifdef SHADOW
   float shadow = shadowOn(inShadowMap(point, vec3(0.0)));
 #else
   const float shadow = 1.0;
 #endif
-  fragment = vec4(floorAt(point, up, albedo, shadow), 1.0);
+  fragment = vec4(floorAt(point, floorFrame[2].xyz, albedo, shadow), 1.0);
 #endif
 }`;
 
-const SKY_VERTEX = `#version 300 es
+const SKY_VERTEX = `
 uniform vec3 rayMiddle, rayRight, rayUp;
 out vec3 ray;
 void main() {
@@ -123,21 +119,19 @@ in vec3 ray;
 out vec4 fragment;
 void main() { fragment = vec4(toneMapped(skyAt(normalize(ray), 0.0)), 1.0); }`;
 
-const DEPTH_VERTEX = `#version 300 es
+const DEPTH_VERTEX = `
 layout(location = 0) in vec3 inPoint;
 uniform mat4 modelProjection;
 void main() { gl_Position = modelProjection * vec4(inPoint, 1.0); }`;
 
-const DEPTH_FRAGMENT = `#version 300 es
-precision highp float;
+const DEPTH_FRAGMENT = `
 out vec2 blocker;
 void main() { blocker = vec2(1.0, gl_FragCoord.z); }`;
 
 // How much of the first lamp's light does not reach the floor, by places of the shadow map. All that it covers lies above the floor,
 // so shadows are means of that, as wide as the mean depth makes penumbras; what is near is looked for in two steps.
 const WIDEST_SEARCH = 0.06;  // [widths of the map]
-const shadeFragment = size => `#version 300 es
-precision highp float;
+const shadeFragment = size => `
 uniform sampler2D blockers;  // share of a texel that is covered, and that times the depth
 uniform float softness;
 out vec4 shade;
@@ -157,8 +151,7 @@ void main() {
 }`;
 
 // Smooths edges along themselves where no samples do so: fast approximate antialiasing (FXAA, Lottes 2009), by the brightness of green.
-const SMOOTH_FRAGMENT = `#version 300 es
-precision highp float;
+const SMOOTH_FRAGMENT = `
 uniform sampler2D image;
 out vec4 fragment;
 void main() {

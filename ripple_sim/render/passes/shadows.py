@@ -303,7 +303,7 @@ _INFLUENCE = 0.8  # radius, in half widths of the map
 class FloorOcclusion:
     """The floor map: its ambient visibility (1 - occlusion), where shadows may fall, and the light of what occludes it.
 
-    Without a floor the map is a single texel that nothing shades.
+    Without a floor there is a single texel, which counts nowhere.
 
     Parameters
     ----------
@@ -315,9 +315,7 @@ class FloorOcclusion:
     def __init__(self, resources: Resources, options: Mapping[str, int], floor: Floor | None) -> None:
         self._floor = floor
         if floor is None:
-            self._map = resources.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
-            self._seen = resources.texture((1, 1), 4, bytes([255] * 4))
-            self._bounce = resources.texture((1, 1), 4, bytes(8), dtype="f2")
+            self._map = self._seen = self._bounce = resources.texture((1, 1), 4, bytes(4))
             return
         program = resources.program("passes/floor_occlusion", **options, TILES=0)
         self._pass = resources.vertex_array(program, [])

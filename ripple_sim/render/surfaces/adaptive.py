@@ -20,8 +20,10 @@ from .tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from .vertices import SurfaceVertices
 
 
-def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Where places [k, 2] on a page of charts [texels] lie between the texels.
+def spline_samples(
+    chart: NDArray, row: NDArray, column: NDArray, resolution: int
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Where places on charts, [k] each, lie between the texels.
 
     Returns
     -------
@@ -30,9 +32,8 @@ def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32],
     offset : float32 [k, 2]
         How far off the middle one's centre it is [texels].
     """
-    chart, row, column = page.locate(places)
     place = np.stack([row, column], axis=1)
-    nearest = np.clip(np.floor(place + 0.5), 0, page.resolution - 1)
+    nearest = np.clip(np.floor(place + 0.5), 0, resolution - 1)
     return np.column_stack([chart, nearest]).astype(np.int32), (place - nearest).astype(np.float32)
 
 
@@ -104,9 +105,8 @@ class AdaptiveTessellation:
         self.long = np.flatnonzero(self.length >= min_length).astype(np.int32)
         ends, index = np.unique(edges.ends[self.long], return_inverse=True)
         self.ends = index.reshape(-1, 2).astype(np.int32)
-        self.texel, self.offset = spline_samples(
-            page, vertices.lookups[np.concatenate([ends, self.base_count + self.long])]
-        )
+        places = vertices.lookups[np.concatenate([ends, self.base_count + self.long])]
+        self.texel, self.offset = spline_samples(*page.locate(places), page.resolution)
 
     def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.

@@ -193,11 +193,12 @@ def site_visual(model: Any, site: int) -> Visual:
 
 def content_of(drawn: mujoco.MjvGeom) -> tuple[Any, ...]:
     """What an entry of a scene shows, but for the pose of a geom or site; a flex or skin always shows something new."""
-    content = (drawn.objid, drawn.objtype, drawn.type, drawn.dataid, drawn.matid, drawn.rgba.tobytes())
+    arrays = drawn.rgba.tobytes(), drawn.size.tobytes()
+    content = drawn.objid, drawn.objtype, drawn.type, drawn.dataid, drawn.matid, *arrays
     if drawn.objtype in (_GEOM_OBJECT, _SITE_OBJECT):
-        return *content, drawn.size.tobytes()
+        return content
     moving = object() if drawn.type in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN) else drawn.mat.tobytes()
-    return *content, drawn.size.tobytes(), drawn.pos.tobytes(), moving
+    return *content, drawn.pos.tobytes(), moving
 
 
 def visuals_in(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> list[Visual]:

@@ -89,7 +89,6 @@ def test_weights_links_and_time_step_are_those_of_the_cpu(
     exact = np.moveaxis(cpu.operator.stencil.weights, 1, -1)
     assert np.abs(links - exact).max() < 1e-6 * np.abs(exact).max()
     irregular = cpu.operator.stencil.irregular
-    if irregular is not None:
-        np.testing.assert_allclose(made.irregular.weights, irregular.weights, rtol=1e-9)
+    np.testing.assert_allclose(made.irregular.weights, irregular.weights, rtol=1e-9)
     assert gl.stable_timestep == pytest.approx(cpu.stable_timestep, rel=2e-6)
     np.testing.assert_allclose(gl._areas, cpu._areas)

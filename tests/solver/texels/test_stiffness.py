@@ -247,9 +247,8 @@ def test_weights_and_areas_are_those_of_the_texels_where_they_are(name, fixed):
     there = TexelCells(texels.topology, beside)
     exact = there.at_rest(speeds, soft)
     np.testing.assert_allclose(stencil.weights, exact.weights, atol=3e-6 * np.abs(exact.weights).max())
-    if exact.irregular is not None:
-        np.testing.assert_allclose(stencil.irregular.weights, exact.irregular.weights, atol=1e-6)
-        np.testing.assert_allclose(stencil.irregular.others, exact.irregular.others)
+    np.testing.assert_allclose(stencil.irregular.weights, exact.irregular.weights, atol=1e-6)
+    np.testing.assert_allclose(stencil.irregular.others, exact.irregular.others)
     np.testing.assert_allclose(areas, there.areas, rtol=3e-6)
 
 
