@@ -125,13 +125,6 @@ def test_on_a_gpu_there_is_nothing_to_say(devices: Path) -> None:
     assert find_problems(False, devices) == []
 
 
-@pytest.fixture
-def no_egl(monkeypatch):
-    """Let every EGL library be missing, as on a machine without Mesa."""
-    monkeypatch.setattr(gl, "_shared", {})
-    monkeypatch.setattr(gl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
-
-
 def report(capsys) -> dict:
     assert cli.main(["info", "--json"]) == 0
     return json.loads(capsys.readouterr().out)
@@ -147,7 +140,10 @@ def test_info_names_versions_driver_and_the_backend_that_auto_takes(capsys):
     assert got["backend"] == ("cpu" if context.software else "gl") == backend.auto_backend()
 
 
-def test_without_egl_info_says_what_to_install(capsys, no_egl):
+def test_without_egl_info_says_what_to_install(capsys, monkeypatch):
+    """Every EGL library is missing, as on a machine without Mesa."""
+    monkeypatch.setattr(gl, "_shared", {})
+    monkeypatch.setattr(gl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
     with pytest.raises(GLError):
         gl.shared_context()
     got = report(capsys)

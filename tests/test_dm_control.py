@@ -21,25 +21,21 @@ MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 OPTIONS: dict[str, Any] = {"resolution": 16, "backend": "cpu"}
 
 
-def dm_control_physics() -> Any:
+def dm_control_physics(xml: str) -> Any:
     from dm_control.mujoco import Physics
 
-    return Physics.from_xml_string(MODEL)
+    return Physics.from_xml_string(xml)
 
 
 # the stand-in everywhere, and the package itself where it is installed
-def stand_in() -> StandIn:
-    return StandIn(MODEL)
-
-
-KINDS = [stand_in, *([dm_control_physics] if importlib.util.find_spec("dm_control") else [])]
+KINDS = [StandIn, *([dm_control_physics] if importlib.util.find_spec("dm_control") else [])]
 
 
 @pytest.mark.parametrize("make", KINDS)
 @pytest.mark.parametrize("legacy", [True, False])
 def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "disable")
-    physics = make()
+    physics = make(MODEL)
     physics.legacy_step = legacy
     ripples = couple(physics, MATERIALS, **OPTIONS)
     model = mujoco.MjModel.from_xml_string(MODEL)
@@ -63,13 +59,12 @@ def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("make", KINDS)
 def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
-    physics = make()
+    physics = make(MODEL)
     ripples = couple(physics, MATERIALS, looks={"block": "clay"}, **OPTIONS)
     size = {"height": 24, "width": 32}
     plain = physics.render(**size)
     depth, segmentation = physics.render(**size, depth=True), physics.render(**size, segmentation=True)
-    assert plain.shape == (24, 32, 3)
-    assert depth.shape == (24, 32)
+    assert (plain.shape, depth.shape) == ((24, 32, 3), (24, 32))
     assert {tuple(each) for each in segmentation.reshape(-1, 2)} == {(-1, -1), (0, 5), (1, 5)}
     ripples["block"].velocity = np.random.default_rng(2).standard_normal((6, 16, 16)) / 10
     ripples["block"].step(0.02)

@@ -107,8 +107,7 @@ def test_info_of_the_environment_stays_and_a_reset_flattens(path: Path) -> None:
     assert info["height"] == env.unwrapped.data.qpos[2]
     assert info["heights"]["block"].any()
     _, info = env.reset(seed=3)
-    assert info["impulses"] == []
-    assert not info["heights"]["block"].any()
+    assert info["impulses"] == [] and not info["heights"]["block"].any()
     assert env.ripples["block"].time == 0.0
 
 

@@ -24,7 +24,7 @@ from .clean import (
     without_slivers,
 )
 from .sheets import cut_apart
-from .topology import corner_angles, distinct, genera, labels, rims_of, sides_of, triangle_areas
+from .topology import corner_angles, distinct, genera, labels, rims_of, sides_of, triangle_areas, triangles_beside
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
 _STEPS = 300
@@ -154,6 +154,11 @@ class Mesh:
     def components(self) -> NDArray[np.int64]:
         """Part to which each triangle belongs, numbered from 0 by their first triangles, shape [triangle_count]."""
         return labels(sides_of(self.F)[0] // 3, len(self.F))
+
+    @functools.cached_property
+    def beside(self) -> NDArray[np.int64]:
+        """The triangle beyond each side of every triangle, shape [triangle_count, 3]; -1 at rims."""
+        return triangles_beside(self.F)
 
     @property
     def component_count(self) -> int:

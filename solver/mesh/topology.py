@@ -134,6 +134,13 @@ def sides_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]
     return edges.sides[~edges.rim], np.sort(edges.sides[edges.rim, 0])
 
 
+def triangles_beside(F: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The triangle beyond each side of the triangles of a manifold mesh, [m, 3]; -1 at rims."""
+    beside, pairs = np.full(F.size, -1), sides_of(F)[0]
+    beside[pairs] = pairs[:, ::-1] // 3
+    return beside.reshape(-1, 3)
+
+
 def genera(F: NDArray[np.int64], part: NDArray[np.int64], rims: tuple[NDArray[np.int64], ...]) -> NDArray[np.int64]:
     """Number of handles of every part of a manifold, oriented mesh.
 
@@ -193,10 +200,7 @@ class Folds:
 
     def __init__(self, V: Floats, F: Ints) -> None:
         self.F = F
-        beside = np.full(F.size, -1)
-        pairs = sides_of(F)[0]
-        beside[pairs[:, 0]], beside[pairs[:, 1]] = pairs[:, 1] // 3, pairs[:, 0] // 3
-        self._beside = beside.reshape(-1, 3)
+        self._beside = triangles_beside(F)
         normals = _area_vectors(np.asarray(V, np.float64), F)
         self._least = _LEAST * np.linalg.norm(normals, axis=1)
         self._rest = _folded(normals, self._beside, self._least)

@@ -7,7 +7,6 @@ tight. In one fold that is the geodesic of the polyhedron, elsewhere next to it.
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 
 from ..kernel import Floats, Floats32, Ints, kernel
@@ -40,9 +39,7 @@ def link_detours(mesh: Mesh, topology: TexelTopology, triangles: Ints, barycentr
     """
     there = np.where(topology.rim, -1, topology.halo)
     detours = np.zeros((4, *there.shape), np.float32)
-    F = np.asarray(mesh.F, np.int64)
-    neighbours = igl.triangle_triangle_adjacency(F)[0].astype(np.int64)
-    _measure(there, mesh.V, F, neighbours, triangles.reshape(-1), barycentrics.reshape(-1, 3), detours)
+    _measure(there, mesh.V, mesh.F, mesh.beside, triangles.reshape(-1), barycentrics.reshape(-1, 3), detours)
     return detours
 
 

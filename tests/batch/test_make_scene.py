@@ -31,10 +31,8 @@ def test_the_files_of_a_scene_agree(unbroken):
     folder = unbroken.scene(2)
     facts = json.loads((folder / "scene.json").read_text())
     heights, positions = load_batch(unbroken.path)[2].heights()["egg"], np.load(folder / "qpos.npy")
-    assert heights.shape == (4, 6, 8, 8)
-    assert positions.shape == (4, 14)
-    assert np.abs(heights).max() == np.float32(facts["targets"]["egg"]["height_max"])
-    assert np.abs(heights).max() > 0
+    assert (heights.shape, positions.shape) == ((4, 6, 8, 8), (4, 14))
+    assert np.abs(heights).max() == np.float32(facts["targets"]["egg"]["height_max"]) > 0
     rows = [line.split(",") for line in (folder / "impulses.csv").read_text().splitlines()]
     assert rows[0][:4] == ["frame", "time [s]", "geom", "other"]
     assert facts["impulse"] == pytest.approx(sum(float(row[7]) for row in rows[1:]))
@@ -79,10 +77,8 @@ def test_a_failure_leaves_nothing_behind_and_says_why(tmp_path, monkeypatch, err
     monkeypatch.setattr(module, "render_scene", fail)
     outcome = make_scene(str(batch.path), 1)
     assert outcome.state == state
-    assert str(error) in outcome.error
-    assert "Traceback" in outcome.log
-    assert not list((batch.work / "000001").iterdir())
-    assert batch.finished() == set()
+    assert str(error) in outcome.error and "Traceback" in outcome.log
+    assert not list((batch.work / "000001").iterdir()) and not batch.finished()
 
 
 PACKED = 'heights = true\nformat = "webdataset"\nscenes_per_tar = 3\npasses = ["depth", "flow"]\n'

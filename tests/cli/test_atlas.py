@@ -38,9 +38,19 @@ def open_file(tmp_path):
     return tmp_path / "open.off"
 
 
-def test_json_tells_size_area_quality_seconds_and_what_was_mended(capsys, ball_file):
-    assert cli.main(["atlas", str(ball_file), "--resolution", "8", "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+@pytest.fixture
+def told(capsys):
+    """Run the command and return its report."""
+
+    def run(path, *words, resolution=8):
+        assert cli.main(["atlas", str(path), "--resolution", str(resolution), "--json", *map(str, words)]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return run
+
+
+def test_json_tells_size_area_quality_seconds_and_what_was_mended(told, ball_file):
+    report = told(ball_file)
     assert report["mesh"] == str(ball_file)
     assert (report["vertices"], report["triangles"], report["method"]) == (162, 320, "progressive")
     np.testing.assert_allclose(report["size"], 4, rtol=0.02)
@@ -53,8 +63,7 @@ def test_json_tells_size_area_quality_seconds_and_what_was_mended(capsys, ball_f
     ]
     assert {"flipped", "solid_angle", "q001", "q50", "q999", "starved", "coverage"} <= report["quality"].keys()
     assert {"load", "sphere_map", "rays"} == report["seconds"].keys()
-    assert cli.main(["atlas", str(ball_file), "--resolution", "8", "--json"]) == 0
-    assert {"load", "cache"} == json.loads(capsys.readouterr().out)["seconds"].keys()
+    assert {"load", "cache"} == told(ball_file)["seconds"].keys()
 
 
 def test_the_plain_report_says_the_same(capsys, ball_file):
@@ -67,10 +76,9 @@ def test_the_plain_report_says_the_same(capsys, ball_file):
 
 
 @pytest.mark.usefixtures("coarse_pictures")
-def test_a_picture_is_written_and_is_not_blank(tmp_path, capsys, ball_file):
+def test_a_picture_is_written_and_is_not_blank(tmp_path, told, ball_file):
     picture = tmp_path / "atlas.png"
-    assert cli.main(["atlas", str(ball_file), "--resolution", "8", "--json", "--plot", str(picture)]) == 0
-    assert "plot" in json.loads(capsys.readouterr().out)["seconds"]
+    assert "plot" in told(ball_file, "--plot", picture)["seconds"]
     pixels = np.asarray(Image.open(picture).convert("RGB"))
     assert pixels.shape == (1080, 1920, 3)
     assert (pixels[0] == 255).all()  # a white margin
@@ -80,11 +88,7 @@ def test_a_picture_is_written_and_is_not_blank(tmp_path, capsys, ball_file):
 
 @pytest.mark.parametrize(
     ("path", "said"),
-    [
-        ("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"),
-        ("atlas", "valid are"),
-        ("missing/atlas.png", "folder that exists"),
-    ],
+    [("atlas.bmp", r"bmp'.*valid are \.png"), ("atlas", "valid are"), ("missing/atlas.png", "folder that exists")],
 )
 def test_a_picture_without_a_place_is_refused_before_the_mesh_is_read(refusal, monkeypatch, tmp_path, path, said):
     monkeypatch.chdir(tmp_path)
@@ -99,10 +103,9 @@ def test_repair_closes_or_says_what_to_install(refusal, monkeypatch, open_file):
         assert "pip install 'ripple-sim[repair]'" in refusal(*command, str(open_file), "--repair")
 
 
-def test_repair_says_what_it_did(capsys, open_file):
+def test_repair_says_what_it_did(told, open_file):
     pytest.importorskip("pymeshfix")
-    assert cli.main(["atlas", str(open_file), "--resolution", "8", "--repair", "--json"]) == 0
-    assert [note[:11] for note in json.loads(capsys.readouterr().out)["notes"]] == ["1 unreferen", "hole closed"]
+    assert [note[:11] for note in told(open_file, "--repair")["notes"]] == ["1 unreferen", "hole closed"]
 
 
 def test_wrapped_balls_get_one_atlas_and_a_line_that_says_so(capsys, refusal, tmp_path):
@@ -114,24 +117,21 @@ def test_wrapped_balls_get_one_atlas_and_a_line_that_says_so(capsys, refusal, tm
     assert re.search(line, capsys.readouterr().out, re.MULTILINE)
 
 
-def test_an_open_mesh_gets_patches(capsys, open_file):
-    assert cli.main(["atlas", str(open_file), "--resolution", "32", "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+def test_an_open_mesh_gets_patches(told, open_file):
+    report = told(open_file, resolution=32)
     assert (report["layout"], report["method"], report["quality"]["flipped"]) == ("patches", None, 0)
     charts, n, _ = report["charts"]
     assert charts * n * n == pytest.approx(6 * 32**2, rel=0.2)
 
 
 @pytest.mark.usefixtures("coarse_pictures")
-def test_the_thickness_over_what_is_inside_is_told_and_drawn(tmp_path, capsys, refusal, ball_file):
+def test_the_thickness_over_what_is_inside_is_told_and_drawn(tmp_path, told, refusal, ball_file):
     core, plot = tmp_path / "core.off", tmp_path / "thickness.png"
     trimesh.creation.icosphere(subdivisions=3, radius=1.5).export(core)
-    argv = ["atlas", str(ball_file), "--resolution", "8", "--inside", str(core), "--plot", str(plot)]
-    assert cli.main([*argv, "--json"]) == 0
-    thickness = json.loads(capsys.readouterr().out)["thickness"]
+    thickness = told(ball_file, "--inside", core, "--plot", plot)["thickness"]
     assert thickness["least"] <= thickness["median"] <= thickness["greatest"]
     assert thickness["median"] == pytest.approx(0.5, rel=0.08)  # over a ball of radius 2 with flat sides
     pixels = np.asarray(Image.open(plot).convert("RGB"))
     assert pixels[200:900, 200:800].std() > 20
-    assert refusal(*argv, "--threshold", "3").count("takes no threshold") == 1
+    assert refusal("atlas", str(ball_file), "--inside", str(core), "--threshold", "3").count("takes no threshold") == 1
     assert "--inside" in refusal("atlas", str(ball_file), "--threshold", "3")

@@ -25,14 +25,6 @@ def spec_of(V: np.ndarray, F: np.ndarray) -> mujoco.MjSpec:
     return spec
 
 
-def rest_height(model: mujoco.MjModel) -> float:
-    """Height at which the ball of radius 0.02 m first touches something."""
-    data = mujoco.MjData(model)
-    while data.time < 2 and not any(contact.dist < contact.includemargin for contact in data.contact):
-        mujoco.mj_step(model, data)
-    return float(data.body("ball").xpos[2]) - 0.02
-
-
 def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
     # the waist of the peanut, 0.045 m below its hull
     V, F = peanut(0.04)
@@ -42,10 +34,11 @@ def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
         spec = spec_of(V, F)
         make_collidable(spec, "target", route)
         add_ball(spec, "ball", [0, 0, 0.35], size=[0.02, 0, 0])
-        heights[route] = rest_height(spec.compile())
-    assert heights["sdf"] == pytest.approx(waist, abs=0.012)
-    assert heights["flex"] == pytest.approx(waist, abs=0.012)
-    assert heights["hull"] == pytest.approx(V[:, 2].max(), abs=0.012)
+        data = mujoco.MjData(model := spec.compile())
+        while data.time < 2 and not any(contact.dist < contact.includemargin for contact in data.contact):
+            mujoco.mj_step(model, data)
+        heights[route] = data.body("ball").xpos[2] - 0.02
+    assert heights == pytest.approx({"sdf": waist, "flex": waist, "hull": V[:, 2].max()}, abs=0.012)
     assert heights["hull"] - heights["sdf"] > 0.03
 
 

@@ -168,6 +168,10 @@ def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: 
         Ripples(model_of(SCENE), materials, backend="cpu", **options)
 
 
+def begun(model: mujoco.MjModel) -> Ripples:
+    return Ripples(model, {"target": Material(speed=1.0, density=100.0)}, resolution=8, backend="cpu")
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -180,14 +184,7 @@ def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: 
 )
 def test_places_and_keys_that_are_none_are_named(call, message: str) -> None:
     with pytest.raises(RippleError, match=message):
-        call(Ripples(model_of(SCENE), {"target": Material()}, resolution=8, backend="cpu"))
-
-
-def stepping(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Step the ripples of a model with some data."""
-    ripples = Ripples(model, {"target": Material(speed=1.0, density=100.0)}, resolution=8, backend="cpu")
-    mujoco.mj_step(model, data)
-    ripples.step(data)
+        call(begun(model_of(SCENE)))
 
 
 @pytest.mark.parametrize(
@@ -197,7 +194,7 @@ def stepping(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 def test_data_of_a_model_compiled_with_another_number_is_refused(before: str, after: str, what: str) -> None:
     other = model_of(SCENE.replace(before, after))
     with pytest.raises(RippleError, match=f"belongs to another model .* of another {what}"):
-        stepping(model_of(SCENE), mujoco.MjData(other))
+        begun(model_of(SCENE)).mj_step(mujoco.MjData(other))
 
 
 @pytest.mark.parametrize(
@@ -214,13 +211,13 @@ def test_data_of_a_model_compiled_with_another_number_is_refused(before: str, af
 )
 def test_data_of_a_copy_is_as_good_as_the_model_s_own(make) -> None:
     model = model_of(SCENE)
-    stepping(model, make(model))
+    begun(model).mj_step(make(model))
 
 
 def test_a_model_may_be_changed_in_place() -> None:
     """As domain randomisation does; data of a copy that was taken once is taken on."""
     model = model_of(SCENE)
-    ripples = Ripples(model, {"target": Material(speed=1.0, density=100.0)}, resolution=8, backend="cpu")
+    ripples = begun(model)
     for data in (mujoco.MjData(model), mujoco.MjData(copy.copy(model))):
         ripples.step(data)
         model.body_mass[1] *= 1.1

@@ -40,7 +40,7 @@ def test_force_and_torque_stay_what_they_are(block: Atlas, seed: int) -> None:
     np.testing.assert_allclose(forces @ points, loads @ corners, atol=1e-12)
 
 
-def test_no_force_where_the_surface_is_not(block: Atlas) -> None:
+def test_no_force_where_the_surface_is_not() -> None:
     """Two contacts on the head and on the rump of an animal load it there, and not on the saddle between them."""
     V, F = limbed(0.05)
     animal = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
@@ -54,8 +54,7 @@ def test_no_force_where_the_surface_is_not(block: Atlas) -> None:
 
 def test_geoms_that_are_not_convex_load_the_surface_at_their_contacts(block: Atlas) -> None:
     points, _, radius = spread_patch(block, SQUARE, np.ones(4), 0.01, convex=False)
-    assert len(points) == 4
-    assert radius == 0.01
+    assert (len(points), radius) == (4, 0.01)
 
 
 def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:

@@ -61,13 +61,12 @@ FALL = """<mujoco><option timestep="{dt}"/><worldbody><geom name="target" type="
 
 def highest(model: mujoco.MjModel, material: Material, seconds: float, **options: object) -> tuple[float, Ripples]:
     """Greatest height [m]; any warning is an error."""
-    ripples, data = Ripples(model, {"target": material}, backend="cpu", **options), mujoco.MjData(model)
-    top = 0.0
+    run, top = Run(model, "target", material=material, conserve_volume=True, **options), 0.0
     with warnings.catch_warnings(action="error"):
-        for _ in range(round(seconds / model.opt.timestep)):
-            ripples.mj_step(data)
-            top = max(top, float(np.abs(ripples["target"].height).max()))
-    return top, ripples
+        while run.data.time < seconds - 1e-9:
+            run.step()
+            top = max(top, float(np.abs(run.ripples["target"].height).max()))
+    return top, run.ripples
 
 
 def test_a_heavy_box_comes_to_rest_in_a_shallow_pit() -> None:
@@ -206,11 +205,9 @@ def test_a_chosen_material_takes_few_substeps_on_an_egg_of_any_size(scale: float
 
 
 def test_fast_waves_on_a_small_egg_get_fewer_texels() -> None:
-    slow = chosen(Material(speed=0.04, density=1.0), 0.04)["egg"].atlas.resolution
-    fast = chosen(Material(speed=1.0, density=1.0), 0.04)["egg"].atlas.resolution
-    assert (slow, fast) == (96, 32)
-    shorter = chosen(Material(speed=1.0, density=1.0), 0.04, dt=0.0004)["egg"].atlas.resolution
-    assert 32 < shorter < 96
+    slow, fast = (Material(speed=speed, density=1.0) for speed in (0.04, 1.0))
+    assert [chosen(each, 0.04)["egg"].atlas.resolution for each in (slow, fast)] == [96, 32]
+    assert 32 < chosen(fast, 0.04, dt=0.0004)["egg"].atlas.resolution < 96
 
 
 def test_a_small_body_gets_texels_that_resolve_its_footprint() -> None:
@@ -234,12 +231,12 @@ def test_dents_stay_small_and_rings_are_seen(share: float) -> None:
         f"""<mujoco><worldbody><geom name="target" type="sphere" size="0.5"/>
         <body pos="0.01 0.02 {1.5 + share / 2}"><freejoint/><geom size="{share / 2}"/></body></worldbody></mujoco>"""
     )
-    data, ripples = mujoco.MjData(model), Ripples(model, {"target": Material()}, resolution=32, backend="cpu")
-    waves, dent, ring = ripples["target"], 0.0, 0.0
+    run = Run(model, "target", material=Material(), resolution=32, conserve_volume=True)
+    waves, dent, ring = run.ripples["target"], 0.0, 0.0
     places = waves.atlas.positions
     around = (np.hypot(places[..., 0], places[..., 1]) > share / 2 + 0.05) & (places[..., 2] > 0)
-    while data.time < 0.9:
-        ripples.mj_step(data)
+    while run.data.time < 0.9:
+        run.step()
         dent, ring = max(dent, -float(waves.height.min())), max(ring, float(np.abs(waves.height[around]).max()))
     assert 0.01 < dent / 0.5 < 0.25
     assert 0.005 < ring < 0.02
@@ -261,14 +258,12 @@ WEAK = Material(speed=0.6, damping=1.0, stiffness=0.0, density=1.0)
 def warned(xml: str, material: Material, seconds: float = 0.5, backend: str = "cpu") -> tuple[list[str], Ripples]:
     """Messages of a ball that falls on the target at 4.5 m/s, and the ripples afterwards."""
     model = mujoco.MjModel.from_xml_string(xml)
-    data = mujoco.MjData(model)
-    data.qvel[2] = -4.5
-    ripples = Ripples(model, {"target": material}, resolution=32, backend=backend)
+    run = Run(model, "target", material=material, resolution=32, conserve_volume=True, backend=backend)
+    run.data.qvel[2] = -4.5
     with warnings.catch_warnings(record=True, action="always") as caught:
-        for _ in range(round(seconds / 0.002)):
-            ripples.mj_step(data)
+        run.until(seconds)
     assert all(issubclass(each.category, RippleWarning) for each in caught)
-    return [str(each.message) for each in caught], ripples
+    return [str(each.message) for each in caught], run.ripples
 
 
 def advised(message: str) -> Material:

@@ -23,8 +23,7 @@ TABLES = [scene_file.SceneFile, *scene_file._TABLES.values()]
 
 def hook(name: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, DOCS / "hooks" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
+    assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -92,8 +91,7 @@ def test_the_page_on_scene_files_has_every_table_and_the_words_of_a_look() -> No
 
 def test_the_tables_of_a_plan_that_take_any_key_are_told_as_tables() -> None:
     text = hook("scene_tables").plan_tables()
-    assert "| `vary` | table |" in text
-    assert "| `model` | table |" in text
+    assert all(f"| `{name}` | table |" in text for name in ("vary", "model"))
 
 
 ROOT = Path(__file__).parents[2]

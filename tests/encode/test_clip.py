@@ -128,9 +128,7 @@ def stills(folder: Path, frames: np.ndarray, **settings: object) -> list[Path]:
 
 
 def chunks(content: bytes) -> list[tuple[bytes, bytes]]:
-    assert content[:4] == b"RIFF"
-    assert content[8:12] == b"WEBP"
-    assert struct.unpack_from("<I", content, 4)[0] == len(content) - 8
+    assert struct.unpack_from("<4sI4s", content) == (b"RIFF", len(content) - 8, b"WEBP")
     at, found = 12, []
     while at < len(content):
         name, size = struct.unpack_from("<4sI", content, at)

@@ -143,8 +143,7 @@ def test_an_interrupted_render_goes_on_to_the_same_frames(scene: Scene, tmp_path
 def test_the_tone_curve_makes_the_picture_of_linear_light() -> None:
     light = render(BODIES + FLOOR, samples=1, linear=True)
     picture = render(BODIES + FLOOR, samples=1)
-    assert light.dtype == np.float16
-    assert light.shape == picture.shape
+    assert (light.dtype, light.shape) == (np.float16, picture.shape)
     # half a step of dithering, half a step of rounding, what half floats leave out, and that the smooth background is
     # interpolated before the curve or after it
     assert np.abs(255 * tone_mapped(light.astype(float)) - picture).max() < 1.6
@@ -156,8 +155,7 @@ def test_highlights_keep_what_the_screen_cannot_show() -> None:
     light, picture = (render('<geom size="1" material="m"/>', metal, samples=1, linear=way) for way in (True, False))
     white = picture.min(axis=-1) >= 245
     assert white.sum() > 20
-    assert light[white].min() > 1
-    assert light[white].max() > 10
+    assert light[white].min() > 1 and light[white].max() > 10
     assert np.isfinite(light).all()
 
 
@@ -181,8 +179,7 @@ def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background() ->
     whole, empty = (render(bodies, linear=True).astype(float) for bodies in (BODIES, "<geom size='1e-3'/>"))
     cut_out = render(linear=True, alpha=True).astype(float)
     light, opacity = cut_out[..., :3], cut_out[..., 3:]
-    assert opacity.min() == 0
-    assert opacity.max() == 1
+    assert (opacity.min(), opacity.max()) == (0, 1)
     edges = (opacity[..., 0] > 0) & (opacity[..., 0] < 1)
     assert edges.sum() > 50
     np.testing.assert_allclose(light + (1 - opacity) * empty, whole, rtol=3e-3, atol=1e-3)

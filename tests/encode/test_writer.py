@@ -89,10 +89,8 @@ def test_mp4_is_what_browsers_play(tmp_path):
     write(path)
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
-        assert stream.codec_context.name == "h264"
-        assert stream.codec_context.pix_fmt == "yuv420p"
-        assert stream.average_rate == FPS
-        assert stream.frames == 12
+        assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
+        assert (stream.average_rate, stream.frames) == (FPS, 12)
     data = path.read_bytes()
     assert 0 < data.index(b"moov") < data.index(b"mdat")
 

@@ -183,14 +183,10 @@ def potential(r: float, times: np.ndarray) -> np.ndarray:
     return times * simpson(np.sin(SLANTS) * np.exp(-((r - s) ** 2) / 2) * i0e(r * s), x=SLANTS)
 
 
-def plane_height(r: float, times: np.ndarray) -> np.ndarray:
-    return (potential(r, times + 1e-3) - potential(r, times - 1e-3)) / 2e-3
-
-
 @pytest.mark.parametrize("distance", [6.0, 11.0])
 def test_front_and_crest_come_when_the_initial_value_problem_says(distance: float) -> None:
     times = distance + np.linspace(-3, 2, 101)
-    signal = plane_height(distance, times)
+    signal = (potential(distance, times + 1e-3) - potential(distance, times - 1e-3)) / 2e-3
     [expected_front], [expected_crest] = front_and_crest(times, signal[:, None])
     (front, _), (crest, _) = plane_arrival(np.array([distance, FARTHEST]))
     assert front == pytest.approx(expected_front, abs=5e-3)

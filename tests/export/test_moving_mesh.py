@@ -11,18 +11,14 @@ from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, WaveSolver, build_atlas, sphere_atlas
 from ripple_sim.solver.texels import with_filled_halo
 
-RESOLUTION = 16
-
 
 @pytest.fixture(scope="module", params=["cube", "patches"])
 def atlas(request: pytest.FixtureRequest) -> Atlas:
-    V, F = limbed() if request.param == "cube" else drum()
-    return build_atlas(Mesh.from_arrays(V, F), RESOLUTION, layout=request.param, cache=False)
-
-
-def drum() -> tuple[np.ndarray, np.ndarray]:
-    """An open square sheet."""
-    return grid(8, lambda x, y: (2 * x - 1, 2 * y - 1, 0.1 * (2 * x - 1) * (2 * y - 1)))
+    if request.param == "cube":
+        V, F = limbed()
+    else:  # an open square sheet
+        V, F = grid(8, lambda x, y: (2 * x - 1, 2 * y - 1, 0.1 * (2 * x - 1) * (2 * y - 1)))
+    return build_atlas(Mesh.from_arrays(V, F), 16, layout=request.param, cache=False)
 
 
 def smooth_field(atlas: Atlas, amplitude: float) -> np.ndarray:

@@ -50,8 +50,7 @@ def test_stage_is_valid_in_metres_with_z_up_and_a_time_code_a_frame(run: Any) ->
     registry = UsdValidation.ValidationRegistry()
     errors = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators()).Validate(stage)
     assert [error.GetErrorAsString() for error in errors] == []
-    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
-    assert UsdGeom.GetStageUpAxis(stage) == "Z"
+    assert (UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)) == (1.0, "Z")
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, FRAMES - 1)
     assert stage.GetTimeCodesPerSecond() == stage.GetFramesPerSecond() == FPS
     assert stage.GetDefaultPrim().GetPath() == "/World"

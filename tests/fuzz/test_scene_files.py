@@ -6,20 +6,21 @@ from typing import Any
 import pytest
 from fuzzing import CHANGES, NUMBERS, VALUES, changed, fuzzed, outcome, places, put
 from hypothesis import given, strategies as st
+from scene_files import write_scene
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene import Scene, SceneFile, load_scene, parse_scene
 from ripple_sim.solver import RippleError
 
 TABLE: dict[str, Any] = {
-    "model": "model.xml",
+    "model": "scene.xml",
     "duration": 1.0,
     "camera": {"lookat": [0.0, 0.0, 0.0], "distance": 2.0},
     "ripple": [{"geom": "g", "material": {"speed": 1.0}, "still": [{"point": [0, 0, 1], "radius": 0.1}]}],
     "drop": [{"body": "b", "time": 0.1}],
     "poke": [{"geom": "g", "time": 0.2, "point": [0, 0, 1], "impulse": 1.0, "radius": 0.1}],
 }
-TEXT = """model = "model.xml"
+TEXT = """model = "scene.xml"
 duration = 1.0
 [camera]
 lookat = [0.0, 0.0, 0.0]
@@ -43,9 +44,9 @@ def test_a_table_with_any_value_anywhere(place: tuple, value: Any) -> None:
 def test_a_file_with_any_bytes_anywhere(tmp_path_factory: pytest.TempPathFactory, changes: list) -> None:
     folder = tmp_path_factory.getbasetemp() / "changed"
     folder.mkdir(exist_ok=True)
-    (folder / "model.xml").write_text(MODEL.format("", 'type="sphere" size="1"', ""))
-    (folder / "scene.toml").write_bytes(changed(TEXT.encode(), changes))
-    assert isinstance(outcome(lambda: load_scene(folder / "scene.toml")), Scene | RippleError)
+    path = write_scene(folder, MODEL.format("", 'type="sphere" size="1"', ""), "")
+    path.write_bytes(changed(TEXT.encode(), changes))
+    assert isinstance(outcome(lambda: load_scene(path)), Scene | RippleError)
 
 
 ATTRIBUTES = st.dictionaries(
@@ -70,10 +71,10 @@ def written(attributes: dict[str, str]) -> str:
 def test_a_model_with_any_numbers(tmp_path_factory: pytest.TempPathFactory, option: dict, geom: dict, key: str) -> None:
     folder: Path = tmp_path_factory.getbasetemp() / "model"
     folder.mkdir(exist_ok=True)
-    (folder / "scene.toml").write_text('model = "model.xml"\n[[ripple]]\ngeom = "g"\n')
-    (folder / "model.xml").write_text(MODEL.format(written(option), written({"size": "1", **geom}), key))
-    found = outcome(lambda: load_scene(folder / "scene.toml"))
+    model = MODEL.format(written(option), written({"size": "1", **geom}), key)
+    path = write_scene(folder, model, 'model = "scene.xml"\n[[ripple]]\ngeom = "g"\n')
+    found = outcome(lambda: load_scene(path))
     assert isinstance(found, Scene | RippleError)
     if isinstance(found, Scene):
         assert 0 < found.model.opt.timestep <= 1
-    assert sorted(each.name for each in folder.iterdir()) == ["model.xml", "scene.toml"]
+    assert sorted(each.name for each in folder.iterdir()) == ["scene.toml", "scene.xml"]

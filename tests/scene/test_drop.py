@@ -158,20 +158,15 @@ def test_the_image_of_a_glb_is_inside_it(tmp_path):
     assert tuple(mesh_image(tmp_path / "p.glb")[0, 0]) == RED
 
 
-def coloured(path: Path) -> Path:
-    """The same peanut without texture coordinates; its vertices are red in its upper half and blue in its lower one."""
-    V, F = peanut()
-    colors = np.where(V[:, 1:2] > np.median(V[:, 1]), RED, BLUE).astype(np.uint8)
-    trimesh.Trimesh(V, F, vertex_colors=colors, process=False).export(path)
-    return path
-
-
 @pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize("how", ["named", "asked for", "p.ply", "p.glb", "p.obj"])
 def test_a_dropped_on_mesh_wears_its_image_or_the_colours_of_its_vertices(tmp_path, how):
     """Red above and blue below, in the film and in the model that MuJoCo would draw."""
     if how.startswith("p."):
-        scene = drop_scene(coloured(tmp_path / how), bodies=0, up="y")
+        V, F = peanut()
+        colors = np.where(V[:, 1:2] > np.median(V[:, 1]), RED, BLUE).astype(np.uint8)
+        trimesh.Trimesh(V, F, vertex_colors=colors, process=False).export(tmp_path / how)
+        scene = drop_scene(tmp_path / how, bodies=0, up="y")
     else:
         mesh = textured_obj(tmp_path / "p.obj")
         half_and_half(tmp_path / ("p_texture.png" if how == "named" else "paint.png"))

@@ -48,10 +48,9 @@ def test_bodies_take_turns_in_shape_and_wait_where_none_touches_another() -> Non
     data = forwarded(model)
     kinds = [int(kind) for kind, _ in BODY_SHAPES.values()]
     for i, drop in enumerate(drops):
-        assert drop.body == f"body_{i}"
-        assert model.geom(drop.body).type == kinds[i % len(kinds)]
-        assert 0.02 < model.geom(drop.body).size[0] < 0.11
-        assert model.geom(drop.body).rgba[3] == 1
+        geom = model.geom(f"body_{i}")
+        assert (drop.body, geom.type) == (geom.name, kinds[i % len(kinds)])
+        assert 0.02 < geom.size[0] < 0.11 and geom.rgba[3] == 1
     waiting = {model.geom(drop.body).id for drop in drops}
     assert not [contact for contact in data.contact if waiting & set(contact.geom.tolist())]
 

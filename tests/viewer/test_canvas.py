@@ -78,8 +78,7 @@ def test_a_window_of_another_size_ends_the_video_with_what_it_has(recorder: Reco
 
 def test_a_video_without_frames_leaves_nothing(recorder: Recorder, tmp_path: Path) -> None:
     recorder.start(frame(0))
-    assert recorder.stop() is None
-    assert recorder.stop() is None
+    assert recorder.stop() is recorder.stop() is None
     assert not recorder.add(frame(0))
     assert names(tmp_path) == []
 
@@ -99,8 +98,7 @@ def test_a_failure_to_write_ends_the_recording(recorder: Recorder, tmp_path: Pat
     with pytest.raises(EncodingError, match=r"cannot write the video .*duck-1\.mp4"):
         recorder.stop()
     assert not recorder.recording
-    assert names(tmp_path) == ["duck-1.mp4"]
-    assert names(tmp_path / "duck-1.mp4") == ["mine"]
+    assert (names(tmp_path), names(tmp_path / "duck-1.mp4")) == (["duck-1.mp4"], ["mine"])
 
 
 FOCUS = np.array([0.3, -0.1, 0.5])

@@ -11,7 +11,6 @@ from __future__ import annotations
 import dataclasses
 import math
 
-import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
@@ -82,7 +81,7 @@ def texels_towards(directions: Floats, n: int) -> Ints:
 
 
 def cast_rays(
-    sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64], stride: int = 1
+    sphere: NDArray[np.float64], mesh: Mesh, directions: NDArray[np.float64], stride: int = 1
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Intersect rays from the origin with the sphere-mapped mesh.
 
@@ -93,7 +92,7 @@ def cast_rays(
     ----------
     sphere : [vertex_count, 3]
         A fold-free sphere map (unit vectors).
-    F : [triangle_count, 3]
+    mesh : Mesh
     directions : [k, 3]
         Ray directions.
     stride : int
@@ -112,10 +111,9 @@ def cast_rays(
         If a ray meets no triangle, which a fold-free map rules out.
     """
     hits, seeds = np.full(len(directions), -1, dtype=np.int64), directions[::stride]
-    hits[::stride] = RayScene(sphere, F).cast(np.zeros_like(seeds), seeds)[0]
-    neighbours, _ = igl.triangle_triangle_adjacency(F)
+    hits[::stride] = RayScene(sphere, mesh.F).cast(np.zeros_like(seeds), seeds)[0]
     barycentrics = np.empty((len(directions), 3))
-    lost = _walk_to_triangles(sphere, F, neighbours.astype(np.int64), directions, hits, barycentrics)
+    lost = _walk_to_triangles(sphere, mesh.F, mesh.beside, directions, hits, barycentrics)
     if lost:
         raise AtlasError(f"{lost} of {len(directions)} rays meet no triangle of the sphere map; is the map fold-free?")
     return hits, barycentrics
@@ -143,7 +141,7 @@ def _walk_to_triangles(
             if min(x, y, z) >= 0:
                 break
             worst = 2 if z < min(x, y) else 1 if y < x else 0
-            # libigl numbers the edge (corner k, corner k + 1) as k; the edge opposite corner k is (k + 1, k + 2)
+            # side k goes from corner k to corner k + 1; the one opposite corner k is side k + 1
             triangle = neighbours[triangle, (worst + 1) % 3]
             x, y, z = _edge_products(sphere, F[triangle], d)
         if min(x, y, z) < 0 or x + y + z <= 0:
@@ -224,7 +222,7 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
     directions = texel_directions(check_resolution(resolution))
     # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
     stride = math.gcd(resolution, STRIDE) if directions.size > 3 * len(mesh.F) else 1
-    triangles, barycentrics = cast_rays(sphere, mesh.F, directions.reshape(-1, 3), stride)
+    triangles, barycentrics = cast_rays(sphere, mesh, directions.reshape(-1, 3), stride)
     positions, normals = _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics)
     shape = directions.shape[:3]
     triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)

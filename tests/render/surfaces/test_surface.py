@@ -73,12 +73,6 @@ def areas(corners: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
 
 
-def welded(positions: np.ndarray, F: np.ndarray) -> np.ndarray:
-    """Triangles by numbers that are the same where positions are, but for round-off."""
-    _, place = np.unique(positions.round(9), axis=0, return_inverse=True)
-    return place.ravel()[F]
-
-
 MESHES = {f"ball {d} {s}": ball_mesh(d, s) for d, s in ((1, 0), (2, 1), (5, 2), (9, 3))} | {"facets": facets(4)}
 
 
@@ -94,7 +88,8 @@ def test_no_gap_opens_and_no_area_is_lost(pair):
     assert len(cut.F) > len(F)
     before, after = areas(attributes[F][:, :, :3]), areas(cut.attributes[cut.F][:, :, :3])
     assert after.sum() == pytest.approx(before.sum(), rel=1e-10)
-    closed = welded(cut.attributes[:, :3], cut.F)
+    _, place = np.unique(cut.attributes[:, :3].round(9), axis=0, return_inverse=True)
+    closed = place.ravel()[cut.F]  # by numbers that are the same where positions are, but for round-off
     sides = np.concatenate([closed[:, [0, 1]], closed[:, [1, 2]], closed[:, [2, 0]]])
     directed, count = np.unique(sides, axis=0, return_counts=True)
     assert count.max() == 1

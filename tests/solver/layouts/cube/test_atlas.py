@@ -102,7 +102,7 @@ def surface_points(atlas: Atlas, triangles: np.ndarray, barycentrics: np.ndarray
 
 def test_rays_agree_with_every_ray_against_every_triangle(animal: Atlas) -> None:
     directions = texel_directions(8).reshape(-1, 3)
-    triangles, barycentrics = cast_rays(animal.sphere, animal.mesh.F, directions)
+    triangles, barycentrics = cast_rays(animal.sphere, animal.mesh, directions)
     expected, weights = cast_rays_exhaustively(animal.sphere, animal.mesh.F, directions)
     assert weights.min() > -1e-12
     # a ray through an edge may count to either side; the point is the same
@@ -119,9 +119,9 @@ def test_rays_agree_with_every_ray_against_every_triangle(animal: Atlas) -> None
 def test_rays_that_walk_on_from_their_neighbours_hit_the_same(animal: Atlas) -> None:
     n = 48
     directions = texel_directions(n).reshape(-1, 3)
-    triangles, barycentrics = cast_rays(animal.sphere, animal.mesh.F, directions)
+    triangles, barycentrics = cast_rays(animal.sphere, animal.mesh, directions)
     for stride in (3, 16, len(directions)):
-        walked, weights = cast_rays(animal.sphere, animal.mesh.F, directions, stride)
+        walked, weights = cast_rays(animal.sphere, animal.mesh, directions, stride)
         inside = barycentrics.min(axis=1) > 0
         np.testing.assert_array_equal(walked[inside], triangles[inside])
         np.testing.assert_array_equal(weights[inside], barycentrics[inside])
@@ -140,7 +140,7 @@ def test_rays_in_degenerate_directions_agree_too(what: str) -> None:
         directions = np.concatenate([V, (V[F[:, 0]] + V[F[:, 1]]) / 2])
     else:
         directions = np.random.default_rng(0).standard_normal((200, 3))
-    found, weights = cast_rays(V, F, directions)
+    found, weights = cast_rays(V, Mesh(V, F), directions)
     expected, expected_weights = cast_rays_exhaustively(V, F, directions)
     hit, other = (np.einsum("ij,ijk->ik", w, V[F[t]]) for t, w in ((found, weights), (expected, expected_weights)))
     np.testing.assert_allclose(hit, other, atol=1e-9)
