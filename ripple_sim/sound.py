@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.coupling.soft import is_soft
+from ripple_sim.coupling.soft import target_pose
 from ripple_sim.encode.images import riff_chunk
 from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import RippleWarning
@@ -65,11 +65,8 @@ class Microphone:
     def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:
         """Stand at a point in the world from now on [m], [3]; call it again when it or a target has moved."""
         for name, geom in self._ripples.geom_ids.items():
-            if is_soft(self._ripples.model, geom):
-                here = point
-            else:
-                here = (point - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
-            self._ears[name].stand(self._ripples[name], here)
+            position, rotation = target_pose(data, geom)
+            self._ears[name].stand(self._ripples[name], (point - position) @ rotation)
 
     def follow(self, simulation: Simulation) -> None:
         """Stand where the scene's camera is now."""

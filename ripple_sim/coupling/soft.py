@@ -53,17 +53,15 @@ def find_soft(model: mujoco.MjModel, name: object) -> int:
 
 
 def soft_name(model: mujoco.MjModel, target: int) -> str:
-    """Name of a flex or a skin, or "flex <id>", "skin <id>"."""
-    skin = target - first_skin(model)
-    if skin >= 0:
-        return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SKIN, skin) or f"skin {skin}"
-    flex = target - first_flex(model)
-    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) or f"flex {flex}"
+    """Name of a flex or a skin, see `soft_names`."""
+    return soft_names(model)[target - first_flex(model)]
 
 
 def soft_names(model: mujoco.MjModel) -> list[str]:
-    """Names of all flexes, then of all skins."""
-    return [soft_name(model, first_flex(model) + i) for i in range(model.nflex + model.nskin)]
+    """Names of all flexes, then of all skins; without one "flex <id>", "skin <id>"."""
+    flex, skin = mujoco.mjtObj.mjOBJ_FLEX, mujoco.mjtObj.mjOBJ_SKIN
+    flexes = [mujoco.mj_id2name(model, flex, i) or f"flex {i}" for i in range(model.nflex)]
+    return flexes + [mujoco.mj_id2name(model, skin, i) or f"skin {i}" for i in range(model.nskin)]
 
 
 class SoftSurface:

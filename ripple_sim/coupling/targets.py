@@ -29,7 +29,7 @@ from .geoms import (
     rotation_in_body,
     target_name,
 )
-from .soft import is_soft
+from .soft import is_soft, target_pose
 from .suited import suited_targets
 from .target_mesh import target_atlas
 
@@ -84,17 +84,16 @@ def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
     if site < 0:
         sites = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SITE, i) for i in range(model.nsite))
         raise SceneError(f"the model has no site {name!r}; its sites are {', '.join(filter(None, sites)) or 'none'}")
-    data, soft = mujoco.MjData(model), is_soft(model, geom)
-    bodies = [] if soft else [model.site_bodyid[site], model.geom_bodyid[geom]]
+    data = mujoco.MjData(model)
+    bodies = [] if is_soft(model, geom) else [model.site_bodyid[site], model.geom_bodyid[geom]]
     if len({int(model.body_weldid[body]) for body in bodies}) > 1:
         names = " and ".join(repr(model.body(body).name) for body in bodies)
         raise SceneError(
             f"site {name!r} and the geom it measures are on bodies {names}, which move; put it on the geom's"
         )
     mujoco.mj_kinematics(model, data)
-    if soft:
-        return data.site_xpos[site].copy()
-    return (data.site_xpos[site] - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+    position, rotation = target_pose(data, geom)
+    return (data.site_xpos[site] - position) @ rotation
 
 
 class Targets:

@@ -14,7 +14,7 @@ from ..kernel import Ints
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
 from ..texels import cells
-from ..texels.moving import MovedStencil, Ride
+from ..texels.moving import MovedStencil, interpolate
 from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
@@ -36,10 +36,10 @@ class DeviceStiffness:
 
     def __init__(self, gl: GLContext, dispatch: Dispatch, stencil: MovedStencil, mass: NDArray[np.float64]) -> None:
         self._gl, self._dispatch, self._mass = gl, dispatch, mass
-        topology, texels, ride = stencil.topology, stencil.cells, stencil.places.ride.ride
+        topology, texels, ride = stencil.topology, stencil.cells, stencil.places.ride
         self._width, self._count = topology.halo.shape[1], topology.halo.size
-        at = texels.special_places  # nowhere off their triangles, see `StencilBuffer`
-        self._special = Ride(ride.corners[at], ride.weights[at], ride.offsets)
+        at = texels.special_places
+        self._special = ride.corners[at], ride.weights[at], np.empty((3, len(at)))
         self._around = np.zeros((3, self._count))
         added, crossing, missing = texels.special_links, crossing_links(topology), missing_links(topology)
         self._added = _link_groups(gl, topology, added, np.arange(len(added) + 1))
@@ -64,7 +64,8 @@ class DeviceStiffness:
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
         """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
         V, (quads, _) = stencil.places.V, stencil.coefficient
-        self._around[:, stencil.cells.special_places] = self._special.at(V)
+        interpolate(V, *self._special)
+        self._around[:, stencil.cells.special_places] = self._special[-1]
         values, of_cells = stencil.cells.special(self._around, stencil.coefficient)
         irregular = stencil.with_added(of_cells)
         with self._gl:
@@ -136,7 +137,7 @@ class StencilBuffer:
         processor's own cores, where the CPU's loops take a fifth of the time.
         """
         moved = stencil if isinstance(stencil, MovedStencil) and not self._gl.software else None
-        if moved and not len(moved.places.ride.ride.offsets) and not len(moved.places.ride.images):
+        if moved and moved.places.ride.on_triangles:
             if self._device is None:
                 self._device = DeviceStiffness(self._gl, self._dispatch, moved, mass)
             self.irregular = self._device.write(moved, self.buffer)

@@ -40,7 +40,12 @@ from .distance import (
     seeded as seeded,
 )
 from .maps import texture_map as texture_map, vertex_map as vertex_map
-from .moving import MovedPlaces as MovedPlaces, MovedStencil as MovedStencil, Ride as Ride, SurfaceRide as SurfaceRide
+from .moving import (
+    MovedPlaces as MovedPlaces,
+    MovedStencil as MovedStencil,
+    SurfaceRide as SurfaceRide,
+    interpolate as interpolate,
+)
 from .stencil import (
     EAST as EAST,
     LINK_ENDS as LINK_ENDS,

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel import Floats, Ints, Ints32, kernel
+from ..kernel import Floats, Ints32, kernel
 from ..mesh.closest import closest_points
 from .atlas import Atlas
 from .chart_map import barycentrics_in
@@ -19,45 +18,8 @@ from .stiffness import CellCoefficient, TexelCells
 _OFF = 1e-9
 
 
-class Ride(NamedTuple):
-    """Points that keep their triangle and their barycentric coordinates, k of them.
-
-    Attributes
-    ----------
-    corners : int32 [k, 3]
-        Vertices of their triangles.
-    weights : float64 [k, 3]
-        Barycentric coordinates.
-    offsets : float64 [k, 3]
-        Where they lie off that place, along the triangle's first side, across it, and along its normal, in units of
-        the root of twice its area; 0 rows where none does.
-    """
-
-    corners: Ints32
-    weights: Floats
-    offsets: Floats
-
-    @classmethod
-    def of(cls, V: Floats, corners: Ints, weights: Floats, points: Floats) -> Ride:
-        """The ride of points [k, 3] whose triangles and barycentric coordinates are known; NaN: of none."""
-        off = np.nan_to_num(points - np.einsum("ij,ijk->ik", weights, V[corners]))
-        short = corners.astype(np.int32)
-        if np.abs(off).max(initial=0.0) <= _OFF * np.ptp(V, axis=0).max():
-            return cls(short, weights, np.zeros((0, 3)))
-        frames = _frames(V, short)
-        return cls(short, weights, np.linalg.solve(np.swapaxes(frames, 1, 2), off[..., None])[..., 0])
-
-    def at(self, V: Floats) -> Floats:
-        """Positions [3, k] for the vertices V [n, 3] [m]."""
-        points = np.empty((3, len(self.corners)))
-        _interpolate(V, self.corners, self.weights, points)
-        if len(self.offsets):
-            points += np.einsum("ij,ijk->ki", self.offsets, _frames(V, self.corners))
-        return points
-
-
 class SurfaceRide:
-    """All places of an atlas, with halo, on vertices that move.
+    """All places of an atlas, with halo, on vertices that move: each keeps its triangle and its place in it.
 
     Parameters
     ----------
@@ -66,10 +28,12 @@ class SurfaceRide:
 
     Attributes
     ----------
-    ride : Ride
-        Of all places; weights are NaN where there is nothing.
-    images : int64 [k]
-        Those that show a texel where it is not, on a periodic surface.
+    corners : int32 [k, 3]
+        Vertices of the places' triangles.
+    weights : float64 [k, 3]
+        Barycentric coordinates; NaN where there is nothing.
+    on_triangles : bool
+        Whether all lie in their triangles: none is off, and none shows a texel where it is not.
     """
 
     def __init__(self, atlas: Atlas) -> None:
@@ -88,15 +52,24 @@ class SurfaceRide:
         shift = np.where(
             (topology.rim.reshape(-1) | nothing)[:, None], 0.0, places - atlas.positions.reshape(-1, 3)[halo]
         )
-        self.images = np.flatnonzero(shift.any(axis=1))
-        self._shift = shift[self.images].T
-        self.ride = Ride.of(V, corners, weights, places - shift)
+        self._images = np.flatnonzero(shift.any(axis=1))
+        self._shift = shift[self._images].T
+        self.corners, self.weights, self._offsets = corners.astype(np.int32), weights, np.zeros((0, 3))
+        # along the triangle's first side, across it, and along its normal, in units of the root of twice its area
+        off = np.nan_to_num(places - shift - np.einsum("ij,ijk->ik", weights, V[corners]))
+        if np.abs(off).max(initial=0.0) > _OFF * np.ptp(V, axis=0).max():
+            frames = np.swapaxes(_frames(V, self.corners), 1, 2)
+            self._offsets = np.linalg.solve(frames, off[..., None])[..., 0]
+        self.on_triangles = not (len(self._offsets) or len(self._images))
 
     def around(self, V: Floats) -> NDArray[np.float64]:
         """Coordinates of the texels with halo, [3, C, n + 2, n + 2]; NaN where there is nothing."""
-        points = self.ride.at(V)
-        if len(self.images):
-            points[:, self.images] += self._shift
+        points = np.empty((3, len(self.corners)))
+        interpolate(V, self.corners, self.weights, points)
+        if len(self._offsets):
+            points += np.einsum("ij,ijk->ki", self._offsets, _frames(V, self.corners))
+        if len(self._images):
+            points[:, self._images] += self._shift
         return points.reshape(3, *self._shape)
 
     def positions(self, V: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
@@ -108,7 +81,7 @@ class SurfaceRide:
         """Unit normals of the texels [C, n, n, 3], from those of the vertices [n, 3]."""
         charts, width, _ = self._shape
         normals = np.empty((charts, width - 2, width - 2, 3))
-        _interpolate_units(vertex_normals, self.ride.corners, self.ride.weights, normals)
+        _interpolate_units(vertex_normals, self.corners, self.weights, normals)
         return normals
 
 
@@ -195,7 +168,7 @@ def _frames(V: Floats, corners: NDArray[np.integer]) -> NDArray[np.float64]:
 
 
 @kernel
-def _interpolate(values: Floats, corners: Ints32, weights: Floats, out: Floats) -> None:
+def interpolate(values: Floats, corners: Ints32, weights: Floats, out: Floats) -> None:
     """Values [n, 3] of vertices at points with weights [k, 3] at corners [k, 3], into [3, k]."""
     for i in range(len(corners)):
         a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
