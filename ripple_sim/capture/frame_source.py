@@ -231,7 +231,7 @@ def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] |
     return Surface(
         V=mesh.V,
         F=mesh.F,
-        charts=Charts(drawn.chart_map, atlas.texels.shape),
+        charts=Charts(drawn.chart_map, ChartPage(len(atlas.areas), atlas.resolution)),
         look=look,
         color=color,
         uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,

@@ -42,7 +42,7 @@ from ripple_sim.render.visuals.lights import (
     sky_colors,
 )
 from ripple_sim.render.visuals.texture_mapping import mapping_of
-from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
+from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
 from ripple_sim.video.options import VideoOptions
@@ -149,7 +149,7 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     pose = source.pose(data)
     lighting = lighting_of(model, data, pose, source.lighting)
     studio = lighting.studio
-    floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in source.ripples.geom_ids.values()])
+    floor = find_floor(model, source.ripples.geom_ids.values())
     albedo = None
     if floor is not None:
         visual = geom_visual(model, floor)
@@ -164,9 +164,7 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         "horizon": horizon.tolist(),
         "zenith": zenith.tolist(),
         "sky": sky.tolist(),
-        "floor": None
-        if floor is None
-        else mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, floor) or f"geom_{floor}",
+        "floor": None if floor is None else model.geom(floor).name or f"geom_{floor}",
         "fade": list(STUDIO_FADE if studio else FADE),
         "boxes_reflected": strength,
         "boxes_diffuse": _DIFFUSE_SHARE * strength if studio else 0.0,

@@ -121,7 +121,7 @@ class FieldWriter(Writer):
         self._source = source
         self._store = store = Store(path, {"software": MARK, "fps": source.fps, "slow_motion": source.slow_motion})
         model = source.model
-        bodies = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, i) or f"body {i}" for i in range(model.nbody)]
+        bodies = [model.body(i).name or f"body {i}" for i in range(model.nbody)]
         store.fixed("body", ["body"], np.array(bodies))
         store.fixed("axis", ["axis"], np.array(["x", "y", "z"]))
         store.fixed("component", ["component"], np.array(["w", "x", "y", "z"]))

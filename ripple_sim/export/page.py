@@ -32,7 +32,7 @@ from ripple_sim.render.passes.shadows import find_floor
 from ripple_sim.render.surfaces.vertices import memory_order
 from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, lighting_of
 from ripple_sim.render.visuals.texture_mapping import mapping_of
-from ripple_sim.render.visuals.visual import geom_visual, texture_pixels, visible_geoms
+from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
 from ripple_sim.solver import Mesh
 
 from .moving_mesh import MovingMesh
@@ -320,7 +320,7 @@ class PageWriter:
     def _begin(self, data: mujoco.MjData) -> None:
         source, model = self._source, self._source.model
         targets = set(source.ripples.geom_ids.values())
-        floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in targets])
+        floor = find_floor(model, targets)
         found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
         parts = [*self._targets.values(), *(_solid_part(model, solid) for solid in found)]
         pose = source.pose(data)

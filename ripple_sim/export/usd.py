@@ -186,7 +186,11 @@ class UsdWriter:
         self._camera.CreateShutterOpenAttr(0.0)
         self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
         self._lamps = Lamps(stage, world.GetPath().AppendChild("lights"), source)
-        self._bodies = self._define_bodies(UsdGeom.Scope.Define(stage, "/World/bodies").GetPath())
+        bodies = UsdGeom.Scope.Define(stage, "/World/bodies").GetPath()
+        self._bodies = [
+            UsdGeom.Xform.Define(stage, child(stage, bodies, source.model.body(i).name or f"body_{i}"))
+            for i in range(source.model.nbody)
+        ]
         self._define_solids()
         self._before: dict[str, NDArray[np.float32]] = {}
         self._surfaces = {name: self._define_surface(name) for name in source.ripples}
@@ -240,7 +244,7 @@ class UsdWriter:
         self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
         self._camera.CreateFocusDistanceAttr()
         self._lamps.begin(data)
-        for body, prim in self._bodies.items():
+        for body, prim in enumerate(self._bodies):
             if _stands(self._source.model, body):
                 place(prim, data.xpos[body], data.xquat[body], 0)
             else:
@@ -262,7 +266,7 @@ class UsdWriter:
 
     def _sample(self, time: int, data: mujoco.MjData, shapes: dict[str, Displaced]) -> None:
         """Set the time samples of a frame."""
-        for body, prim in self._bodies.items():
+        for body, prim in enumerate(self._bodies):
             if not _stands(self._source.model, body):
                 place(prim, data.xpos[body], data.xquat[body], time)
         source, pose = self._source, self._source.pose(data)
@@ -278,13 +282,6 @@ class UsdWriter:
             mesh.GetNormalsAttr().Set(vectors(shape.normals), time)
             mesh.GetVelocitiesAttr().Set(vectors(shape.velocities), time)
             mesh.GetExtentAttr().Set(extent(shape.points), time)
-
-    def _define_bodies(self, path: Sdf.Path) -> dict[int, UsdGeom.Xform]:
-        model, prims = self._source.model, {}
-        for body in range(model.nbody):
-            name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or f"body_{body}"
-            prims[body] = UsdGeom.Xform.Define(self._stage, child(self._stage, path, name))
-        return prims
 
     def _define_solids(self) -> None:
         model = self._source.model

@@ -114,10 +114,9 @@ def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
         # a mesh asset counts v as MuJoCo does, from the upper edge
         own = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
         uv = texture_places(mapping, own)[mesh.faces]
-    kind, index = ("site", visual.index) if visual.site else ("geom", visual.index)
-    name = mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), index) or f"{kind}_{index}"
-    position, quaternion = (np.array(getattr(model, f"{kind}_{what}")[index]) for what in ("pos", "quat"))
-    body = int(getattr(model, f"{kind}_bodyid")[index])
+    kind, own = ("site", model.site(visual.index)) if visual.site else ("geom", model.geom(visual.index))
+    name, body = own.name or f"{kind}_{visual.index}", int(own.bodyid[0])
+    position, quaternion = np.array(own.pos), np.array(own.quat)
     normals = normalized(mesh.normals)
     if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
         normals = normalized(normals / visual.half_sizes)

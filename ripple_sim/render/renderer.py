@@ -22,7 +22,7 @@ from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.visuals.geoms import shaped
 from ripple_sim.render.visuals.lights import SceneLight
 from ripple_sim.render.visuals.objects import Assets
-from ripple_sim.render.visuals.visual import content_of, geom_visual, visible_geoms, visuals_in
+from ripple_sim.render.visuals.visual import content_of, geom_visual, visuals_in
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
@@ -93,8 +93,7 @@ class Renderer:
         with gl:
             self._assets = assets = Assets(model, resources)
             self._light = light = SceneLight(assets, lighting)
-            geoms = [geom for geom in visible_geoms(model) if geom not in targets]
-            plane = find_floor(model, geoms)
+            plane = find_floor(model, targets)
             self._floor = None if plane is None else Floor(assets, plane)
             self._scene = DrawnScene(assets, targets, size)
             self._targets = {target: geom_visual(model, target) for target in targets}

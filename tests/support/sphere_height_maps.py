@@ -4,13 +4,14 @@ import numpy as np
 
 from ripple_sim.render.surfaces import Charts
 from ripple_sim.solver.layouts.cube import CubeChartMap, cube_topology, texel_directions
+from ripple_sim.solver.texels import ChartPage
 
 N = 24
 
 
 def cube_charts(sphere: np.ndarray, resolution: int = N) -> Charts:
     """Charts of a surface by its sphere map, one unit vector a vertex."""
-    return Charts(CubeChartMap(sphere), (6, resolution, resolution))
+    return Charts(CubeChartMap(sphere), ChartPage(6, resolution))
 
 
 def height_map_of(height, gradient) -> np.ndarray:

@@ -29,7 +29,7 @@ function readArrays(parts, bytes) {
   }
 }
 
-// Two earlier vertices from which each is predicted; coding.py finds the same ones. The last entry stands for none.
+// Two earlier vertices from which each is predicted; page.py finds the same ones. The last entry stands for none.
 function parentsOf(part) {
   const parents = new Int32Array(2 * part.points).fill(part.points);
   const second = new Uint8Array(part.points), third = new Uint8Array(part.points);

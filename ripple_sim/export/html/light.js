@@ -2,7 +2,7 @@
 const SHADOW_WIDTH = 1.5;  // of the shadow map [distances of the camera]
 const DARK = {position: null, size: 0, shadow: false};  // where there is no lamp
 
-// The light of a frame, as the renderer sets it (render/visuals/studio.py): lamps, sky, what the floor sends back. `boxes` is the
+// The light of a frame, as the renderer sets it (render/visuals/lights.py): lamps, sky, what the floor sends back. `boxes` is the
 // soft boxes' light on the floor.
 function lightOf(meta, view, boxes, shadowSize) {
   const {studio, lamps, ambient} = meta.light, floor = meta.floor, [first = DARK] = lamps;

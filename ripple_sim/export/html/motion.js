@@ -1,6 +1,6 @@
 "use strict";
 // Surfaces whose own vertices move: a finer point takes the mean of the linear maps about the corners of its triangle
-// (render/surfaces/moving_vertices.py).
+// (render/surfaces/moving.py).
 
 class Motion {
   constructor(part, told, bytes) {

@@ -5,7 +5,7 @@ The floor is a plane that fades into the background.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import moderngl
@@ -20,7 +20,7 @@ from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.lights import Light
 from ripple_sim.render.visuals.objects import Assets
 from ripple_sim.render.visuals.texture_mapping import mapping_of
-from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
+from ripple_sim.render.visuals.visual import geom_visual, texture_pixels, visible_geoms
 
 # Texels along a side: as many as make one about as wide as a pixel, where the casters fill the frame.
 _LEAST, _MOST, _PER_PIXEL, _STEP = 512, 1536, 1.4, 256
@@ -200,11 +200,12 @@ _LOWEST_SINE = 0.02  # elevation of a light at which shadows have no end
 _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # of a box about a ball
 
 
-def find_floor(model: Any, geoms: list[int]) -> int | None:
-    """The plane that faces up most, or None."""
+def find_floor(model: Any, targets: Collection[int]) -> int | None:
+    """The visible plane that faces up most and is no target, or None."""
     rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
-    planes = [geom for geom in geoms if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE]
+    visible = [geom for geom in visible_geoms(model) if geom not in targets]
+    planes = [geom for geom in visible if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE]
     return max(planes, key=lambda geom: rest.geom_xmat[geom][8], default=None)
 
 

@@ -36,22 +36,17 @@ class Charts(NamedTuple):
     ----------
     map : ChartMap
         The way from the surface's mesh to the charts.
-    shape : (C, n, n)
-        Of a field on them.
+    page : ChartPage
+        All of them on one page.
     """
 
     map: ChartMap
-    shape: tuple[int, int, int]
+    page: ChartPage
 
     @classmethod
     def of(cls, atlas: Atlas) -> Charts:
         """The charts of an atlas."""
-        return cls(atlas.chart_map, atlas.texels.shape)
-
-    @property
-    def page(self) -> ChartPage:
-        """All of them on one page."""
-        return ChartPage(self.shape[0], self.shape[1])
+        return cls(atlas.chart_map, ChartPage(len(atlas.areas), atlas.resolution))
 
 
 def split_at_charts(
@@ -90,14 +85,14 @@ def split_at_charts(
     source, alike = np.where(whole, vertex, 0), np.where(whole, vertex, 0)
     source[part, place] = len(attributes) + np.arange(len(cut))
     alike[part, place] = len(attributes) + distinct.ravel()
-    key = alike * charts.shape[0] + chart[:, None]
+    key = alike * charts.page.charts + chart[:, None]
     _, where, index = np.unique(key, return_index=True, return_inverse=True)
     row = source.ravel()[where]
     return (
         index.reshape(-1, 3),
         np.concatenate([attributes, cut])[row],
         np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row],
-        key.ravel()[where] % charts.shape[0],
+        key.ravel()[where] % charts.page.charts,
     )
 
 

@@ -189,7 +189,7 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     smooth, charts = smooth_normals(V, F), surface.charts
     uv = np.zeros((len(V), 2)) if surface.uv is None else np.asarray(surface.uv, dtype=np.float64)
     mesh = Mesh(V, F)
-    texel_size = float(np.sqrt(mesh.area / np.prod(charts.shape)))
+    texel_size = float(np.sqrt(mesh.area / (charts.page.charts * charts.page.resolution**2)))
     finer = tessellated(
         mesh,
         charts,
@@ -245,7 +245,7 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
     """
     charts, uv = surface.charts, np.zeros(0) if surface.uv is None else np.asarray(surface.uv)
     arrays = charts.map.arrays()
-    name = f"{charts.map.layout} {charts.shape} {list(arrays)} {max_length!r} {max_faces}"
+    name = f"{charts.map.layout} {charts.page} {list(arrays)} {max_length!r} {max_faces}"
     key = content_key(name, [surface.V, surface.F, uv, *arrays.values()])
     return _kept.get(key, lambda: _read_only(_surface_vertices(surface, max_length, max_faces)))
 
