@@ -12,10 +12,11 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SolverError
+from ..mesh.topology import labels
 from ..texels.stencil import (
     EAST,
     NO_LINKS,
@@ -74,9 +75,7 @@ def floating_parts(
 def _chart_parts(topology: TexelTopology) -> NDArray[np.int64]:
     """Part of the mesh to which each chart belongs, [C], from 0."""
     chart, side = np.nonzero(topology.glued[..., 0] >= 0)
-    other, count = topology.glued[chart, side, 0], len(topology.glued)
-    graph = coo_array((np.ones(len(chart)), (chart, other)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
 
 
 def _joins_all(tie: Tie) -> bool:
