@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from scene_files import write_scene
 
-from ripple_sim import RippleError
+from ripple_sim import RippleError, Simulation
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import check_files, load_model, load_scene, refusal_of
-from ripple_sim.simulation import Simulation
 
 MJCF = """<mujoco><worldbody><geom name="egg" size="0.1"/>
 <body name="stone" pos="0 0 1"><freejoint/><geom size="0.05"/></body>

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ripple_sim import Material, RippleError
+from ripple_sim import Material, RippleError, Simulation
 from ripple_sim.scene import LAWS, MaterialChange, MaterialEntry, PresetEntry, load_scene, parse_scene
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import texture_map
 
 

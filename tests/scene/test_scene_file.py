@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scene_files import write_scene
 
-from ripple_sim import scene
+from ripple_sim import Simulation, scene
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import CameraEntry, Events, RippleEntry, Scene, StillEntry
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
 
 LEAST = {"model": "scene.xml", "ripple": [{"geom": "egg"}]}
