@@ -60,7 +60,6 @@ def check_scene(scene: Scene) -> None:
         seen.add(entry.geom)
         _check_target(scene.model, entry)
     named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
-    parse_request(scene.overlay)
     _check_sensors(scene)
     if scene.lighting not in LIGHTING:
         raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")

@@ -135,9 +135,6 @@ class Request:
     energy: bool = False
     sensors: bool = False
 
-    def __bool__(self) -> bool:
-        return self != Request()
-
 
 def parse_request(words: Iterable[str]) -> Request:
     """Read names of overlays; "height" and "velocity" may have a range, such as "height=0.02" [m, m/s].

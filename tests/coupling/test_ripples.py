@@ -7,7 +7,7 @@ import igl
 import mujoco
 import numpy as np
 import pytest
-from hits import Run
+from hits import Run, contact_forces
 from mujoco_models import BALL, forwarded, limbed_asset, model_of
 
 from ripple_sim import Material, Ripples
@@ -72,10 +72,8 @@ def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> 
     """Independent of the atlas: the contacts' force-weighted point, and the nearest point of the mesh in the world."""
     target = '<body name="target"><freejoint/><geom name="target" type="sdf" mesh="limbed" mass="20"/></body>'
     model = model_of(target + BALL.format("3 0 0"), limbed_asset(), 'gravity="0 0 0"')
-    data, rng, wrench = mujoco.MjData(model), np.random.default_rng(7), np.zeros(6)
-    ripples = Ripples(model, {"target": Material()}, resolution=128, backend="cpu")
-    atlas = ripples["target"].atlas
-    off = []
+    run, off = Run(model, "target", material=Material(), resolution=128, conserve_volume=True), []
+    data, rng, atlas = run.data, np.random.default_rng(7), run.ripples["target"].atlas
     for _ in range(14):
         mujoco.mj_resetData(model, data)
         data.qpos[3:7] = (quat := rng.standard_normal(4)) / np.linalg.norm(quat)
@@ -87,16 +85,11 @@ def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> 
         data.qpos[7:10], data.qvel[6:9] = aim - 0.9 * way, 3.0 * way
         hits = 0
         while data.time < 0.5 and hits < 4:
-            ripples.mj_step(data)
-            for impulse in ripples.last_impulses:
+            for impulse in run.step():
                 hits += 1
-                points, forces = [], []
-                for i, contact in enumerate(data.contact):
-                    mujoco.mj_contactForce(model, data, i, wrench)
-                    points.append(contact.pos.copy())
-                    forces.append(max(wrench[0], 0.0))
+                forces = np.maximum(contact_forces(model, data)[:, 0], 0.0)
                 world = atlas.mesh.V @ data.geom("target").xmat.reshape(3, 3).T + data.geom("target").xpos
-                weighted = np.array(forces) @ np.array(points) / sum(forces)
+                weighted = forces @ data.contact.pos / forces.sum()
                 _, _, nearest = igl.point_mesh_squared_distance(weighted[None], world, atlas.mesh.F)
                 texel = np.sqrt(atlas.areas[impulse.texel])
                 off.append(np.linalg.norm(nearest[0] - impulse.point) / texel)

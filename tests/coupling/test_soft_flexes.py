@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from hits import Run
+from hits import Run, contact_forces
 from mujoco_models import mesh_asset
 
 from ripple_sim import Material, Ripples, make_collidable
@@ -36,16 +36,8 @@ def play(spec: mujoco.MjSpec, seconds: float) -> tuple[Run, float]:
     run, told = Run(spec, "target", resolution=24), 0.0
     while run.data.time < seconds - 1e-9:
         run.step()
-        told += normal_forces(run).sum() * DT
+        told += contact_forces(run.model, run.data)[:, 0].sum() * DT
     return run, told
-
-
-def normal_forces(run: Run) -> np.ndarray:
-    """Of MuJoCo's contacts at present [N]."""
-    wrenches = np.zeros((run.data.ncon, 6))
-    for i, wrench in enumerate(wrenches):
-        mujoco.mj_contactForce(run.model, run.data, i, wrench)
-    return wrenches[:, 0]
 
 
 @pytest.mark.parametrize("kind", ["2", "3"])
@@ -60,7 +52,7 @@ def test_cloth_and_soft_cube_give_a_flat_top_all_the_momentum_that_they_lose(kin
     assert -run.ripples["target"].momentum() == pytest.approx(run.given(), rel=0.01)
     while not run.hits[-1] and run.data.time < 0.5:
         run.step()
-    middle = np.average(run.data.contact.pos, axis=0, weights=normal_forces(run))
+    middle = np.average(run.data.contact.pos, axis=0, weights=contact_forces(run.model, run.data)[:, 0])
     np.testing.assert_allclose(run.hits[-1][0].point, [*middle[:2], 0.2], atol=1e-6)
 
 

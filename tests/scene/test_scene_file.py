@@ -265,8 +265,8 @@ def test_request_takes_every_name_and_ranges() -> None:
     request = scene.parse_request([" height=0.02", "contacts", "grid", "time", "energy "])
     assert request == scene.Request("height", 0.02, True, True, True, True)
     assert scene.parse_request(["velocity"]) == scene.Request(heatmap="velocity")
-    assert not scene.parse_request([])
-    assert scene.parse_request(["time"])
+    assert scene.parse_request([]) == scene.Request()
+    assert scene.parse_request(["time"]) == scene.Request(time=True)
 
 
 @pytest.mark.parametrize(

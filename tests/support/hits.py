@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
 from ripple_sim import Impulse, Material, Ripples
 
@@ -48,3 +49,11 @@ class Run:
     def pairs(self) -> set[tuple[str, str]]:
         """Names of the geoms that met: the target's, and the other one's."""
         return {(hit.geom, hit.other) for hits in self.hits for hit in hits}
+
+
+def contact_forces(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Forces [N] and torques [N m] of MuJoCo's contacts in their own frames, [k, 6]: the first is the normal force."""
+    wrenches = np.zeros((data.ncon, 6))
+    for i, wrench in enumerate(wrenches):
+        mujoco.mj_contactForce(model, data, i, wrench)
+    return wrenches
