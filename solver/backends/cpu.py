@@ -193,7 +193,7 @@ class CPUBackend(FieldBackend):
         # each field begins elsewhere in its page
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
         self._stencil, self._features = NO_WEIGHTS, NO_FEATURES
-        if operator.laplace_stencil is not None:
+        if operator.bending is not None:
             self._features = self._features._replace(moment=fields.zeros().reshape(-1))
         if operator.yield_height is not None:
             self._dent = fields.zeros()
@@ -262,9 +262,9 @@ class CPUBackend(FieldBackend):
         features = self._features
         if operator.viscosity_stencil is not None:
             features = features._replace(viscosity=fields.weights(operator.viscosity_stencil, features.viscosity.rows))
-        if operator.laplace_stencil is not None and operator.rigidity is not None:
-            rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
-            laplace = fields.weights(operator.laplace_stencil, features.laplace.rows)
+        if operator.bending is not None:
+            rigidity = fields.coefficients(operator.bending.rigidity.astype(np.float32))
+            laplace = fields.weights(operator.bending.laplace, features.laplace.rows)
             features = features._replace(laplace=laplace, rigidity=rigidity)
         self._features = features
         if operator.density is not None:

@@ -160,9 +160,9 @@ class ExtraForces:
         if operator.viscosity_stencil is not None:
             self._viscosity = StencilBuffer(gl, fields, dispatch, operator.viscosity_stencil)
             self._apply_viscosity = dispatch.texel_shader("apply")
-        if operator.laplace_stencil is not None and operator.rigidity is not None:
-            self._laplace = StencilBuffer(gl, fields, dispatch, operator.laplace_stencil)
-            self._rigidity, self._moment = fields.upload(operator.rigidity), fields.zeros()
+        if operator.bending is not None:
+            self._laplace = StencilBuffer(gl, fields, dispatch, operator.bending.laplace)
+            self._rigidity, self._moment = fields.upload(operator.bending.rigidity), fields.zeros()
             self._apply_rigidity = dispatch.texel_shader("apply", FACTOR=1)
             added = {"ADD": 1} if self._viscosity else {}
             self._subtract_laplace = dispatch.texel_shader("apply", SUBTRACT=1, **added)
@@ -175,9 +175,9 @@ class ExtraForces:
         """Take over the stencils of the same surface with its texels elsewhere."""
         if self._viscosity and operator.viscosity_stencil is not None:
             self._viscosity.write(operator.viscosity_stencil, operator.mass)
-        if self._laplace and operator.laplace_stencil is not None and operator.rigidity is not None:
-            self._laplace.write(operator.laplace_stencil, operator.mass)
-            self._fields.write(self._rigidity, operator.rigidity.astype(np.float32))
+        if self._laplace and operator.bending is not None:
+            self._laplace.write(operator.bending.laplace, operator.mass)
+            self._fields.write(self._rigidity, operator.bending.rigidity.astype(np.float32))
         self._link(operator)
 
     def gather(self, height: moderngl.Buffer, velocity: moderngl.Buffer) -> None:
@@ -204,10 +204,10 @@ class ExtraForces:
         ones = np.ones_like(operator.mass)
         if self._viscosity:
             self._viscosity_links = link_buffers(self._gl, self._fields, self._viscosity.irregular, ones)
-        if self._laplace and operator.rigidity is not None:
+        if self._laplace and operator.bending is not None:
             self._moment_links, self._bending_links = (
                 link_buffers(self._gl, self._fields, self._laplace.irregular, factors)
-                for factors in (operator.rigidity, -ones)
+                for factors in (operator.bending.rigidity, -ones)
             )
 
     def _apply_links(

@@ -199,7 +199,7 @@ class Mesh:
 
     @functools.cached_property
     def vertex_normals(self) -> NDArray[np.float64]:
-        """Unit normals, shape [vertex_count, 3]; see `normals.vertex_normals`."""
+        """Unit normals, shape [vertex_count, 3]; see the function of this name."""
         return vertex_normals(self.V, self.F)
 
 

@@ -23,7 +23,7 @@ from .coefficients import LIMITS
 from .deep_water import FluidOperator, over_fluid
 from .material import Material
 from .plate_rim import FREE, RIMS, Rim, links_and_springs, plate_matrix, rim_conditions, rim_places, tension_springs
-from .wave_operator import WaveOperator
+from .wave_operator import Bending, WaveOperator
 
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
@@ -72,16 +72,16 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
     grip = source_grip(field["speed"] ** 2, field["stiffness"], field["bending"])
     tension = density * field["speed"] ** 2
     stencil, laplace = assemble(tension), assemble(np.ones_like(area)) if bends else None
-    rigidity, links = density * field["bending"] / area if bends else None, NO_LINKS
+    bending, links = None if laplace is None else Bending(laplace, density * field["bending"] / area), NO_LINKS
     if kind == "fem" and not texels.topology.fixed_rim and (conditions > (0 if bends else FREE)).any():
         places = rim_places(texels, conditions)
         springs, held = tension_springs(places, texels, tension.ravel()), places.texels[places.conditions != FREE]
         field["fixed"].reshape(-1)[held] |= texels.bare_rim.reshape(-1)[held]
-        if laplace is not None and rigidity is not None:
+        if bending is not None:
             matrix, inner = plate_matrix(
-                texels, places, softening(texels), density * field["bending"], material.poisson, laplace
+                texels, places, softening(texels), density * field["bending"], material.poisson, bending.laplace
             )
-            rigidity *= inner
+            bending = bending._replace(rigidity=bending.rigidity * inner)
             links, beside = links_and_springs(matrix)
             springs += beside
             stencil.irregular = IrregularLinks.joined(stencil.irregular, links)
@@ -92,8 +92,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
         damping=field["damping"],
         stiffness=field["stiffness"],
         viscosity_stencil=assemble(density * field["viscosity"]) if drags else None,
-        laplace_stencil=laplace,
-        rigidity=rigidity,
+        bending=bending,
         yield_height=field["yield_height"] if yields else None,
         fixed=field["fixed"] if field["fixed"].any() else None,
         density=density if np.ptp(density) else None,
@@ -182,7 +181,7 @@ class MovingOperator:
         if operator.viscosity_stencil is not None:
             self._viscosity_share = _share(field["viscosity"], field["speed"] ** 2, material.tightening)
             self._viscosity = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
-        if operator.laplace_stencil is not None and not len(operator.rim_links.texels):
+        if operator.bending is not None and not len(operator.rim_links.texels):
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
         around = np.ascontiguousarray(np.moveaxis(texels.halo_positions, -1, 0))
         self._level = atlas.areas / self._cells.moved(around, self._tension)[1]
@@ -191,15 +190,15 @@ class MovingOperator:
     def at(self, places: MovedPlaces) -> WaveOperator:
         """Operator where the places are."""
         tension = MovedStencil(self._cells, self._tension, places, added=self._rest.rim_links)
-        viscosity, laplace, rigidity = None, self._rest.laplace_stencil, self._rest.rigidity
+        viscosity, bending = None, self._rest.bending
         if self._viscosity is not None:
             like = None if self._viscosity_share is None else (tension, self._viscosity_share)
             viscosity = MovedStencil(self._cells, self._viscosity, places, like)
-        if self._laplace is not None and rigidity is not None:
+        if self._laplace is not None and bending is not None:
             laplace = MovedStencil(self._cells, self._laplace, places)
             # sigma b / A, with sigma = M / A
-            rigidity = rigidity * (self._areas / self.areas(laplace)) ** 2
-        return self._rest.moved(tension, viscosity, laplace, rigidity)
+            bending = Bending(laplace, bending.rigidity * (self._areas / self.areas(laplace)) ** 2)
+        return self._rest.moved(tension, viscosity, bending)
 
     def areas(self, stencil: Stencil) -> Floats:
         """Area of each texel [m^2], [C, n, n], under a stencil of `at`; that at rest under any other."""

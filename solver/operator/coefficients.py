@@ -7,16 +7,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import POSITIVE, SolverError, shown
 
-# name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
+# name: unit, whether it has to be greater than 0, whether infinity is allowed; none may be negative
 LIMITS = {
-    "speed": ("m/s", 0.0, False, False),
-    "damping": ("1/s", 0.0, False, False),
-    "stiffness": ("1/s^2", 0.0, False, False),
-    "viscosity": ("m^2/s", 0.0, False, False),
-    "density": ("kg/m^2", 0.0, True, False),
-    "bending": ("m^4/s^2", 0.0, False, False),
-    "yield_height": ("m", 0.0, True, True),
-    "deep": ("1/m", 0.0, False, False),
+    "speed": ("m/s", False, False),
+    "damping": ("1/s", False, False),
+    "stiffness": ("1/s^2", False, False),
+    "viscosity": ("m^2/s", False, False),
+    "density": ("kg/m^2", True, False),
+    "bending": ("m^4/s^2", False, False),
+    "yield_height": ("m", True, True),
+    "deep": ("1/m", False, False),
 }
 
 # Beyond any physical value, and small enough that nothing overflows on the way to the time step.
@@ -25,13 +25,16 @@ _HIGHEST = 1e12
 
 def check_numbers(name: str, value: ArrayLike) -> None:
     """Raise `SolverError` unless a coefficient is within its limits, and one number or one value a texel."""
-    unit, low, strict, endless = LIMITS[name]
+    unit, strict, endless = LIMITS[name]
     numbers = _numbers(name, value)
-    small = (numbers <= low) | (numbers < 1 / _HIGHEST) if strict else numbers < low
-    wrong = small | np.isnan(numbers) | ((numbers > _HIGHEST) & ~(np.isinf(numbers) & endless))
+    wrong = (
+        (numbers < (1 / _HIGHEST if strict else 0))
+        | np.isnan(numbers)
+        | ((numbers > _HIGHEST) & ~(np.isinf(numbers) & endless))
+    )
     if wrong.any():
         worst = numbers.flat[np.argmax(wrong)]
-        bound = f"greater than {low:g} and at least {1 / _HIGHEST:g}" if strict else f"{low:g} or greater"
+        bound = f"greater than 0 and at least {1 / _HIGHEST:g}" if strict else "0 or greater"
         raise SolverError(
             f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to {_HIGHEST:g}"
             f"{', or infinity' if endless else ''}"

@@ -130,7 +130,7 @@ def over_fluid(operator: WaveOperator, deep: float, geometry: Stencil, areas: ND
     """
     for wrong, what in (
         (operator.density is not None, "a density that varies"),
-        (operator.rigidity is not None, "bending"),
+        (operator.bending is not None, "bending"),
         (operator.yield_height is not None, "a yield height"),
     ):
         if wrong:

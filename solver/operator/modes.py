@@ -96,7 +96,7 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
         if operator.topology.fixed_rim or not operator.free.all() or uneven:
             raise SolverError("modes of deep fluid are known with a free rim, no clamp, one speed and stiffness alone")
         matrix, weight, least = stiffness_matrix(operator.geometry), operator.areas.ravel(), 0.0
-    tilts = 0 if operator.laplace_stencil is None else 2
+    tilts = 0 if operator.bending is None else 2
     vectors = _lowest(matrix[moving][:, moving], weight[moving], least, int(count) + tilts)
     heights = np.zeros((vectors.shape[1], operator.mass.size))
     heights[:, moving] = vectors.T
@@ -108,9 +108,9 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
 def elastic_matrix(operator: WaveOperator) -> csr_array:
     """K + L B L + M k as a matrix [T, T] [kg/s^2], whose product with a height is minus `elastic_force`."""
     matrix = stiffness_matrix(operator.stencil) + diags_array((operator.mass * operator.stiffness).ravel())
-    if operator.laplace_stencil is not None and operator.rigidity is not None:
-        laplace = stiffness_matrix(operator.laplace_stencil)
-        matrix = matrix + laplace @ diags_array(operator.rigidity.ravel()) @ laplace
+    if operator.bending is not None:
+        laplace = stiffness_matrix(operator.bending.laplace)
+        matrix = matrix + laplace @ diags_array(operator.bending.rigidity.ravel()) @ laplace
     return csr_array(matrix)
 
 

@@ -8,14 +8,15 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SolverError
+from ..mesh.topology import labels
 from ..texels.stencil import (
     EAST,
     NO_LINKS,
@@ -74,9 +75,7 @@ def floating_parts(
 def _chart_parts(topology: TexelTopology) -> NDArray[np.int64]:
     """Part of the mesh to which each chart belongs, [C], from 0."""
     chart, side = np.nonzero(topology.glued[..., 0] >= 0)
-    other, count = topology.glued[chart, side, 0], len(topology.glued)
-    graph = coo_array((np.ones(len(chart)), (chart, other)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
 
 
 def _joins_all(tie: Tie) -> bool:
@@ -103,6 +102,21 @@ SAFETY = 0.99
 _OF_REST = ("free", "movable", "anchored", "source_share", "inverse_density", "response", "parts")
 
 
+class Bending(NamedTuple):
+    """L B L, the bi-Laplacian's symmetric form; B L h are a plate's moments.
+
+    Attributes
+    ----------
+    laplace : Stencil
+        Link weights of L, which gives the area integral of the Laplacian.
+    rigidity : float64 [C, n, n]
+        B = sigma b / A [kg/s^2].
+    """
+
+    laplace: Stencil
+    rigidity: NDArray[np.float64]
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class WaveOperator:
     """M h_tt = -(K + L B L) h - M zeta h_t - M k h - D h_t on the texels; stencils give K, L and D.
@@ -117,10 +131,8 @@ class WaveOperator:
         zeta [1/s] and k [1/s^2]; beside the rims of a plate k may be below 0.
     viscosity_stencil : Stencil or None
         Link weights of D [kg/s]; None without viscosity.
-    laplace_stencil : Stencil or None
-        Link weights of L, which gives the area integral of the Laplacian; None without bending.
-    rigidity : float64 [C, n, n] or None
-        B = sigma b / A [kg/s^2]: L B L is the bi-Laplacian's symmetric form, B L h a plate's moments.
+    bending : Bending or None
+        L and B; None without bending.
     yield_height : float64 [C, n, n] or None
         [m]; None where everything is elastic.
     fixed : bool [C, n, n] or None
@@ -140,8 +152,7 @@ class WaveOperator:
     damping: NDArray[np.float64]
     stiffness: NDArray[np.float64]
     viscosity_stencil: Stencil | None = None
-    laplace_stencil: Stencil | None = None
-    rigidity: NDArray[np.float64] | None = None
+    bending: Bending | None = None
     yield_height: NDArray[np.float64] | None = None
     fixed: NDArray[np.bool_] | None = None
     rim_links: IrregularLinks = NO_LINKS
@@ -163,8 +174,8 @@ class WaveOperator:
     def movable(self) -> NDArray[np.bool_]:
         """Texels that sources may move: free, and with something that pulls back. All, where nothing pulls anywhere."""
         pulled = (self.stencil.absolute_sums() > 0) | (self.stiffness > 0)
-        if self.rigidity is not None:
-            pulled |= self.rigidity > 0
+        if self.bending is not None:
+            pulled |= self.bending.rigidity > 0
         movable = pulled & self.free
         return movable if movable.any() else self.free
 
@@ -173,8 +184,8 @@ class WaveOperator:
         """Free texels that a link ties to what is clamped, [C, n, n]."""
         free = self.free.astype(np.float64)
         tied = self.stencil(free) != 0
-        if self.laplace_stencil is not None:
-            tied |= self.laplace_stencil(free) != 0
+        if self.bending is not None:
+            tied |= self.bending.laplace(free) != 0
         return tied & self.free
 
     @functools.cached_property
@@ -196,25 +207,14 @@ class WaveOperator:
     def parts(self) -> NDArray[np.int32] | None:
         """Number of the freely floating part to which each texel belongs, [C, n, n], or None: `floating_parts`."""
         ties: list[Tie] = [(self.stencil, None)]
-        if self.laplace_stencil is not None and self.rigidity is not None:
-            ties.append((self.laplace_stencil, self.rigidity))
+        if self.bending is not None:
+            ties.append(self.bending)
         return floating_parts(ties, (self.stiffness > 0) | self.anchored, self.movable)
 
-    def moved(
-        self,
-        stencil: Stencil,
-        viscosity_stencil: Stencil | None,
-        laplace_stencil: Stencil | None,
-        rigidity: NDArray[np.float64] | None,
-    ) -> WaveOperator:
+    def moved(self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | None) -> WaveOperator:
         """The same surface with its texels elsewhere: masses, and what holds or parts it, stay."""
         moved = dataclasses.replace(
-            self,
-            stencil=stencil,
-            viscosity_stencil=viscosity_stencil,
-            laplace_stencil=laplace_stencil,
-            rigidity=rigidity,
-            bounded=True,
+            self, stencil=stencil, viscosity_stencil=viscosity_stencil, bending=bending, bounded=True
         )
         for name in _OF_REST:
             object.__setattr__(moved, name, getattr(self, name))
@@ -231,8 +231,9 @@ class WaveOperator:
     def link_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
         """-(K + L B L) h [N], float64 [C, n, n]: what neighbours exert on each other, by tension and bending."""
         force = self.stencil(height)
-        if self.laplace_stencil is not None and self.rigidity is not None:
-            force -= self.laplace_stencil(self.rigidity * self.laplace_stencil(height))
+        if self.bending is not None:
+            laplace, rigidity = self.bending
+            force -= laplace(rigidity * laplace(height))
         return force
 
     @functools.cached_property
@@ -243,9 +244,9 @@ class WaveOperator:
         nothing moves.
         """
         bound = self.stencil.fastest(self.mass)
-        if self.laplace_stencil is not None and self.rigidity is not None:
-            bending = self.laplace_stencil.fastest(self.mass)
-            bound += bending * float((self.rigidity * self.mass).max()) * bending
+        if self.bending is not None:
+            bending = self.bending.laplace.fastest(self.mass)
+            bound += bending * float((self.bending.rigidity * self.mass).max()) * bending
         if self.stiffness.min() < 0:  # as plates have them beside rims, with links that outweigh them
             wave = self._rate(self.elastic_force, bound + max(self.stiffness.max(), 0.0))
         else:

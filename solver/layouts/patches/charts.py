@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ...errors import AtlasError
+from ...mesh.topology import labels
 from .cells import BorderedCells
 from .disks import Border, along, flattened
 from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved, halved_chords
@@ -118,9 +117,8 @@ def charts_of(surface: TriangleSurface, sides: list[Sides]) -> tuple[TriangleSur
     size = len(surface.V)
     walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
     wall = np.isin(surface.edges.ends @ [size, 1], np.sort(walls, axis=1) @ [size, 1])
-    beside = surface.edges.sides[~wall] // 3
-    links = coo_array((np.ones(len(beside)), tuple(beside.T)), shape=(len(surface.F),) * 2)
-    number, part = connected_components(links, directed=False)
+    part = labels(surface.edges.sides[~wall] // 3, len(surface.F))
+    number = int(part.max()) + 1
     if number != len(sides):
         raise AtlasError(f"{len(sides)} charts came out as {number}: triangles of the surface are too thin")
     # the triangle on the inner side of the first edge of a chart's second side

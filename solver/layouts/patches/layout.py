@@ -13,10 +13,9 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ...kernel import Floats, Ints, kernel
+from ...mesh.topology import labels
 from ..energy import FIXED, FREE
 from .collapse import without_cuts
 from .energy import ChartShapes, energy_of, gather, relax_all, scratch, shapes_of, star_energy, sweep, sweep_all
@@ -310,8 +309,7 @@ def _components(
     V: NDArray[np.float64], F: NDArray[np.int64], cells: int
 ) -> tuple[list[TriangleSurface], list[int], NDArray[np.float64]]:
     """Each connected component, how many cells it gets, and its share of the area."""
-    links = coo_array((np.ones(F.size), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(len(V), len(V)))
-    _, part = connected_components(links, directed=False)
+    part = labels(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), len(V))
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
     areas = TriangleSurface.of(V, F).areas
     share = np.bincount(of, areas / areas.sum()).astype(np.float64)

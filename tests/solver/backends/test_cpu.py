@@ -26,10 +26,11 @@ class DenseWaves:
         self.dent = np.zeros_like(self.h)
         self.forces, self.acceleration = np.zeros_like(self.h), 0.0
         size = len(self.h)
+        laplace, rigidity = operator.bending or (None, np.zeros(size))
         self._tension, self._viscosity, self._laplace = (
-            matrix(each, size) for each in (operator.stencil, operator.viscosity_stencil, operator.laplace_stencil)
+            matrix(each, size) for each in (operator.stencil, operator.viscosity_stencil, laplace)
         )
-        self._rigidity = np.zeros(size) if operator.rigidity is None else operator.rigidity.ravel()
+        self._rigidity = rigidity.ravel()
 
     def advance(self, substeps: int, dt: float) -> None:
         operator = self._operator
