@@ -49,10 +49,7 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        (
-            {"preset": "foam"},
-            "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, suited, g",
-        ),
+        ({"preset": "foam"}, "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, suited, g"),
         (
             {"preset": {"name": "membrane", "modulus": 1.0}},
             "no parameter 'modulus'; valid are tension, density, damping",
