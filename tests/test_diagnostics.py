@@ -65,7 +65,7 @@ def test_a_vendor_file_that_is_damaged_or_whose_library_is_missing(tmp_path, mon
         ("{", "is damaged"),
         (
             f'{{"ICD": {{"library_path": "{gone}"}}}}',
-            f"names {gone}, which cannot be loaded: apt-get install libnvidia",
+            f"names {gone}, which cannot be loaded: apt-get install libnvidia-gl-",
         ),
     ):
         file.write_text(text)

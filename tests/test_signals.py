@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 from scene_files import write_scene
 
-from ripple_sim import VideoOptions, export_scene, load_scene, render_video
+from ripple_sim import ExportOptions, Simulation, VideoOptions, export_scene, load_scene, render_video
 from ripple_sim.batch.worker import FrameRecord, StoreEntry
 from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import SceneError
-from ripple_sim.export.options import ExportOptions
 from ripple_sim.overlay.notes import traces
-from ripple_sim.simulation import Simulation
 
 MODEL = """<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 <geom name="ball" type="sphere" size="0.3" pos="0 0 0.3"/><site name="top" pos="0 0 0.6"/>

@@ -8,13 +8,10 @@ import pytest
 from bouncing_stone import MJCF, TOML
 from scene_files import write_scene
 
+from ripple_sim import Scene, Simulation, VideoOptions, load_scene, render_video
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.errors import SceneError, SimulationError
-from ripple_sim.scene import Scene, load_scene
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.video import VideoOptions
-from ripple_sim.video.render_video import render_video
 
 pytestmark = pytest.mark.usefixtures("opengl")
 

@@ -15,8 +15,7 @@ from ripple_sim import Material, VideoOptions, load_scene, render_video
 from ripple_sim.encode.clip import H264, Clip, Stream, join_clips
 from ripple_sim.errors import VideoError
 from ripple_sim.scene.scene_file import uniform_material
-from ripple_sim.solver import WaveSolver, build_atlas, load_mesh
-from ripple_sim.solver.texels.texel_atlas import texel_atlas
+from ripple_sim.solver import WaveSolver, build_atlas, load_mesh, texel_atlas
 from ripple_sim.sound import DENSITY, RATE, SPEED, Ear, gain, write_wav
 
 

@@ -199,11 +199,6 @@ class MovedHeightMap(NamedTuple):
     height_map: NDArray[np.float32]
     V: NDArray[np.float64]
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the height map."""
-        return self.height_map.shape
-
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray:
         return np.asarray(self.height_map, dtype=dtype)
 
@@ -228,11 +223,10 @@ class HeightMapTextures:
         self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self._texture.repeat_x = self._texture.repeat_y = False
 
-    def write(self, layer: int, height_map: AnyHeightMap) -> float:
+    def write(self, layer: int, height_map: NDArray[np.float32] | DeviceHeightMap) -> float:
         """Replace a target's height map, [C, n + 2, n + 2, 4]; return the largest height in it [m]."""
         if isinstance(height_map, DeviceHeightMap):
             return height_map.fill(self._texture, layer)
-        height_map = np.asarray(height_map)
         write_page(self._texture, self._pages[layer], layer, height_map)
         return float(np.abs(height_map[..., 3]).max())
 

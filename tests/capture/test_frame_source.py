@@ -10,12 +10,10 @@ from exposed_scene import DISTANCE, FOVY, FPS, HEIGHT, SPEED, WIDTH, linear
 from mujoco_models import posed
 from PIL import Image
 
+from ripple_sim import Simulation, VideoOptions, render_video
 from ripple_sim.capture import FrameSource, Sensor, focal_distance, snapshots, viewpoint
 from ripple_sim.render import Camera, perspective, view_matrix
 from ripple_sim.scene import CameraEntry, Scene, check_camera, with_exposure
-from ripple_sim.simulation import Simulation
-from ripple_sim.video import VideoOptions
-from ripple_sim.video.render_video import render_video
 
 FOCAL_PIXELS = HEIGHT / 2 / np.tan(np.radians(FOVY) / 2)
 

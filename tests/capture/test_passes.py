@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scene_files import write_scene
 
+from ripple_sim import Simulation, load_scene
 from ripple_sim.capture import FrameSource, Sighting, passes_of, snapshots
 from ripple_sim.export import MovingMesh
-from ripple_sim.scene import load_scene
-from ripple_sim.simulation import Simulation
 
 WIDTH, HEIGHT = 160, 120
 MJCF = """<mujoco><option timestep="0.002" gravity="0 0 -3"/><worldbody>

@@ -9,10 +9,9 @@ from hits import Run
 from mujoco_models import add_ball, forwarded, mesh_spec
 from vessels import opened
 
-from ripple_sim import make_collidable
+from ripple_sim import drop_scene, make_collidable
 from ripple_sim.coupling import find_flex_colliders, flex_thickness, inset
 from ripple_sim.errors import SceneError
-from ripple_sim.scene import drop_scene
 from ripple_sim.scenes.shapes import limbed, peanut, polygonise, sphere
 from ripple_sim.solver import Mesh
 

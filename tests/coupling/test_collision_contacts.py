@@ -13,9 +13,8 @@ import trimesh
 from hits import Run
 from mujoco_models import BALL, add_ball, mesh_asset, mesh_spec, model_of
 
-from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim import Material, Ripples, RippleWarning, make_collidable
 from ripple_sim.coupling import hull_gap, places_facing
-from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 

@@ -16,18 +16,16 @@ SHAPES = ('type="box" size="0.2 0.2 0.1"', 'type="sphere" size="0.15"', 'type="c
 def pit(seed: int, cone: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Bodies of three shapes that have fallen into a pit, with contacts of several dimensions."""
     rng = np.random.default_rng(seed)
-    walls = "".join(
-        f'<geom type="plane" size="3 3 0.1" pos="{-0.35 * x} {-0.35 * y} 0" zaxis="{x} {y} {z}"/>'
-        for x, y, z in ((0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
-    )
+    wall = '<geom type="plane" size="3 3 0.1" pos="{0} {1} 0" zaxis="{2} {3} {4}"/>'
+    ways = (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)
+    walls = "".join(wall.format(-0.35 * x, -0.35 * y, x, y, z) for x, y, z in ways)
     bodies = "".join(
         f'<body pos="{x:.3f} {y:.3f} {0.2 + 0.25 * i:.3f}"><freejoint/>'
         f'<geom {SHAPES[i % 3]} condim="{(1, 3, 4, 6)[i % 4]}"/></body>'
         for i, (x, y) in enumerate(rng.uniform(-0.1, 0.1, (8, 2)))
     )
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option timestep="0.002" cone="{cone}"/><worldbody>{walls}{bodies}</worldbody></mujoco>'
-    )
+    option = f'<option timestep="0.002" cone="{cone}"/>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{option}<worldbody>{walls}{bodies}</worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, nstep=400)
     return model, data

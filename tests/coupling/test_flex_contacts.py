@@ -10,10 +10,9 @@ import trimesh
 from hits import Run
 from mujoco_models import add_ball, mesh_asset, mesh_spec, vector
 
-from ripple_sim import make_collidable
+from ripple_sim import RippleWarning, make_collidable
 from ripple_sim.coupling import ContactReader, CoupledModel, FlexContacts, target_atlas
 from ripple_sim.coupling.target_mesh import target_mesh
-from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import limbed, peanut
 
 GEOM = mujoco.mjtGeom

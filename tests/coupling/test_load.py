@@ -149,10 +149,8 @@ def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface()
 def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
     """Three targets and bodies on all of them: those that ripple with others have the same waves, bit for bit."""
     rng = np.random.default_rng(4)
-    targets = "".join(
-        f'<geom name="{name}" type="box" size="0.3 0.3 0.05" pos="{x} 0 0"/>'
-        for name, x in (("left", -0.7), ("middle", 0.0), ("right", 0.7))
-    )
+    target, names = '<geom name="{}" type="box" size="0.3 0.3 0.05" pos="{} 0 0"/>', ("left", "middle", "right")
+    targets = "".join(target.format(name, x) for name, x in zip(names, (-0.7, 0.0, 0.7), strict=True))
     bodies = "".join(
         f'<body pos="{0.7 * (i % 3 - 1) + x:.3f} {y:.3f} {0.1 + 0.02 * i:.3f}"><freejoint/>'
         f'<geom type="{("sphere", "box", "capsule")[i // 3]}" size="0.04 0.04 0.04"/></body>'
@@ -160,7 +158,6 @@ def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
     )
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{targets}{bodies}</worldbody></mujoco>")
     data = mujoco.MjData(model)
-    names = ("left", "middle", "right")
     options = {"resolution": 16, "backend": "cpu"}
     together = Ripples(model, {name: Material() for name in names}, **options)
     alone = {name: Ripples(model, {name: Material()}, **options) for name in names}
@@ -170,9 +167,9 @@ def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
         together.step(data)
         for ripples in alone.values():
             ripples.step(data)
-        assert [(each.geom, each.other) for each in together.last_impulses] == [
-            (each.geom, each.other) for ripples in alone.values() for each in ripples.last_impulses
-        ]
+        one_by_one = [each for ripples in alone.values() for each in ripples.last_impulses]
+        hits, expected = ([(each.geom, each.other) for each in told] for told in (together.last_impulses, one_by_one))
+        assert hits == expected
         most = max(most, len(together.last_impulses))
     assert most > 6
     for name in names:

@@ -13,11 +13,8 @@ import pytest
 from hits import Run
 from mujoco_models import mesh_asset
 
-from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.errors import RippleWarning
-from ripple_sim.scene import load_scene
+from ripple_sim import Material, Ripples, RippleWarning, Simulation, load_scene, make_collidable
 from ripple_sim.scenes.shapes import limbed, peanut
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver
 
 GRAVITY = np.array([0, 0, -9.81])

@@ -14,8 +14,7 @@ from random_models import RandomModel
 from shared_sphere_maps import sharing_sphere_maps
 from wave_heights import WaveHeights
 
-from ripple_sim import Impulse, Material, Ripples
-from ripple_sim.errors import RippleWarning
+from ripple_sim import Impulse, Material, Ripples, RippleWarning
 
 RESOLUTION, TOLERANCE = 16, 0.01
 # as long as this the surface receives every force as it comes [s]

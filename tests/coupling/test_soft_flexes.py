@@ -6,8 +6,7 @@ import pytest
 from hits import Run, contact_forces
 from mujoco_models import mesh_asset
 
-from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.errors import RippleWarning
+from ripple_sim import Material, Ripples, RippleWarning, make_collidable
 from ripple_sim.scenes.shapes import limbed
 
 MASS, DT = 0.5, 0.002

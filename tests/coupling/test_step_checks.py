@@ -9,9 +9,8 @@ import trimesh
 from hits import contact_forces
 from mujoco_models import BALL, mesh_asset, model_of
 
-from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim import Material, Ripples, RippleWarning, make_collidable
 from ripple_sim.coupling import PAIR, CoupledModel, TunnellingCheck, step_checks, too_fast
-from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import peanut
 
 MASS, DT = 1e-5, 0.001

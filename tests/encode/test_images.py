@@ -14,17 +14,15 @@ from mujoco_models import posed
 from sphere_height_maps import cube_charts
 from unfinished_videos import contents, egg_scene, interrupting_at, written_until_full
 
+from ripple_sim import Scene, VideoOptions, render_video
 from ripple_sim.cli import main as cli
 from ripple_sim.encode import PassFiles, check_passes, open_writer
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay import color_table
 from ripple_sim.render import Camera, Renderer, Surface, tone_mapped
 from ripple_sim.render.visuals import shapes as meshes
-from ripple_sim.scene import Scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.video import VideoOptions
-from ripple_sim.video.render_video import render_video
 
 WIDTH, HEIGHT = 64, 48
 FRONT = Camera((0.0, 0.0, 0.0), 5.0, 70.0, -20.0, 40.0)

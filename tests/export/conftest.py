@@ -6,8 +6,7 @@ import mujoco
 import pytest
 from scene_files import write_scene
 
-from ripple_sim import Material, Ripples
-from ripple_sim.scene import Scene, load_scene
+from ripple_sim import Material, Ripples, Scene, load_scene
 
 MJCF = """<mujoco><option timestep="0.001"/>
 <asset><texture name="tiles" type="2d" builtin="checker" width="8" height="8"/>

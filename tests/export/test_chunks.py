@@ -11,9 +11,7 @@ import pytest
 from programs import ended
 from unfinished_videos import interrupting_at
 
-from ripple_sim import ExportOptions, RippleError, export_scene
-from ripple_sim.scene import Scene
-from ripple_sim.simulation import Simulation
+from ripple_sim import ExportOptions, RippleError, Scene, Simulation, export_scene
 
 pytest.importorskip("pxr")
 from pxr import Usd, UsdGeom, UsdValidation

@@ -17,13 +17,11 @@ from chromium import PATIENCE, browsing, launched
 from mujoco_models import forwarded
 from PIL import Image
 
-from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, export_scene
+from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, Scene, Simulation, export_scene
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.encode import made_here
 from ripple_sim.export import MovingMesh
 from ripple_sim.render.surfaces import memory_order
-from ripple_sim.scene import Scene
-from ripple_sim.simulation import Simulation
 
 SIZE, FPS, FRAMES, SEEN = (320, 180), 100, 20, 18
 

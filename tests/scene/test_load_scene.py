@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from scene_files import write_scene
 
-from ripple_sim import RippleError
+from ripple_sim import RippleError, Simulation
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import check_files, load_model, load_scene, refusal_of
-from ripple_sim.simulation import Simulation
 
 MJCF = """<mujoco><worldbody><geom name="egg" size="0.1"/>
 <body name="stone" pos="0 0 1"><freejoint/><geom size="0.05"/></body>
@@ -199,7 +198,8 @@ KEY = '<keyframe><key/><key name="start" {}/></keyframe>'
     [
         *((f'<option timestep="{step}"/>', STEP) for step in ("0", "-0.002", "inf", "nan", "1e300")),
         (KEY.format('qpos="1 2"'), r"keyframe 'start' .* has 2 positions \(qpos\); valid are 7"),
-        ('<keyframe><key/><key qvel="0 0 nan 0 0 0"/></keyframe>', r"keyframe 1 of .* holds NaN or inf; valid are fin"),
+        (KEY.format('qvel="0 0 nan 0 0 0"'), "keyframe 'start' of .* holds NaN or inf; valid are finite numbers"),
+        ('<keyframe><key/><key qpos="0 0 nan 1 0 0 0"/></keyframe>', "keyframe 1 of .* valid are finite numbers"),
         ('<size memory="100000000G"/>', r'allocate memory; name in the MJCF how much .* <size memory="4G"/>'),
     ],
 )

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ripple_sim import Material, RippleError
+from ripple_sim import Material, RippleError, Simulation
 from ripple_sim.scene import LAWS, MaterialChange, MaterialEntry, PresetEntry, load_scene, parse_scene
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import texture_map
 
 
@@ -50,10 +49,7 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        (
-            {"preset": "foam"},
-            "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, suited, g",
-        ),
+        ({"preset": "foam"}, "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, suited, g"),
         (
             {"preset": {"name": "membrane", "modulus": 1.0}},
             "no parameter 'modulus'; valid are tension, density, damping",

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scene_files import write_scene
 
-from ripple_sim import scene
+from ripple_sim import Simulation, scene
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import CameraEntry, Events, RippleEntry, Scene, StillEntry
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
 
 LEAST = {"model": "scene.xml", "ripple": [{"geom": "egg"}]}
@@ -123,10 +122,14 @@ def checked(*targets: RippleEntry, **others: object) -> None:
     )
 
 
+def still(radius: float) -> RippleEntry:
+    return RippleEntry(geom="egg", still=[StillEntry((0, 0, 0.1), radius)])
+
+
 def test_a_scene_without_mistakes_passes() -> None:
     checked(EGG, RippleEntry(geom="pea", color=(0, 0.5, 1)))
     checked(EGG, duration=scene.MAX_DURATION - 1.0, overlay=("height=0.02", "time"), lighting="studio")
-    checked(RippleEntry(geom="egg", still=[StillEntry((0, 0, 0.1), 0.01)]))
+    checked(still(0.01))
 
 
 def test_an_event_after_the_end_is_told_of() -> None:
@@ -166,14 +169,7 @@ def test_an_event_after_the_end_is_told_of() -> None:
         ),
         ((RippleEntry(geom="egg", still_map="/none.png"),), {}, "ripple.still_map names the image '/none.png', which"),
         ((RippleEntry(geom="egg", still_map="/"),), {}, "valid is the path of an image relative to the scene file"),
-        *(
-            (
-                (RippleEntry(geom="egg", still=[StillEntry((0, 0, 0), radius)]),),
-                {},
-                f"radius {radius} m; valid is above 0",
-            )
-            for radius in (0.0, -1.0, float("inf"), float("nan"))
-        ),
+        *(((still(radius),), {}, f"radius {radius} m; valid is above 0") for radius in (0.0, -1.0, np.inf, np.nan)),
     ],
 )
 def test_each_mistake_is_named_with_its_value_and_what_is_valid(targets, others: dict, message: str) -> None:
@@ -289,10 +285,8 @@ def test_request_refuses(words: list[str], said: str) -> None:
 @pytest.mark.parametrize(
     "text, said",
     [
-        (
-            ".".join(["a"] * 200_000) + " = 1",
-            r"plan '.*a\.toml' has a key of 200000 parts",
-        ),  # tomllib would take half an hour
+        # tomllib would take half an hour
+        (".".join(["a"] * 200_000) + " = 1", r"plan '.*a\.toml' has a key of 200000 parts"),
         ("[" + " . ".join(["'a'"] * 101) + "]", "has a key of 101 parts .*; valid are at most 100"),
         ("a = " + "9" * 5000, "is not valid TOML: Exceeds the limit"),
         ("a = " + "[" * 5000, "nested too deeply"),

@@ -8,9 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.scene import load_scene
+from ripple_sim import Simulation, load_scene
 from ripple_sim.scenes import shapes
-from ripple_sim.simulation import Simulation
 
 NAMES = "animal arm drum duck finger heavy jelly kick pair pretzel rolling skull sphere teapot terrain"
 

@@ -9,10 +9,9 @@ import pytest
 import trimesh
 from PIL import Image
 
-from ripple_sim import RippleError
+from ripple_sim import RippleError, Simulation
 from ripple_sim.errors import SceneError
 from ripple_sim.scene import InsideEntry, evaluate, load_inside, load_scene
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.operator import STIFF
 

@@ -12,6 +12,7 @@ from scene_files import write_scene
 from sphere_height_maps import cube_charts
 from unfinished_videos import interrupting_at
 
+from ripple_sim import Scene, Simulation, load_scene, render_video
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay import (
@@ -27,13 +28,10 @@ from ripple_sim.overlay import (
 )
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import shapes as meshes
-from ripple_sim.scene import Scene, load_scene
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.layouts.cube import cube_topology, texel_directions
 from ripple_sim.solver.texels import with_filled_halo
 from ripple_sim.video import Film, Progress, VideoOptions
-from ripple_sim.video.render_video import render_video
 
 N, RATE, FRAMES = 24, 30, 8
 EVERYTHING = ["height", "contacts", "grid", "time", "energy"]

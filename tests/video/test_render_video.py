@@ -17,13 +17,12 @@ from PIL import Image
 from programs import ended
 from unfinished_videos import MJCF, contents, egg_scene, interrupting_at
 
-from ripple_sim import ExportOptions
+from ripple_sim import ExportOptions, render_video
 from ripple_sim.encode import FRAMES_IN_CLIP
 from ripple_sim.errors import ExportError, VideoError
 from ripple_sim.scene import MaterialEntry, Scene, load_scene
 from ripple_sim.solver.gl import GLContext
 from ripple_sim.video import VideoOptions, prefetched
-from ripple_sim.video.render_video import render_video
 
 OPTIONS = {"size": (64, 48), "fps": 30}
 

@@ -83,8 +83,6 @@ class Instances:
         Whether it hides the sky from what is below: opaque geoms do.
     casts : bool
         Whether it casts shadows: what MuJoCo adds to explain a scene does not.
-    balls : float64 [k, 4]
-        That contain them.
     shadow_biases : float64 [k]
         How far above the surface shadows must be looked up so that its edges do not shade it [m].
     """
@@ -131,7 +129,7 @@ class Instances:
             for buffer, content in zip(self._level(0), _packed(found[1](0)), strict=True):
                 buffer.orphan(len(content))
                 buffer.write(content)
-        self.shadow_biases, self.balls = np.zeros(len(members)), np.zeros((len(members), 4))
+        self.shadow_biases = np.zeros(len(members))
 
     def update(
         self, data: Any, eye: NDArray[np.float64], pixels: float, occluders: Occluders, sharp: bool = False
@@ -150,7 +148,7 @@ class Instances:
         self._records["core_size"], self._records["shell_size"] = self._sizes[sharp].transpose(1, 0, 2)
         self._buffer.write(self._records.tobytes())
         half = self._records["core_size"] + self._records["shell_size"]
-        self.balls, radius = np.column_stack([position, np.linalg.norm(half, axis=1)]), half.max(axis=1)
+        balls, radius = np.column_stack([position, np.linalg.norm(half, axis=1)]), half.max(axis=1)
         away = np.maximum(np.linalg.norm(position - eye, axis=1) - radius, 0.1 * radius)
         largest = float((radius / away).max()) * pixels
         # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
@@ -158,12 +156,12 @@ class Instances:
         self._segments = _FINEST if sharp else next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
         if self._visual.kind in _ROUND:
             self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
-        near = occluders.near(self.balls, self._hosts)
+        near = occluders.near(balls, self._hosts)
         for number, bias, bits in zip(self.numbers, self.shadow_biases, near, strict=True):
             self._assets.objects.place(number, float(bias), occluders=int(bits))
 
     def bounds(self, data: Any) -> NDArray[np.float64]:
-        """Bounding balls [k, 4] of one or several visuals, tighter than `balls`, where the data says they are."""
+        """Bounding ball [1, 4] of the first one, the only one of what is transparent, where the data says it is."""
         return ball_of(self._assets.model, data, self._visual)
 
     def draw(self) -> None:

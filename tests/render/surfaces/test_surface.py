@@ -12,9 +12,8 @@ from sphere_height_maps import cube_charts
 from ripple_sim.render import LOOKS, Camera, Renderer, Surface
 from ripple_sim.render.surfaces import Charts, split_at_charts, target_color
 from ripple_sim.render.visuals import shapes
-from ripple_sim.solver import RippleError, TexelMesh, texel_atlas
+from ripple_sim.solver import HeightMap, RippleError, TexelMesh, texel_atlas
 from ripple_sim.solver.layouts.cube import CHART_NORMALS
-from ripple_sim.solver.waves import HeightMap
 
 
 @pytest.mark.parametrize(
