@@ -55,8 +55,7 @@ class Motion:
         self._operator = MovingOperator(atlas, material, operator)
         self._folds = Folds(atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64))
         self._edges = edges_of(self._folds.F).ends
-        self._squares = np.empty(len(self._edges))
-        _square_lengths(self.V, self._edges, self._squares)
+        self._squares = _square_lengths(self.V, self._edges)
         self._now = operator
         self._warned, self._looks = False, 0
 
@@ -69,7 +68,7 @@ class Motion:
         self.__dict__.pop("atlas", None)
         if not _stretches(self.V, self._edges, self._squares):
             return None
-        _square_lengths(self.V, self._edges, self._squares)
+        self._squares = _square_lengths(self.V, self._edges)  # another array: copies have the one before
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
         self.__dict__.pop("areas", None)
         self._warn_of_folds()
@@ -125,10 +124,12 @@ class Motion:
 
 
 @kernel
-def _square_lengths(V: Floats, edges: Ints, squares: Floats) -> None:
-    """Fill in the squared lengths [k] of edges [k, 2]; NumPy takes as long as all else that a motion takes."""
+def _square_lengths(V: Floats, edges: Ints) -> Floats:
+    """Squared lengths [k] of edges [k, 2]; NumPy takes as long as all else that a motion takes."""
+    squares = np.empty(len(edges))
     for i in range(len(edges)):
         squares[i] = _squared(V, edges, i)
+    return squares
 
 
 @kernel

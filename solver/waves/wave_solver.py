@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -398,7 +399,7 @@ class WaveSolver:
 
     def __getstate__(self) -> tuple[Any, ...]:
         """What `copy` and `pickle` keep: a copy goes on as the original does, bit for bit."""
-        made_of = self.rest, self.material, self._kind, self.operator, self._motion
+        made_of = self.rest, self.material, self._kind, self.operator, copy.copy(self._motion)
         return made_of, self.backend, self.conserve_volume, self.state
 
     def __setstate__(self, kept: tuple[Any, ...]) -> None:

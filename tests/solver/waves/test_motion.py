@@ -107,7 +107,7 @@ def test_copies_go_on_as_the_original_does():
     waves = WaveSolver(ATLAS, Material(speed=1.0), backend="cpu")
     waves.add_impulse([0, 0, 1], 1.0, 0.3)
     waves.move(ATLAS.mesh.V * [1, 1, 1.5])
-    copies = copy.deepcopy(waves), pickle.loads(pickle.dumps(waves))
+    copies = copy.copy(waves), copy.deepcopy(waves), pickle.loads(pickle.dumps(waves))
     for each in (waves, *copies):
         each.move(ATLAS.mesh.V * [1, 1, 1.6])
         each.step(0.05)
