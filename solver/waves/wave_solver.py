@@ -415,10 +415,8 @@ class WaveSolver:
         Assigning raises `SolverError` for a state of another resolution. Where the solver's own material clamps the
         surface or carries no waves, it takes over dents alone, and comes to rest.
         """
-        elastic, clock = (
-            self._finite(self._backend.elastic(), "height"),
-            (self.time, self._substep, self.substeps_taken),
-        )
+        elastic = self._finite(self._backend.elastic(), "height")
+        clock = self.time, self._substep, self.substeps_taken
         return WaveState(elastic, self.dent, self.velocity, self._held.load, *clock)
 
     @state.setter
