@@ -1,5 +1,6 @@
 #version 410
-// Objects as a light or the floor sees them: MAP says what of them (see contract.py, soft_shadows.glsl). With MOVED vertices are those of a target, displaced.
+// Objects as a light or the floor sees them: MAP says what of them (see contract.py, soft_shadows.glsl). With MOVED
+// vertices are those of a target, displaced.
 #include "glsl/frame.glsl"
 
 VARYING vec3 albedo;

@@ -13,9 +13,8 @@ from ripple_sim.solver.mesh.topology import Edges, edges_of, undirected
 
 # columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
 # chart map
-POSITION, NORMAL, COORDINATES, DIRECTION, BAKED, UV = (
-    slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 17),
-)  # fmt: skip
+POSITION, NORMAL, COORDINATES = slice(0, 3), slice(3, 6), slice(6, 9)
+DIRECTION, BAKED, UV = slice(9, 12), slice(12, 15), slice(15, 17)
 
 
 def tessellate(
