@@ -2,26 +2,21 @@
 
 import numpy as np
 
-from ripple_sim.coupling.geoms import TARGET_TYPES, find_geom
+from ripple_sim.coupling import TARGET_TYPES, find_target, is_soft
 from ripple_sim.coupling.target_mesh import target_mesh
-from ripple_sim.scene import load_scene
-from ripple_sim.scene.scene import shipped_scenes
+from ripple_sim.scene import load_scene, shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, sphere_map_path
-from ripple_sim.solver.errors import MeshError
 from ripple_sim.solver.layouts.sphere_map import progressive_sphere_map
-from ripple_sim.solver.mesh.mesh import check_genus_zero
 
 needed = set()
 for name in shipped_scenes():
     scene = load_scene(name)
     for target in scene.targets:
-        geom = find_geom(scene.model, target.geom)
-        if TARGET_TYPES[int(scene.model.geom_type[geom])] == "sphere":
+        geom = find_target(scene.model, target.geom)
+        if is_soft(scene.model, geom) or TARGET_TYPES[int(scene.model.geom_type[geom])] == "sphere":
             continue
         mesh = target_mesh(scene.model, geom)
-        try:
-            check_genus_zero(mesh)
-        except MeshError:
+        if not mesh.closed or mesh.genus.tolist() != [0]:
             continue  # its atlas has the patch layout
         path = sphere_map_path(mesh)
         np.save(path, progressive_sphere_map(mesh.V, mesh.F))

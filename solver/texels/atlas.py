@@ -57,7 +57,7 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
 
 # Raise it when a layout's map or the file's contents change: the cache has its atlases rebuilt. Files of users are read
 # from that of version 1.0.0 on, as `docs/stability.md` says.
-FORMAT, OLDEST = 15, 13
+FORMAT, OLDEST = 16, 13
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 
 _NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
