@@ -127,19 +127,17 @@ TERMS = 9
 
 
 @kernel
-def expand_star(p: Vector, x: Vector, y: Vector, ring: Floats, shapes: Floats, degree: int, terms: Floats) -> None:
+def expand_star(
+    p: Vector, x: Vector, y: Vector, first: Floats, second: Floats, shapes: Floats, degree: int, terms: Floats
+) -> None:
     """Fill `terms` [degree, 9] for a vertex at p with tangents x, y.
 
-    Triangle i has the corners p, ring[i] and ring[i + 1], counterclockwise; after the last of the ring, [degree, 3],
-    comes the first. Row i of `shapes` [degree, 4] is the triangle's reference: area, and cotangents of the angles at p,
-    ring[i] and ring[i + 1] over twice the area.
+    Triangle i has the corners p, first[i] and second[i], each [degree, 3], counterclockwise. Row i of `shapes`
+    [degree, 4] is its reference: area, and cotangents of the angles at p, first[i] and second[i] over twice the area.
     """
-    e = subtract(row(ring, degree - 1), p)
-    ax, ay, az = dot(e, x), dot(e, y), dot(e, p)
-    i = degree - 1
-    for k in range(degree):
-        e = subtract(row(ring, k), p)
-        bx, by, bz = dot(e, x), dot(e, y), dot(e, p)
+    for i in range(degree):
+        e, g = subtract(row(first, i), p), subtract(row(second, i), p)
+        ax, ay, az, bx, by, bz = dot(e, x), dot(e, y), dot(e, p), dot(g, x), dot(g, y), dot(g, p)
         area, opposite, left, right = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
         half = 0.5 / area
         cx, cy, cz = bx - ax, by - ay, bz - az
@@ -156,8 +154,6 @@ def expand_star(p: Vector, x: Vector, y: Vector, ring: Floats, shapes: Floats, d
         terms[i, DZ] = -2.0 * (left * bz + right * az)
         terms[i, BEND] = left + right
         terms[i, AREA] = area
-        ax, ay, az = bx, by, bz
-        i = k
 
 
 @kernel
@@ -177,10 +173,13 @@ def star_energy(terms: Floats, degree: int, density: Density, move: Vector) -> f
 
 
 @kernel
-def star_slopes(terms: Floats, degree: int, density: Density) -> tuple[float, float, float, float, float, float]:
+def star_slopes(
+    terms: Floats, degree: int, density: Density, curvature: float
+) -> tuple[float, float, float, float, float, float]:
     """Energy, gradient x, y and Hessian xx, xy, yy at rest; the energy is infinite if a triangle is folded.
 
-    On the sphere a tangent step also falls towards the centre, and the Hessian loses the radial slope.
+    With a curvature of 1, on the sphere, a tangent step also falls towards the centre, and the Hessian loses the radial
+    slope; charts have 0.
     """
     energy = gx = gy = radial = hxx = hxy = hyy = 0.0
     for i in range(degree):
@@ -198,6 +197,7 @@ def star_slopes(terms: Floats, degree: int, density: Density) -> tuple[float, fl
         hxx += area * (flat + dx * ddx + jx * jjx)
         hyy += area * (flat + dy * ddy + jy * jjy)
         hxy += area * (dx * ddy + jx * jjy)
+    radial *= curvature
     return energy, gx, gy, hxx - radial, hxy, hyy - radial
 
 
@@ -224,33 +224,38 @@ def newton_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -
 
 
 @kernel
-def tangent_move(a: float, b: float) -> Vector:
-    """Move dx, dy, dz that takes p to p + a x + b y, brought back to the sphere."""
-    square = a * a + b * b
+def tangent_move(a: float, b: float, curvature: float) -> Vector:
+    """Move dx, dy, dz that takes p to p + a x + b y, with a curvature of 1 brought back to the sphere."""
+    square = curvature * (a * a + b * b)
     length = np.sqrt(1.0 + square)
     return a / length, b / length, -square / (length * (1.0 + length))
 
 
 @kernel
-def descend(terms: Floats, degree: int, density: Density) -> tuple[float, Vector]:
+def descend(terms: Floats, degree: int, density: Density, curvature: float, freedom: int) -> tuple[float, Vector]:
     """How far the energy of a star falls by a Newton step of its vertex that folds nothing, and the move."""
     stay = (0.0, 0.0, 0.0)
-    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, density)
+    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, density, curvature)
     if not energy < np.inf:
         return 0.0, stay
-    sx, sy = newton_direction(gx, gy, hxx, hxy, hyy)
+    if freedom == FREE:
+        sx, sy = newton_direction(gx, gy, hxx, hxy, hyy)
+    elif freedom == COLUMN:
+        sx, sy = -gx / max(abs(hxx), 1e-300), 0.0
+    else:
+        sx, sy = 0.0, -gy / max(abs(hyy), 1e-300)
     descent = -(gx * sx + gy * sy)
     if not descent > 1e-13 * energy:
         return 0.0, stay
     step = min(1.0, REACH / np.sqrt(sx * sx + sy * sy))
     for _ in range(MOST_TRIALS):
-        move = tangent_move(step * sx, step * sy)
+        move = tangent_move(step * sx, step * sy, curvature)
         lower = star_energy(terms, degree, density, move)
         if lower < energy - ARMIJO * step * descent:
             further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
             while further:
                 step *= 2.0
-                ahead = tangent_move(step * sx, step * sy)
+                ahead = tangent_move(step * sx, step * sy, curvature)
                 least = star_energy(terms, degree, density, ahead)
                 further = 2.0 * least < lower
                 if least < lower:

@@ -13,7 +13,7 @@ from .cells import (
 )
 from .collapse import without_cuts as without_cuts
 from .disks import disk_cells as disk_cells, signed_areas as signed_areas
-from .energy import shapes_of as shapes_of, total_energy as total_energy
+from .energy import assemble as assemble, reference_of as reference_of, total_energy as total_energy
 from .layout import move_tips as move_tips, patch_map as patch_map, relax as relax
 from .pieces import Pieces as Pieces
 from .quads import (

@@ -14,11 +14,11 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel import Floats, Ints, kernel
+from ...kernel import Ints, kernel
 from ...mesh.topology import labels
-from ..energy import FIXED, FREE
+from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
-from .energy import ChartShapes, energy_of, gather, relax_all, scratch, shapes_of, star_energy, sweep, sweep_all
+from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
 from .quads import CELLS, Quads, large_quads_of, part_of, quads_of
 from .seamless import Frame, SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned, wedge
 from .surface import TriangleSurface
@@ -28,14 +28,14 @@ _SWEEPS = 3  # over the vertices round a tip, before it is judged
 _WORTH = 1e-3  # share of the energy round a tip that a move must save
 
 
-def move_tips(seamless: SeamlessMap, shapes: ChartShapes, tips: Ints) -> Ints:
+def move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints) -> Ints:
     """Move each of these tips to the first neighbour where the energy is lower; return where those are that moved."""
-    return _move_tips(seamless, shapes, tips, scratch(seamless))
+    return _move_tips(seamless, reference, tips, scratch(seamless))
 
 
 @kernel
-def _move_tips(seamless: SeamlessMap, shapes: ChartShapes, tips: Ints, star: Floats) -> Ints:
-    fan = np.empty((2, len(star)), np.int64)
+def _move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints, star: Star) -> Ints:
+    fan = np.empty((2, len(star.terms)), np.int64)
     mark = np.zeros(len(seamless.z) + len(seamless.F), np.int64)
     count = stamp = 0
     moved = np.empty(len(tips), np.int64)
@@ -48,7 +48,7 @@ def _move_tips(seamless: SeamlessMap, shapes: ChartShapes, tips: Ints, star: Flo
                 continue
             stamp += 1
             vertices, triangles = _around(seamless, v, u, mark, stamp)
-            if len(vertices) and _moved(seamless, shapes, vertices, triangles, fan, star):
+            if len(vertices) and _moved(seamless, reference, vertices, triangles, fan, star):
                 moved[count] = u
                 count += 1
                 break
@@ -105,30 +105,31 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
 @kernel
 def _moved(
     seamless: SeamlessMap,
-    shapes: ChartShapes,
+    reference: Reference,
     vertices: Ints,
     triangles: Ints,
     fan: Ints,
-    star: Floats,
+    star: Star,
 ) -> bool:
     """Try to move a tip; whether it stays there."""
-    before = energy_of(seamless, shapes, triangles)
+    before = energy_of(seamless, reference, triangles)
     z, chart, freedom = seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices]
     turn, shift = seamless.turn[triangles], seamless.shift[triangles]
     v, u = vertices[0], vertices[1]
     _change_frames(seamless, v, u, fan)
-    degree = gather(seamless, shapes, v, star)
-    _put_into_star(seamless, shapes, v, u, star, degree)
+    degree = gather(seamless, reference, v, 0j, star)
+    _put_into_star(seamless, v, u, star, degree, reference.density)
     angle = 0.0
     for i in range(degree):
-        p, q = complex(star[i, 0], star[i, 1]) - seamless.z[v], complex(star[i, 2], star[i, 3]) - seamless.z[v]
+        p = complex(star.first[i, 0], star.first[i, 1]) - seamless.z[v]
+        q = complex(star.second[i, 0], star.second[i, 1]) - seamless.z[v]
         angle += np.arctan2(wedge(p, q), p.real * q.real + p.imag * q.imag)
     _enter_chart(seamless, v)
     # round a wide cone's vertex the map may wind twice without a fold
-    if angle < 3.0 * np.pi and energy_of(seamless, shapes, triangles) < np.inf:
+    if angle < 3.0 * np.pi and energy_of(seamless, reference, triangles) < np.inf:
         for _ in range(_SWEEPS):
-            sweep(seamless, shapes, vertices, star, True)
-        if energy_of(seamless, shapes, triangles) < (1.0 - _WORTH) * before:
+            sweep(seamless, reference, vertices, star, True)
+        if energy_of(seamless, reference, triangles) < (1.0 - _WORTH) * before:
             return True
     seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices] = z, chart, freedom
     for i in range(len(triangles)):
@@ -138,13 +139,13 @@ def _moved(
 
 
 @kernel
-def _put_into_star(seamless: SeamlessMap, shapes: ChartShapes, u: int, v: int, star: Floats, degree: int) -> None:
+def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: int, density: Density) -> None:
     """Put u, in the frame that it begins with, on a way from v, where its star's energy is least and nothing folded."""
     start = seamless.star_start[u]
     z = left = right = middle = 0j
     for i in range(degree):
         f, k = seamless.star[start + i] // 3, seamless.star[start + i] % 3
-        p, q = complex(star[i, 0], star[i, 1]), complex(star[i, 2], star[i, 3])
+        p, q = complex(star.first[i, 0], star.first[i, 1]), complex(star.second[i, 0], star.second[i, 1])
         middle += (p + q) / (2 * degree)
         if seamless.F[f, (k + 1) % 3] == v:
             z, left = p, q
@@ -157,7 +158,7 @@ def _put_into_star(seamless: SeamlessMap, shapes: ChartShapes, u: int, v: int, s
         t = 0.65
         for _ in range(trials):
             p = z + t * (goal - z)
-            energy = star_energy(star, degree, p.real, p.imag)
+            energy = star_energy(star.terms, degree, density, (p.real, p.imag, 0.0))
             if energy < least:
                 least, best = energy, p
             elif least < np.inf:
@@ -278,15 +279,15 @@ def relax(V: NDArray[np.float64], seamless: SeamlessMap) -> None:
 
     Cells are small and flat enough for that from where the quads lie; no step folds a triangle.
     """
-    shapes = shapes_of(V, seamless.F, len(seamless.glued))
-    relax_all(seamless, shapes, _ROUGH)
+    reference = reference_of(V, seamless.F, len(seamless.glued))
+    relax_all(seamless, reference, _ROUGH)
     tips = np.flatnonzero(seamless.freedom == FIXED)
     for i in range(_MOST_MOVES):
-        tips = move_tips(seamless, shapes, tips)
+        tips = move_tips(seamless, reference, tips)
         if not len(tips):
             break
-        sweep_all(seamless, shapes, i % 2 == 0)
-    relax_all(seamless, shapes, _FINE)
+        sweep_all(seamless, reference, i % 2 == 0)
+    relax_all(seamless, reference, _FINE)
 
 
 def _recut(part: TriangleSurface, quads: Quads, count: int, wanted: float, large: bool) -> Quads:

@@ -22,7 +22,7 @@ from ...errors import SphereMapError
 from ...kernel import Floats, Ints32, kernel
 from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
-from ..energy import FOLDED, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
+from ..energy import FOLDED, FREE, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
 from ..newton import CG_TOLERANCE, System, add_triangle, conjugate_gradients, descend_by_newton, line_search
 from .certificate import align, certify
 from .decimation import CornerTable, corner_table, decimate, following, gather_star, preceding, undo_collapse
@@ -195,13 +195,14 @@ def sweep(level: Level, S: Floats, shapes: Floats, density: Density, backwards: 
     largest = 0
     for v in range(count):
         largest = max(largest, level.star_start[v + 1] - level.star_start[v])
-    ring, terms = np.empty((largest, 3)), np.empty((largest, TERMS))
+    ring, terms = np.empty((largest + 1, 3)), np.empty((largest, TERMS))
     fall = 0.0
     for i in range(count):
         v = count - 1 - i if backwards else i
         first, last = level.star_start[v], level.star_start[v + 1]
         for k in range(last - first):
             ring[k, 0], ring[k, 1], ring[k, 2] = row(S, level.ring[first + k])
+        ring[last - first, 0], ring[last - first, 1], ring[last - first, 2] = row(ring, 0)
         fall += relax_vertex(v, S, ring, shapes[first:last], last - first, density, terms)
     return fall
 
@@ -212,12 +213,13 @@ def relax_vertex(
 ) -> float:
     """Move v to lower the energy of its star; return by how much it fell.
 
-    `ring` and `shapes` are as in `expand_star`, and `terms` is room for what it fills.
+    `ring` [degree + 1, 3] are its neighbours, counterclockwise, and the first again, `shapes` as in `expand_star`, and
+    `terms` is room for what it fills.
     """
     p = row(S, v)
     x, y = tangent_frame(p)
-    expand_star(p, x, y, ring, shapes, degree, terms)
-    fall, move = descend(terms, degree, density)
+    expand_star(p, x, y, ring, ring[1:], shapes, degree, terms)
+    fall, move = descend(terms, degree, density, 1.0, FREE)
     if fall > 0.0:
         S[v, 0], S[v, 1], S[v, 2] = unit(combine(1.0, combine(move[0], x, move[1], y), 1.0 + move[2], p))
     return fall
@@ -355,13 +357,14 @@ CROWDED = 64  # neighbours of a new vertex with more triangles than this wait fo
 def _gather(
     neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, ring: Floats, shapes: Floats
 ) -> None:
-    """Fill in what `expand_star` asks for, from the half-edges to the neighbours."""
+    """Fill in what `relax_vertex` asks for, from the half-edges to the neighbours."""
     cotangent = reference.cotangent
     for i in range(degree):
         h = neighbours[i]
         ring[i, 0], ring[i, 1], ring[i, 2] = row(S, tail[following(h)])
         shapes[i, 0], shapes[i, 1] = reference.area[h // 3], cotangent[h]
         shapes[i, 2], shapes[i, 3] = cotangent[following(h)], cotangent[preceding(h)]
+    ring[degree, 0], ring[degree, 1], ring[degree, 2] = row(ring, 0)
 
 
 @kernel
@@ -380,7 +383,7 @@ def _place(
     """Put u where its star's energy is least among trial points on the ways from v."""
     start = row(S, v)
     x, y = tangent_frame(start)
-    expand_star(start, x, y, ring, shapes, degree, terms)
+    expand_star(start, x, y, ring, ring[1:], shapes, degree, terms)
     middle = (0.0, 0.0, 0.0)
     for i in range(degree):
         middle = combine(1.0, middle, 1.0, row(ring, i))
@@ -412,8 +415,8 @@ def insert_vertices(log: Ints32, table: CornerTable, surface: RealSurface, S: Fl
     """
     tail, density = table.tail, reference.density
     neighbours, others = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
-    ring, shapes, terms = np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS))
-    other_ring, other_shapes = np.empty((CROWDED, 3)), np.empty((CROWDED, 4))
+    ring, shapes, terms = np.empty((len(S) + 1, 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS))
+    other_ring, other_shapes = np.empty((CROWDED + 1, 3)), np.empty((CROWDED, 4))
     for h in log[::-1]:
         u, v = tail[h], tail[table.twin[h]]
         undo_collapse(table, h)

@@ -176,7 +176,7 @@ def star_terms(level, S, reference, v):
     x, y = tangent_frame(tuple(S[v]))
     terms = np.empty((last - first, TERMS))
     ring, shapes = S[level.ring[first:last]], star_shapes(level.star, reference)[first:last]
-    expand_star(tuple(S[v]), x, y, ring, shapes, last - first, terms)
+    expand_star(tuple(S[v]), x, y, ring, np.roll(ring, -1, axis=0), shapes, last - first, terms)
     return terms, np.array(x), np.array(y)
 
 
@@ -188,7 +188,7 @@ def test_the_expanded_star_knows_the_energy_of_every_place(v):
     terms, x, y = star_terms(level, S, reference, v)
     at_rest = total_energy(level.tail, S, reference)
     for a, b in np.random.default_rng(v).uniform(-0.05, 0.05, (10, 2)):
-        move = tangent_move(a, b)
+        move = tangent_move(a, b, 1.0)
         moved = S.copy()
         moved[v] += move[0] * x + move[1] * y + move[2] * S[v]
         assert np.linalg.norm(moved[v]) == pytest.approx(1, abs=1e-15)
@@ -204,9 +204,9 @@ def test_slopes_of_the_expanded_star_are_those_of_its_energy():
     degree, h = len(terms), 1e-4
 
     def at(a, b):
-        return star_energy(terms, degree, SPHERE, tangent_move(a, b))
+        return star_energy(terms, degree, SPHERE, tangent_move(a, b, 1.0))
 
-    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, SPHERE)
+    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, SPHERE, 1.0)
     assert energy == pytest.approx(at(0.0, 0.0), rel=1e-14)
     assert [gx, gy] == pytest.approx([(at(h, 0) - at(-h, 0)) / (2 * h), (at(0, h) - at(0, -h)) / (2 * h)], rel=1e-4)
     assert hxx == pytest.approx((at(h, 0) - 2 * energy + at(-h, 0)) / h**2, rel=1e-3)

@@ -13,8 +13,9 @@ from scipy.spatial import ConvexHull
 from surfaces import disk, sphere, torus
 
 from ripple_sim.solver import Mesh, glue
-from ripple_sim.solver.layouts import FIXED, FREE, patches
+from ripple_sim.solver.layouts import FIXED, FREE, System, patches
 from ripple_sim.solver.layouts.patches import Metric, Quads, SeamlessMap, TriangleSurface
+from ripple_sim.solver.mesh import edges_of
 
 TIPS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 
@@ -138,22 +139,39 @@ def test_fewer_triangles_cover_the_same_surface_and_charts_once(mesh: Mesh, quad
 
 def test_a_relaxed_map_covers_the_charts_once_with_less_energy(quads: Quads) -> None:
     seamless = patches.seamless_map(quads)
-    shapes = patches.shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
-    before = patches.total_energy(seamless, shapes)
+    reference = patches.reference_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    before = patches.total_energy(seamless, reference)
     patches.relax(quads.surface.V, seamless)
     assert_one_to_one(seamless)
     inside = np.concatenate([seamless.z.real, seamless.z.imag])
     assert (inside >= 0).all() and (inside <= 1).all()
-    assert patches.total_energy(seamless, shapes) < 0.9 * before
+    assert patches.total_energy(seamless, reference) < 0.9 * before
+
+
+def test_the_slope_of_newtons_system_is_that_of_the_energy(quads: Quads) -> None:
+    seamless = patches.seamless_map(quads)
+    reference = patches.reference_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    edges = edges_of(seamless.F)
+    ends = edges.ends.astype(np.int32)
+    system = System.zeros(len(seamless.z), len(ends))
+    patches.assemble(seamless, reference, edges.of, ends, system)
+    way = np.random.default_rng(0).normal(size=(len(seamless.z), 2))
+    way[seamless.freedom == FIXED] = 0
+    start, step = seamless.z.copy(), 1e-9
+    energies = []
+    for t in (step, -step):
+        seamless.z[:] = start + t * way @ (1, 1j)
+        energies.append(patches.total_energy(seamless, reference))
+    assert (system.gradient * way).sum() == pytest.approx((energies[0] - energies[1]) / (2 * step), rel=1e-4)
 
 
 def test_moved_tips_lower_the_energy_and_leave_the_map_one_to_one(quads: Quads) -> None:
     seamless = patches.seamless_map(quads)
-    shapes = patches.shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    reference = patches.reference_of(quads.surface.V, quads.surface.F, len(quads.glued))
     tips = np.flatnonzero(seamless.freedom == FIXED)
-    before = patches.total_energy(seamless, shapes)
-    assert len(patches.move_tips(seamless, shapes, tips))
-    assert patches.total_energy(seamless, shapes) < before
+    before = patches.total_energy(seamless, reference)
+    assert len(patches.move_tips(seamless, reference, tips))
+    assert patches.total_energy(seamless, reference) < before
     assert (seamless.freedom == FIXED).sum() == len(tips)
     places = assert_one_to_one(seamless)
     total = np.zeros(len(seamless.z))
