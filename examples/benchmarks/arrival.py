@@ -213,6 +213,9 @@ def _distance_near(V: NDArray, F: NDArray, source: int, limit: float) -> NDArray
     """Exact distance from one vertex [m]; infinite beyond a limit [m], where no way is searched for."""
     near = np.linalg.norm(V - V[source], axis=1) < 1.1 * limit
     triangles = F[near[F].all(axis=1)]
+    # not another limb beside it: what no way leads to would be at no distance
+    _, part = igl.facet_components(triangles)
+    triangles = triangles[part == part[(triangles == source).any(axis=1)][0]]
     used, local = np.unique(triangles, return_inverse=True)
     start, none = np.searchsorted(used, [source]), np.empty(0, dtype=np.int64)
     distance = np.full(len(V), np.inf)
@@ -226,7 +229,7 @@ def against_elements(meshes: dict[str, Mesh], resolution: int, sources: int) -> 
     for name, mesh in meshes.items():
         atlas = build_atlas(mesh, resolution)
         width, coordinates = ideal_width(atlas), _vertex_coordinates(atlas)
-        for source in spread_sources(atlas, sources):
+        for source in spread_sources(mesh, sources):
             distance = geodesic_distance(atlas.mesh, source)
             far = np.isfinite(distance) & (distance > NEAREST * width)
             farthest = distance[far].max()
@@ -306,28 +309,14 @@ def arrival_times(
     return front_and_crest(dt * np.arange(len(signal)), np.array(signal))
 
 
-def spread_sources(atlas: Atlas, count: int) -> list[int]:
-    """Vertices spread evenly over the atlas, the same for every call.
+def spread_sources(mesh: Mesh, count: int) -> list[int]:
+    """Vertices at equal shares of the area of a mesh's largest part, in the order of its triangles.
 
-    In the cube layout they are nearest to a spiral on the sphere; in another they follow one another at equal shares of
-    the area, chart by chart, on the largest part of the mesh.
+    No map has a say in them, so that maps can be compared.
     """
-    if atlas.layout != "cube":
-        return _sources_by_area(atlas, count)
-    k = np.arange(count) + 0.5
-    z, angle = 1 - 2 * k / count, k * np.pi * (3 - np.sqrt(5))
-    spiral = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], axis=1)
-    return [int(vertex) for vertex in np.argmax(spiral @ atlas.sphere.T, axis=1)]
-
-
-def _sources_by_area(atlas: Atlas, count: int) -> list[int]:
-    mesh, triangles = atlas.mesh, atlas.triangles.ravel()
-    part = mesh.components[triangles]
-    texels = np.flatnonzero(part == np.argmax(np.bincount(part, atlas.areas.ravel())))
-    share = np.cumsum(atlas.areas.ravel()[texels])
-    chosen = texels[np.searchsorted(share, (np.arange(count) + 0.5) / count * share[-1])]
-    corner = np.argmax(atlas.barycentrics.reshape(-1, 3)[chosen], axis=1)
-    return [int(vertex) for vertex in mesh.F[triangles[chosen], corner]]
+    areas, part = mesh.triangle_areas, mesh.components
+    share = np.cumsum(np.where(part == np.argmax(np.bincount(part, areas)), areas, 0.0))
+    return mesh.F[np.searchsorted(share, (np.arange(count) + 0.5) / count * share[-1]), 0].tolist()
 
 
 CALIBRATED = "dynamic-paint, calibrated"
@@ -351,7 +340,7 @@ def speed_factor(arrivals: Sequence[Arrival]) -> float:
 
 def _rows(mesh: Mesh, resolution: int, sources: int) -> dict[str, Row]:
     atlas = build_atlas(mesh, resolution)
-    vertices = spread_sources(atlas, sources)
+    vertices = spread_sources(mesh, sources)
     measured = {operator: _measure(atlas, vertices, operator) for operator in OPERATORS}
     rows: dict[str, Row] = {operator: mean_error(each) for operator, each in measured.items()}
     factor = speed_factor(measured["dynamic-paint"])

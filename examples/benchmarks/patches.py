@@ -97,7 +97,7 @@ def cached_seconds(mesh: Mesh) -> float:
 
 
 def arrival(atlas: Atlas, sources: int) -> str:
-    errors = [arrivals.arrival(atlas, source).error() for source in arrivals.spread_sources(atlas, sources)]
+    errors = [arrivals.arrival(atlas, source).error() for source in arrivals.spread_sources(atlas.mesh, sources)]
     median, q90 = (100 * np.mean([getattr(each, name) for each in errors]) for name in ("front_median", "front_q90"))
     return f"{median:.2f} / {q90:.2f}"
 

@@ -62,7 +62,7 @@ def stills(mesh: Path, file: Path) -> Path:
 
 
 def row(name: str, atlas: Atlas) -> list[str]:
-    error = mean_error([arrival(atlas, vertex) for vertex in spread_sources(atlas, SOURCES)])
+    error = mean_error([arrival(atlas, vertex) for vertex in spread_sources(atlas.mesh, SOURCES)])
     figures = [f"{100 * error[f'front_{key}']:.1f} %" for key in ("median", "q90", "under_3_percent")]
     charts, n, _ = atlas.areas.shape
     return [name, str(int(atlas.mesh.genus.sum())), f"{charts} x {n} x {n}", *figures]

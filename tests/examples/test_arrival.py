@@ -45,7 +45,7 @@ def test_front_on_a_sphere_arrives_at_the_distance() -> None:
 
 def test_waves_arrive_in_time_on_a_body_with_limbs() -> None:
     atlas = build_atlas(Mesh.from_arrays(*limbed()), 96, cache=False)
-    for source in spread_sources(atlas, 1):
+    for source in spread_sources(atlas.mesh, 1):
         error = arrival(atlas, source).error()
         assert error.front_median < 0.005
         assert error.front_under_3_percent > 0.97
@@ -58,7 +58,7 @@ def test_waves_arrive_in_time_on_a_body_with_limbs() -> None:
 @pytest.mark.parametrize("name", ["spot.obj", "bunny.off", "elephant.obj"])
 def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
     atlas = build_atlas(load_mesh(known_mesh(f"good/{name}")), 96, cache=False)
-    errors = [arrival(atlas, source).error() for source in spread_sources(atlas, 3)]
+    errors = [arrival(atlas, source).error() for source in spread_sources(atlas.mesh, 3)]
     assert np.mean([error.front_median for error in errors]) < 0.01
     # a crest lags by what texels disperse, and by what limbs and furrows bend, however narrow the texels
     assert np.mean([error.crest_median for error in errors]) < 0.012
@@ -99,7 +99,7 @@ def test_same_object_otherwise_presented_has_the_same_times() -> None:
 def test_waves_arrive_in_time_on_any_surface_and_not_on_its_other_parts() -> None:
     ring, drum = torus(24), moved(disk(12), (3, 0, 0))
     atlas = build_atlas(joined(ring, drum), 64, cache=False, layout="patches")
-    sources = spread_sources(atlas, 3)
+    sources = spread_sources(atlas.mesh, 3)
     assert max(sources) < len(ring.V)  # on the larger part
     other = len(ring.V) + np.argmin(np.linalg.norm(drum.V - drum.V.mean(axis=0), axis=1))
     for source, own in ((sources[0], ring), (int(other), drum)):
@@ -120,7 +120,7 @@ def atlas() -> Atlas:
 
 @pytest.mark.parametrize("operator", ["fem", "dynamic-paint"])
 def test_calibration_finds_the_factor_of_a_known_speed(atlas: Atlas, operator: str) -> None:
-    source = spread_sources(atlas, 1)[0]
+    source = spread_sources(atlas.mesh, 1)[0]
     as_it_is = arrival(atlas, source, operator)
     slow = arrival(atlas, source, operator, speed=0.7)
     assert speed_factor([slow]) == pytest.approx(speed_factor([as_it_is]) / 0.7, rel=5e-3)

@@ -4,16 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from eigenvalues import cases, mean_error, of_polyhedron
+from eigenvalues import cases, errors_against, mean_error, of_polyhedron
 from plates import PLATES, atlas_of, frequencies
 
-from ripple_sim.solver import build_atlas
+from ripple_sim.solver import build_atlas, load_mesh
 
-DOCS = Path(__file__).parents[2] / "docs"
-RUNS = {name: (DOCS / "runs" / f"{name}.txt").read_text("utf-8") for name in ("eigenvalues", "plates")}
+ROOT = Path(__file__).parents[2]
+DOCS, LIMBED = ROOT / "docs", ROOT / "scenes" / "meshes" / "limbed.obj"
+RUNS = {name: (DOCS / "runs" / f"{name}.txt").read_text("utf-8") for name in ("eigenvalues", "polyhedra", "plates")}
 
 
-@pytest.mark.parametrize(("run", "page"), [("eigenvalues", "accuracy"), ("plates", "validation")])
+@pytest.mark.parametrize(
+    ("run", "page"), [("eigenvalues", "accuracy"), ("polyhedra", "accuracy"), ("plates", "validation")]
+)
 def test_the_printed_table_is_the_stored_run(run: str, page: str) -> None:
     assert f"```\n{RUNS[run]}```" in (DOCS / f"{page}.md").read_text("utf-8")
 
@@ -26,6 +29,14 @@ def test_eigenvalues_are_of_todays_operator(name: str) -> None:
     atlas = build_atlas(case.mesh(), 32, layout="patches")
     assert f"{atlas.areas.size:,}" == texels
     assert mean_error(atlas, case) == pytest.approx(float(error), rel=0.01)
+
+
+def test_eigenvalues_of_a_polyhedron_are_of_todays_sphere_map() -> None:
+    rows = RUNS["polyhedra"].partition("limbed.obj")[2].splitlines()[1:3]
+    mesh = load_mesh(LIMBED)
+    errors = errors_against(of_polyhedron(mesh, 1), build_atlas(mesh, 32))
+    stored = [float(row.split()[3]) for row in rows]
+    assert [errors.mean(), errors.max()] == pytest.approx(stored, rel=0.03)
 
 
 def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
