@@ -255,8 +255,10 @@ def tangents(around: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 # square of their size, as the error of the operator does: eigenvalues stay of second order.
 _TEXELS = 0.5
 
-# Needles at creases may lose more, where the time step would be less than this share of an even grid's.
-_STEP = 0.45
+# Needles at creases, which are faster than most by this factor, may lose more where the time step would be less than
+# this share of an even grid's. Hardly faster are rings of narrow texels round a limb: all waves along the limb pass
+# through those, and softening them made the lowest frequencies too low.
+_NEEDLE, _STEP = 2.0, 0.45
 
 # All but this share of the surface at most stays as it is, and texels that are hardly faster.
 _BULK, _FASTER = 0.99, 1.2
@@ -332,8 +334,9 @@ def softening(texels: TexelMesh) -> NDArray[np.float64]:
     rates, shares = rate.ravel()[order], (areas.ravel() / areas.mean())[order]
     lost = np.cumsum(shares) - rates * np.cumsum(shares / rates)
     cheapest = float(rates[np.flatnonzero(lost <= _TEXELS * np.log2(rates[0] / rates) + 1e-9)[-1]])
-    bound = min(cheapest, _even(areas))
-    return np.minimum(1, max(bound, _FASTER * _bulk(rate.ravel(), areas.ravel())) / rate)
+    bulk = _bulk(rate.ravel(), areas.ravel())
+    bound = min(cheapest, max(_NEEDLE * bulk, _even(areas)))
+    return np.minimum(1, max(bound, _FASTER * bulk) / rate)
 
 
 def _bulk(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:

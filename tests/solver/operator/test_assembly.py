@@ -33,6 +33,22 @@ def test_needles_do_not_set_the_time_step_of_all() -> None:
     assert steps[1] > 0.9 * steps[0]
 
 
+def test_a_narrow_ring_stays_as_stiff_as_it_is() -> None:
+    # one column of squares 0.55 of the others' width, which are 4.5 times as long as wide: all that crosses a thin limb
+    n = 192
+    widths = np.ones(n + 1)
+    widths[[0, -1]], widths[n // 2] = 0.5, 0.55
+    x = np.concatenate([[0], np.cumsum(widths)])
+    y = 4.5 * x[-1] * ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
+    places = np.stack([*np.meshgrid(x, y), np.zeros((n + 2, n + 2))], axis=-1)[None]
+    texels = TexelMesh.of(square(n).topology, places[:, 1:-1, 1:-1], beyond=places)
+    texels = dataclasses.replace(texels, areas=texels.cells.areas)
+    mode = np.cos(np.pi * texels.positions[..., 0] / x[-1])
+    stiffness = texels.stencil(np.ones_like(mode), softening(texels))
+    square_frequency = -np.sum(mode * stiffness(mode)) / np.sum(texels.areas * mode**2)
+    assert square_frequency == pytest.approx((np.pi / x[-1]) ** 2, rel=1e-4)
+
+
 def dense_in_the_middle(n: int) -> TexelMesh:
     """Unit square."""
     u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
