@@ -6,6 +6,8 @@ prints the errors of its phase and group speed. Shear modulus, density and thick
 in c_T / d and wave numbers in 1 / d.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.optimize import brentq
 
@@ -82,22 +84,41 @@ def main() -> None:
 
 
 def three_fields() -> None:
-    """Errors of the surface with two hidden fields: the least local law that has both speeds, fitted to them.
+    """Errors of the surface with two hidden fields, the least local law that has both speeds: fits to them.
 
-    omega^2 are the eigenvalues of a matrix [3, 3] whose entries are linear in q^2; the lowest is the mode's.
+    The faster the hidden waves may run, the closer is the best fit.
     """
     wave_numbers, step = np.linspace(1.3, 8, 68), 1e-3
+    exact = np.sqrt([lowest_square(q) for q in wave_numbers])
+    exact_group = np.array([group_speed(q) for q in wave_numbers])
+    fits = (
+        ((0.9307, 4.0, 4.0), (21.911, 16.703, 8.155), (4.5874, 7.4256), 8.485),
+        ((0.9872, 2.5, 2.5), (9.889, 37.315, 9.041), (4.9078, 3.0892), 13.733),
+        ((0.8412, 1.5, 1.5), (6.109, 11.063, 79.987), (1.6699, 4.8775), 24.313),
+    )
+    for fit in fits:
+        below, at, above = (three_field_frequency(wave_numbers + d, *fit) for d in (-step, 0, step))
+        phase, group = at / exact - 1, (above - below) / (2 * step) / exact_group - 1
+        print(
+            f"three fields, hidden waves at {fit[0][1] ** 0.5:.2f} c_T: phase within {np.abs(phase).max():.1%}, "
+            f"group within {np.abs(group).max():.1%}"
+        )
 
-    def lowest(q: np.ndarray) -> np.ndarray:
-        matrix, x = np.zeros((len(q), 3, 3)), q**2
-        matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2] = 13.03 + 0.9451 * x, 37.18 + 4 * x, 4.886 + 4 * x
-        matrix[:, 1, 0], matrix[:, 2, 0] = np.sqrt(54.15 * x), np.sqrt(20.76)
-        return np.sqrt(np.linalg.eigvalsh(matrix)[:, 0])
 
-    phase = lowest(wave_numbers) / np.sqrt([lowest_square(q) for q in wave_numbers]) - 1
-    slope = (lowest(wave_numbers + step) - lowest(wave_numbers - step)) / (2 * step)
-    group = slope / [group_speed(q) for q in wave_numbers] - 1
-    print(f"three fields: phase within {np.abs(phase).max():.1%}, group within {np.abs(group).max():.1%}")
+def three_field_frequency(
+    q: np.ndarray, fast: Sequence[float], stiff: Sequence[float], slopes: Sequence[float], between: float
+) -> np.ndarray:
+    """Lowest angular frequency of the surface and two hidden fields that are coupled, of wave numbers [n].
+
+    omega^2 are the eigenvalues of a matrix [3, 3]: squares of the fields' own speeds and stiffnesses, surface first.
+    The hidden fields are potentials of what moves along the layer inside: the surface's coupling to them goes with q,
+    by these two slopes, that of one to the other does not. The matrix of each fit is positive for all q.
+    """
+    matrix = np.zeros((len(q), 3, 3))
+    matrix[:, range(3), range(3)] = np.array(stiff) + np.outer(q**2, fast)
+    matrix[:, 1:, 0] = np.outer(q, slopes)
+    matrix[:, 2, 1] = between
+    return np.sqrt(np.linalg.eigvalsh(matrix)[:, 0])
 
 
 if __name__ == "__main__":
