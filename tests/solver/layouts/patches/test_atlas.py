@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from all_kinds import band, graph, punctured_ball, voxels
-from hand_made import eigenvalues
+from hand_made import eigenvalues, square_eigenvalues
 from known_meshes import known_mesh
 from surfaces import disk, grid, joined, moved, sphere, square, torus
 
@@ -216,10 +216,6 @@ def degrees(multiplicity: Callable[[int], int]) -> np.ndarray:
     return np.concatenate([np.full(multiplicity(d), d * (d + 1.0)) for d in range(9)])
 
 
-def squares(first: int) -> np.ndarray:
-    return np.sort([np.pi**2 * (a * a + b * b) for a in range(first, 9) for b in range(first, 9)])
-
-
 def texel_meshes(mesh: Mesh, project: Callable[[np.ndarray], np.ndarray]) -> list[TexelMesh]:
     """At two resolutions, with the texels on the true surface."""
     patches = patch_map(mesh.V, mesh.F, 24)
@@ -236,7 +232,7 @@ def texel_meshes(mesh: Mesh, project: Callable[[np.ndarray], np.ndarray]) -> lis
     [
         (lambda: sphere(2), on_sphere, {"free": degrees(lambda d: 2 * d + 1)}),
         (hemisphere, on_sphere, {"free": degrees(lambda d: d + 1), "fixed": degrees(lambda d: d)}),
-        (lambda: square(4), np.asarray, {"free": squares(0), "fixed": squares(1)}),
+        (lambda: square(4), np.asarray, {rim: square_eigenvalues(rim) for rim in ("free", "fixed")}),
     ],
     ids=["sphere", "hemisphere", "square"],
 )
