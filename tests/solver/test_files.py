@@ -20,18 +20,9 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.scene import check_files, load_image, mesh_image
-from ripple_sim.solver import (
-    AtlasError,
-    HeightMap,
-    Mesh,
-    RippleError,
-    SolverError,
-    WaveSolver,
-    build_atlas,
-    load_mesh,
-    sphere_atlas,
-)
+from ripple_sim.solver import AtlasError, HeightMap, Mesh, RippleError, SolverError, WaveSolver, load_mesh, sphere_atlas
 from ripple_sim.solver.files import atomic_write, read_image, require_memory, rooms
+from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.texels import texture_map
 
 

@@ -7,19 +7,10 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver import (
-    Atlas,
-    GLError,
-    Material,
-    SolverError,
-    TexelMesh,
-    WaveSolver,
-    build_atlas,
-    sphere_atlas,
-    texel_atlas,
-)
+from ripple_sim.solver import Atlas, GLError, Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
 from ripple_sim.solver.backends import auto_backend, backend, make_backend
 from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.operator import WaveOperator, build_operator
 
 STEPS = 1000

@@ -11,16 +11,8 @@ from genus_zero import icosphere
 from hypothesis import HealthCheck, given, settings, strategies as st
 from surfaces import disk
 
-from ripple_sim.solver import (
-    Atlas,
-    AtlasError,
-    Mesh,
-    SphereAtlas,
-    SphereMapError,
-    build_atlas,
-    load_atlas,
-    sphere_atlas,
-)
+from ripple_sim.solver import Atlas, AtlasError, Mesh, SphereAtlas, SphereMapError, sphere_atlas
+from ripple_sim.solver.layouts import build_atlas, load_atlas
 
 
 @pytest.fixture(scope="module")
