@@ -16,9 +16,7 @@ from ripple_sim.solver.layouts import build_atlas, load_atlas
 HUGE = 10**400  # no float holds it
 ATLAS = sphere_atlas(resolution=4)
 WAVES = WaveSolver(ATLAS, backend="cpu")
-MODEL = mujoco.MjModel.from_xml_string(
-    "<mujoco><worldbody><geom name='g' type='sphere' size='1'/></worldbody></mujoco>"
-)
+MODEL = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom name='g' size='1'/></worldbody></mujoco>")
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "waves of nothing": (lambda: Material(wavelengths=None), "wavelengths is None m; valid are two numbers"),
