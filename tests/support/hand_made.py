@@ -117,3 +117,9 @@ def eigenvalues(texels: TexelMesh, count: int) -> np.ndarray:
     # some more than asked for, to full precision: round-off alone shows the second of two equal ones
     found = eigsh(texels.stiffness(), count + 4, mass.tocsc(), sigma=-0.1, v0=start, return_eigenvectors=False)
     return np.sort(found)[:count]
+
+
+def square_eigenvalues(rim: str) -> np.ndarray:
+    """Of the unit square, at wave speed 1: the lowest of them, in ascending order."""
+    first = 1 if rim == "fixed" else 0
+    return np.sort([np.pi**2 * (a * a + b * b) for a in range(first, 9) for b in range(first, 9)])

@@ -1,13 +1,14 @@
 """What bodies and surfaces exchange, by MuJoCo's own account and by that of the bodies' velocities."""
 
+import collections
 import dataclasses
 
 import mujoco
 import numpy as np
+from hits import contact_forces
 
 # A body that is so many times as heavy as another hardly feels it, and MuJoCo's solvers do not care.
 _HEAVY = 1e3
-FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
 @dataclasses.dataclass
@@ -38,11 +39,6 @@ class MomentumBalance:
     A free body's change of momentum, less gravity and all contact forces but the normal ones, is what its contacts'
     normal forces gave it. Along their sum it is compared with them.
 
-    Parameters
-    ----------
-    model : mujoco.MjModel
-    targets : list of str
-
     Attributes
     ----------
     pairs : dict
@@ -53,21 +49,14 @@ class MomentumBalance:
 
     def __init__(self, model: mujoco.MjModel, targets: list[str]) -> None:
         self.model, self.names = model, [model.geom(i).name or f"geom {i}" for i in range(model.ngeom)]
-        self.targets = {model.geom(name).id: name for name in targets}
-        constrained = set()
-        for i in range(model.neq):
-            constrained |= {int(model.eq_obj1id[i]), int(model.eq_obj2id[i])}
-        self.free = {}
-        for joint in np.flatnonzero(model.jnt_type == FREE).tolist():
-            body = int(model.jnt_bodyid[joint])
-            alone = model.body_mass[body] == model.body_subtreemass[body]
-            if body not in constrained and alone:
-                self.free[body] = int(model.jnt_dofadr[joint])
-        self.pairs: dict[tuple[str, str], Balance] = {}
+        self.pairs: dict[tuple[str, str], Balance] = collections.defaultdict(Balance)
         self.pushes: dict[tuple[str, str], np.ndarray] = {}
-        self._flex_geom = {}
-        for flex in range(model.nflex):
-            self._flex_geom[flex] = model.geom(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)).id
+        self._targets = targets
+        flexes = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) for flex in range(model.nflex))
+        self._flexed = np.array([model.geom(name).id for name in flexes], int)
+        free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
+        tied = np.isin(free, [model.eq_obj1id, model.eq_obj2id])
+        self._free = free[~tied & (model.body_mass[free] == model.body_subtreemass[free])].tolist()
 
     def before(self, data: mujoco.MjData) -> None:
         """Keep the velocities that a step begins with."""
@@ -75,56 +64,42 @@ class MomentumBalance:
 
     def after(self, data: mujoco.MjData, impulses: list) -> None:
         """Account for a step."""
-        normal, whole = self._contact_forces(data)
-        dt = self.model.opt.timestep
-        self.pushes = {
-            (self.names[a], self.names[b]): sign * sum(vector for _, vector in forces)
-            for (first, second), forces in normal.items()
-            for a, b, sign in ((first, second, 1.0), (second, first, -1.0))
-        }
-        shares = {body: self._share(data, body, normal, whole, dt) for body in self.free}
-        for (target, other), forces in normal.items():
-            for a, b in ((target, other), (other, target)):
-                if a not in self.targets:
-                    continue
-                pair = self.pairs.setdefault((self.names[a], self.names[b]), Balance())
-                reported = sum(force for force, _ in forces) * dt
-                if a in self._flex_geom.values() or b in self._flex_geom.values():
-                    # contacts with triangles push sideways in pairs: only the sum of their forces is meant
-                    reported = float(np.linalg.norm(sum(vector for _, vector in forces))) * dt
-                pair.reported += reported
-                pair.exchanged += abs(reported)
-                share = self._share_of_pair(a, b, shares)
-                pair.felt += share * reported
+        dt, geoms, forces = self.model.opt.timestep, data.contact.geom.copy(), contact_forces(self.model, data)[:, :3]
+        by_flex = geoms < 0
+        geoms[by_flex] = self._flexed[data.contact.flex[by_flex]]
+        # which the solver's force contains, unlike the geoms' own
+        forces[:, 0] -= self._pulls(data)
+        frames = data.contact.frame.reshape(-1, 3, 3)
+        vectors = np.stack([forces[:, :1] * frames[:, 0], np.einsum("ki,kij->kj", forces, frames)], axis=1)
+        on_bodies = np.zeros((self.model.nbody, 2, 3))  # normal forces, and whole ones
+        np.add.at(on_bodies, self.model.geom_bodyid[geoms[:, 1]], vectors)
+        np.subtract.at(on_bodies, self.model.geom_bodyid[geoms[:, 0]], vectors)
+        largest = np.linalg.norm(on_bodies[:, 1], axis=1).max()
+        shares = {body: self._share(data, body, *on_bodies[body], largest) for body in self._free}
+        self.pushes = {}
+        for pair in np.unique(geoms, axis=0):
+            mine, (a, b) = (geoms == pair).all(axis=1), (self.names[geom] for geom in pair)
+            push, reported = vectors[mine, 0].sum(axis=0), dt * forces[mine, 0].sum()
+            if np.isin(pair, self._flexed).any():
+                # contacts with triangles push sideways in pairs: only the sum of their forces is meant
+                reported = dt * float(np.linalg.norm(push))
+            self.pushes |= {(a, b): push, (b, a): -push}
+            for names in ((a, b), (b, a)):
+                if names[0] in self._targets:
+                    account = self.pairs[names]
+                    account.reported += reported
+                    account.exchanged += abs(reported)
+                    account.felt += reported * self._share_of_pair(pair, shares)
         for impulse in impulses:
-            self.pairs.setdefault((impulse.geom, impulse.other), Balance()).given += impulse.impulse
+            self.pairs[impulse.geom, impulse.other].given += impulse.impulse
 
-    def _share_of_pair(self, a: int, b: int, shares: dict[int, float]) -> float:
+    def _share_of_pair(self, pair: np.ndarray, shares: dict[int, float]) -> float:
         """By the lighter body of two geoms, if that is free, or else by the heavier, if that feels it."""
-        moving = (body for body in self.model.geom_bodyid[[a, b]] if self.model.body_dofnum[body])
-        light, *heavy = sorted(moving, key=lambda body: self.model.body_mass[body])
-        known = [body for body in (light, *heavy) if self.model.body_mass[body] <= _HEAVY * self.model.body_mass[light]]
+        mass = self.model.body_mass
+        moving = (body for body in self.model.geom_bodyid[pair].tolist() if self.model.body_dofnum[body])
+        light, *heavy = sorted(moving, key=lambda body: mass[body])
+        known = [light, *(body for body in heavy if mass[body] <= _HEAVY * mass[light])]
         return next((shares[body] for body in known if body in shares), 1.0)
-
-    def _contact_forces(self, data: mujoco.MjData) -> tuple[dict, dict]:
-        """Normal forces with their vectors on the second geom, by pair, and the whole forces on each body."""
-        normal: dict[tuple[int, int], list] = {}
-        whole: dict[int, np.ndarray] = {}
-        wrench, pulls = np.zeros(6), self._pulls(data)
-        for i, contact in enumerate(data.contact):
-            mujoco.mj_contactForce(self.model, data, i, wrench)
-            # which the solver's force contains, unlike the geoms' own
-            wrench[0] -= pulls[i]
-            frame = contact.frame.reshape(3, 3)
-            geoms = [
-                g if g >= 0 else self._flex_geom[f]
-                for g, f in zip(contact.geom.tolist(), contact.flex.tolist(), strict=True)
-            ]
-            normal.setdefault((geoms[0], geoms[1]), []).append((wrench[0], wrench[0] * frame[0]))
-            for geom, sign in zip(geoms, (-1.0, 1.0), strict=True):
-                body = int(self.model.geom_bodyid[geom])
-                whole[body] = whole.get(body, np.zeros(3)) + sign * (frame.T @ wrench[:3])
-        return normal, whole
 
     def _pulls(self, data: mujoco.MjData) -> np.ndarray:
         """Share of every contact of the forces of suckers on its bodies [N]."""
@@ -135,27 +110,18 @@ class MomentumBalance:
             pulls[mine] += data.actuator_force[sucker] / max(mine.sum(), 1)
         return pulls
 
-    def _share(self, data: mujoco.MjData, body: int, normal: dict, whole: dict, dt: float) -> float:
+    def _share(self, data: mujoco.MjData, body: int, pushed: np.ndarray, whole: np.ndarray, largest: float) -> float:
         """Change of a free body's momentum over that which its contacts' normal forces account for."""
-        if body not in whole:
-            return 1.0
-        pushed = np.zeros(3)
-        for (first, second), forces in normal.items():
-            for geom, sign in ((first, -1.0), (second, 1.0)):
-                if self.model.geom_bodyid[geom] == body:
-                    pushed += sign * sum(vector for _, vector in forces)
-        if not np.linalg.norm(pushed) > 0:
-            return 1.0
-        start, mass = self.free[body], self.model.body_mass[body]
-        before, change = self._velocity[start : start + 6], (data.qvel - self._velocity)[start : start + 6] / dt
-        usual = mass * (np.abs(self.model.opt.gravity).max() + np.abs(before).max() / dt)
-        usual = max([usual, *(np.linalg.norm(force) for force in whole.values())])
-        if np.linalg.norm(pushed) < 1e-7 * usual:
-            # too weak to be felt among roundings
+        start, mass, gravity = self.model.body_dofadr[body], self.model.body_mass[body], self.model.opt.gravity
+        dof, dt = slice(start, start + 6), self.model.opt.timestep
+        before, change = self._velocity[dof], (data.qvel - self._velocity)[dof] / dt
+        usual = max(largest, mass * (np.abs(gravity).max() + np.abs(before).max() / dt))
+        if np.linalg.norm(pushed) <= 1e-7 * usual:
+            # nothing, or too weak to be felt among roundings
             return 1.0
         # from the frame's origin, whose velocity a free joint has, to the centre of mass
         rotation, arm = data.xmat[body].reshape(3, 3), data.xipos[body] - data.xpos[body]
         spin = rotation @ before[3:]
         at_centre = change[:3] + np.cross(rotation @ change[3:], arm) + np.cross(spin, np.cross(spin, arm))
-        felt = mass * (at_centre - self.model.opt.gravity) - (whole[body] - pushed)
+        felt = mass * (at_centre - gravity) - (whole - pushed)
         return float(felt @ pushed / (pushed @ pushed))

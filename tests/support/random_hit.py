@@ -11,23 +11,19 @@ _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
 class RandomHit:
-    """A random model whose hitters are some steps away from the target, on their way to it.
-
-    The first hit is over after so many steps, `steps`.
-    """
+    """A random model whose hitters are on their way to the target; the first hit is over after so many `steps`."""
 
     def __init__(self, random: RandomModel) -> None:
         self._random, self.model = random, random.compile()
         self.data = mujoco.MjData(self.model)
         self.steps = int(min(250, 12 + 6 * random.stopping / random.timestep))
         mujoco.mj_fwdPosition(self.model, self.data)
-        ways = [self._send(f"hitter {i}") for i in range(len(random.hitters))]
-        self._drive(ways)
+        self._drive([self._send(f"hitter {i}") for i in range(len(random.hitters))])
         if random.ground:
             self._lay_ground()
-        if random.restarted:
-            self._keep()
         mujoco.mj_forward(self.model, self.data)
+        if random.restarted:
+            mujoco.mj_setKeyframe(self.model, self.data, 0)
 
     def step(self) -> None:
         """Let mocap bodies move on, and MuJoCo take a step."""
@@ -37,11 +33,9 @@ class RandomHit:
     @contextlib.contextmanager
     def filtering(self) -> Iterator[None]:
         """Refuse the contacts of the last hitter with the target, where the model says so."""
-        if not self._random.refused:
-            yield
-            return
-        pair = {self.model.geom(name).id for name in ("target", f"hitter {len(self._random.hitters) - 1}")}
-        mujoco.set_mjcb_contactfilter(lambda model, data, one, other: int({one, other} == pair))
+        if self._random.refused:
+            pair = {self.model.geom(name).id for name in ("target", f"hitter {len(self._random.hitters) - 1}")}
+            mujoco.set_mjcb_contactfilter(lambda model, data, one, other: int({one, other} == pair))
         try:
             yield
         finally:
@@ -52,26 +46,16 @@ class RandomHit:
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
         mujoco.mj_forward(self.model, self.data)
 
-    def _keep(self) -> None:
-        """Make a keyframe of the beginning."""
-        for name in ("qpos", "qvel", "ctrl"):
-            getattr(self.model, f"key_{name}")[0] = getattr(self.data, name)
-        self.model.key_mpos[0], self.model.key_mquat[0] = self.data.mocap_pos.ravel(), self.data.mocap_quat.ravel()
-
     def _drive(self, ways: list[np.ndarray]) -> None:
         """Switch motors and suckers on, towards the target, and choose velocities of mocap bodies [m/s]."""
         model, self._drift = self.model, np.zeros((self.model.nmocap, 3))
+        driven = {f"hitter {i}": -way for i, way in enumerate(ways)} | {"target": 0.3 * ways[0]}
+        for name, way in driven.items():
+            if model.body(name).mocapid[0] >= 0:
+                self._drift[model.body(name).mocapid[0]] = way * self._random.speed
         self.data.ctrl[:] = 1.0
-        for i, way in enumerate(ways):
-            mocap = model.body(f"hitter {i}").mocapid[0]
-            if mocap >= 0:
-                self._drift[mocap] = -way * self._random.speed
-        if self._random.mount == "mocap":
-            self._drift[model.body("target").mocapid[0]] = 0.3 * ways[0] * self._random.speed
-        motors = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT)
-        for motor in motors.tolist():
-            joint = model.joint(int(model.actuator_trnid[motor, 0]))
-            axis, hitter = joint.name.split()
+        for motor in np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).tolist():
+            axis, hitter = model.joint(int(model.actuator_trnid[motor, 0])).name.split()
             parent = model.body_parentid[model.joint(f"x {hitter}").bodyid[0]]
             along = self.data.xmat[parent].reshape(3, 3)[:, "xyz".index(axis)]
             self.data.ctrl[motor] = -ways[int(hitter)] @ along
@@ -111,17 +95,16 @@ class RandomHit:
 
     def _move(self, name: str, place: np.ndarray) -> None:
         model, data, body = self.model, self.data, self.model.body(name)
+        joint = int(body.jntadr[0])
         if body.mocapid[0] >= 0:
             data.mocap_pos[body.mocapid[0]] = place
-            return
-        joint = int(body.jntadr[0])
-        if model.jnt_type[joint] == _FREE:
+        elif model.jnt_type[joint] == _FREE:
             data.qpos[model.jnt_qposadr[joint] :][:3] = place
-            return
-        x = model.joint("x " + name.split()[1])
-        body, parent = int(x.bodyid[0]), int(model.body_parentid[x.bodyid[0]])
-        local = (place - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3)
-        data.qpos[x.qposadr[0] :][:3] = local - model.body_pos[body]
+        else:  # on three slides, two of them a parent's of a link
+            x = model.joint("x " + name.split()[1])
+            parent = model.body_parentid[x.bodyid[0]]
+            local = (place - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3)
+            data.qpos[x.qposadr[0] :][:3] = local - model.body_pos[x.bodyid[0]]
 
     def _touch(self, name: str) -> bool:
         """Whether a geom touches the target, or the flex that collides for it."""

@@ -42,28 +42,8 @@ SCALES = (1e-3, 0.03, 1.0, 30.0, 1e3)
 class RandomModel:
     """A model with a geom "target" and up to three more, "hitter 0" and so on, that are to meet it.
 
-    Parameters
-    ----------
-    seed : int
-
-    Attributes
-    ----------
-    kind, mount : str
-        Of the target.
-    hitters : list of str
-        What moves each of the others.
-    ground : str or None
-        Type of the geom "ground".
-    size : float
-        Half the target's size [m].
-    timestep, stopping : float
-        Time step, and time constant of the contacts [s].
-    speed : float
-        At which geoms meet [m/s].
-    restarted, refused : bool
-        Whether a keyframe brings back the beginning, and whether a user's filter lets the last hitter through.
-    rng : numpy.random.Generator
-    xml : str
+    Lengths are in metres, times in seconds: `size` is half the target's, geoms meet at a `speed`, and their contacts
+    have the time constant `stopping`. What is drawn for the scene beyond the model comes from `rng`.
     """
 
     def __init__(self, seed: int) -> None:
@@ -84,11 +64,13 @@ class RandomModel:
             # which MuJoCo does not collide
             self.ground = "plane"
         self.condim = 1 if self.kind == "flex" else int(rng.choice([1, 3, 4, 6]))
+        # a keyframe brings back the beginning; a user's filter lets the last hitter through
         self.sleeps, self.restarted, sticky = rng.random(3) < (0.15, 0.1, 0.15)
         self.refused = len(self.hitters) > 1 and bool(rng.random() < 0.15)
         # share of the usual force at a hit
         self.stickiness = 10 ** rng.uniform(-2, 0) if sticky and self.kind != "flex" else 0.0
         self._meshes: dict[str, str] = {}
+        self._actuators = ""
         self.xml = self._xml()
 
     @property
@@ -106,12 +88,12 @@ class RandomModel:
         return spec.compile()
 
     def _xml(self) -> str:
-        bodies, links, motors, suckers, equality = "", "", "", "", ""
-        for i, hitter in enumerate(self.hitters):
-            body, driven, sucking = self._hitter(i, hitter)
-            motors, suckers = motors + driven, suckers + sucking
-            bodies, links = (bodies, links + body) if hitter == "link" else (bodies + body, links)
-        bodies = self._target(links) + bodies
+        hitters = [self._hitter(i, hitter) for i, hitter in enumerate(self.hitters)]
+        moved, links = (
+            "".join(body for body, hitter in zip(hitters, self.hitters, strict=True) if (hitter == "link") is linked)
+            for linked in (False, True)
+        )
+        bodies, equality = self._target(links) + moved, ""
         if self.mount in ("weld", "connect"):
             partner = self.rng.choice(["partner", "world"])
             anchor = f'anchor="{self._vector(self.size)}"' if self.mount == "connect" else ""
@@ -123,7 +105,7 @@ class RandomModel:
         key = "<keyframe><key/></keyframe>" if self.restarted else ""
         return f"""<mujoco><compiler boundinertia="1e-14" boundmass="1e-9"/>{self._option()}
             <asset>{self._assets()}</asset><worldbody>{bodies}</worldbody>{equality}
-            <actuator>{motors}{suckers}</actuator>{key}</mujoco>"""
+            <actuator>{self._actuators}</actuator>{key}</mujoco>"""
 
     def _target(self, links: str) -> str:
         shape = self._shape(self.kind, self.size, "egg")
@@ -137,35 +119,34 @@ class RandomModel:
             return body
         return f'<body><joint type="slide" axis="{self._vector(1.0)}"/>{self._inertia()}{body}</body>'
 
-    def _hitter(self, i: int, hitter: str) -> tuple[str, str, str]:
-        """Body, motors and sucker of what moves by itself, at a place of its own."""
+    def _hitter(self, i: int, hitter: str) -> str:
+        """Body of what moves by itself, at a place of its own, with its actuators."""
         name, place = f"hitter {i}", f'pos="{vector(3 * self.size * np.array([i, 1, 3]))}"'
         shape = self._shape(str(self.rng.choice([*SHAPES, "small sdf"])), self.radii[i], f"egg {i}")
         geom, turned = f'<geom name="{name}" {shape} {self._matter()}/>', vector(self.rng.standard_normal(4))
-        x, y, z = (
-            f'<joint name="{axis} {i}" type="slide" axis="{direction}"/>'
-            for axis, direction in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True)
-        )
         force = float(self._mass()) * self.speed / self.stopping
-        if hitter == "driven":
-            return f'<body name="{name}" {place}>{x}{y}{z}{geom}</body>', self._motors(i, force), ""
-        if hitter == "link":
-            inner = f'<body name="{name}">{z}{geom}</body>'
-            return f"<body>{x}{y}{self._inertia()}{inner}</body>", self._motors(i, force), ""
         if hitter == "mocap":
-            return f'<body name="{name}" {place} quat="{turned}" mocap="true">{geom}</body>', "", ""
-        sucker = ""
+            return f'<body name="{name}" {place} quat="{turned}" mocap="true">{geom}</body>'
+        if hitter in ("driven", "link"):
+            axes = zip("xyz", np.eye(3), strict=True)
+            x, y, z = (f'<joint name="{axis} {i}" type="slide" axis="{vector(way)}"/>' for axis, way in axes)
+            inertia = self._inertia() if hitter == "link" else ""
+            self._drive(i, force)
+            if hitter == "link":
+                return f'<body>{x}{y}{inertia}<body name="{name}">{z}{geom}</body></body>'
+            return f'<body name="{name}" {place}>{x}{y}{z}{geom}</body>'
         if self.stickiness and self.rng.random() < 0.5:
-            sucker = f'<adhesion body="{name}" ctrlrange="0 1" gain="{self.stickiness * force:.4g}"/>'
-        return f'<body name="{name}" {place} quat="{turned}"><freejoint/>{geom}</body>', "", sucker
+            pull = f'gain="{self.stickiness * force:.4g}"'
+            self._actuators += f'<adhesion body="{name}" ctrlrange="0 1" {pull}/>'
+        return f'<body name="{name}" {place} quat="{turned}"><freejoint/>{geom}</body>'
 
-    def _motors(self, i: int, force: float) -> str:
+    def _drive(self, i: int, force: float) -> None:
         """Motors of three joints that push with a force [N], or direct current motors that begin with it."""
-        if self.rng.random() < 0.7:
-            return "".join(f'<motor joint="{axis} {i}" gear="{force}"/>' for axis in "xyz")
         constant = 1 / (NO_LOAD * self.speed)
-        motor = f'motorconst="{constant:.6g}" resistance="{constant / force:.6g}"'
-        return "".join(f'<dcmotor joint="{axis} {i}" {motor}/>' for axis in "xyz")
+        motor, matter = "motor", f'gear="{force}"'
+        if self.rng.random() >= 0.7:
+            motor, matter = "dcmotor", f'motorconst="{constant:.6g}" resistance="{constant / force:.6g}"'
+        self._actuators += "".join(f'<{motor} joint="{axis} {i}" {matter}/>' for axis in "xyz")
 
     def _matter(self) -> str:
         """Mass and contact parameters of a geom, which may be sticky."""

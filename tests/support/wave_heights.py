@@ -10,11 +10,25 @@ from ripple_sim.solver import Atlas, WaveSolver
 
 
 class WaveHeights:
-    """Heights of a target's waves beside the thickness of the object, step by step."""
+    """Greatest height of a target's waves over the half of the local thickness, and greatest share of it that is steep.
 
-    def __init__(self, atlas: Atlas) -> None:
-        self._atlas = atlas
+    `highest`, and `steepest`: of what was seen by `look`.
+    """
+
+    def __init__(self, atlas: Atlas, steep: float) -> None:
+        self._atlas, self._steep = atlas, steep
         self._size = float(np.ptp(atlas.mesh.V, axis=0).max())
+        self.highest = self.steepest = 0.0
+
+    def look(self, waves: WaveSolver) -> None:
+        h = waves.height.astype(np.float64)
+        if np.abs(h).max() < 1e-3 * self._size:
+            return
+        self.highest = max(self.highest, float((np.abs(h.ravel()) / self._radius).max()))
+        duals, areas = self._quads
+        rises = np.stack([h[:, :-1, 1:] - h[:, :-1, :-1], h[:, 1:, :-1] - h[:, :-1, :-1]], axis=-1)
+        gradient = np.linalg.norm(np.einsum("cijxk,cijk->cijx", duals, rises), axis=-1)
+        self.steepest = max(self.steepest, float(areas[gradient > self._steep].sum() / areas.sum()))
 
     @functools.cached_property
     def _radius(self) -> np.ndarray:
@@ -34,26 +48,9 @@ class WaveHeights:
         return median_filter(radius, (1, 3, 3)).ravel()
 
     @functools.cached_property
-    def _quads(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Sides of the charts' quads from their first corner, [C, n - 1, n - 1, 3, 2], their duals, and areas."""
+    def _quads(self) -> tuple[np.ndarray, np.ndarray]:
+        """Duals of the sides of the charts' quads from their first corner, [C, n - 1, n - 1, 3, 2], and areas."""
         P = self._atlas.positions
         sides = np.stack([P[:, :-1, 1:] - P[:, :-1, :-1], P[:, 1:, :-1] - P[:, :-1, :-1]], axis=-1)
         areas = np.linalg.norm(np.cross(sides[..., 0], sides[..., 1]), axis=-1)
-        return sides, np.linalg.pinv(np.swapaxes(sides, -1, -2)), areas
-
-    def high(self, waves: WaveSolver) -> float:
-        """The greatest height over the local thickness' half."""
-        height = np.abs(waves.height.reshape(-1).astype(np.float64))
-        if height.max() < 1e-3 * self._size:
-            return 0.0
-        return float((height / self._radius).max())
-
-    def steep(self, waves: WaveSolver, slope: float) -> float:
-        """Share of the surface that is steeper than a slope."""
-        h = waves.height.astype(np.float64)
-        if np.abs(h).max() < 1e-3 * self._size:
-            return 0.0
-        _, duals, areas = self._quads
-        rises = np.stack([h[:, :-1, 1:] - h[:, :-1, :-1], h[:, 1:, :-1] - h[:, :-1, :-1]], axis=-1)
-        gradient = np.linalg.norm(np.einsum("cijxk,cijk->cijx", duals, rises), axis=-1)
-        return float(areas[gradient > slope].sum() / areas.sum())
+        return np.linalg.pinv(np.swapaxes(sides, -1, -2)), areas

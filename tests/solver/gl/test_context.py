@@ -291,16 +291,14 @@ def test_includes_are_put_in_once_and_defines_at_the_top(package: str) -> None:
     assert text == "#version 430\n#define N 8\n#define HALF 0.5\n// inner, N\n\n// outer, HALF\n\n\nvoid main() {}\n"
 
 
-def test_a_missing_file_is_named(package: str) -> None:
-    with pytest.raises(GLError, match=r"some_shaders has no shader shared/none\.glsl"):
-        load_shader(package, "passes/lost")
-    with pytest.raises(GLError, match=r"has no shader passes/two\.glsl"):
-        load_shader(package, "passes/two")
-
-
-def test_a_shader_starts_with_its_version(package: str) -> None:
-    with pytest.raises(GLError, match="must start with #version"):
-        load_shader(package, "passes/bare")
+def test_a_missing_file_is_named_and_a_shader_starts_with_its_version(package: str) -> None:
+    for name, message in (
+        ("lost", r"some_shaders has no shader shared/none\.glsl"),
+        ("two", r"has no shader passes/two\.glsl"),
+        ("bare", "must start with #version"),
+    ):
+        with pytest.raises(GLError, match=message):
+            load_shader(package, f"passes/{name}")
 
 
 def test_a_stage_is_what_stands_before_all_and_its_own_part(package: str, tmp_path: Path) -> None:

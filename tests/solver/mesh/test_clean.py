@@ -7,8 +7,7 @@ import re
 
 import numpy as np
 import pytest
-import trimesh
-from all_kinds import BALL, band, crumbs, klein_bottle, needles, punctured_ball, shuffled, thickened_graph, voxels
+from all_kinds import BALL, band, crumbs, cube, klein_bottle, needles, punctured_ball, shuffled, thickened_graph, voxels
 from hypothesis import given, settings, strategies as st
 from sound import assert_sound, assert_unchanged_when_read_again
 
@@ -209,10 +208,7 @@ def test_flips_duplicates_and_shuffles_are_mended(flipped, doubled, turned, seed
     F[flipped] = F[flipped][:, ::-1]
     F[turned] = np.roll(F[turned], 1, axis=1)
     F = np.vstack([F, F[doubled]])
-    rng = np.random.default_rng(seed)
-    F = F[rng.permutation(len(F))]
-    order = rng.permutation(len(BALL.vertices))
-    mesh = mended_or_refused(np.array(BALL.vertices)[np.argsort(order)], order[F])
+    mesh = mended_or_refused(*shuffled(np.array(BALL.vertices), F, seed))
     assert mesh is not None
     assert mesh.closed and mesh.genus.tolist() == [0]
     assert (len(mesh.V), len(mesh.F)) == (42, 80)
@@ -282,13 +278,9 @@ def test_place_does_not_matter(animal: Atlas) -> None:
         assert quality[name] == pytest.approx(value, rel=0.25 if name in ("edge_min", "edge_max") else 0.05)
 
 
-def test_hairline_cracks_are_closed_but_gaps_are_not() -> None:
-    box = trimesh.creation.box()
-    F = np.array(box.faces)
-    apart = np.vstack([box.vertices, np.array(box.vertices) + 3e-8])
-    mesh = Mesh.from_arrays(apart, np.vstack([F[:5], F[5:] + 8]))
-    assert (len(mesh.V), len(mesh.F)) == (8, 12)
-    assert any("cracks closed" in note for note in mesh.notes)
-    wide = Mesh.from_arrays(np.vstack([box.vertices, np.array(box.vertices) + 1e-3]), np.vstack([F[:5], F[5:] + 8]))
-    assert not wide.closed
-    assert wide.component_count == 2
+@pytest.mark.parametrize(("gap", "parts"), [(3e-8, 1), (1e-3, 2)])
+def test_hairline_cracks_are_closed_but_gaps_are_not(gap: float, parts: int) -> None:
+    V, F = cube()
+    mesh = Mesh.from_arrays(np.vstack([V, V + gap]), np.vstack([F[:5], F[5:] + 8]))
+    assert (mesh.component_count, len(mesh.F)) == (parts, 12)
+    assert mesh.closed == any("cracks closed" in note for note in mesh.notes) == (parts == 1)

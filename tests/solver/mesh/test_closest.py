@@ -13,17 +13,10 @@ from ripple_sim.solver.mesh import RayScene, TriangleTree, closest_points, downw
 from ripple_sim.solver.texels import barycentrics_in
 
 
-def by_igl(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    tree = igl.AABB()
-    tree.init(V, F)
-    squared, _, closest = tree.squared_distance(V, F, points)
-    return np.sqrt(squared), closest
-
-
 def check(V: np.ndarray, F: np.ndarray, points: np.ndarray, tree: TriangleTree | None = None) -> np.ndarray:
-    distances, expected = by_igl(V, F, points)
+    squared, _, expected = igl.point_mesh_squared_distance(points, V, F)
     triangles, closest = closest_points(tree or triangle_tree(V, F), points)
-    np.testing.assert_allclose(np.linalg.norm(closest - points, axis=1), distances, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(closest - points, axis=1), np.sqrt(squared), rtol=1e-12, atol=1e-14)
     corners = V[F[triangles]]
     on_them = np.einsum("kc,kcj->kj", barycentrics_in(corners, closest), corners)
     np.testing.assert_allclose(on_them, closest, atol=1e-9)

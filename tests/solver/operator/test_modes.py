@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hand_made import flat_charts, polygon, square
+from hand_made import flat_charts, polygon, square, square_eigenvalues
 from modes import swing
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, build_operator, modes, sphere_atlas, texel_atlas
@@ -53,12 +53,11 @@ def test_a_sphere_rings_in_each_of_its_harmonics(ball: Atlas, material: Material
     assert (np.abs(found.shapes).max(axis=(1, 2, 3)) == 1).all()
 
 
-@pytest.mark.parametrize(("rim", "first"), [("free", 0), ("fixed", 1)])
-def test_six_squares_have_every_mode_six_times(rim: str, first: int) -> None:
+@pytest.mark.parametrize("rim", ["free", "fixed"])
+def test_six_squares_have_every_mode_six_times(rim: str) -> None:
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     six = flat_charts([corners + np.array([0, 0, k]) for k in range(6)], [[(-1, -1)] * 4] * 6, 16)
-    m, n = np.meshgrid(*2 * [np.arange(first, 9)])
-    exact = np.sort(3.0 / 2 * np.hypot(m, n).ravel())
+    exact = 3.0 / (2 * np.pi) * np.sqrt(square_eigenvalues(rim))
     found = modes(texel_atlas(six), Material(speed=3.0), 36, rim=rim).frequencies
     np.testing.assert_allclose(found, np.repeat(exact[exact > 0], 6)[:36], rtol=0.02)
 

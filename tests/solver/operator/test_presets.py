@@ -96,8 +96,7 @@ def test_the_density_after_a_hit_keeps_the_dent_within_a_factor_of_two_of_the_de
 
 def test_the_density_of_a_free_membrane_gives_the_dent() -> None:
     density = density_for(1.0, 0.02, radius=0.2, speed=2.0)
-    waves = WaveSolver(
-        sphere_atlas(1.0, 64), Material(speed=2.0, density=density), backend="cpu", conserve_volume=False
-    )
+    membrane = Material(speed=2.0, density=density)
+    waves = WaveSolver(sphere_atlas(1.0, 64), membrane, backend="cpu", conserve_volume=False)
     waves.add_impulse([0, 0, 1], 1.0, 0.2)
     assert deepest(waves, 0.1, 100) == pytest.approx(0.02, rel=0.15)

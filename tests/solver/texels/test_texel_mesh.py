@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from cube_symmetry import cube_rotations, permute_texels
-from hand_made import disk, eigenvalues, flat_charts, flat_torus, polygon, square
+from hand_made import RIM, disk, eigenvalues, flat_charts, flat_torus, polygon, square
 from modes import orders
 
 from ripple_sim.solver import Material, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
@@ -65,11 +65,8 @@ def test_momentum_of_an_impulse_on_a_rim_and_an_irregular_vertex() -> None:
         assert waves.momentum() == pytest.approx(-0.7, rel=1e-5)
 
 
-RIMS = [[(-1, -1)] * 4]
-
-
 def test_a_rectangle_is_covered_by_texels_as_long_and_as_wide_as_its_sides_say() -> None:
-    texels = flat_charts([[[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]]], RIMS, 5)
+    texels = flat_charts([[[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]]], [[RIM] * 4], 5)
     found = texel_quality(texels, texel_atlas(texels).mesh)
     timestep = found.pop("timestep")
     assert found == pytest.approx({"edge_min": 1 / 5, "edge_max": 3 / 5, "folded": 0, "coverage": 1, "spanned": 1})
@@ -124,6 +121,5 @@ def test_smoothing_does_not_know_how_the_cube_is_turned() -> None:
     field = np.random.default_rng(1).standard_normal((6, 6, 6))
     found = smoothed(topology, field)
     for rotation in cube_rotations():
-        np.testing.assert_allclose(
-            smoothed(topology, permute_texels(field, rotation)), permute_texels(found, rotation), atol=1e-14
-        )
+        turned = smoothed(topology, permute_texels(field, rotation))
+        np.testing.assert_allclose(turned, permute_texels(found, rotation), atol=1e-14)

@@ -9,6 +9,7 @@ import itertools
 
 import numpy as np
 import pytest
+from genus_zero import TETRAHEDRON
 from scipy.spatial import ConvexHull
 from surfaces import disk, sphere, torus
 
@@ -16,14 +17,6 @@ from ripple_sim.solver import Mesh, glue
 from ripple_sim.solver.layouts import FIXED, FREE, System, patches
 from ripple_sim.solver.layouts.patches import Metric, Quads, SeamlessMap, TriangleSurface
 from ripple_sim.solver.mesh import edges_of
-
-TIPS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
-
-
-def ball_with_limbs(length: float, sharpness: float, level: int) -> Mesh:
-    ball = sphere(level)
-    radius = 1 + length * np.exp(sharpness * (ball.V @ TIPS.T - 1)).sum(axis=1)
-    return Mesh.from_arrays(ball.V * radius[:, None], ball.F)
 
 
 def test_sizes_keep_to_their_bounds() -> None:
@@ -34,7 +27,9 @@ def test_sizes_keep_to_their_bounds() -> None:
 
 
 def test_texels_on_limbs_are_neither_folded_nor_wide() -> None:
-    atlas = patches.patch_atlas(ball_with_limbs(3.0, 40.0, 4), 64)
+    ball, tips = sphere(4), TETRAHEDRON[0] / np.sqrt(3)
+    radius = 1 + 3.0 * np.exp(40.0 * (ball.V @ tips.T - 1)).sum(axis=1)
+    atlas = patches.patch_atlas(Mesh.from_arrays(ball.V * radius[:, None], ball.F), 64)
     quality = atlas.quality()
     assert quality["folded"] == 0
     assert quality["timestep"] > 0.5
