@@ -20,7 +20,7 @@ from PIL import Image
 from ripple_sim.errors import RippleWarning
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.texels.texel_atlas import ChartPage
+from ripple_sim.solver.texels.topology import ChartPage
 from ripple_sim.solver.waves.height_map import DeviceHeightMap
 
 from .camera import Pose, perspective, view_matrix

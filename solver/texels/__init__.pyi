@@ -61,7 +61,6 @@ from .stencil import (
     stiffness_matrix as stiffness_matrix,
 )
 from .stiffness import LEAST_RATIO as LEAST_RATIO, TexelCells as TexelCells
-from .texel_atlas import ChartPage as ChartPage
 from .texel_mesh import (
     TexelGrid as TexelGrid,
     TexelMesh as TexelMesh,
@@ -79,6 +78,7 @@ from .thickness import (
 )
 from .topology import (
     QUANTILES as QUANTILES,
+    ChartPage as ChartPage,
     TexelTopology as TexelTopology,
     fill_halo as fill_halo,
     glue as glue,

@@ -21,10 +21,9 @@ from ..files import require_memory
 from ..gl import GLContext
 from ..kernel import Floats32, kernel
 from ..texels.atlas import Atlas
-from ..texels.texel_atlas import ChartPage
 from ..texels.texel_mesh import TexelMesh
 from ..texels.thickness import LEAST, medial_radius
-from ..texels.topology import TexelTopology, fill_halo
+from ..texels.topology import ChartPage, TexelTopology, fill_halo
 
 # Of the medial radius: heights up to the first share are drawn as they are, and none beyond the second.
 FREE, MOST = 0.25, 0.6

@@ -383,7 +383,7 @@ _CORNERS = 6  # of a cell
 _RADIUS = 0.75  # of a cell, over the root of its share of the area
 _REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
 _SMALLEST = 0.85  # of the radius of cells elsewhere
-_FARTHEST = 100  # a surface reaches, in units of the root of a cell's area: at 88 charts take a minute
+_FARTHEST = 100**2  # length of a surface over its width, times the number of its cells: at 88**2 charts take a minute
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
@@ -403,14 +403,19 @@ def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
 
 def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:
     """About as many quads as cells, some more of these; None where the surface has none."""
-    return cut_into_large_quads(_cells_of(part, round(_LARGE * count)))
+    return cut_into_large_quads(_cells_of(part, max(count, min(round(_LARGE * count), int(_FARTHEST / _length(part))))))
+
+
+def _length(part: TriangleSurface) -> float:
+    """How long a surface is, over how wide."""
+    return float(np.ptp(part.V, axis=0).max()) ** 2 / part.areas.sum()
 
 
 def _cells_of(part: TriangleSurface, count: int) -> BorderedCells:
-    area, extent = part.areas.sum(), float(np.ptp(part.V, axis=0).max())
-    if extent > _FARTHEST * np.sqrt(area / count):
+    area = part.areas.sum()
+    if count * _length(part) > _FARTHEST:
         raise AtlasError(
-            f"the surface is about {extent**2 / area:.2g} times as long as wide, too long for charts: shorten what "
+            f"the surface is about {_length(part):.2g} times as long as wide, too long for charts: shorten what "
             "sticks out of it, or scale it alike along all axes"
         )
     metric, reach = Metric.of(refined(part, np.sqrt(area / (_TRIANGLES / CELLS * count)))), np.inf

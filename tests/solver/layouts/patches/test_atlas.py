@@ -15,7 +15,7 @@ from known_meshes import known_mesh
 from surfaces import disk, grid, joined, moved, sphere, square, torus
 
 from ripple_sim.solver import Atlas, AtlasError, Material, Mesh, TexelMesh, WaveSolver, build_atlas, glue, load_mesh
-from ripple_sim.solver.layouts.patches import atlas_from_patch_map, centres, layout, patch_map
+from ripple_sim.solver.layouts.patches import atlas_from_patch_map, centres, layout, patch_map, quads
 from ripple_sim.solver.texels import folded_texels
 
 
@@ -173,6 +173,12 @@ def test_a_surface_too_long_for_its_width_is_refused_at_once(stretch: float) -> 
     long = Mesh.from_arrays(sphere(1).V * [1, 1, stretch], sphere(1).F)
     with pytest.raises(AtlasError, match="times as long as wide"):
         build_atlas(long, 16, cache=False, layout="patches")
+
+
+def test_a_surface_a_little_too_long_for_so_many_cells_has_fewer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a strip 100 times as long as wide at N = 96, in less time."""
+    monkeypatch.setattr(quads, "_FARTHEST", 20**2)
+    assert_atlas_carries_waves(build_atlas(ANY_MESH["strip"](), 16, cache=False, layout="patches"))
 
 
 def test_many_parts_none_of_which_has_a_share_to_speak_of(monkeypatch: pytest.MonkeyPatch) -> None:
