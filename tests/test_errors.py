@@ -10,15 +10,8 @@ from ripple_sim.errors import RenderError, SceneError
 from ripple_sim.solver import errors as of_solver
 from ripple_sim.solver.errors import GLError, RippleError, deprecated
 
-CLASSES = sorted(
-    {
-        each
-        for module in (of_solver, of_application)
-        for _, each in inspect.getmembers(module, inspect.isclass)
-        if issubclass(each, Exception)
-    },
-    key=lambda each: each.__name__,
-)
+MEMBERS = [each for module in (of_solver, of_application) for _, each in inspect.getmembers(module, inspect.isclass)]
+CLASSES = sorted({each for each in MEMBERS if issubclass(each, Exception)}, key=lambda each: each.__name__)
 ERRORS = [each for each in CLASSES if not issubclass(each, Warning)]
 
 

@@ -56,9 +56,7 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     assert all(each in told.getvalue() for each in ("compiling the wave step (once): 12 s", "0/120"))
 
 
-def test_what_takes_long_is_logged_and_printed_as_a_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_takes_long_is_logged_and_printed_as_a_line(monkeypatch, capsys, caplog) -> None:
     monkeypatch.setattr(kernel._watch, "seconds", {"ripple_sim.solver": 2.1})
     monkeypatch.setattr(kernel._watch, "told", False)
 

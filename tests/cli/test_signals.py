@@ -184,9 +184,7 @@ def test_without_streams_home_and_cache_an_atlas_is_whole(tmp_path: Path, tetrah
     assert sorted(each.name for each in tmp_path.iterdir()) == ["mesh.npz", tetrahedron.name]
 
 
-def test_a_full_disk_is_no_bad_input(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tetrahedron: Path
-) -> None:
+def test_a_full_disk_is_no_bad_input(tmp_path, monkeypatch, capsys, tetrahedron) -> None:
     def full(file: BinaryIO, *_: object) -> None:
         file.write(b"half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -56,14 +56,12 @@ CALM, CHATTERING = "0.02 1", "0.01 0.2"
 
 # the latter never comes quite to rest: contacts of flat bodies break and close at every other step
 @pytest.mark.parametrize(
-    ("target", "body", "solref"),
-    [
-        ("sphere", "ball", CALM),
-        *((*each, CHATTERING) for each in (("box", "box"), ("box", "capsule"), ("animal", "box"), ("flex", "box"))),
-    ],
+    ("target", "body"),
+    [("sphere", "ball"), ("box", "box"), ("box", "capsule"), ("animal", "box"), ("flex", "box")],
 )
-def test_surface_under_a_body_at_rest_becomes_still_in_its_dimple(target: str, body: str, solref: str) -> None:
-    run, history = Run(model_of(target, body, solref), "target", material=MATERIAL, resolution=24), []
+def test_surface_under_a_body_at_rest_becomes_still_in_its_dimple(target: str, body: str) -> None:
+    model = model_of(target, body, CALM if target == "sphere" else CHATTERING)
+    run, history = Run(model, "target", material=MATERIAL, resolution=24), []
     data, waves = run.data, run.ripples["target"]
     while data.time < 4:
         run.step()

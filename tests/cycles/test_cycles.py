@@ -92,9 +92,8 @@ def test_the_stage_keeps_what_preview_surfaces_have_no_word_for(folder: Path) ->
 @pytest.mark.filterwarnings("ignore:MuJoCo. Insufficient arena memory")
 def test_what_mujoco_says_of_the_first_frame_is_ours(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ball = '<body pos="1 0 1"><freejoint/><geom size="0.1"/></body>'
-    (folder / "scene.xml").write_text(
-        MODEL.replace("<mujoco>", '<mujoco><size memory="300K"/>').replace("</worldbody>", f"{40 * ball}</worldbody>")
-    )
+    small = MODEL.replace("<mujoco>", '<mujoco><size memory="300K"/>')
+    (folder / "scene.xml").write_text(small.replace("</worldbody>", f"{40 * ball}</worldbody>"))
     scene = load_scene(folder / "scene.toml")
     mujoco.set_mju_user_warning(None)
     stand_in(folder, monkeypatch, fails=0)

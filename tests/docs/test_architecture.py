@@ -55,9 +55,8 @@ def test_the_house_stays_small(plots) -> None:
 def test_the_drawing_has_the_arrows_of_the_source(plots) -> None:
     drawn = re.search(r"<dc:description>(.*?)</dc:description>", DRAWING.read_text(encoding="utf-8"), re.DOTALL)
     assert drawn is not None
-    assert drawn[1].split(", ") == plots.architecture.summary(plots.architecture.arrows()[0]), (
-        "draw it anew: python examples/plots/architecture.py --docs"
-    )
+    advice = "draw it anew: python examples/plots/architecture.py --docs"
+    assert drawn[1].split(", ") == plots.architecture.summary(plots.architecture.arrows()[0]), advice
 
 
 def test_the_drawing_is_drawn(plots, tmp_path: Path) -> None:

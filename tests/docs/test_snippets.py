@@ -57,10 +57,8 @@ class Block(NamedTuple):
 
 def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
-    return [
-        Block(text.count("\n", 0, m.start()) + 1, m[1], m[2], m[3])
-        for m in re.finditer(r'^```(\w*)(?: title="(.*?)")?\n(.*?)^```$', text, re.DOTALL | re.MULTILINE)
-    ]
+    found = re.finditer(r'^```(\w*)(?: title="(.*?)")?\n(.*?)^```$', text, re.DOTALL | re.MULTILINE)
+    return [Block(text.count("\n", 0, m.start()) + 1, *m.groups()) for m in found]
 
 
 def commands(page: Path) -> list[str]:

@@ -4,7 +4,6 @@ import dataclasses
 import resource
 import signal
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -113,9 +112,7 @@ def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) 
         ("run.usdc", {"chunk": None, "resume": True}, "add --chunk"),
     ],
 )
-def test_what_cannot_be_is_refused_before_it_is_simulated(
-    scene: Scene, tmp_path: Path, name: str, options: dict[str, Any], message: str
-) -> None:
+def test_what_cannot_be_is_refused_before_it_is_simulated(scene, tmp_path, name: str, options: dict, message: str):
     with pytest.raises(RippleError, match=message):
         export_scene(scene, tmp_path / name, dataclasses.replace(OPTIONS, **options))
     assert not list(tmp_path.iterdir())

@@ -255,10 +255,8 @@ def test_the_browser_has_moving_surfaces(browser: Any, soft_model: mujoco.MjMode
             mesh = meshes[name]
             order, size = memory_order(mesh.F, mesh.rest)[1], np.ptp(mesh.rest, axis=0).max()
             for frame in (17, 18, 19, 3):
-                points = tab.evaluate(
-                    f"ripplePlayer.player.show({frame}).then("
-                    f"() => Array.from(ripplePlayer.player.drawing.parts[{number}].data[0]))"
-                )
+                tab.evaluate(f"ripplePlayer.player.show({frame})")
+                points = tab.evaluate(f"Array.from(ripplePlayer.player.drawing.parts[{number}].data[0])")
                 expected = seen[frame, name][order]
                 assert np.abs(np.reshape(points, (-1, 3)) - expected).max() < 1e-4 * size
             assert np.abs(seen[19, name] - seen[3, name]).max() > 0.02 * size  # it moves

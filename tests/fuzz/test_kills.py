@@ -29,15 +29,7 @@ JOBS = {  # the first of them in the tests, all by `make fuzz`
 }
 # a process is forked from one that has imported all, so that most moments lie in the work
 CONTEXT = multiprocessing.get_context("forkserver")
-LOADED = [
-    "ripple_sim.batch.worker",
-    "ripple_sim.cli.main",
-    "ripple_sim.export.fields",
-    "ripple_sim.export.page",
-    "ripple_sim.export.usd",
-    "ripple_sim.figures.atlas_plot",
-    "pandas",
-]
+LOADED = ["batch.worker", "cli.main", "export.fields", "export.page", "export.usd", "figures.atlas_plot"]
 
 
 def finish(home: Path, words: str, kill: int = 0, after: float = 300) -> tuple[int, float]:
@@ -82,7 +74,7 @@ Whole = Callable[[str], tuple[float, dict[str, bytes]]]
 @pytest.fixture(scope="module")
 def undisturbed(opengl: None) -> Iterator[Whole]:
     """How long a job takes by its name [s], and what it makes; found out when it is asked for."""
-    CONTEXT.set_forkserver_preload(LOADED)
+    CONTEXT.set_forkserver_preload([*(f"ripple_sim.{each}" for each in LOADED), "pandas"])
     with tempfile.TemporaryDirectory() as folder:
 
         @functools.cache

@@ -136,9 +136,7 @@ def placed(marks: list[Mark], body: str = "", largest: float = 1.0) -> list:
     return overlay.place_marks(marks, largest, LAYOUT, FRONT, *posed(EMPTY.format(body)))
 
 
-def mark(
-    impulse: float, axis: tuple[float, float, float] = (1, 0, 0), place: tuple = (0, 0, 0), **fields: float
-) -> Mark:
+def mark(impulse: float, axis: tuple = (1, 0, 0), place: tuple = (0, 0, 0), **fields: float) -> Mark:
     return Mark(np.array(place, float), np.array(axis, float), impulse, **fields)
 
 

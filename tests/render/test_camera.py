@@ -147,9 +147,8 @@ def test_box_holds_the_ball(lens: tuple[float, float]) -> None:
     centres = camera.eye + local @ camera.rotation.T
     directions = random.normal(size=(500, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    for centre, radius, box in zip(
-        centres, radii, render.boxes_of(np.column_stack([centres, radii]), camera, SIZE), strict=True
-    ):
+    boxes = render.boxes_of(np.column_stack([centres, radii]), camera, SIZE)
+    for centre, radius, box in zip(centres, radii, boxes, strict=True):
         shown = np.clip(pixels(centre + radius * directions, camera), 0, SIZE)
         assert (shown >= box[:2]).all() and (shown <= box[2:]).all()
 

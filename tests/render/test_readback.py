@@ -3,7 +3,6 @@
 import contextlib
 import dataclasses
 import itertools
-from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -113,9 +112,7 @@ def views(count: int) -> list[Camera]:
 
 @pytest.mark.parametrize("alpha", [False, True])
 @pytest.mark.parametrize("driver", ["software", "gpu"])
-def test_frames_come_back_in_order_however_many_are_on_their_way(
-    gl, request: pytest.FixtureRequest, driver: str, alpha: bool
-) -> None:
+def test_frames_come_back_in_order_however_many_are_on_their_way(gl, request, driver: str, alpha: bool) -> None:
     model, data = posed(LONE_BALL)
     renderer = Renderer(gl, model, {}, size=(70, 50), alpha=alpha)
     expected = [renderer.render(data, {}, camera) for camera in views(5)]
@@ -151,9 +148,7 @@ def test_colours_are_divided_by_opacity(gl) -> None:
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
 @pytest.mark.parametrize("options", [{"overlay": ["height", "contacts"], "compare": "paper"}, {"supersample": 2}])
 @pytest.mark.usefixtures("gl", "gpu")
-def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backend: str, options: dict
-) -> None:
+def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(tmp_path, monkeypatch, backend, options):
     scene = egg_scene(tmp_path, '<geom type="plane" size="2 2 1" pos="0 0 -0.25"/>', duration=0.4, density=20.0)
     done: list[int] = []
     render_all = Film.render_all

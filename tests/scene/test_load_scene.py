@@ -215,9 +215,7 @@ def test_a_scene_file_that_is_a_fifo_is_named_as_what_it_is(tmp_path: Path) -> N
         load_scene(tmp_path / "scene.toml")
 
 
-def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(tmp_path, monkeypatch, capfd) -> None:
     monkeypatch.chdir(tmp_path)
     path = ball_scene(tmp_path, f'<option magnetic="nan 0 0"/>{BALL}')
     with pytest.warns(RippleWarning, match="MuJoCo: XML contains a 'NaN'"):

@@ -11,17 +11,10 @@ from ripple_sim import Impulse, Material, Ripples
 class Run:
     """A model in motion, the waves of its targets, and the impulses of every step, `hits`.
 
-    The material may be given by its density [kg/m^2] alone; the options are those of `Ripples`.
+    The model may be a specification, the material its density [kg/m^2] alone; the options are those of `Ripples`.
     """
 
-    def __init__(
-        self,
-        model: mujoco.MjModel | mujoco.MjSpec,
-        *targets: str,
-        density: float = 50.0,
-        material: Material | None = None,
-        **options: object,
-    ) -> None:
+    def __init__(self, model, *targets: str, density: float = 50.0, material: Material | None = None, **options):
         self.model = model.compile() if isinstance(model, mujoco.MjSpec) else model
         self.data = mujoco.MjData(self.model)
         options = {"resolution": 12, "backend": "cpu", "conserve_volume": False, **options}

@@ -57,10 +57,8 @@ def sphere(subdivisions: int) -> Mesh:
 def joined(*meshes: Mesh) -> Mesh:
     """Several meshes as one."""
     first = np.cumsum([0, *(len(each.V) for each in meshes)])
-    return Mesh.from_arrays(
-        np.concatenate([each.V for each in meshes]),
-        np.concatenate([each.F + k for each, k in zip(meshes, first, strict=False)]),
-    )
+    F = [each.F + k for each, k in zip(meshes, first, strict=False)]
+    return Mesh.from_arrays(np.concatenate([each.V for each in meshes]), np.concatenate(F))
 
 
 def moved(mesh: Mesh, offset: tuple[float, float, float], size: float = 1.0) -> Mesh:

@@ -103,13 +103,8 @@ def colours(frame) -> np.ndarray:
     tuple(map(int, mujoco.__version__.split(".")[:2])) < (3, 12), reason="MuJoCo laid pictures otherwise before 3.12"
 )
 def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
-    variants = [
-        ("2d", 'texuniform="false"'),
-        ("2d", 'texuniform="true" texrepeat="3 2"'),
-        ("2d", 'texrepeat="2.5 1"'),
-        ("cube", 'texuniform="false"'),
-        ("cube", 'texuniform="true"'),
-    ]
+    flat = ('texuniform="false"', 'texuniform="true" texrepeat="3 2"', 'texrepeat="2.5 1"')
+    variants = [("2d", text) for text in flat] + [("cube", f'texuniform="{each}"') for each in ("false", "true")]
     body = SHELF + '<geom type="plane" size="0 0 .1" pos="0 0 -9"/>'
     models = [textured_model(body, text, kind=kind) for kind, text in variants]
     paths = [str(tmp_path / f"{i}.mjb") for i in range(len(models))]

@@ -93,15 +93,12 @@ def test_gl_equals_cpu_at_any_resolution(gl_backend: str, resolution: int) -> No
 @pytest.mark.parametrize("operator", ["fem", "paper", "uncorrected", "dynamic-paint"])
 def test_gl_equals_cpu(animal: Atlas, gl_backend: str, operator: str) -> None:
     animal = build_atlas(animal.mesh, 24)
-    rng = np.random.default_rng(5)
-    shape = animal.areas.shape
-    material = Material(
-        speed=rng.uniform(0.2, 0.6, shape),
-        damping=rng.uniform(0, 1, shape),
-        stiffness=rng.uniform(0, 5, shape),
-        viscosity=1e-4,
-        density=rng.uniform(1, 2, shape),
+    rng, limits = (
+        np.random.default_rng(5),
+        {"speed": (0.2, 0.6), "damping": (0, 1), "stiffness": (0, 5), "density": (1, 2)},
     )
+    maps = {name: rng.uniform(*between, animal.areas.shape) for name, between in limits.items()}
+    material = Material(**maps, viscosity=1e-4)
 
     def run(name: str) -> np.ndarray:
         waves = WaveSolver(animal, material, backend=name, operator=operator)

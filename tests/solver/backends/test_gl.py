@@ -71,9 +71,7 @@ SURFACES = {"sphere": lambda: SPHERE, "strips": lambda: texel_atlas(square(70)),
 
 @pytest.mark.parametrize(("rim", "tightening"), [("free", 0.0), ("fixed", 1.5)])
 @pytest.mark.parametrize("name", SURFACES)
-def test_weights_links_and_time_step_are_those_of_the_cpu(
-    opengl: None, monkeypatch: pytest.MonkeyPatch, name: str, rim: str, tightening: float
-) -> None:
+def test_weights_links_and_time_step_are_those_of_the_cpu(opengl, monkeypatch, name: str, rim: str, tightening: float):
     monkeypatch.setattr(GLContext, "software", False)
     atlas = SURFACES[name]()
     material = Material(speed=1.0 + 0.5 * atlas.barycentrics[..., 0], viscosity=1e-3, tightening=tightening)

@@ -140,20 +140,9 @@ def test_a_fork_is_told_to_be_spawned_and_auto_takes_the_cpu(opengl: None) -> No
     assert all("is a fork; start processes with multiprocessing's method 'spawn'" in lines[i] for i in (0, 2))
 
 
-PROCESSOR = [
-    "llvmpipe (LLVM 15.0.7, 256 bits)",
-    "softpipe",
-    "Mesa Software Rasterizer",
-    "SWR (LLVM 12.0.0)",
-    "LLVMPIPE",
-]
-GPU = [
-    "NVIDIA H200/PCIe/SSE2",
-    "AMD Radeon RX 6800 (radeonsi, navi21, LLVM 15.0.7, DRM 3.49)",
-    "Mesa Intel(R) UHD Graphics 620 (KBL GT2)",
-    "Apple M1",
-    "D3D12 (NVIDIA GeForce RTX 3080)",
-]
+PROCESSOR = ["llvmpipe (LLVM 15.0.7, 256 bits)", "softpipe", "Mesa Software Rasterizer", "SWR (LLVM 12.0)", "LLVMPIPE"]
+AMD, INTEL = "AMD Radeon RX 6800 (radeonsi, navi21, LLVM 15.0.7, DRM 3.49)", "Mesa Intel(R) UHD Graphics 620 (KBL GT2)"
+GPU = [AMD, INTEL, "NVIDIA H200/PCIe/SSE2", "Apple M1", "D3D12 (NVIDIA GeForce RTX 3080)"]
 
 
 @pytest.mark.parametrize("renderer", PROCESSOR + GPU)
