@@ -241,9 +241,7 @@ VIEWED = """<mujoco><visual><global fovy="38"/></visual><worldbody><geom type="p
 TRACKING = {"trackbodyid": 1, "lookat": np.array([0.0, 0.1, 2.0]), "elevation": -20.0, "azimuth": 30.0}
 
 
-def pose_of_mujoco(
-    model: mujoco.MjModel, data: mujoco.MjData, camera_id: int, config: dict[str, object]
-) -> tuple[np.ndarray, np.ndarray]:
+def pose_of_mujoco(model: mujoco.MjModel, data: mujoco.MjData, camera_id: int, config: dict):
     """Position and view of Gymnasium's camera: free by default, aimed at the median, with the settings on top."""
     camera, scene = mujoco.MjvCamera(), mujoco.MjvScene(model, 100)
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE if camera_id < 0 else mujoco.mjtCamera.mjCAMERA_FIXED

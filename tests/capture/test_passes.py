@@ -37,9 +37,7 @@ FLOOR, EGG, BALL = 1, 2, 3  # in the segmentation
 
 
 @pytest.fixture(scope="module", params=["rigid", "moving"])
-def seen(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, opengl: None
-) -> list[tuple[Sighting, np.ndarray]]:
+def seen(request, tmp_path_factory, opengl) -> list[tuple[Sighting, np.ndarray]]:
     """Two frames: what is seen, and where points on the egg are in the world. Its surface may move by itself, too."""
     path = write_scene(tmp_path_factory.mktemp("scene"), MJCF, TOML)
     simulation = Simulation(load_scene(path), fps=20, backend="cpu")

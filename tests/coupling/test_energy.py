@@ -60,9 +60,7 @@ def test_energy_of_bodies_and_waves_never_rises(seed: int) -> None:
     assert touched
 
 
-@pytest.mark.parametrize(
-    ("mass", "dt", "kind"), [(5.0, 0.002, "sphere"), (20.0, 0.001, "sphere"), (20.0, 0.002, "cube")]
-)
+@pytest.mark.parametrize(("mass", "dt", "kind"), [(5, 0.002, "sphere"), (20, 0.001, "sphere"), (20, 0.002, "cube")])
 def test_a_body_laid_at_rest_stays_in_its_dimple(mass: float, dt: float, kind: str) -> None:
     model = scene(kind, mass, dt, 0.06 - 1e-4)
     run, rigid, given = coupled(model, Material()), mujoco.MjData(model), []

@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 from mujoco_models import BALL, add_ball, mesh_spec, model_of
 
-from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling import (
-    CoupledModel,
-    by_name,
-    find_flex_colliders,
-    find_geom,
-    flex_thickness,
-    geom_name,
-    named_collision_geoms,
-)
+from ripple_sim import Material, RippleError, Ripples, coupling
+from ripple_sim.coupling import CoupledModel, find_geom, geom_name
 from ripple_sim.scenes.shapes import peanut
 
 NAMELESS = """<geom type="plane" size="1 1 1"/>
@@ -53,9 +45,9 @@ def test_long_lists_of_geoms_are_cut() -> None:
 
 def test_a_geom_with_two_values_is_refused() -> None:
     model = model_of(NAMELESS)
-    assert by_name(model, {"chest": 1, 2: 5}, "numbers") == {"chest": 1, "torso/1": 5}
+    assert coupling.by_name(model, {"chest": 1, 2: 5}, "numbers") == {"chest": 1, "torso/1": 5}
     with pytest.raises(RippleError, match="numbers has two entries for geom 'chest', one of them as 1"):
-        by_name(model, {"chest": 1, 1: 2}, "numbers")
+        coupling.by_name(model, {"chest": 1, 1: 2}, "numbers")
 
 
 def test_targets_go_by_name_or_id_or_place() -> None:
@@ -115,7 +107,7 @@ def model() -> mujoco.MjModel:
 )
 def test_colliders_of_targets(model, targets, contacts, expected) -> None:
     ids = [find_geom(model, name) for name in targets]
-    coupled = CoupledModel(model, ids, named_collision_geoms(model, targets, contacts))
+    coupled = CoupledModel(model, ids, coupling.named_collision_geoms(model, targets, contacts))
     assert [[coupled.names[geom] for geom in coupled.collision_geoms(target)] for target in ids] == expected
 
 
@@ -245,7 +237,7 @@ def test_flex_speaks_for_its_geom(coupled: CoupledModel) -> None:
     assert coupled.flex_colliders == {target: 0}
     np.testing.assert_array_equal(np.flatnonzero(coupled.has_flex), [target])
     np.testing.assert_allclose(coupled.solref[target], [0.03, 1.0])
-    assert coupled.collider_extents[target] == flex_thickness(coupled.model, 0) < coupled.extents[target]
+    assert coupled.collider_extents[target] == coupling.flex_thickness(coupled.model, 0) < coupled.extents[target]
     # the geom's own masks are 0 now
     assert np.flatnonzero(coupled.can_collide(target)).tolist() == sorted(numbers(coupled, "ball", "floor"))
 
@@ -263,8 +255,8 @@ def test_flex_of_another_name_body_or_kind_stands_for_nothing() -> None:
     spec = mesh_spec((V, F), route=None)
     spec.worldbody.add_body(name="elsewhere")
     spec.add_flex(name="other", dim=2, vertbody=["base"], **mesh)
-    assert find_flex_colliders(spec.compile()) == {}
+    assert coupling.find_flex_colliders(spec.compile()) == {}
     for body, geom in (("base", {0: 1}), ("elsewhere", {})):
         changed = spec.copy()
         changed.add_flex(name="target", dim=2, vertbody=[body], **mesh)
-        assert find_flex_colliders(changed.compile()) == geom
+        assert coupling.find_flex_colliders(changed.compile()) == geom

@@ -3,6 +3,7 @@
 So it is of moving targets that fall on the ground, or meet bodies which are tied, driven or sticky.
 """
 
+import itertools
 import runpy
 from pathlib import Path
 from types import SimpleNamespace
@@ -88,11 +89,8 @@ HINGE = '<joint axis="0 1 0" pos="0.4 0 0" damping="0.2" stiffness="40"/>'
 MOUNTS = [("<freejoint/>", "pyramidal", 1), (HINGE, "elliptic", 3), ("", "elliptic", 3), ("", "pyramidal", 3)]
 CASES = [(*pair, share) for share in (0.0, 0.9) for pair in [*PAIRS, ("box", "box"), ("hull", "box")]]
 CASES += [(target, "sphere", 0.5) for target in TARGETS]
-CASES += [
-    ("flex", body, 0.9 * ((i + j) % 2), *mount)
-    for i, body in enumerate(("capsule", "box", "cylinder"))
-    for j, mount in enumerate(MOUNTS)
-]
+ON_FLEX = itertools.product(enumerate(("capsule", "box", "cylinder")), enumerate(MOUNTS))
+CASES += [("flex", body, 0.9 * ((i + j) % 2), *mount) for (i, body), (j, mount) in ON_FLEX]
 
 
 @pytest.mark.filterwarnings("ignore:geom 'target' collides", "ignore:body 'body' meets geom 'target'")
@@ -183,10 +181,7 @@ def test_answer_does_not_depend_on_the_frame_rate(tmp_path: Path) -> None:
     np.testing.assert_allclose(arrivals, arrivals[-1], rtol=0.01)
 
 
-GROUND = {
-    "plane": '<geom name="ground" type="plane" size="3 3 1"/>',
-    "hfield": '<geom name="ground" type="hfield" hfield="flat"/>',
-}
+GROUND = {"plane": 'size="3 3 1"', "hfield": 'hfield="flat"'}
 FALLING = {
     "sphere": 'size="0.2"',
     "box": 'type="box" size="0.2 0.15 0.1"',
@@ -210,7 +205,8 @@ def test_a_target_that_falls_on_the_ground_gets_its_change_of_momentum(target: s
     spec = mujoco.MjSpec.from_string(
         f"""<mujoco><option timestep="0.002"/><compiler angle="degree"/><default><geom condim="1"/></default>
         <asset>{mesh_asset("peanut", *peanut(0.06))}
-        <hfield name="flat" nrow="5" ncol="5" size="3 3 0.1 0.2"/></asset><worldbody>{GROUND[ground]}
+        <hfield name="flat" nrow="5" ncol="5" size="3 3 0.1 0.2"/></asset><worldbody>
+        <geom name="ground" type="{ground}" {GROUND[ground]}/>
         <body name="body" pos="0.01 0.02 0.3"><freejoint/><geom name="target" {FALLING[target]} mass="2"/></body>
         </worldbody></mujoco>"""
     )

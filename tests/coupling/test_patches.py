@@ -11,9 +11,7 @@ from ripple_sim.solver.waves.footprint import footprint
 SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
 
 
-def spread_patch(
-    atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool
-) -> tuple[np.ndarray, np.ndarray, float]:
+def spread_patch(atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool):
     patch = np.zeros(1, int), np.array([radius]), np.array([convex])
     patches, at, shares, radii = load_points(points, forces, *patch, lambda probes: atlas.nearest(probes)[0])
     assert not patches.any()

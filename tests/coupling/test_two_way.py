@@ -14,9 +14,7 @@ from ripple_sim.coupling import support_point
 GRAVITY = 9.81
 
 
-def ring(
-    two_way: bool, speed: float = 2.0, target: str = "", mass: float = 0.2, gap: float = -1e-4, gravity: float = GRAVITY
-):
+def ring(two_way: bool, speed=2.0, target: str = "", mass: float = 0.2, gap: float = -1e-4, gravity: float = GRAVITY):
     """Let a ring run to a ball on a block, or above it: heights, and over time both momenta and the speed under it."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.001" gravity="0 0 {-gravity}"/><worldbody>

@@ -11,6 +11,7 @@ from programs import ended
 import ripple_sim
 
 ROOT = Path(__file__).parents[2]
+FOLDERS = {"ripple_sim": "ripple_sim", "solver": "ripple_sim/solver", "scenes": "ripple_sim/scenes"}
 SUFFIXES = {".py", ".glsl", ".toml", ".xml", ".obj", ".png", ".npy", ".typed"}
 
 
@@ -20,7 +21,7 @@ def wheel(tmp_path_factory) -> set[str]:
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
     source.mkdir()
-    for name in ("ripple_sim", "solver", "scenes", "pyproject.toml", "README.md", "LICENSE"):
+    for name in (*FOLDERS, "pyproject.toml", "README.md", "LICENSE"):
         (source / name).symlink_to(ROOT / name)
     ended("-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", folder, source, check=True)
     with zipfile.ZipFile(next(folder.glob("*.whl"))) as archive:
@@ -30,11 +31,7 @@ def wheel(tmp_path_factory) -> set[str]:
 def test_every_source_file_is_in_the_wheel(wheel):
     expected = {
         f"{inside}/{path.relative_to(ROOT / folder).as_posix()}"
-        for folder, inside in (
-            ("ripple_sim", "ripple_sim"),
-            ("solver", "ripple_sim/solver"),
-            ("scenes", "ripple_sim/scenes"),
-        )
+        for folder, inside in FOLDERS.items()
         for path in (ROOT / folder).rglob("*")
         if path.suffix in SUFFIXES and "__pycache__" not in path.parts
     }

@@ -94,19 +94,15 @@ def test_the_tables_of_a_plan_that_take_any_key_are_told_as_tables() -> None:
     assert all(f"| `{name}` | table |" in text for name in ("vary", "model"))
 
 
-ROOT = Path(__file__).parents[2]
-QUOTED = re.findall(
-    r"(?<![*\w])\*([^*|]+)\*(?![*\w])", (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
-)
+QUOTED = re.findall(r"(?<![*\w])\*([^*|]+)\*(?![*\w])", (DOCS / "troubleshooting.md").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
 def messages() -> str:
     """The source, with strings that go on in the next line in one piece."""
-    sources = [
-        file.read_text(encoding="utf-8") for name in ("ripple_sim", "solver") for file in (ROOT / name).rglob("*.py")
-    ]
-    return re.sub(r'"\s*\n\s*f?"', "", "\n".join(sources)).replace("{MARK}", MARK)
+    files = [file for name in ("ripple_sim", "solver") for file in (DOCS.parent / name).rglob("*.py")]
+    source = "\n".join(file.read_text(encoding="utf-8") for file in files)
+    return re.sub(r'"\s*\n\s*f?"', "", source).replace("{MARK}", MARK)
 
 
 @pytest.mark.parametrize("words", QUOTED)

@@ -118,9 +118,8 @@ class Reader:
         if block.title is not None and block.title.startswith("plan"):
             path = self.folder / block.title
             Variation(read_plan(path), 0).load()
-            path.write_text(
-                re.sub(r"size = .*\nfps = .*\nduration = .*", "size = [64, 48]\nfps = 10\nduration = 0.2", block.text)
-            )
+            small = "size = [64, 48]\nfps = 10\nduration = 0.2"
+            path.write_text(re.sub(r"size = .*\nfps = .*\nduration = .*", small, block.text))
             return
         if block.title is not None:
             self.scene = self.folder / block.title

@@ -24,9 +24,7 @@ def encode(path: Path, codec: Codec, frames: np.ndarray, stream: Stream = STREAM
     return path
 
 
-def in_parts(
-    folder: Path, codec: Codec, frames: np.ndarray, counts: list[int], stream: Stream
-) -> list[tuple[Path, int]]:
+def in_parts(folder: Path, codec: Codec, frames: np.ndarray, counts: list[int], stream: Stream):
     """Clips of so many frames each, with the number of their first."""
     first = np.cumsum([0, *counts]).tolist()
     return [(encode(folder / f"{a}.part", codec, frames[a:b], stream), a) for a, b in itertools.pairwise(first)]
@@ -91,12 +89,9 @@ def test_a_broken_clip_is_an_error_and_no_shorter_video(tmp_path: Path, codec: C
     assert codec is H264 or not (tmp_path / "whole").exists()
 
 
-@pytest.mark.parametrize(
-    ("frames", "counts"), [(striped(1), [1]), (striped(5), [5]), (striped(7), [4, 3]), (striped(5), [2, 2, 1])]
-)
-def test_few_colours_of_a_gif_come_back_exactly_however_its_frames_are_cut_into_clips(
-    tmp_path: Path, frames: np.ndarray, counts: list[int]
-) -> None:
+@pytest.mark.parametrize("counts", [[1], [5], [4, 3], [2, 2, 1]])
+def test_few_colours_of_a_gif_come_back_exactly_however_it_is_cut_into_clips(tmp_path: Path, counts: list[int]) -> None:
+    frames = striped(sum(counts))
     join_gif(in_parts(tmp_path, LOSSLESS, frames, counts, STREAM), tmp_path / "whole.gif", STREAM)
     np.testing.assert_array_equal(pictures(tmp_path / "whole.gif"), frames)
 

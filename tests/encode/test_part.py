@@ -97,10 +97,9 @@ def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
 def test_an_interrupted_video_says_what_is_left(tmp_path):
     with pytest.raises(KeyboardInterrupt) as ending:
         write(tmp_path / "clip.mp4", 0, 60)
-    assert ending.value.__notes__ == [
-        f"{FRAMES_IN_CLIP} frames are kept in {tmp_path / 'clip.mp4.part'}; --resume carries on from there"
-    ]
-    assert [path.name for path in (tmp_path / "clip.mp4.part" / "frames").iterdir()] == ["frames_00000-00047.mp4"]
+    part = tmp_path / "clip.mp4.part"
+    assert ending.value.__notes__ == [f"{FRAMES_IN_CLIP} frames are kept in {part}; --resume carries on from there"]
+    assert [path.name for path in (part / "frames").iterdir()] == ["frames_00000-00047.mp4"]
 
 
 def test_a_video_without_a_whole_clip_leaves_nothing(tmp_path):

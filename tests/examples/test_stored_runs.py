@@ -14,11 +14,10 @@ DOCS, LIMBED = ROOT / "docs", ROOT / "scenes" / "meshes" / "limbed.obj"
 RUNS = {name: (DOCS / "runs" / f"{name}.txt").read_text("utf-8") for name in ("eigenvalues", "polyhedra", "plates")}
 
 
-@pytest.mark.parametrize(
-    ("run", "page"), [("eigenvalues", "accuracy"), ("polyhedra", "accuracy"), ("plates", "validation")]
-)
-def test_the_printed_table_is_the_stored_run(run: str, page: str) -> None:
-    assert f"```\n{RUNS[run]}```" in (DOCS / f"{page}.md").read_text("utf-8")
+@pytest.mark.parametrize("run", RUNS)
+def test_the_printed_table_is_the_stored_run(run: str) -> None:
+    page = "validation.md" if run == "plates" else "accuracy.md"
+    assert f"```\n{RUNS[run]}```" in (DOCS / page).read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", ["hemisphere, fixed", "square, free"])

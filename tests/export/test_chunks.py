@@ -34,10 +34,7 @@ def sampled(path: Path, time: float) -> list[np.ndarray]:
     stone, surface = (stage.GetPrimAtPath(each) for each in (STONE, SURFACE))
     mesh = UsdGeom.Mesh(surface)
     frames = [np.array(getattr(mesh, name)().Get(time), dtype=float) for name in ATTRIBUTES]
-    return [
-        *frames,
-        *(np.array(UsdGeom.Xformable(each).ComputeLocalToWorldTransform(time)) for each in (stone, surface)),
-    ]
+    return frames + [np.array(UsdGeom.Xformable(each).ComputeLocalToWorldTransform(time)) for each in (stone, surface)]
 
 
 def files(path: Path) -> dict[str, bytes]:

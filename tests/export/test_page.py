@@ -170,9 +170,7 @@ def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> N
 
 
 @browsing
-def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
-    browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
-) -> None:
+def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(browser, soft_model, tmp_path):
     data = forwarded(soft_model)
     waves, looks = Material(speed=0.3, density=1500.0), {"egg": "rubber", "jelly": "jelly"}
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")

@@ -72,7 +72,10 @@ def test_damaged_kernels_are_not_loaded(damages: list) -> None:
             cache.save("key", b"new")
 
 
-STORE = 'video = "png"\npasses = ["depth"]\nheights = true\n'
+STORES = {
+    "plain": 'video = "png"\npasses = ["depth"]\nheights = true\n',
+    "tars": 'video = "none"\nformat = "webdataset"\nscenes_per_tar = 1\n',
+}
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +84,7 @@ def batches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     home = tmp_path_factory.mktemp("batches")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, "LocalExecutor", Here)
-        for name, more in {
-            "plain": STORE,
-            "tars": 'video = "none"\nformat = "webdataset"\nscenes_per_tar = 1\n',
-        }.items():
+        for name, more in STORES.items():
             text = PLAN.replace("count = 5", "count = 2").replace("[64, 48]", "[16, 16]")
             run_batch(small_plan(home, more, text), home / name, RunOptions(limit=1, keep_free=0))
             batch = BatchFolder(home / name)
@@ -105,7 +105,7 @@ def read_all(folder: Path) -> None:
 
 
 @fuzzed_by(25)
-@given(st.sampled_from(["plain", "tars"]), DAMAGES, st.sampled_from(["", "--status", "--retry-failed"]))
+@given(st.sampled_from(sorted(STORES)), DAMAGES, st.sampled_from(["", "--status", "--retry-failed"]))
 def test_a_damaged_batch_goes_on_or_is_refused(batches: Path, name: str, damages: list, flag: str) -> None:
     with home_of_others() as home:
         shutil.copytree(batches / name, home / "out")
@@ -154,9 +154,7 @@ def outputs(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 @fuzzed_by(25)
 @given(st.sampled_from(sorted(JOBS)), st.sampled_from(["whole", "half"]), DAMAGES, st.sampled_from(["", "--overwrite"]))
-def test_damaged_outputs_are_replaced_or_refused(
-    outputs: Path, name: str, state: str, damages: list, flag: str
-) -> None:
+def test_damaged_outputs_are_replaced_or_refused(outputs: Path, name: str, state: str, damages: list, flag: str):
     assume(not flag or all(kind != "link" for _, kind, _ in damages))  # --overwrite replaces what a link leads to
     resumed = ["--resume"] if state == "half" and (JOBS[name][0] == "render" or name == "usda") else []
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:

@@ -5,21 +5,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import fuzzing
 import pytest
-from fuzzing import (
-    CHANGES,
-    NUMBERS,
-    TEXTS,
-    VALUES,
-    changed,
-    command,
-    fuzzed,
-    fuzzed_by,
-    home_of_others,
-    outcome,
-    places,
-    put,
-)
+from fuzzing import fuzzed, fuzzed_by, home_of_others, outcome
 from hypothesis import assume, given, strategies as st
 from small_batch import PLAN, Here, write_files
 from unfinished_videos import contents
@@ -28,20 +16,12 @@ from ripple_sim.batch import Plan, RunOptions, Variation, plan as plans, read_pl
 from ripple_sim.errors import RippleError
 
 TABLE = tomllib.loads(PLAN + 'video = "none"\n')
-KEYS = [
-    "camera.azimuth",
-    "camera.lookat[1]",
-    "ripple[egg].material.speed",
-    "ripple[egg].look",
-    "ripple.geom",
-    "duration",
-]
+KEYS = ["camera.azimuth", "camera.lookat[1]", "ripple[egg].material.speed", "ripple[egg].look", "ripple.geom"]
 ATTRIBUTES = ["geom[stone].mass", "geom[*].size", "geom.pos[2]", "body[grain].quat", "option.timestep", "light.name"]
 KINDS = ["uniform", "log_uniform", "normal", "integers", "choice", "orientation", "constant", "weights", "length"]
-LIKELY = st.lists(st.floats(0.1, 2) | NUMBERS, min_size=2, max_size=3) | st.integers(0, 3) | VALUES
-DRAWN = (
-    st.dictionaries(st.sampled_from([*KINDS, "apply", "together", "limits"]), LIKELY, min_size=1, max_size=2) | LIKELY
-)
+OPTIONS = ["apply", "together", "limits"]
+LIKELY = st.lists(st.floats(0.1, 2) | fuzzing.NUMBERS, min_size=2, max_size=3) | st.integers(0, 3) | fuzzing.VALUES
+DRAWN = st.dictionaries(st.sampled_from([*KINDS, *OPTIONS]), LIKELY, min_size=1, max_size=2) | LIKELY
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -68,17 +48,17 @@ def tried(home: Path) -> None:
 
 
 @fuzzed
-@given(st.sampled_from(places(TABLE)[1:]), VALUES | DRAWN)
+@given(st.sampled_from(fuzzing.places(TABLE)[1:]), fuzzing.VALUES | DRAWN)
 def test_a_plan_with_any_value_anywhere(place: tuple, value: Any) -> None:
     assume("\\ud800" not in repr(value))  # which no TOML file can hold
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         write_files(home)
-        patch.setattr(plans, "read_toml", lambda *_: put(TABLE, place, value))
+        patch.setattr(plans, "read_toml", lambda *_: fuzzing.put(TABLE, place, value))
         tried(home)
 
 
 @fuzzed
-@given(st.sampled_from(["vary", "model"]), st.sampled_from([*KEYS, *ATTRIBUTES]) | TEXTS, DRAWN)
+@given(st.sampled_from(["vary", "model"]), st.sampled_from([*KEYS, "duration", *ATTRIBUTES]) | fuzzing.TEXTS, DRAWN)
 def test_a_plan_that_draws_anything(part: str, key: str, drawn: Any) -> None:
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         write_files(home)
@@ -87,11 +67,11 @@ def test_a_plan_that_draws_anything(part: str, key: str, drawn: Any) -> None:
 
 
 @fuzzed
-@given(CHANGES)
+@given(fuzzing.CHANGES)
 def test_a_plan_with_any_bytes_anywhere(changes: list) -> None:
     with home_of_others() as home:
         write_files(home)
-        (home / "plan.toml").write_bytes(changed(PLAN.encode(), changes))
+        (home / "plan.toml").write_bytes(fuzzing.changed(PLAN.encode(), changes))
         tried(home)
 
 
@@ -128,6 +108,6 @@ def test_an_export_with_any_options_twice(output: str, words: list[tuple], forei
         for _ in range(2):
             before = contents(home)
             given = [word for each in words if each != ("--overwrite",) for word in each]
-            if command("export", "scene.toml", "-o", output, "--fps", 20, "--duration", 0.1, *given):
+            if fuzzing.command("export", "scene.toml", "-o", output, "--fps", 20, "--duration", 0.1, *given):
                 assert contents(home) == before
             assert not [each for each in home.rglob("*") if each.name.endswith(".part")]

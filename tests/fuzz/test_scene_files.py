@@ -1,16 +1,19 @@
-"""Scene files and models of any content load, or raise our error."""
+"""Scene files, models and meshes of any content load, or raise our error; a mesh is finite and has triangles."""
 
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import trimesh
 from fuzzing import CHANGES, NUMBERS, VALUES, changed, fuzzed, outcome, places, put
 from hypothesis import given, strategies as st
+from hypothesis.extra import numpy as hnp
 from scene_files import write_scene
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene import Scene, SceneFile, load_scene, parse_scene
-from ripple_sim.solver import RippleError
+from ripple_sim.solver import Mesh, MeshError, RippleError, load_mesh
 
 TABLE: dict[str, Any] = {
     "model": "scene.xml",
@@ -78,3 +81,29 @@ def test_a_model_with_any_numbers(tmp_path_factory: pytest.TempPathFactory, opti
     if isinstance(found, Scene):
         assert 0 < found.model.opt.timestep <= 1
     assert sorted(each.name for each in folder.iterdir()) == ["scene.toml", "scene.xml"]
+
+
+def check_mesh(found: object) -> None:
+    assert isinstance(found, Mesh) or (isinstance(found, MeshError) and "\n" not in str(found))
+    if isinstance(found, Mesh):
+        assert np.isfinite(found.V).all()
+        assert len(found.F) > 0
+
+
+@fuzzed
+@given(st.sampled_from(["obj", "off", "ply", "stl", "glb"]), CHANGES, st.floats(0.2, 1))
+def test_a_mesh_with_any_bytes_and_any_end(tmp_path_factory: Any, kind: str, changes: list, part: float) -> None:
+    path: Path = tmp_path_factory.getbasetemp() / f"fuzzed.{kind}"
+    trimesh.creation.icosphere(subdivisions=1).export(path)
+    content = changed(path.read_bytes(), changes)
+    path.write_bytes(content[: int(part * len(content))])
+    check_mesh(outcome(lambda: load_mesh(path)))
+
+
+@fuzzed
+@given(
+    hnp.arrays(np.float64, st.tuples(st.integers(0, 8), st.just(3)), elements=st.floats(width=64)),
+    hnp.arrays(np.int64, st.tuples(st.integers(0, 12), st.just(3)), elements=st.integers(-2, 9)),
+)
+def test_a_mesh_of_any_arrays(V: np.ndarray, F: np.ndarray) -> None:
+    check_mesh(outcome(lambda: Mesh.from_arrays(V, F)))

@@ -64,9 +64,7 @@ def test_the_drums_wall_is_a_closed_tube_that_faces_outwards_and_stands_on_the_f
     assert V[:, 2].min() == 0
 
 
-@pytest.mark.parametrize(
-    ("path", "genus", "rims"), [(vessels.TEAPOT_FILE, [1, 0], 3), (vessels.PRETZEL_FILE, [3], 0)], ids=str
-)
+@pytest.mark.parametrize(("path", "genus", "rims"), [(vessels.TEAPOT_FILE, [1, 0], 3), (vessels.PRETZEL_FILE, [3], 0)])
 def test_vessels_have_their_handles_and_rims_and_no_slivers(path, genus, rims) -> None:
     mesh = load_mesh(path)
     assert not mesh.notes

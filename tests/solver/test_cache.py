@@ -13,28 +13,18 @@ from genus_zero import icosphere
 from programs import ended
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.solver import Mesh, RippleError, build_atlas
-from ripple_sim.solver.cache import (
-    LIMIT,
-    _private_folder,
-    cache_folder,
-    cache_path,
-    cached_files,
-    kept_with,
-    make_room,
-    mark_used,
-)
+from ripple_sim.solver import Mesh, RippleError, build_atlas, cache
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return cache_folder()
+    return cache.cache_folder()
 
 
 def keep(name: str, *, age: float, size: int = 1_000_000) -> Path:
     """A file of the cache that was last used so many seconds after 1970."""
-    path = cache_path(name, [np.arange(3)])
+    path = cache.cache_path(name, [np.arange(3)])
     path.write_bytes(bytes(size))
     os.utime(path, (age, age))
     return path
@@ -42,14 +32,14 @@ def keep(name: str, *, age: float, size: int = 1_000_000) -> Path:
 
 def test_what_was_used_longest_ago_goes_first_and_what_has_just_been_made_stays_though_too_large(monkeypatch) -> None:
     old, older, newest = keep("old", age=20), keep("older", age=10), keep("newest", age=30)
-    monkeypatch.setenv(LIMIT, "2")
-    mark_used(older)
-    make_room(newest)
-    assert list(cached_files()) == [newest, older]
+    monkeypatch.setenv(cache.LIMIT, "2")
+    cache.mark_used(older)
+    cache.make_room(newest)
+    assert list(cache.cached_files()) == [newest, older]
     assert not old.exists()
     made = keep("large", age=5, size=3_000_000)
-    make_room(made)
-    assert list(cached_files()) == [made]
+    cache.make_room(made)
+    assert list(cache.cached_files()) == [made]
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +48,9 @@ def ball_mesh() -> Mesh:
 
 
 def test_a_limit_of_zero_keeps_nothing(monkeypatch, ball_mesh: Mesh) -> None:
-    monkeypatch.setenv(LIMIT, "0")
+    monkeypatch.setenv(cache.LIMIT, "0")
     build_atlas(ball_mesh, 8)
-    assert not cached_files()
+    assert not cache.cached_files()
 
 
 def test_the_files_of_others_stay(folder: Path, monkeypatch) -> None:
@@ -69,25 +59,25 @@ def test_the_files_of_others_stay(folder: Path, monkeypatch) -> None:
         path.write_bytes(bytes(1000))
     unfinished = folder / f".{'a' * 32}.npz.123.part"
     unfinished.write_bytes(bytes(1000))
-    monkeypatch.setenv(LIMIT, "0")
-    make_room(folder / "none")
+    monkeypatch.setenv(cache.LIMIT, "0")
+    cache.make_room(folder / "none")
     assert set(folder.iterdir()) == set(foreign)
 
 
 @pytest.mark.parametrize("limit", ["much", "-1", "nan", "inf"])
 def test_a_limit_that_is_no_size_is_refused_before_anything_is_made(limit: str, ball_mesh: Mesh, monkeypatch) -> None:
-    monkeypatch.setenv(LIMIT, limit)
-    with pytest.raises(RippleError, match=f"{LIMIT} is '{limit}'; valid is a number of megabytes"):
+    monkeypatch.setenv(cache.LIMIT, limit)
+    with pytest.raises(RippleError, match=f"{cache.LIMIT} is '{limit}'; valid is a number of megabytes"):
         build_atlas(ball_mesh, 8)
 
 
 def test_a_file_that_another_process_removes_is_no_error(monkeypatch) -> None:
     newest = keep("newest", age=30)
-    listed = cached_files()
+    listed = cache.cached_files()
     newest.unlink()
     monkeypatch.setattr("ripple_sim.solver.cache.cached_files", lambda: listed)
-    monkeypatch.setenv(LIMIT, "0")
-    make_room(newest)
+    monkeypatch.setenv(cache.LIMIT, "0")
+    cache.make_room(newest)
 
 
 @pytest.mark.parametrize("home", [None, "/proc/no/home"])
@@ -95,14 +85,14 @@ def test_without_a_home_results_are_kept_in_a_private_folder(home: str | None, t
     """A service, or a container with a foreign user: neither HOME nor an entry in passwd, or one that is not there."""
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("ripple_sim.solver.cache._private_folder", _private_folder.__wrapped__)
+    monkeypatch.setattr("ripple_sim.solver.cache._private_folder", cache._private_folder.__wrapped__)
     if home is None:
         monkeypatch.delenv("HOME", raising=False)
         monkeypatch.setattr("pwd.getpwuid", lambda uid: {}[uid])
     else:
         monkeypatch.setenv("HOME", home)
     with pytest.warns(RippleWarning, match="set XDG_CACHE_HOME"):
-        folder = cache_folder()
+        folder = cache.cache_folder()
     assert folder.parent == tmp_path and folder.stat().st_mode & 0o077 == 0
 
 
@@ -112,7 +102,7 @@ def test_a_private_folder_of_somebody_else_is_not_used(tmp_path: Path, monkeypat
     planted.mkdir(mode=0o777)
     planted.chmod(0o777)
     with pytest.warns(RippleWarning, match="there is no home"):
-        folder = _private_folder.__wrapped__("there is no home")
+        folder = cache._private_folder.__wrapped__("there is no home")
     assert folder != planted and folder.stat().st_mode & 0o077 == 0
 
 
@@ -142,12 +132,12 @@ sys.exit(not np.array_equal(build_atlas(mesh, 8).positions, expected))
 """
 
 
-def run(program: str, cache: Path) -> list[str]:
-    """Run a program with a cache of its own; return what it leaves there."""
-    environment = {"XDG_CACHE_HOME": str(cache), "PATH": "", "NUMBA_NUM_THREADS": "1"}
+def run(program: str, home: Path) -> list[str]:
+    """Run a program with a home of its own; return what it leaves there."""
+    environment = {"XDG_CACHE_HOME": str(home), "PATH": "", "NUMBA_NUM_THREADS": "1"}
     result = ended("-c", _BEGIN + program, env=environment, timeout=600)
     assert (result.returncode, result.stderr) == (0, "")
-    return [each.name for each in cache.rglob("*") if each.is_file()]
+    return [each.name for each in home.rglob("*") if each.is_file()]
 
 
 def test_four_processes_fill_one_cache_at_once(tmp_path: Path) -> None:
@@ -165,7 +155,7 @@ def test_what_is_made_from_an_object_is_made_once_and_kept_while_the_object_live
 
     made = []
 
-    @kept_with
+    @cache.kept_with
     def make(owner):
         made.append(weakref.ref(result := Thing()))
         return result

@@ -9,24 +9,14 @@ import numpy as np
 import pytest
 
 from ripple_sim import Ripples, load_scene
-from ripple_sim.solver import (
-    Material,
-    RippleError,
-    WaveSolver,
-    build_atlas,
-    load_atlas,
-    load_mesh,
-    sphere_atlas,
-    thickness_map,
-)
+from ripple_sim.solver import Material, RippleError, WaveSolver, load_mesh, sphere_atlas, thickness_map
 from ripple_sim.solver.errors import PATH, POSITIVE, Valid, checked, instance, shown, whole
+from ripple_sim.solver.layouts import build_atlas, load_atlas
 
 HUGE = 10**400  # no float holds it
 ATLAS = sphere_atlas(resolution=4)
 WAVES = WaveSolver(ATLAS, backend="cpu")
-MODEL = mujoco.MjModel.from_xml_string(
-    "<mujoco><worldbody><geom name='g' type='sphere' size='1'/></worldbody></mujoco>"
-)
+MODEL = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom name='g' size='1'/></worldbody></mujoco>")
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "waves of nothing": (lambda: Material(wavelengths=None), "wavelengths is None m; valid are two numbers"),

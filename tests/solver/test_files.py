@@ -20,18 +20,9 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.scene import check_files, load_image, mesh_image
-from ripple_sim.solver import (
-    AtlasError,
-    HeightMap,
-    Mesh,
-    RippleError,
-    SolverError,
-    WaveSolver,
-    build_atlas,
-    load_mesh,
-    sphere_atlas,
-)
+from ripple_sim.solver import AtlasError, HeightMap, Mesh, RippleError, SolverError, WaveSolver, load_mesh, sphere_atlas
 from ripple_sim.solver.files import atomic_write, read_image, require_memory, rooms
+from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.texels import texture_map
 
 
@@ -78,10 +69,8 @@ def test_frames_that_cannot_fit_are_refused(opengl: None) -> None:
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     gl = shared_context()
     if gl.software:
-        with (
-            address_space(64_000_000),
-            pytest.raises(RippleError, match=r"frames of 4096x4096 pixels takes 1\.48 GB .* take smaller frames"),
-        ):
+        message = r"frames of 4096x4096 pixels takes 1\.48 GB .* take smaller frames"
+        with address_space(64_000_000), pytest.raises(RippleError, match=message):
             Renderer(gl, model, {}, size=(4096, 4096))
 
 
@@ -186,9 +175,7 @@ def png(width: int, height: int) -> bytes:
     """A file of a few hundred bytes that says it has so many pixels."""
     head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
-    packed = [
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
-    ]
+    packed = [struct.pack(f">I4s{len(x)}sI", len(x), kind, x, zlib.crc32(kind + x)) for kind, x in chunks]
     return b"\x89PNG\r\n\x1a\n" + b"".join(packed)
 
 
@@ -230,9 +217,8 @@ READERS: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("reader", READERS)
 def test_a_decompression_bomb_is_refused_wherever_images_are_read(reader: str, tmp_path: Path) -> None:
     (tmp_path / "bomb.png").write_bytes(png(20_000, 20_000))
-    with pytest.raises(
-        RippleError, match=r"cannot be read: Image size \(400000000 pixels\) exceeds limit of 178956970"
-    ):
+    message = r"cannot be read: Image size \(400000000 pixels\) exceeds limit of 178956970"
+    with pytest.raises(RippleError, match=message):
         READERS[reader](tmp_path / "bomb.png")
 
 

@@ -36,17 +36,12 @@ def fuzzed_by(usual: int, share: float = 1.0) -> settings:
 
 fuzzed = fuzzed_by(100)
 
-NUMBERS = st.one_of(
-    st.floats(allow_nan=True, allow_infinity=True),
-    st.integers(),
-    st.sampled_from([0, -1, 10**400, -(10**400), 1e-300, 1e300, float("nan"), float("inf"), True]),
-)
+LIMITS = [0, -1, 10**400, -(10**400), 1e-300, 1e300, float("nan"), float("inf"), True]
+NUMBERS = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.integers(), st.sampled_from(LIMITS))
 STRANGE = ["", "\0", "a" * 5000, "../..", "/dev/null", "\ud800", "'\n\""]
 TEXTS = st.one_of(st.text(max_size=20), st.sampled_from(STRANGE))
 SCALARS = st.one_of(NUMBERS, TEXTS, st.none(), st.booleans())
-VALUES = st.recursive(
-    SCALARS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXTS, inner, max_size=3), max_leaves=6
-)
+VALUES = st.recursive(SCALARS, lambda x: st.lists(x, max_size=4) | st.dictionaries(TEXTS, x, max_size=3), max_leaves=6)
 
 
 def outcome(call: Callable[[], Any]) -> Any:
@@ -110,24 +105,11 @@ def home_of_others() -> Iterator[Path]:
         assert contents(home / "thesis") == before
 
 
-JSON = [
-    "[]",
-    "{}",
-    "null",
-    "5",
-    '"made by ripple-sim"',
-    '["made by ripple-sim"]',
-    '{"made by ripple-sim": 1}',
-    "[" * 9999,
-]
+MARK = '"made by ripple-sim"'
+JSON = ["[]", "{}", "null", "5", MARK, f"[{MARK}]", f"{{{MARK}: 1}}", "[" * 9999]
 SHARES = st.floats(0, 1, exclude_max=True)
-DAMAGES = st.lists(
-    st.tuples(
-        SHARES, st.sampled_from(["empty", "cut", "flip", "missing", "folder", "link", "json", "swap", "digit"]), SHARES
-    ),
-    min_size=1,
-    max_size=3,
-)
+KINDS = st.sampled_from(["empty", "cut", "flip", "missing", "folder", "link", "json", "swap", "digit"])
+DAMAGES = st.lists(st.tuples(SHARES, KINDS, SHARES), min_size=1, max_size=3)
 
 
 def damage(folder: Path, damages: list[tuple[float, str, float]]) -> None:

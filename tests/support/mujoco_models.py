@@ -44,9 +44,7 @@ def forwarded(model: mujoco.MjModel) -> mujoco.MjData:
     return data
 
 
-def mesh_spec(
-    shape: tuple[np.ndarray, np.ndarray], joint: str | None = None, route: str | None = "flex", **geom: object
-) -> mujoco.MjSpec:
+def mesh_spec(shape: tuple, joint: str | None = None, route: str | None = "flex", **geom: object) -> mujoco.MjSpec:
     """A mesh geom "target" on a body "base" of its own, which may move."""
     V, F = shape
     spec = mujoco.MjSpec()

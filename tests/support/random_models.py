@@ -160,9 +160,8 @@ class RandomModel:
         if kind in SHAPES and kind != "egg":
             return f'type="{kind}" size="{vector(radius * np.array(SHAPES[kind]))}"'
         name, which = ("animal", 1) if kind in ANIMALS else (egg, 0)
-        self._meshes[name] = mesh_asset(
-            name, *_meshes()[which], f'scale="{vector(radius * np.ones(3))}" inertia="legacy"'
-        )
+        scale = vector(radius * np.ones(3))
+        self._meshes[name] = mesh_asset(name, *_meshes()[which], f'scale="{scale}" inertia="legacy"')
         return f'type="{"sdf" if "sdf" in kind else "mesh"}" mesh="{name}"'
 
     def _assets(self) -> str:

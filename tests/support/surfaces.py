@@ -17,9 +17,8 @@ def grid(n: int, place: Callable, *, closed: tuple[bool, bool] = (False, False))
     a, b = np.meshgrid(*(np.arange(count) / n for count in counts), indexing="ij")
     V = np.stack(np.broadcast_arrays(*place(a, b)), axis=-1).reshape(-1, 3)
     i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
-    corner = [
-        ((i + k) % counts[0] * counts[1] + (j + m) % counts[1]).ravel() for k, m in ((0, 0), (1, 0), (1, 1), (0, 1))
-    ]
+    ring = (0, 0), (1, 0), (1, 1), (0, 1)
+    corner = [((i + k) % counts[0] * counts[1] + (j + m) % counts[1]).ravel() for k, m in ring]
     return V, np.concatenate([np.stack([corner[k] for k in each], axis=1) for each in ((0, 1, 2), (0, 2, 3))])
 
 

@@ -12,20 +12,9 @@ from scene_files import write_scene
 from sphere_height_maps import cube_charts
 from unfinished_videos import interrupting_at
 
-from ripple_sim import Scene, Simulation, load_scene, render_video
+from ripple_sim import Scene, Simulation, load_scene, overlay, render_video
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay import (
-    ContactMarks,
-    Layout,
-    Mark,
-    Projection,
-    color_table,
-    colors,
-    compared_operators,
-    draw_marks,
-    place_marks,
-)
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import shapes as meshes
 from ripple_sim.solver.gl import shared_context
@@ -46,7 +35,7 @@ def make_scene(tmp_path: Path) -> Callable[..., Scene]:
 
 
 def film_of(scene: Scene, words: list[str], size: tuple[int, int], baseline: str | None = None) -> Film:
-    operators = compared_operators(baseline)
+    operators = overlay.compared_operators(baseline)
     simulations = [Simulation(scene, fps=RATE, backend="cpu", operator=operator) for operator in operators]
     return Film(simulations, VideoOptions(size=size, fps=RATE, overlay=words, compare=baseline), FRAMES)
 
@@ -58,7 +47,7 @@ def last_frame(film: Film) -> np.ndarray:
 def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
     model, data = posed('<mujoco><worldbody><geom name="target" type="sphere" size="1"/></worldbody></mujoco>')
     ball = meshes.ball(16)
-    surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell), "metal", heatmap_colors=color_table())
+    surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell), "metal", heatmap_colors=overlay.color_table())
     renderer = Renderer(shared_context(), model, {0: surface}, size=(200, 200))
     renderer.set_heatmap(0, with_filled_halo(cube_topology(field.shape[1]), field), limit)
     return renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 40.0))
@@ -68,7 +57,7 @@ def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
 def test_surface_has_the_color_of_its_height(value: float) -> None:
     picture = ball_with_field(np.full((6, N, N), value, np.float32), 0.01)
     inside = picture[80:120, 80:120].astype(float)
-    expected = colors(value, 0.01).astype(float)
+    expected = overlay.colors(value, 0.01).astype(float)
     shade = inside.max(axis=-1) / expected.max()
     assert shade.min() > 0.4
     assert shade.max() == pytest.approx(1, abs=0.02)  # where the light falls the colour is the bar's own
@@ -88,8 +77,8 @@ def test_field_is_where_it_belongs_and_seamless() -> None:
 def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) -> None:
     scene = make_scene()
     simulation = Simulation(scene, fps=RATE, backend="cpu")
-    marks = ContactMarks(simulation, 1 / RATE)
-    gathered: list[Mark] = []
+    marks = overlay.ContactMarks(simulation, 1 / RATE)
+    gathered: list[overlay.Mark] = []
     while not gathered:
         simulation.advance_frame()
         gathered = marks.follow()
@@ -103,10 +92,10 @@ def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) ->
     camera = Camera((0.0, 0.0, 0.0), 1.6, 90.0, -30.0)
     width, height_px = 320, 180
     frame = np.full((height_px, width, 3), 255, np.uint8)
-    projection = Projection(camera.pose(), width, height_px)
-    layout = Layout(width, height_px)
-    draw_marks(
-        frame, place_marks(gathered, 1e9, layout, projection, *posed("<mujoco/>")), layout
+    projection = overlay.Projection(camera.pose(), width, height_px)
+    layout = overlay.Layout(width, height_px)
+    overlay.draw_marks(
+        frame, overlay.place_marks(gathered, 1e9, layout, projection, *posed("<mujoco/>")), layout
     )  # nothing but its dot
     dark = (255.0 - frame.min(axis=2)).round()
     rows, columns = np.indices(dark.shape)
@@ -179,7 +168,7 @@ def test_scene_file_names_overlays_and_a_video_shows_them(make_scene: Callable[.
     scene = make_scene('overlay = ["height=0.01", "time"]\n' + TOML)
     assert scene.overlay == ("height=0.01", "time")
     pictures = {}
-    for name, overlay in (("own", None), ("same", ["height=0.01", "time"]), ("none", [])):
-        render_video(scene, tmp_path / name, VideoOptions(size=(96, 54), fps=10, duration=0.3, overlay=overlay))
+    for name, words in (("own", None), ("same", ["height=0.01", "time"]), ("none", [])):
+        render_video(scene, tmp_path / name, VideoOptions(size=(96, 54), fps=10, duration=0.3, overlay=words))
         pictures[name] = sorted(path.read_bytes() for path in (tmp_path / name).iterdir())
     assert pictures["own"] == pictures["same"] != pictures["none"]

@@ -49,9 +49,7 @@ def test_a_screenshot_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_
 
 
 @pytest.mark.parametrize("size", [(32, 48), (33, 47), (33, 48)])
-def test_a_video_has_the_frames_at_its_rate_without_an_odd_row_or_column(
-    recorder: Recorder, tmp_path: Path, size: tuple[int, int]
-) -> None:
+def test_a_video_has_the_frames_at_its_rate_without_an_odd_row_or_column(recorder, tmp_path, size):
     path = recorder.start(frame(0, *size))
     assert recorder.recording
     levels = [40, 120, 200]

@@ -13,9 +13,8 @@ from ripple_sim.errors import DisplayError
 
 def test_on_a_screen(screen: str) -> None:
     checks = Path(__file__).with_name("passive_checks.py")
-    result = ended(
-        "-m", "pytest", "-q", "-p", "no:cacheprovider", str(checks), env={**os.environ, "DISPLAY": screen}, timeout=600
-    )
+    words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", str(checks))
+    result = ended(*words, env={**os.environ, "DISPLAY": screen}, timeout=600)
     assert result.returncode == 0, result.stdout + result.stderr
 
 

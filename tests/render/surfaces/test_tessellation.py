@@ -5,17 +5,8 @@ import pytest
 from mujoco_models import posed
 from sphere_height_maps import N, constant_height_map, cube_charts, height_map_of
 
-from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.surfaces import (
-    COORDINATES,
-    POSITION,
-    AdaptiveTessellation,
-    SurfaceVertices,
-    adaptive,
-    midpoints,
-    tessellate,
-    welded,
-)
+from ripple_sim.render import Camera, Renderer, Surface, surfaces
+from ripple_sim.render.surfaces import COORDINATES, POSITION, adaptive
 from ripple_sim.render.visuals import shapes, triangle_normals
 from ripple_sim.solver import HeightMap, sphere_atlas
 from ripple_sim.solver.backends import DeviceField
@@ -27,7 +18,7 @@ from ripple_sim.solver.texels import ChartPage
 def refine(V, F, normals, same=None, **limits):
     attributes = np.concatenate([V, normals, 2 * V], axis=1)
     same = np.arange(len(V)) if same is None else same
-    F, finer, _ = tessellate(F, attributes, same, **limits)
+    F, finer, _ = surfaces.tessellate(F, attributes, same, **limits)
     return F, finer, attributes
 
 
@@ -79,13 +70,13 @@ def ball(tolerance, min_length=0.0):
     V = V[np.unique(same, return_index=True)[1]][same.ravel()]
     attributes, F = np.concatenate([V, V, V], axis=1), np.arange(len(V)).reshape(-1, 3)
     edges = edges_of(F)
-    _, inner = welded(edges, F, same.ravel())
-    vertices = np.concatenate([attributes, midpoints(edges.ends, inner, attributes)])
+    _, inner = surfaces.welded(edges, F, same.ravel())
+    vertices = np.concatenate([attributes, surfaces.midpoints(edges.ends, inner, attributes)])
     page = ChartPage(6, N)
     chart, row, column = cube_chart_points(vertices[:, COORDINATES], N)
     places = page.places(chart, (np.stack([column, row], axis=1) + 0.5) / N)
-    made = SurfaceVertices(F, vertices, edges, places, places, np.zeros((0, 4)), F)
-    adaptive = AdaptiveTessellation(made, page, tolerance, min_length)
+    made = surfaces.SurfaceVertices(F, vertices, edges, places, places, np.zeros((0, 4)), F)
+    adaptive = surfaces.AdaptiveTessellation(made, page, tolerance, min_length)
     return adaptive, vertices, F
 
 

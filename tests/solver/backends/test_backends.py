@@ -7,19 +7,10 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver import (
-    Atlas,
-    GLError,
-    Material,
-    SolverError,
-    TexelMesh,
-    WaveSolver,
-    build_atlas,
-    sphere_atlas,
-    texel_atlas,
-)
+from ripple_sim.solver import Atlas, GLError, Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
 from ripple_sim.solver.backends import auto_backend, backend, make_backend
 from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.operator import WaveOperator, build_operator
 
 STEPS = 1000
@@ -46,9 +37,7 @@ def maps(atlas: Atlas) -> Material:
 
 FEATURES: dict[str, Callable[[Atlas], Material]] = {
     "plain": lambda atlas: Material(speed=1.0),
-    "damping and density maps": lambda atlas: Material(
-        speed=1.0, damping=0.3 * north(atlas), density=1.0 + north(atlas)
-    ),
+    "damping and density maps": lambda atlas: Material(1.0, damping=0.3 * north(atlas), density=1.0 + north(atlas)),
     "speed map": lambda atlas: Material(speed=1.0 + 0.5 * atlas.positions[..., 0]),
     "reflecting region": lambda atlas: Material(speed=1.0 * ~north(atlas)),
     "fixed": lambda atlas: Material(speed=1.0, fixed=north(atlas)),
@@ -183,9 +172,7 @@ def hardware(opengl: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> G
     backend.measured.cache_clear()
 
 
-def test_auto_takes_what_was_measured_to_be_faster(
-    hardware: GLContext, operator: WaveOperator, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_auto_takes_what_was_measured_to_be_faster(hardware: GLContext, operator: WaveOperator, monkeypatch):
     """A GPU that takes 1 ms for any number of texels, a processor that takes 1 ms for 4,000."""
     known = backend.Measured((1000.0, 8000.0), (1e-3, 1e-3), (0.25e-3, 2e-3))
     monkeypatch.setattr(backend, "measure", lambda gl: known)
@@ -204,9 +191,7 @@ def test_a_machine_is_measured_once(hardware: GLContext, monkeypatch: pytest.Mon
     assert auto_backend(10**6) == first.faster(10**6)
 
 
-def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(
-    operator: WaveOperator, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(operator: WaveOperator, monkeypatch: pytest.MonkeyPatch):
     def fail(device: int | None) -> None:
         raise GLError("no OpenGL 4.3 context")
 

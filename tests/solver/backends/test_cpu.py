@@ -27,9 +27,8 @@ class DenseWaves:
         self.forces, self.acceleration = np.zeros_like(self.h), 0.0
         size = len(self.h)
         laplace, rigidity = operator.bending or (None, np.zeros(size))
-        self._tension, self._viscosity, self._laplace = (
-            matrix(each, size) for each in (operator.stencil, operator.viscosity_stencil, laplace)
-        )
+        stencils = operator.stencil, operator.viscosity_stencil, laplace
+        self._tension, self._viscosity, self._laplace = (matrix(each, size) for each in stencils)
         self._rigidity = rigidity.ravel()
 
     def advance(self, substeps: int, dt: float) -> None:
@@ -75,15 +74,11 @@ def ramp(texels: TexelMesh) -> np.ndarray:
 
 
 MATERIALS = {
-    "plain": lambda texels: Material(speed=1.0),
-    "maps": lambda texels: Material(
-        speed=ramp(texels), damping=2 * ramp(texels), stiffness=5 * ramp(texels), density=ramp(texels)[:, ::-1]
-    ),
-    "viscous plate": lambda texels: Material(speed=0.5, bending=1e-3, viscosity=1e-2, damping=0.5),
-    "plate alone": lambda texels: Material(speed=0.0, bending=1e-3 * ramp(texels)),
-    "yields, partly fixed": lambda texels: Material(
-        speed=1.0, stiffness=3.0, yield_height=0.4 * ramp(texels), fixed=ramp(texels) > 1.3
-    ),
+    "plain": lambda x: Material(speed=1.0),
+    "maps": lambda x: Material(speed=ramp(x), damping=2 * ramp(x), stiffness=5 * ramp(x), density=ramp(x)[:, ::-1]),
+    "viscous plate": lambda x: Material(speed=0.5, bending=1e-3, viscosity=1e-2, damping=0.5),
+    "plate alone": lambda x: Material(speed=0.0, bending=1e-3 * ramp(x)),
+    "yields, partly fixed": lambda x: Material(1.0, stiffness=3.0, yield_height=0.4 * ramp(x), fixed=ramp(x) > 1.3),
 }
 
 
@@ -128,13 +123,13 @@ def test_waves_are_those_of_whole_matrices(mesh: str, material: str, substeps: i
 
 def test_few_loops_are_compiled_for_all_materials() -> None:
     texels = MESHES["torus"]
-    maps = 0.0, 1.0, ramp(texels)
+    maps, before = (0.0, 1.0, ramp(texels)), len(advance.signatures)
     for damping, stiffness, density, bending in itertools.product(maps, maps, maps[1:], (0.0, 1e-3)):
         material = Material(speed=1.0, damping=damping, stiffness=stiffness, density=density, bending=bending)
         operator = operator_of(texels, material)
         for keeps_volume in (False, True):
             CPUBackend(operator, keeps_volume=keeps_volume).advance(1, step_of(operator))
-    assert len(advance.signatures) <= 5
+    assert len(advance.signatures) <= before + 5
 
 
 def test_waves_without_damping_run_back_to_where_they_came_from() -> None:

@@ -144,7 +144,7 @@ PROCESSOR = [
     "llvmpipe (LLVM 15.0.7, 256 bits)",
     "softpipe",
     "Mesa Software Rasterizer",
-    "SWR (LLVM 12.0.0, 256 bits)",
+    "SWR (LLVM 12.0.0)",
     "LLVMPIPE",
 ]
 GPU = [
@@ -167,12 +167,8 @@ def test_a_device_that_does_not_exist_is_named_in_the_error(opengl: None, device
         create_context(device)
 
 
-@pytest.mark.parametrize(
-    ("reason", "devices"), [("requested device index 0, but found 0 devices", 8), ("libEGL.so not loaded", 1)]
-)
-def test_without_any_device_the_error_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, reason: str, devices: int
-) -> None:
+@pytest.mark.parametrize(("reason", "devices"), [("requested device index 0", 8), ("libEGL.so not loaded", 1)])
+def test_without_any_device_the_error_says_what_to_install(monkeypatch, reason: str, devices: int) -> None:
     """A library that cannot be loaded is not asked again for every device."""
     asked = []
 
@@ -251,15 +247,11 @@ def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(tmp_path, 
         np.testing.assert_allclose(np.frombuffer(got.read(), "f4"), [750.0, 753.0, 756.0])
 
 
-@pytest.mark.parametrize(
-    ("free", "writable", "expected"), [(1e6, True, "true"), (1e9, True, None), (1e9, False, "true")]
-)
-def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(
-    free: float, writable: bool, expected: str | None, monkeypatch
-) -> None:
+@pytest.mark.parametrize(("free", "ours", "expected"), [(1e6, True, "true"), (1e9, True, None), (1e9, False, "true")])
+def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(free, ours, expected, monkeypatch) -> None:
     """Its cache is mapped into memory: a page for which the disk has no room ends the process by a bus error."""
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=free))
-    monkeypatch.setattr("os.access", lambda *_: writable)
+    monkeypatch.setattr("os.access", lambda *_: ours)
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
     create_context(None).release()
     assert os.environ.get("MESA_SHADER_CACHE_DISABLE") == expected

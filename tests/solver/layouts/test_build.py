@@ -11,16 +11,8 @@ from genus_zero import icosphere
 from hypothesis import HealthCheck, given, settings, strategies as st
 from surfaces import disk
 
-from ripple_sim.solver import (
-    Atlas,
-    AtlasError,
-    Mesh,
-    SphereAtlas,
-    SphereMapError,
-    build_atlas,
-    load_atlas,
-    sphere_atlas,
-)
+from ripple_sim.solver import Atlas, AtlasError, Mesh, SphereAtlas, SphereMapError, sphere_atlas
+from ripple_sim.solver.layouts import build_atlas, load_atlas
 
 
 @pytest.fixture(scope="module")
@@ -107,10 +99,8 @@ def revolved(height: np.ndarray, radius: np.ndarray, around: int) -> tuple[np.nd
     V = np.vstack([side.reshape(-1, 3), [[0, 0, 2 * height[0] - height[1]], [0, 0, 2 * height[-1] - height[-2]]]])
     i, j = np.arange(around), np.roll(np.arange(around), -1)
     bottom, top = np.full(around, n * around), np.full(around, n * around + 1)
-    quads = [
-        np.stack([k + i, k + j, k + around + j, k + around + i], axis=1) for k in range(0, (n - 1) * around, around)
-    ]
-    quads = np.concatenate(quads)
+    first = np.stack([i, j, around + j, around + i], axis=1)
+    quads = np.concatenate([first + k for k in range(0, (n - 1) * around, around)])
     caps = [np.stack([bottom, j, i], axis=1), np.stack([top, (n - 1) * around + i, (n - 1) * around + j], axis=1)]
     return V, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], *caps])
 

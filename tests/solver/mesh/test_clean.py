@@ -154,20 +154,19 @@ def test_cells_that_touch_along_edges_stay_bodies_of_their_volume(seed: int, fil
     assert mesh.volume == pytest.approx(cells.sum())
 
 
+three = {"min_size": 3, "max_size": 3}
+corner = st.tuples(*[st.integers(0, 2)] * 3)
+
+
 @quick
-@given(
-    F=st.lists(st.lists(st.integers(0, 9), min_size=3, max_size=3, unique=True), min_size=1, max_size=40),
-    seed=st.integers(0, 9),
-)
+@given(F=st.lists(st.lists(st.integers(0, 9), **three, unique=True), min_size=1, max_size=40), seed=st.integers(0, 9))
 def test_any_triangles_between_ten_points_become_a_mesh(F: list[list[int]], seed: int) -> None:
     distinct = list({tuple(sorted(triangle)): triangle for triangle in F}.values())
     made(np.random.default_rng(seed).uniform(size=(10, 3)), np.array(distinct))
 
 
 @quick
-@given(
-    triangles=st.lists(st.lists(st.tuples(*[st.integers(0, 2)] * 3), min_size=3, max_size=3), min_size=1, max_size=30)
-)
+@given(triangles=st.lists(st.lists(corner, **three), min_size=1, max_size=30))
 def test_any_triangles_on_a_lattice_become_a_mesh_or_have_no_area(triangles) -> None:
     # points in line, planes in common, triangles in each other
     V = np.array(triangles, dtype=float).reshape(-1, 3)
@@ -187,6 +186,7 @@ def test_any_triangles_on_a_lattice_become_a_mesh_or_have_no_area(triangles) -> 
 faces = st.lists(st.integers(0, len(BALL.faces) - 1), max_size=6)
 corners = st.lists(st.tuples(st.integers(0, len(BALL.faces) - 1), st.integers(0, 2)), max_size=3)
 vertices = st.integers(0, len(BALL.vertices) - 1)
+pairs = st.tuples(vertices, vertices)
 
 
 def mended_or_refused(V, F, uv=None) -> Mesh | None:
@@ -230,9 +230,7 @@ def test_deletions_leave_rims(deleted, flipped) -> None:
 
 
 @quick
-@given(
-    deleted=faces, doubled=faces, flipped=faces, rewired=corners, target=vertices, joined=st.tuples(vertices, vertices)
-)
+@given(deleted=faces, doubled=faces, flipped=faces, rewired=corners, target=vertices, joined=pairs)
 def test_any_damage_is_mended_or_refused(deleted, doubled, flipped, rewired, target, joined) -> None:
     V, F = np.array(BALL.vertices), np.array(BALL.faces)
     for face, corner in rewired:
@@ -244,10 +242,7 @@ def test_any_damage_is_mended_or_refused(deleted, doubled, flipped, rewired, tar
 
 
 @quick
-@given(
-    values=st.lists(st.floats(width=64), min_size=9, max_size=9),
-    where=st.lists(vertices, min_size=3, max_size=3, unique=True),
-)
+@given(values=st.lists(st.floats(width=64), min_size=9, max_size=9), where=st.lists(vertices, **three, unique=True))
 def test_any_coordinates_are_mended_or_refused(values, where) -> None:
     V = np.array(BALL.vertices)
     V[where] = np.array(values).reshape(3, 3)

@@ -84,9 +84,8 @@ def test_triangulation_keeps_the_winding_of_turned_polygons() -> None:
     turned = star @ rotation.T + 5
     triangles = triangulate(turned, np.array([20]))
     assert sorted(np.unique(triangles)) == list(range(20))
-    normals = np.cross(
-        turned[triangles[:, 1]] - turned[triangles[:, 0]], turned[triangles[:, 2]] - turned[triangles[:, 0]]
-    )
+    first, second, third = np.moveaxis(turned[triangles], 1, 0)
+    normals = np.cross(second - first, third - first)
     assert (normals @ rotation[:, 2] > 0).all()
     shoelace = np.cross(star, np.roll(star, -1, axis=0))[:, 2].sum()
     assert np.linalg.norm(normals, axis=1).sum() == pytest.approx(shoelace)

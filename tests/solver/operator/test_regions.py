@@ -84,7 +84,7 @@ def held_cap(n: int, kind: str) -> tuple[WaveSolver, np.ndarray]:
     materials = {
         "held": hold(atlas, Material(), cap),
         "clamped": Material(fixed=cap),
-        "free": Material(speed=np.where(cap, 0.0, 1.0)),
+        "free": Material(1.0 * ~cap),
     }
     waves = WaveSolver(atlas, materials[kind], backend="cpu")
     pulse = np.exp(-(((angle - 1.8) / 0.12) ** 2))

@@ -197,10 +197,8 @@ def noise(*shape: int) -> np.ndarray:
 def at_corners(around: np.ndarray) -> np.ndarray:
     """Bilinear interpolation at the four corners of each chart, [C, 4]."""
     last = around.shape[1] - 2
-    return np.stack(
-        [around[:, r : r + 2, c : c + 2].mean(axis=(1, 2)) for r, c in ((0, 0), (0, last), (last, last), (last, 0))],
-        axis=1,
-    )
+    places = (0, 0), (0, last), (last, last), (last, 0)
+    return np.stack([around[:, r : r + 2, c : c + 2].mean(axis=(1, 2)) for r, c in places], axis=1)
 
 
 @pytest.mark.parametrize("topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology])

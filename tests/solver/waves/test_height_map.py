@@ -64,11 +64,9 @@ def test_gradient_beside_a_fixed_rim_converges() -> None:
     errors = []
     for n in (16, 32, 64):
         texels = square(n).with_fixed_rim()
-        x, y, _ = np.moveaxis(texels.positions, -1, 0)
-        h = np.sin(np.pi * x) * np.sin(2 * np.pi * y)
-        exact = np.pi * np.stack(
-            [np.cos(np.pi * x) * np.sin(2 * np.pi * y), 2 * np.sin(np.pi * x) * np.cos(2 * np.pi * y)], axis=-1
-        )
+        x, y, _ = np.pi * np.moveaxis(texels.positions, -1, 0)
+        h = np.sin(x) * np.sin(2 * y)
+        exact = np.pi * np.stack([np.cos(x) * np.sin(2 * y), 2 * np.sin(x) * np.cos(2 * y)], axis=-1)
         found = HeightMap(texels)(h.astype(np.float32))[:, 1:-1, 1:-1, :2]
         errors.append(np.abs(found - exact).max())
     assert (orders(errors) > 1.8).all()

@@ -35,11 +35,9 @@ def test_modes_of_a_sphere_within_a_decibel_up_to_five_texels_a_wave() -> None:
     waves.step(40.0)
     times, samples = sensor.read()
     shapes = [eval_legendre(degree, sensor.points[:, 2] / np.linalg.norm(sensor.points, axis=1)) for degree in degrees]
-    swings = [
-        -np.exp(-damping * times / 2) * (damping * np.cos(w * times) + (w - damping**2 / 4 / w) * np.sin(w * times))
-        for w in rates
-    ]
-    exact = np.stack(swings, axis=1) @ np.stack(shapes)
+    w, t = rates, times[:, None]
+    swings = -np.exp(-damping * t / 2) * (damping * np.cos(w * t) + (w - damping**2 / 4 / w) * np.sin(w * t))
+    exact = swings @ np.stack(shapes)
     edges = np.append(0.5 * rates[0], (rates[1:] + rates[:-1]) / 2) / (2 * np.pi)
     edges = np.append(edges, sensor.bandwidth)
     assert rates[-1] / (2 * np.pi) < sensor.bandwidth < 20 / (2 * np.pi)  # wide texels are a third wider than the mean

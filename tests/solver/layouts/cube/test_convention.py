@@ -10,15 +10,8 @@ import pytest
 import trimesh
 
 from ripple_sim.solver import Atlas, AtlasError, Mesh, build_atlas
-from ripple_sim.solver.layouts import atlas_from_sphere_map
-from ripple_sim.solver.layouts.cube import (
-    CHART_NORMALS,
-    CHART_U,
-    CHART_V,
-    check_resolution,
-    cube_topology,
-    texel_directions,
-)
+from ripple_sim.solver.layouts import atlas_from_sphere_map, cube
+from ripple_sim.solver.layouts.cube import cube_topology, texel_directions
 from ripple_sim.solver.texels import TexelMesh
 
 
@@ -45,7 +38,7 @@ def test_the_halo_holds_the_nearest_texels_across_the_edges(n: int) -> None:
 @pytest.mark.parametrize("bad", [0, 3, 2.5, -8, 10_000])
 def test_invalid_resolution_is_named(bad: float) -> None:
     with pytest.raises(AtlasError, match=r"valid is a whole number"):
-        check_resolution(bad)
+        cube.check_resolution(bad)
 
 
 def spanned_areas(atlas: Atlas) -> np.ndarray:
@@ -100,7 +93,7 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 def direction_at(chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
     """The direction that a place in a chart stands for, by the definition of the equiangular cube map."""
     a, b = np.tan(np.pi / 4 * (2 * uv - 1)).T
-    return unit(CHART_NORMALS[chart] + a[:, None] * CHART_U[chart] + b[:, None] * CHART_V[chart])
+    return unit(cube.CHART_NORMALS[chart] + a[:, None] * cube.CHART_U[chart] + b[:, None] * cube.CHART_V[chart])
 
 
 def interior_points(atlas: Atlas, seed: int):
