@@ -15,9 +15,8 @@ from .mesh.wrap import Wrap as Wrap, wrap as wrap
 from .operator.assembly import absorbing_damping as absorbing_damping, build_operator as build_operator, hold as hold
 from .operator.material import Material as Material
 from .operator.modes import Modes as Modes, modes as modes
-from .texels.atlas import Atlas as Atlas
+from .texels.atlas import Atlas as Atlas, texel_atlas as texel_atlas
 from .texels.maps import texture_map as texture_map, vertex_map as vertex_map
-from .texels.texel_atlas import texel_atlas as texel_atlas
 from .texels.texel_mesh import TexelMesh as TexelMesh
 from .texels.thickness import thickness_map as thickness_map
 from .texels.topology import TexelTopology as TexelTopology, glue as glue

@@ -5,9 +5,9 @@ from .backend import (
     measured as measured,
 )
 from .cpu import CPUBackend as CPUBackend, RowLayout as RowLayout
-from .gl_dispatch import Dispatch as Dispatch
 from .gl_fields import (
     DeviceField as DeviceField,
+    Dispatch as Dispatch,
     FieldLayout as FieldLayout,
     TexelList as TexelList,
     bind_buffers as bind_buffers,

@@ -19,8 +19,16 @@ from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_li
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
-from .gl_dispatch import DeviceProbes, Dispatch, Pressure
-from .gl_fields import DeviceField, FieldLayout, TexelList, bind_buffers, link_buffers
+from .gl_fields import (
+    DeviceField,
+    DeviceProbes,
+    Dispatch,
+    FieldLayout,
+    Pressure,
+    TexelList,
+    bind_buffers,
+    link_buffers,
+)
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for

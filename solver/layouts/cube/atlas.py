@@ -20,10 +20,9 @@ from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...mesh.rays import RayScene
 from ...mesh.vectors import cross, dot
-from ...texels.atlas import Atlas, check_points
+from ...texels.atlas import Atlas, check_points, triangles_of
 from ...texels.chart_map import Parts, barycentrics_at, uncut
 from ...texels.detours import link_detours
-from ...texels.texel_atlas import triangles_of
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import stretch_summary
 from ..sphere_map import certify, stretch

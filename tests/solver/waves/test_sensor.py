@@ -7,8 +7,7 @@ import pytest
 from hand_made import square
 from scipy.special import eval_legendre
 
-from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.texels.texel_atlas import texel_atlas
+from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas, texel_atlas
 from ripple_sim.solver.waves.sensor import KINDS, filtered
 
 POINTS = np.array([[0.3, -0.2, 0.9], [0.577, 0.577, 0.577], [-0.9, 0.1, -0.4]])
