@@ -1,5 +1,6 @@
 """What lies inside a target of a scene file, and the shape that its surface begins with."""
 
+import re
 from pathlib import Path
 
 import msgspec
@@ -135,38 +136,13 @@ def test_they_are_what_they_say(text: str, value: np.ndarray) -> None:
     np.testing.assert_allclose(evaluate(text, NAMES), value, rtol=1e-14, atol=1e-16)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "__import__('os').system('true')",
-        "x.__class__",
-        "(lambda: 1)()",
-        "[x for x in y]",
-        "x if y else z",
-        "open('a')",
-        "'a' * 9",
-        "x[0]",
-        "exp(x, y)",
-        "exp(x=1)",
-        "sin",
-        "w",
-        "x < y < z",
-        "x and y",
-        "True",
-        "1j",
-        "exp(*x)",
-        "x := 3",
-        "x; y",
-        "",
-        "(" * 300 + "x" + ")" * 300,
-        "-" * 990 + "x",
-        "x+" * 600 + "x",
-        "9**9**9**9",
-        "log(0)",
-        "1/x + 1/(x-x)",
-        "\0",
-    ],
-)
+FORBIDDEN = """__import__('os').system('true') | x.__class__ | (lambda: 1)() | [x for x in y] | x if y else z
+open('a') | 'a' * 9 | x[0] | exp(x, y) | exp(x=1) | sin | w | x < y < z | x and y | True | 1j | exp(*x) | x := 3 | x; y
+9**9**9**9 | log(0) | 1/x + 1/(x-x)"""
+TOO_LONG = ["(" * 300 + "x" + ")" * 300, "-" * 990 + "x", "x+" * 600 + "x"]
+
+
+@pytest.mark.parametrize("text", [*re.split(r" \| |\n", FORBIDDEN), *TOO_LONG, "", "\0"])
 def test_anything_else_is_refused_in_one_line(text: str) -> None:
     with pytest.raises(SceneError, match="the expression") as error:
         evaluate(text, NAMES)

@@ -16,15 +16,10 @@ import pytest
 from PIL import Image
 
 from ripple_sim.cli import main as cli
-from ripple_sim.viewer import BALLS, OPERATORS, SLIDERS, Session, Window, benchmark, open_scene, run, window as viewing
+from ripple_sim.viewer import BALLS, OPERATORS, SLIDERS, Session, Window, benchmark, run, window as viewing
 
 OFF_SCREEN = "DISPLAY" not in os.environ
 MIDDLE = (200, 160)  # of the sphere in the window, from the lower left [pixels]
-
-
-@pytest.fixture(scope="module")
-def scene():
-    return open_scene("sphere")
 
 
 @pytest.fixture

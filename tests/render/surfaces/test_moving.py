@@ -5,6 +5,7 @@ import pytest
 from mujoco_models import posed
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
+from surfaces import grid
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples
 from ripple_sim.render.surfaces import MovingOcclusion, MovingVertices
@@ -24,11 +25,7 @@ def occlusion(V, F):
 
 def sheet(n):
     """Square sheet of n x n vertices, side 2, normals up."""
-    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
-    i = np.arange(n * n).reshape(n, n)
-    a, b, c, d = i[:-1, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel()
-    F = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
-    return np.stack([x.ravel(), y.ravel(), np.zeros(n * n)], axis=1), F
+    return grid(n - 1, lambda a, b: (2 * a - 1, 2 * b - 1, 0 * a))
 
 
 def dented(V):

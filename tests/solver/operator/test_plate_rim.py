@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+import surfaces
 from hand_made import disk, polygon, square
 from scipy.linalg import eigvalsh
 from scipy.sparse import diags_array
 
-from ripple_sim.solver import Material, Mesh, SolverError, WaveSolver, build_atlas, texel_atlas
+from ripple_sim.solver import Material, SolverError, WaveSolver, build_atlas, texel_atlas
 from ripple_sim.solver.operator import build_operator
 from ripple_sim.solver.operator.modes import elastic_matrix, modes
 
@@ -31,11 +32,7 @@ TABLES = {
 @pytest.fixture(scope="module")
 def sheet():
     """Unit square on patches, with irregular vertices inside."""
-    x, y = np.meshgrid(*2 * [np.linspace(0, 1, 9)])
-    index = np.arange(81).reshape(9, 9)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-    F = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)]).reshape(-1, 3)
-    return build_atlas(Mesh.from_arrays(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), F), 32, layout="patches")
+    return build_atlas(surfaces.square(8), 32, layout="patches")
 
 
 @pytest.mark.parametrize("name", TABLES)
