@@ -155,16 +155,9 @@ def test_a_second_signal_ends_the_process_while_the_first_is_cleaned_up() -> Non
 def run(folder: Path, words: str, redirections: str = "", **environment: str | None) -> subprocess.CompletedProcess:
     """The program in a shell."""
     command = f"{sys.executable} -m ripple_sim {words} {redirections}"
-    kept = {name: value for name, value in os.environ.items() if environment.get(name, "") is not None}
-    return subprocess.run(
-        ["sh", "-c", command],
-        cwd=folder,
-        env={**kept, **{name: value for name, value in environment.items() if value is not None}},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
+    env = {name: value for name, value in {**os.environ, **environment}.items() if value is not None}
+    words = ["sh", "-c", command]
+    return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, timeout=600, check=False)
 
 
 @pytest.mark.parametrize(

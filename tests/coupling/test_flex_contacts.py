@@ -161,11 +161,7 @@ def frame_along(normal: np.ndarray) -> np.ndarray:
     return np.array([x, y, np.cross(x, y)])
 
 
-def summed(
-    slab: tuple[mujoco.MjModel, np.ndarray],
-    contacts: list[tuple[tuple[float, ...], tuple[float, float, float]]],
-    surface: tuple[float, ...] | None = UP,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None = UP):
     """Which contacts of the ball with the block are kept, and their forces and normals.
 
     Parameters

@@ -31,13 +31,10 @@ def address() -> Iterator[str]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         number = probe.getsockname()[1]
-    server = subprocess.Popen(
-        [sys.executable, *f"-m ripple_sim view sphere --web --port {number} --size 400x300 --resolution 16".split()],
-        env={key: value for key, value in os.environ.items() if key != "DISPLAY"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+    words = f"-m ripple_sim view sphere --web --port {number} --size 400x300 --resolution 16".split()
+    env = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    server = subprocess.Popen([sys.executable, *words], env=env, **streams)
     try:
         line = server.stdout.readline()
         assert line.startswith(f"http://127.0.0.1:{number}/?secret=")
