@@ -1,7 +1,4 @@
-"""Contacts of collision geoms load the visible surface: all of their force, once, on its nearest part that faces them.
-
-Targets that collide other than as their true surface are warned of.
-"""
+"""Contacts of collision geoms load the visible surface: all of their force, once, on its nearest part in front."""
 
 import re
 import warnings

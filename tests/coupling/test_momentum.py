@@ -1,7 +1,4 @@
-"""What the surface gets is what the bodies lose: for every shape, route, restitution, time step and frame rate.
-
-So it is of moving targets that fall on the ground, or meet bodies which are tied, driven or sticky.
-"""
+"""What the surface gets is what the bodies lose: for every shape, route, restitution, time step and frame rate."""
 
 import itertools
 import runpy

@@ -1,7 +1,4 @@
-"""The time between looks, and resets, of which a mark in the data tells; forces are those of the present contacts.
-
-MuJoCo's own warnings are ours, each once, and its errors say what helps.
-"""
+"""The time between looks, and resets, of which a mark in the data tells; MuJoCo's warnings and errors are ours."""
 
 import copy
 import warnings

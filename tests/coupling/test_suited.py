@@ -1,7 +1,4 @@
-"""Material and resolution that suit the target, where its user leaves them open, whatever the scale.
-
-Waves too high or too steep: a warning once a target, with a material that would do.
-"""
+"""Material and resolution that suit the target where they are left open, and waves that are too high or too steep."""
 
 import math
 import re

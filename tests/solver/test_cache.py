@@ -1,7 +1,4 @@
-"""The cache folder: kept under its limit, what was used longest ago first, and nobody else's files touched.
-
-Under stress: several processes at once, a full disk. What is kept in memory: the latest, and while its owner lives.
-"""
+"""The cache: kept under its limit, what was used longest ago first, nobody else's files touched."""
 
 import os
 import weakref

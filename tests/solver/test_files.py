@@ -1,9 +1,4 @@
-"""What cannot fit into memory is refused before it is begun, in a message that names how much, and which limit.
-
-Files appear complete or not at all.
-
-Images beyond pillow's limit are refused wherever one is read, and the message names the limit.
-"""
+"""What cannot fit into memory is refused before it is begun; files are complete or not there; images have a limit."""
 
 import contextlib
 import os

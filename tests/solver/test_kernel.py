@@ -1,8 +1,4 @@
-"""What every compiled kernel promises: numpy's division, no fast-math unless asked for, options handed on.
-
-Compilation is timed by module, and its time is not that of the work in which it happened. Without compilation, for a
-debugger, kernels are plain Python with the same results.
-"""
+"""What every compiled kernel promises: numpy's division, no fast-math unasked; and what is told of compiling."""
 
 import importlib
 import io

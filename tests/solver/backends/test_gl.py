@@ -1,7 +1,4 @@
-"""Fields, links and lists in storage buffers, and compute shaders over them, against numpy.
-
-The stiffness that the GPU makes of moved vertices against the CPU's.
-"""
+"""Storage buffers, compute shaders and the stiffness of moved vertices on the GPU, against numpy and the CPU."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,4 @@
-"""The OpenGL context: what it frees, and how it says that something went wrong; devices, and which context is current.
-
-Drivers that render on the processor are known by their names. GLSL sources are found below their package, with
-includes and defines put in.
-"""
+"""The OpenGL context: what it frees, its devices, drivers and sources, and how it says what went wrong."""
 
 import os
 import re

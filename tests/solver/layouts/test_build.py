@@ -1,7 +1,4 @@
-"""Atlases are built, saved, loaded and cached; every texel lies on the surface.
-
-Hard shapes (spikes, chains of blobs, thin plates, needles): never a fold, never a lost texel.
-"""
+"""Atlases are built, saved, loaded and cached; every texel lies on the surface, of hard shapes too."""
 
 from pathlib import Path
 

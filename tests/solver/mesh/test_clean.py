@@ -1,7 +1,4 @@
-"""Whatever is given becomes a sound mesh or is refused: of the same area, with the same texture coordinates.
-
-Surfaces with handles, holes, twists and parts, damage of every kind; and what must not matter does not.
-"""
+"""Whatever is given becomes a sound mesh or is refused: of the same area, with the same texture coordinates."""
 
 import re
 

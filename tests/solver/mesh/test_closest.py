@@ -1,7 +1,4 @@
-"""The tree of boxes finds the nearest points of a mesh: those that libigl finds.
-
-Rays from above meet the highest point of a mesh.
-"""
+"""The tree of boxes finds the nearest points of a mesh, as libigl does; rays from above meet its highest point."""
 
 import igl
 import numpy as np

@@ -1,7 +1,4 @@
-"""Mesh files as they are found: every format, polygons, seams, nodes, transforms; known meshes.
-
-What is refused, is so always with one line.
-"""
+"""Mesh files as they are found: every format, polygons, seams, nodes, transforms; refusals in one line."""
 
 import json
 import os

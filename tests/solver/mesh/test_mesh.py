@@ -1,7 +1,4 @@
-"""Meshes: validated, and refused by name; what the cube layout refuses; normals of vertices at tips and knife edges.
-
-Where sheets touch, bodies stay bodies, floors stay floors, and what stands on them comes off.
-"""
+"""Meshes: validated, and refused by name; normals of vertices; bodies that touch stay bodies."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""PLY files: text and binary, lists of any length, texture coordinates, and files that end early.
-
-Polygons are cut into triangles without folds.
-"""
+"""PLY files: text and binary, lists of any length, texture coordinates, polygons, and files that end early."""
 
 from pathlib import Path
 

@@ -1,7 +1,4 @@
-"""The root of the Laplacian: against a dense one, its symmetry, its mean, and its inverse.
-
-Deep water: phase speed on both sides of the crossover, energy, decay, pushes, and what it refuses.
-"""
+"""The root of the Laplacian, against a dense one, and deep water's speed, energy, decay, pushes and refusals."""
 
 import copy
 

@@ -1,7 +1,4 @@
-"""Sources leave the volume as it is, on each part of the surface; what these parts are.
-
-The stable time step, and the kick of one substep.
-"""
+"""Sources leave the volume of each part of the surface as it is; the stable time step, and one substep."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""The atlas locates points, also where charts meet; arrays come back from a file, or the damage is named.
-
-Atlases of texel meshes without a triangle mesh, and the page that holds their charts.
-"""
+"""The atlas locates points, also where charts meet; arrays come back from a file, or the damage is named."""
 
 import copy
 import itertools

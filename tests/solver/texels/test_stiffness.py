@@ -1,7 +1,4 @@
-"""The stiffness of a texel mesh at rest: the laws of its cells, and their sums against assembly by brute force.
-
-Quick stiffness of moving texels against the assembly from nothing, on every kind of cell.
-"""
+"""The stiffness of texel meshes, at rest and moving: the laws of its cells, and assembly by brute force."""
 
 import numpy as np
 import pytest

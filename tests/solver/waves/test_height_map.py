@@ -1,9 +1,4 @@
-"""The height map: second-order gradients everywhere, continuous over the cube's edges and corners.
-
-Heights that stay on the GPU: the same as those read back, and the height map made there is the host's.
-
-The limit on drawn heights: small waves pass unchanged, large ones smoothly bent, none beyond the limit.
-"""
+"""The height map: second-order gradients, continuous over edges and corners, the same on the GPU; its limit."""
 
 from functools import partial
 

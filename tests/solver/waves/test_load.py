@@ -1,7 +1,4 @@
-"""Loads over one step, held forces and pressure: what they add up to, when they end, and what is refused.
-
-The footprint of a source: exact total, distances along the surface where it is not flat, no leak through thin parts.
-"""
+"""Loads over one step, held forces and pressure: what they add up to, when they end; the footprint of a source."""
 
 import numpy as np
 import pytest

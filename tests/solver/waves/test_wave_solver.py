@@ -1,8 +1,4 @@
-"""The wave solver against theory: modes, order, conservation, damping, stability.
-
-Steps are split as stability asks. The state of waves: copies go on as the original does, and other solvers take it
-over. Crests: the greatest height of each texel since the last look, whichever step had it.
-"""
+"""The wave solver against theory: modes, order, conservation, damping, stability; copies, and crests."""
 
 import copy
 import dataclasses

@@ -1,8 +1,4 @@
-"""The atlas of a given sphere map: symmetric, covariant, and on the mesh; the analytic atlas of a sphere.
-
-Figures of merit of a sphere map, where they are known. Rays through the texels meet the triangles that they should,
-by every ray against every triangle; on an octahedron the answer is known in closed form.
-"""
+"""The atlas of a given sphere map: symmetric, covariant, and on the mesh; the analytic atlas of a sphere."""
 
 import itertools
 

@@ -1,9 +1,4 @@
-"""The cube map's geometry: directions, neighbours across edges, symmetries.
-
-Areas of the texels: all of the surface, where the texel mesh cuts corners as well, but no limb that it misses.
-
-Texture coordinates into the atlas: every triangle in one chart's [0, 1], sampling agrees with direct evaluation.
-"""
+"""The cube map's geometry: directions, neighbours across edges, symmetries, areas and texture coordinates."""
 
 import numpy as np
 import pytest

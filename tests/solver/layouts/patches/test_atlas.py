@@ -1,8 +1,4 @@
-"""Atlases of the patch layout: every texel on the surface, areas, rims, several parts, texels on knife edges.
-
-Whatever is thrown at it carries waves: handles, holes, strips, a one-sided band, single triangles, needles. Its
-operator is of second order against eigenvalues that are known exactly.
-"""
+"""Atlases of the patch layout, of any surface, and their operator against eigenvalues that are known exactly."""
 
 from collections.abc import Callable
 

@@ -1,9 +1,4 @@
-"""From cells to charts: sizes of cells, their quads, and the maps onto these, which stay one to one.
-
-Cells are small on limbs, so that the map wraps these without a fold among the texels. Each quad is laid out as a
-square without a fold, glued as the surface is. Maps are coarsened, relaxed, and have the tips of their cones moved.
-Triangles are joined in pairs as well as in the best of all pairings, where these can be counted.
-"""
+"""From cells to charts: sizes of cells, their quads, and the maps onto these, which stay one to one."""
 
 import itertools
 
