@@ -41,7 +41,6 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.fixture
 def signals_as_found() -> Iterator[None]:
-    """Give back the signals that the program takes over."""
     kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     yield
     for number, handler in kept.items():
@@ -50,7 +49,6 @@ def signals_as_found() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def opengl() -> None:
-    """Skip where there is no OpenGL."""
     from ripple_sim.solver import RippleError
     from ripple_sim.solver.gl import shared_context
 

@@ -85,11 +85,7 @@ def test_a_picture_is_written_and_is_not_blank(tmp_path, told, ball_file):
 
 @pytest.mark.parametrize(
     ("path", "said"),
-    [
-        ("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"),
-        ("atlas", "valid are"),
-        ("missing/atlas.png", "folder that exists"),
-    ],
+    [("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"), ("atlas", "valid are"), ("no/atlas.png", "folder that exists")],
 )
 def test_a_picture_without_a_place_is_refused_before_the_mesh_is_read(refusal, monkeypatch, tmp_path, path, said):
     monkeypatch.chdir(tmp_path)

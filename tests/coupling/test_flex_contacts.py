@@ -164,12 +164,8 @@ def frame_along(normal: np.ndarray) -> np.ndarray:
 def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None = UP):
     """Which contacts of the ball with the block are kept, and their forces and normals.
 
-    Parameters
-    ----------
-    contacts
-        Outward normal, and force on the ball in the world [N], of each.
-    surface
-        Normal of the triangle that is touched in the world; None for a vertex.
+    A contact is an outward normal and the force on the ball [N]; the surface is the normal of the touched triangle,
+    or None for a vertex.
     """
     model, normals = slab
     k = len(contacts)

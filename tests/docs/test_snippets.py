@@ -62,7 +62,6 @@ def blocks(page: Path) -> list[Block]:
 
 
 def commands(page: Path) -> list[str]:
-    """Commands within the text."""
     return re.findall(r"`((?:ripple-sim|python|pytest) [^`\n]+)`", page.read_text(encoding="utf-8"))
 
 

@@ -95,7 +95,6 @@ def batches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def read_all(folder: Path) -> None:
-    """Ask a batch for all that is in it."""
     scenes = outcome(lambda: load_batch(folder))
     for scene in () if isinstance(scenes, RippleError) else scenes:
         for read in (scene.names, scene.facts, scene.times, scene.positions, scene.heights, scene.impulses):

@@ -25,5 +25,4 @@ def resources(gl: GLContext) -> Iterator[Resources]:
 
 @pytest.fixture
 def frame(resources: Resources) -> FrameUniforms:
-    """Uniforms of a frame."""
     return FrameUniforms(resources)

@@ -13,24 +13,12 @@ _HEAVY = 1e3
 
 @dataclasses.dataclass
 class Balance:
-    """Impulses of one target and one geom that touches it, summed over steps [N s].
+    """Impulses of one target and one geom that touches it, summed over steps [N s]."""
 
-    Attributes
-    ----------
-    given : float
-        What `Ripples` reports.
-    reported : float
-        Normal forces of MuJoCo's contacts, less the pull of suckers, times the time step.
-    felt : float
-        The same, by the change of momentum of the free body that takes part, where one does.
-    exchanged : float
-        Sum of the amounts of what is reported: pushes and pulls do not cancel.
-    """
-
-    given: float = 0.0
-    reported: float = 0.0
-    felt: float = 0.0
-    exchanged: float = 0.0
+    given: float = 0.0  # what `Ripples` reports
+    reported: float = 0.0  # normal forces of MuJoCo's contacts, less the pull of suckers, times the time step
+    felt: float = 0.0  # the same, by the change of momentum of the free body that takes part, where one does
+    exchanged: float = 0.0  # sum of the amounts of what is reported: pushes and pulls do not cancel
 
 
 class MomentumBalance:
@@ -38,18 +26,13 @@ class MomentumBalance:
 
     A free body's change of momentum, less gravity and all contact forces but the normal ones, is what its contacts'
     normal forces gave it. Along their sum it is compared with them.
-
-    Attributes
-    ----------
-    pairs : dict
-        `Balance` by the names of a target and what touches it.
-    pushes : dict
-        Sum of the latest step's normal forces [N, 3] of the first geom on the second, by their names.
     """
 
     def __init__(self, model: mujoco.MjModel, targets: list[str]) -> None:
         self.model, self.names = model, [model.geom(i).name or f"geom {i}" for i in range(model.ngeom)]
+        # by the names of a target and what touches it
         self.pairs: dict[tuple[str, str], Balance] = collections.defaultdict(Balance)
+        # sum of the latest step's normal forces [N, 3] of the first geom on the second, by their names
         self.pushes: dict[tuple[str, str], np.ndarray] = {}
         self._targets = targets
         flexes = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) for flex in range(model.nflex))

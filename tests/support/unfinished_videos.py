@@ -27,8 +27,6 @@ def egg_scene(folder: Path, floor: str = "", duration: float = 2.0, density: flo
 
 
 def interrupting_at(frame: int) -> Callable[[int, int], None]:
-    """Progress that interrupts at a frame."""
-
     def progress(done: int, _: int) -> None:
         if done == frame:
             raise KeyboardInterrupt

@@ -1,8 +1,4 @@
-"""The energy of a map of triangles against singular values, and its derivatives against differences.
-
-The star of a vertex knows the energy of every place of it; the projected Hessian of a triangle is the positive part of
-the full one.
-"""
+"""The energy of maps and of a vertex's star against singular values, its derivatives against differences."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""The certificate sees every fold; stretch is measured by area.
-
-Turning the map so that the cube lies well on it.
-"""
+"""The certificate sees every fold; stretch is measured by area; the map is turned so that the cube lies well on it."""
 
 import numpy as np
 import pytest

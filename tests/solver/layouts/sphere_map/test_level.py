@@ -1,7 +1,4 @@
-"""Levels of detail renumber what is left of a mesh.
-
-Reference triangles: carried area, real shapes, and what slivers and points become.
-"""
+"""Levels of detail renumber what is left of a mesh; reference triangles carry its areas and its real shapes."""
 
 import numpy as np
 import pytest
