@@ -248,11 +248,9 @@ def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: p
 
 @pytest.mark.filterwarnings("ignore:geom 'shell' collides as 'core'")
 def test_geoms_that_collide_for_a_target_are_watched() -> None:
-    seen = 'contype="0" conaffinity="0"'
-    model = model_of(
-        f'<body name="link"><geom name="shell" size="0.3" {seen}/><geom name="core" type="box" size="0.3 0.3 0.01"/>'
-        "</body>" + BALL.format("0 0 0.5")
-    )
+    shell = '<geom name="shell" size="0.3" contype="0" conaffinity="0"/>'
+    core = '<geom name="core" type="box" size="0.3 0.3 0.01"/>'
+    model = model_of(f'<body name="link">{shell}{core}</body>' + BALL.format("0 0 0.5"))
     data = mujoco.MjData(model)
     data.qvel[2] = -80.0
     ripples = Ripples(model, {"shell": Material()}, contacts={"shell": ["core"]}, resolution=8, backend="cpu")

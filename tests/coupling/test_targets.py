@@ -31,10 +31,8 @@ def test_material_may_change_under_a_body_at_rest() -> None:
 @pytest.mark.parametrize("place", ["poke", "rigid"])
 def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None:
     """MuJoCo puts a mesh's frame at its middle, along its axes of inertia: nobody knows it."""
-    model = model_of(
-        '<body pos="3 0 0" euler="0 0 90"><geom name="target" type="ellipsoid" size="0.3 0.2 0.2" pos="1 0 0" '
-        'euler="0 90 0"/><site name="end" pos="1 0 -0.3"/></body>'
-    )
+    target = '<geom name="target" type="ellipsoid" size="0.3 0.2 0.2" pos="1 0 0" euler="0 90 0"/>'
+    model = model_of(f'<body pos="3 0 0" euler="0 0 90">{target}<site name="end" pos="1 0 -0.3"/></body>')
     run = Run(model, "target", resolution=16, conserve_volume=True)
     mujoco.mj_forward(model, data := run.data)
     ripples, geom, end = run.ripples, data.geom("target"), model.site("end").pos

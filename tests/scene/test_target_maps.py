@@ -191,10 +191,9 @@ def test_an_image_is_taken_in_the_mesh_s_own_coordinates(tmp_path: Path) -> None
     lines += [f"f {a}/{a} {b}/{b} 5/5" for a, b in ((1, 2), (2, 3), (3, 4), (4, 1))]
     (tmp_path / "square.obj").write_text("\n".join(lines))
     Image.fromarray(np.repeat(np.arange(2, 256, 4, dtype=np.uint8)[None], 4, axis=0)).save(tmp_path / "ramp.png")
-    (tmp_path / "square.xml").write_text(
-        "<mujoco><asset><mesh name='m' file='square.obj' inertia='shell'/></asset><worldbody>"
-        "<geom name='egg' type='mesh' mesh='m'/></worldbody></mujoco>"
-    )
+    mesh, geom = "<mesh name='m' file='square.obj' inertia='shell'/>", "<geom name='egg' type='mesh' mesh='m'/>"
+    model = f"<mujoco><asset>{mesh}</asset><worldbody>{geom}</worldbody></mujoco>"
+    (tmp_path / "square.xml").write_text(model)
     heights = []
     for shape in ("map = 'ramp.png'\nlow = -0.01\nhigh = 0.01", "expression = '0.02 * x'"):
         table = BEGIN.replace("egg.xml", "square.xml") + f"[ripple.height]\n{shape}\n"

@@ -6,7 +6,6 @@ FPS, WIDTH, HEIGHT, DISTANCE, FOVY, SPEED = 30, 240, 120, 2.0, 40.0, 18.0
 MJCF = """<mujoco><option gravity="0 0 0" timestep="0.002"/><worldbody>
 <geom name="egg" type="sphere" size="0.05"/>{bodies}</worldbody></mujoco>"""
 
-
 SHOT = '<body name="shot" pos="0 0.9 0.3"><freejoint/><geom size="0.05" contype="0" conaffinity="0"/></body>'
 TOML = f"""model = "scene.xml"
 duration = 0.2

@@ -88,11 +88,9 @@ class RandomModel:
         return spec.compile()
 
     def _xml(self) -> str:
-        hitters = [self._hitter(i, hitter) for i, hitter in enumerate(self.hitters)]
-        moved, links = (
-            "".join(body for body, hitter in zip(hitters, self.hitters, strict=True) if (hitter == "link") is linked)
-            for linked in (False, True)
-        )
+        hitters = [(hitter, self._hitter(i, hitter)) for i, hitter in enumerate(self.hitters)]
+        moved = "".join(body for hitter, body in hitters if hitter != "link")
+        links = "".join(body for hitter, body in hitters if hitter == "link")
         bodies, equality = self._target(links) + moved, ""
         if self.mount in ("weld", "connect"):
             partner = self.rng.choice(["partner", "world"])

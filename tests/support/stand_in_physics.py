@@ -35,12 +35,9 @@ def stand_in_suite(xml: str) -> types.ModuleType:
 
     def load(*_: Any, **__: Any) -> types.SimpleNamespace:
         physics = StandIn(xml)
-        return types.SimpleNamespace(
-            physics=physics,
-            reset=lambda: physics.reset(),
-            step=lambda action: physics.step(5),
-            action_spec=lambda: types.SimpleNamespace(generate_value=lambda: None),
-        )
+        spec = types.SimpleNamespace(generate_value=lambda: None)
+        calls = {"reset": lambda: physics.reset(), "step": lambda action: physics.step(5), "action_spec": lambda: spec}
+        return types.SimpleNamespace(physics=physics, **calls)
 
     suite = types.ModuleType("dm_control.suite")
     suite.load = load  # type: ignore[attr-defined]

@@ -25,7 +25,6 @@ from ripple_sim.video import Film, Progress, VideoOptions
 N, RATE, FRAMES = 24, 30, 8
 EVERYTHING = ["height", "contacts", "grid", "time", "energy"]
 
-
 pytestmark = pytest.mark.usefixtures("opengl")
 
 

@@ -158,10 +158,8 @@ RESOLUTION, SIZE = 16, (120, 480)  # so high that there are edges to be split
 @pytest.fixture(scope="module")
 def scene(gl):
     """A renderer of a ball and its atlas, and what draws its height field: from the host's memory, or on the GPU."""
-    model, data = posed(
-        '<mujoco><worldbody><geom type="plane" size="3 3 .1"/><geom type="sphere" size=".5" pos="0 0 .5"/>'
-        '<geom type="sphere" size=".1" pos=".5 .4 .9"/></worldbody></mujoco>'
-    )
+    balls = '<geom type="sphere" size=".5" pos="0 0 .5"/><geom type="sphere" size=".1" pos=".5 .4 .9"/>'
+    model, data = posed(f'<mujoco><worldbody><geom type="plane" size="3 3 .1"/>{balls}</worldbody></mujoco>')
     ball, atlas = shapes.ball(16), sphere_atlas(1.0, RESOLUTION)
     height_map = HeightMap(atlas.texels)
     targets = {1: Surface(0.5 * ball.shell, ball.faces, cube_charts(ball.shell, RESOLUTION), "rubber")}

@@ -75,7 +75,6 @@ SHELF = "".join(
     ]
 )
 
-
 THEIRS = """
 import sys, mujoco, numpy as np
 frames = []

@@ -26,14 +26,11 @@ def breathing_error(resolution: int, backend: str, tightening: float = 0.0) -> f
     def radius(t):
         return 1 + 0.3 * np.sin(2 * t)
 
-    exact = solve_ivp(
-        lambda t, y: [y[1], -6 * radius(t) ** (2 * tightening - 2) * y[0]],
-        (0, end),
-        [1, 0],
-        t_eval=np.linspace(0, end, steps + 1)[1:],
-        rtol=1e-9,
-        atol=1e-12,
-    )
+    def change(t, y):
+        return [y[1], -6 * radius(t) ** (2 * tightening - 2) * y[0]]
+
+    times = np.linspace(0, end, steps + 1)[1:]
+    exact = solve_ivp(change, (0, end), [1, 0], t_eval=times, rtol=1e-9, atol=1e-12)
     errors = []
     for i, height in enumerate(exact.y[0]):
         waves.move(atlas.mesh.V * radius((i + 0.5) * end / steps))
