@@ -104,8 +104,7 @@ def test_batches_store_the_samples(tmp_path: Path, samples) -> None:
     assert (low.min(), high.max()) == (samples["top"][1].min(), samples["top"][1].max())
 
 
-@pytest.mark.usefixtures("opengl")
-def test_traces_are_drawn(tmp_path: Path) -> None:
+def test_traces_are_drawn(opengl: None, tmp_path: Path) -> None:
     scene, frames = scene_of(tmp_path), {}
     for overlay in ((), ("sensors",)):
         options = VideoOptions(size=(640, 360), duration=0.3, overlay=overlay, **OPTIONS)

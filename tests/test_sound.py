@@ -19,9 +19,8 @@ from ripple_sim.solver import WaveSolver, build_atlas, load_mesh, texel_atlas
 from ripple_sim.sound import DENSITY, RATE, SPEED, Ear, gain, write_wav
 
 
-@pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
-def test_a_piston_on_its_axis(backend: str) -> None:
+def test_a_piston_on_its_axis(opengl: None, backend: str) -> None:
     """A velocity v that begins at once sounds as rho c v until the edge is heard, too (Stepanishen 1971)."""
     atlas, timestep, speed, away = texel_atlas(disk(24)), 2e-5, 0.01, 0.8
     waves = WaveSolver(atlas, Material(speed=0.01), backend=backend, conserve_volume=False)
@@ -106,8 +105,7 @@ def test_the_track_of_a_video_is_what_was_given(tmp_path: Path) -> None:
     assert np.abs(heard[:RATE] - sound)[2000:-2000].max() < 0.01  # in time to the sample
 
 
-@pytest.mark.usefixtures("opengl")
-def test_a_video_with_sound(tmp_path: Path) -> None:
+def test_a_video_with_sound(opengl: None, tmp_path: Path) -> None:
     options = VideoOptions(size=(32, 32), fps=10, duration=0.3, slow_motion=2.0, sound=True, overlay=())
     said = "is hardly heard: waves of .* m and longer sound at .* Hz at most, below hearing"
     with pytest.warns(UserWarning, match=said):

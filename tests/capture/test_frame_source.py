@@ -39,9 +39,8 @@ def blot(scene: Scene, part: tuple[slice, slice], frames: int = 1) -> tuple[floa
     return float(alpha.sum()), (alpha * (at - mean) ** 2).sum(axis=(1, 2)) / alpha.sum()
 
 
-@pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize("shutter", [90.0, 180.0, 360.0])
-def test_a_ball_leaves_a_streak_as_long_as_it_flies_while_the_shutter_is_open(make_scene, shutter):
+def test_a_ball_leaves_a_streak_as_long_as_it_flies_while_the_shutter_is_open(opengl, make_scene, shutter):
     above, count = (slice(0, HEIGHT // 2 - 8), slice(None)), 24
     area, sharp = blot(make_scene(), above, frames=2)
     streak_area, streak = blot(make_scene(shutter=shutter, exposures=count), above, frames=2)
@@ -52,12 +51,11 @@ def test_a_ball_leaves_a_streak_as_long_as_it_flies_while_the_shutter_is_open(ma
     assert streak_area == pytest.approx(area, rel=0.01)
 
 
-@pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize(
     ("depth", "focus", "alpha"),
     [(1.2, 2.0, 1.0), (1.2, 2.0, 0.6), (1.6, 2.0, 1.0), (6.0, 2.0, 1.0), (6.0, 3.0, 0.6), (3.0, 3.0, 1.0)],
 )
-def test_what_is_out_of_focus_blurs_to_the_disc_of_a_thin_lens(make_scene, depth, focus, alpha):
+def test_what_is_out_of_focus_blurs_to_the_disc_of_a_thin_lens(opengl, make_scene, depth, focus, alpha):
     aperture, right = 0.12, (slice(None), slice(WIDTH // 2 + 12, None))
     area, sharp = blot(make_scene(bead(depth, alpha), ""), right)
     scene = make_scene(bead(depth, alpha), "", aperture=aperture, focus=focus, exposures=48)
@@ -69,24 +67,21 @@ def test_what_is_out_of_focus_blurs_to_the_disc_of_a_thin_lens(make_scene, depth
     assert disc_area == pytest.approx(area, rel=0.02)
 
 
-@pytest.mark.usefixtures("opengl")
-def test_depth_of_field_loses_no_light(make_scene):
+def test_depth_of_field_loses_no_light(opengl, make_scene):
     def light(**exposure: Any) -> np.ndarray:
         return linear(last_frame(make_scene(bead(1.2) + bead(5.0), "", **exposure))).mean(axis=(0, 1))
 
     np.testing.assert_allclose(light(aperture=0.12), light(), rtol=3e-3)
 
 
-@pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize("transparent", [False, True])
-def test_one_exposure_is_the_plain_frame(make_scene, transparent):
+def test_one_exposure_is_the_plain_frame(opengl, make_scene, transparent):
     plain = last_frame(make_scene(), 2, transparent=transparent)
     single = last_frame(make_scene(shutter=180.0, aperture=0.1, exposures=1), 2, transparent=transparent)
     np.testing.assert_array_equal(single, plain)
 
 
-@pytest.mark.usefixtures("opengl")
-def test_a_camera_that_goes_round_blurs_what_stands_still(make_scene):
+def test_a_camera_that_goes_round_blurs_what_stands_still(opengl, make_scene):
     right, orbit, depth = (slice(None), slice(WIDTH // 2 + 12, None)), 120.0, 1.2
     scene = make_scene(bead(depth), "", shutter=360.0, exposures=24)
     (_, still), (_, moved) = blot(scene, right), blot(with_exposure(scene, orbit=orbit), right)
@@ -97,8 +92,7 @@ def test_a_camera_that_goes_round_blurs_what_stands_still(make_scene):
     assert np.sqrt(12 * (moved[0] - still[0])) == pytest.approx(way, abs=0.7)
 
 
-@pytest.mark.usefixtures("opengl")
-def test_shadows_of_many_exposures_are_smoother(make_scene):
+def test_shadows_of_many_exposures_are_smoother(opengl, make_scene):
     bodies = '<geom type="plane" size="5 5 0.1" pos="0 0 -0.6"/><geom size="0.25" pos="0.3 0 0"/>'
     scene = make_scene(bodies, "", elevation=-50.0)
     scenes = (with_exposure(scene, aperture=1e-9, exposures=count) for count in (1, 8, 64))
@@ -106,8 +100,7 @@ def test_shadows_of_many_exposures_are_smoother(make_scene):
     assert 0 < np.abs(few - many).mean() < 0.5 * np.abs(one - many).mean()
 
 
-@pytest.mark.usefixtures("opengl")
-def test_overlays_are_laid_over_the_mean(make_scene, tmp_path):
+def test_overlays_are_laid_over_the_mean(opengl, make_scene, tmp_path):
     def render(name: str, **options: Any) -> np.ndarray:
         path = tmp_path / name
         render_video(make_scene(), path, VideoOptions(size=(WIDTH, HEIGHT), fps=FPS, duration=2 / FPS, **options))

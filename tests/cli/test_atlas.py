@@ -72,8 +72,7 @@ def test_the_plain_report_says_the_same(capsys, ball_file):
     assert re.search(r"^sphere map time +\d+\.\d{3} s$", out, re.MULTILINE)
 
 
-@pytest.mark.usefixtures("coarse_pictures")
-def test_a_picture_is_written_and_is_not_blank(tmp_path, told, ball_file):
+def test_a_picture_is_written_and_is_not_blank(coarse_pictures, tmp_path, told, ball_file):
     picture = tmp_path / "atlas.png"
     assert "plot" in told(ball_file, "--plot", picture)["seconds"]
     pixels = np.asarray(Image.open(picture).convert("RGB"))
@@ -121,8 +120,7 @@ def test_an_open_mesh_gets_patches(told, open_file):
     assert charts * n * n == pytest.approx(6 * 32**2, rel=0.2)
 
 
-@pytest.mark.usefixtures("coarse_pictures")
-def test_the_thickness_over_what_is_inside_is_told_and_drawn(tmp_path, told, refusal, ball_file):
+def test_the_thickness_over_what_is_inside_is_told_and_drawn(coarse_pictures, tmp_path, told, refusal, ball_file):
     core, plot = tmp_path / "core.off", tmp_path / "thickness.png"
     trimesh.creation.icosphere(subdivisions=3, radius=1.5).export(core)
     thickness = told(ball_file, "--inside", core, "--plot", plot)["thickness"]

@@ -166,10 +166,9 @@ def small(words: list[str]) -> list[str]:
     return [*kept, *(word for option in SMALL.items() for word in option)]
 
 
-@pytest.mark.usefixtures("opengl")
 @pytest.mark.filterwarnings("error::ripple_sim.errors.RippleWarning")
 @pytest.mark.parametrize("page", named([page for page in PAGES if any(b.language for b in blocks(page))]))
-def test_the_code_of_a_page_runs_from_top_to_bottom(page: Path, folder: Path) -> None:
+def test_the_code_of_a_page_runs_from_top_to_bottom(opengl: None, page: Path, folder: Path) -> None:
     reader = Reader(folder)
     for block in blocks(page):
         try:

@@ -80,16 +80,14 @@ def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(tm
     assert not {"capDate", "owner", "comments"} & set(header)
 
 
-@pytest.mark.usefixtures("exr")
-def test_bytes_for_the_screen_are_no_linear_light(tmp_path: Path) -> None:
+def test_bytes_for_the_screen_are_no_linear_light(exr: None, tmp_path: Path) -> None:
     refused = pytest.raises(VideoError, match=r"frame is uint8 .*; valid is float16 \[48, 64, 3\]")
     size = {"width": WIDTH, "height": HEIGHT, "fps": 24}
     with refused, open_writer(tmp_path / "frames", **size, frame_format="exr") as writer:
         writer.write(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
 
 
-@pytest.mark.usefixtures("exr")
-def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(tmp_path: Path) -> None:
+def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(exr: None, tmp_path: Path) -> None:
     """Half a frame of noise cannot be packed into less than it is: the file's end is cut off."""
     said = written_until_full(tmp_path / "frames", 60 * 60 * 3 * 2 - 1000, 60, 60, 1, frame_format="exr")
     assert said == f"cannot write the video {tmp_path / 'frames'}: File too large\n"
@@ -105,8 +103,7 @@ def test_without_openexr_the_extra_is_named(tmp_path: Path, capsys, monkeypatch)
     assert "missing" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("exr")
-def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(scene: Scene, tmp_path: Path, capsys) -> None:
+def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(exr: None, scene: Scene, tmp_path: Path, capsys):
     frames = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     for option in (["--overlay", "time"], ["--compare", "paper"]):
         assert cli.main(["render", "duck", *frames, *option]) == 2
@@ -117,16 +114,14 @@ def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(scene: Scene
     assert not (tmp_path / "frames").exists()
 
 
-@pytest.mark.usefixtures("exr")
-def test_the_command_writes_a_folder_over_older_frames(scene: Scene, tmp_path: Path) -> None:
+def test_the_command_writes_a_folder_over_older_frames(exr: None, scene: Scene, tmp_path: Path) -> None:
     render_video(scene, tmp_path / "frames", VideoOptions(size=(WIDTH, HEIGHT), fps=30))
     command = ["render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     assert cli.main([*command, "--size", f"{WIDTH}x{HEIGHT}", "--fps", "30", "--duration", "0.1"]) == 0
     assert sorted(contents(tmp_path / "frames")) == [f"frame_{number:05d}.exr" for number in range(3)]
 
 
-@pytest.mark.usefixtures("exr")
-def test_an_interrupted_render_goes_on_to_the_same_frames(scene: Scene, tmp_path: Path) -> None:
+def test_an_interrupted_render_goes_on_to_the_same_frames(exr: None, scene: Scene, tmp_path: Path) -> None:
     options = {**OPTIONS, "transparent": True}
     render_video(scene, tmp_path / "whole", VideoOptions(**options))
     with pytest.raises(KeyboardInterrupt):
@@ -137,8 +132,7 @@ def test_an_interrupted_render_goes_on_to_the_same_frames(scene: Scene, tmp_path
     assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
 
 
-@pytest.mark.usefixtures("opengl")
-def test_the_tone_curve_makes_the_picture_of_linear_light() -> None:
+def test_the_tone_curve_makes_the_picture_of_linear_light(opengl: None) -> None:
     light = render(BODIES + FLOOR, samples=1, linear=True)
     picture = render(BODIES + FLOOR, samples=1)
     assert (light.dtype, light.shape) == (np.float16, picture.shape)
@@ -147,8 +141,7 @@ def test_the_tone_curve_makes_the_picture_of_linear_light() -> None:
     assert np.abs(255 * tone_mapped(light.astype(float)) - picture).max() < 1.6
 
 
-@pytest.mark.usefixtures("opengl")
-def test_highlights_keep_what_the_screen_cannot_show() -> None:
+def test_highlights_keep_what_the_screen_cannot_show(opengl: None) -> None:
     metal = '<asset><material name="m" metallic="1" roughness=".2"/></asset>'
     light, picture = (render('<geom size="1" material="m"/>', metal, samples=1, linear=way) for way in (True, False))
     white = picture.min(axis=-1) >= 245
@@ -157,8 +150,7 @@ def test_highlights_keep_what_the_screen_cannot_show() -> None:
     assert np.isfinite(light).all()
 
 
-@pytest.mark.usefixtures("opengl")
-def test_reflections_and_clear_bodies_are_mixed_in_linear_light() -> None:
+def test_reflections_and_clear_bodies_are_mixed_in_linear_light(opengl: None) -> None:
     def floor(reflectance: float) -> np.ndarray:
         asset = f'<asset><material name="f" rgba=".5 .5 .5 1" reflectance="{reflectance}"/></asset>'
         return render(BODIES + FLOOR.replace("/>", ' material="f"/>'), asset, linear=True).astype(float)
@@ -171,8 +163,7 @@ def test_reflections_and_clear_bodies_are_mixed_in_linear_light() -> None:
         np.testing.assert_allclose(half, (less + more) / 2, atol=1e-3)
 
 
-@pytest.mark.usefixtures("opengl")
-def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background() -> None:
+def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background(opengl: None) -> None:
     """The frame is the cut-out over the empty scene, by the compositor's rule: a + (1 - alpha) b."""
     whole, empty = (render(bodies, linear=True).astype(float) for bodies in (BODIES, "<geom size='1e-3'/>"))
     cut_out = render(linear=True, alpha=True).astype(float)
@@ -184,8 +175,7 @@ def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background() ->
     assert (light[opacity[..., 0] == 0] == 0).all()
 
 
-@pytest.mark.usefixtures("opengl")
-def test_fields_and_grids_are_refused_in_linear_light() -> None:
+def test_fields_and_grids_are_refused_in_linear_light(opengl: None) -> None:
     model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
     ball = meshes.ball(8)
     for paint in ({"heatmap_colors": color_table()}, {"grid": 4}):

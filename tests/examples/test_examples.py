@@ -132,8 +132,7 @@ def test_a_ring_on_gelatine_comes_when_the_exact_one_does(imported) -> None:
     assert np.abs(came / due - 1).mean() < 0.5 * np.abs(late / due - 1).mean()
 
 
-@pytest.mark.usefixtures("opengl")
-def test_mujocos_renderer_ours_and_a_plotter_end_without_a_crash() -> None:
+def test_mujocos_renderer_ours_and_a_plotter_end_without_a_crash(opengl: None) -> None:
     result = ended(EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista", timeout=300)
     assert "| mujoco, ours, pyvista | 0 | 0 |" in result.stdout
     assert result.returncode == 0, result.stderr

@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from chromium import PATIENCE, browsing, launched
+from chromium import PATIENCE, launched
 from mujoco_models import forwarded
 from PIL import Image
 
@@ -120,7 +120,6 @@ def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp
     assert html.unescape(shown.split('"')[1]) == (tmp_path / "run.html").read_text()
 
 
-@browsing
 def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Ripples, tmp_path: Path) -> None:
     """Of an exporter, and of a renderer what it rendered last."""
     data = forwarded(ripples.model)
@@ -143,7 +142,6 @@ def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Rippl
             assert np.abs(image_of(uri) - ours).mean() < 8  # of 255
 
 
-@browsing
 def test_the_browser_has_every_height_to_half_a_step(shown: Any, ours: tuple) -> None:
     assert shown.evaluate("ripplePlayer.player.frames.count") == FRAMES
     steps = shown.evaluate(f"ripplePlayer.player.frames.get({SEEN}).then(f => Array.from(f.steps[0]))")
@@ -152,7 +150,6 @@ def test_the_browser_has_every_height_to_half_a_step(shown: Any, ours: tuple) ->
     assert np.abs(np.array(steps) * step - ours[2]).max() < 0.51 * step
 
 
-@browsing
 def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> None:
     frame, egg, _ = ours
     shown.evaluate(f"ripplePlayer.player.show({SEEN})")
@@ -168,7 +165,6 @@ def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> N
     assert (changed & ~egg).sum() < 0.05 * egg.sum()
 
 
-@browsing
 def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(browser, soft_model, tmp_path):
     data = forwarded(soft_model)
     waves, looks = Material(speed=0.3, density=1500.0), {"egg": "rubber", "jelly": "jelly"}
@@ -195,7 +191,6 @@ def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(browse
         assert (np.abs(pixels(tab) - shown).max(axis=2) > 30).sum() > 100
 
 
-@browsing
 def test_a_drag_turns_the_camera_and_the_button_brings_it_back(shown: Any) -> None:
     shown.evaluate(f"ripplePlayer.player.show({SEEN})")
     before = pixels(shown)
@@ -208,7 +203,6 @@ def test_a_drag_turns_the_camera_and_the_button_brings_it_back(shown: Any) -> No
     assert np.abs(pixels(shown) - before).mean() < 0.1
 
 
-@browsing
 def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
     search = "for (let i = 0; ; i++) if ((await ripplePlayer.player.frames.get(i)).arrows.length) return i;"
     hit = shown.evaluate(f"(async () => {{ {search} }})()")
@@ -229,7 +223,6 @@ def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
     shown.click("#play")
 
 
-@browsing
 def test_the_browser_has_moving_surfaces(browser: Any, soft_model: mujoco.MjModel, tmp_path: Path) -> None:
     """A soft body that moves from the first frame, and a geom that is moved by hand within the second chunk."""
     data, waves = mujoco.MjData(soft_model), Material(speed=0.3, density=1500.0)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from drawn import ball_surface
 from mujoco_models import posed
 from scipy.ndimage import gaussian_filter
-from sphere_height_maps import constant_height_map, cube_charts, height_map_of, linear_height_map
+from sphere_height_maps import N, constant_height_map, cube_charts, height_map_of, linear_height_map
 
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import shapes
@@ -15,15 +16,10 @@ FRONT = Camera(lookat=(0.0, 0.0, 0.0), distance=4.0, azimuth=90.0, elevation=0.0
 LONE_BALL = '<mujoco><worldbody><geom name="target" type="sphere" size="1"/></worldbody></mujoco>'
 
 
-def ball_surface(radius: float = 1.0, look: str = "clay") -> Surface:
-    ball = shapes.ball(16)
-    return Surface(radius * ball.shell, ball.faces, cube_charts(ball.shell), look)
-
-
 def make(gl, xml=LONE_BALL, surface=None, size=SIZE, **options):
     model, data = posed(xml)
     target = model.geom("target").id
-    renderer = Renderer(gl, model, {target: surface or ball_surface()}, size=size, **options)
+    renderer = Renderer(gl, model, {target: surface or ball_surface("clay", 1.0, N)}, size=size, **options)
     return renderer, data, target
 
 
@@ -37,9 +33,9 @@ def silhouette(gl, surface, height_map) -> np.ndarray:
 
 
 def test_constant_height_looks_like_a_larger_sphere(gl):
-    raised = silhouette(gl, ball_surface(1.0), constant_height_map(0.25))
-    larger = silhouette(gl, ball_surface(1.25), constant_height_map(0.0))
-    plain = silhouette(gl, ball_surface(1.0), constant_height_map(0.0))
+    raised = silhouette(gl, ball_surface("clay", 1.0, N), constant_height_map(0.25))
+    larger = silhouette(gl, ball_surface("clay", 1.25, N), constant_height_map(0.0))
+    plain = silhouette(gl, ball_surface("clay", 1.0, N), constant_height_map(0.0))
     assert (raised != larger).mean() < 1e-3
     # and both as large as perspective says: the cone that touches a ball of radius r at distance D
     for pixels, radius in ((raised, 1.25), (plain, 1.0)):

@@ -94,8 +94,7 @@ def mesa(gl: GLContext) -> None:
         pytest.skip("only Mesa can be asked for an older version")
 
 
-@pytest.mark.usefixtures("mesa")
-def test_frames_of_an_older_opengl_are_the_same(tmp_path: Path) -> None:
+def test_frames_of_an_older_opengl_are_the_same(mesa: None, tmp_path: Path) -> None:
     code = "import sys; sys.path[:0] = sys.argv[2:]; import test_versions as here; here.draw_in_old_opengl(sys.argv[1])"
     done = ended("-c", code, tmp_path / "frames.npz", Path(__file__).parent, *sys.path, env={**os.environ, **OLDER})
     assert done.returncode == 0, done.stderr
@@ -106,8 +105,7 @@ def test_frames_of_an_older_opengl_are_the_same(tmp_path: Path) -> None:
             np.testing.assert_array_equal(frames[f"arr_{number}"], frame)
 
 
-@pytest.mark.usefixtures("mesa")
-def test_waves_in_compute_shaders_are_refused_and_auto_takes_the_cpu() -> None:
+def test_waves_in_compute_shaders_are_refused_and_auto_takes_the_cpu(mesa: None) -> None:
     code = """if True:
         from ripple_sim.solver import Material, WaveSolver, sphere_atlas
         from ripple_sim.solver.gl import GLContext

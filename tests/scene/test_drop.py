@@ -158,9 +158,8 @@ def test_the_image_of_a_glb_is_inside_it(tmp_path):
     assert tuple(mesh_image(tmp_path / "p.glb")[0, 0]) == RED
 
 
-@pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize("how", ["named", "asked for", "p.ply", "p.glb", "p.obj"])
-def test_a_dropped_on_mesh_wears_its_image_or_the_colours_of_its_vertices(tmp_path, how):
+def test_a_dropped_on_mesh_wears_its_image_or_the_colours_of_its_vertices(opengl, tmp_path, how):
     """Red above and blue below, in the film and in the model that MuJoCo would draw."""
     if how.startswith("p."):
         V, F = peanut()
@@ -280,8 +279,7 @@ def test_at_least_four_of_six_bodies_hit_a_mesh_of_any_shape_within_three_second
     assert len(hits - {model.geom("floor").id}) >= 4
 
 
-@pytest.mark.usefixtures("opengl")
-def test_a_mesh_of_any_shape_fills_the_picture_and_every_hit_sends_rings_that_are_seen(stranger) -> None:
+def test_a_mesh_of_any_shape_fills_the_picture_and_every_hit_sends_rings_that_are_seen(opengl, stranger) -> None:
     """Seen is what changes 30 pixels of 640 x 360 by 10 of 255 about a hit, 0.2 s after it."""
     first, second, *_ = stranger.events.drop
     events = Events(drop=[first, msgspec.structs.replace(second, time=0.35)])

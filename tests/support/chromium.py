@@ -10,12 +10,13 @@ import pytest
 playwright = pytest.importorskip("playwright.sync_api")
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-browsing = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (on Debian: apt-get install chromium)")
 PATIENCE = 180.0  # [s]; the machine may be busy, and kernels that no test has used yet are compiled meanwhile
 
 
 @contextlib.contextmanager
 def launched(*flags: str) -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("needs Chromium (on Debian: apt-get install chromium)")
     options = ["--no-sandbox", "--disable-background-networking", *flags]
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=options, timeout=1000 * PATIENCE)  # [ms]

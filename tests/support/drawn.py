@@ -30,6 +30,6 @@ def light_of(gl, body, **options):
     return srgb_to_linear(frame_of(gl, body, **options) / 255)
 
 
-def ball_surface(look: str, radius: float = 0.5) -> Surface:
+def ball_surface(look: str, radius: float = 0.5, resolution: int = 8) -> Surface:
     ball = shapes.ball(16)
-    return Surface(radius * ball.shell, ball.faces, cube_charts(ball.shell, 8), look)
+    return Surface(radius * ball.shell, ball.faces, cube_charts(ball.shell, resolution), look)

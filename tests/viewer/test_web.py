@@ -18,10 +18,9 @@ from PIL import Image
 
 for name in ("trame", "trame_vtk"):
     pytest.importorskip(name)
-from chromium import PATIENCE, browsing, launched  # noqa: E402
+from chromium import PATIENCE, launched  # noqa: E402
 
 Page = Any  # playwright's
-pytestmark = browsing
 MIDDLE = (200, 130)  # of the sphere in the picture [pixels]
 
 

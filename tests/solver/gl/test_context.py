@@ -205,8 +205,7 @@ void main() { result = factor * value + more + number.x + texelFetch(picture, iv
 """
 
 
-@pytest.mark.usefixtures("opengl")
-def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(tmp_path, monkeypatch):
+def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(opengl, tmp_path, monkeypatch):
     (tmp_path / "pooled_shaders").mkdir()
     (tmp_path / "pooled_shaders" / "__init__.py").touch()
     (tmp_path / "pooled_shaders" / "scale.glsl").write_text(_SHADER)

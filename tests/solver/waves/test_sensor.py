@@ -77,13 +77,12 @@ def test_a_struck_sheet_against_modal_superposition(speed: float, bending: float
     assert np.abs(error).max() < 1.0
 
 
-@pytest.mark.usefixtures("opengl")
 @pytest.mark.parametrize(
     "material",
     [Material(speed=1.0, viscosity=1e-3), Material.dent(1e-4, speed=1.0, stiffness=200.0)],
     ids=["viscous", "dent"],
 )
-def test_both_backends_give_the_same_samples(material: Material) -> None:
+def test_both_backends_give_the_same_samples(opengl: None, material: Material) -> None:
     runs = []
     for backend in ("cpu", "gl"):
         waves = WaveSolver(sphere_atlas(1.0, 16), material, backend=backend)
