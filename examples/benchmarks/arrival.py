@@ -161,7 +161,7 @@ def arrival(atlas: Atlas, source: int, operator: str = "fem", speed: float = 1.0
     vertices = np.flatnonzero(np.isfinite(distance))
     distance = distance[vertices]
     width = ideal_width(atlas)
-    probes = _vertex_coordinates(atlas)[vertices]
+    probes = vertex_coordinates(atlas)[vertices]
     front, crest = arrival_times(atlas, mesh.V[source], probes, width, distance.max(), operator, speed)
     far = distance > NEAREST * width
     expected_front, expected_crest = plane_arrival(distance[far] / width)
@@ -173,7 +173,7 @@ def ideal_width(atlas: Atlas) -> float:
     return WIDTH * float(np.sqrt(atlas.mesh.area / atlas.areas.size))
 
 
-def _vertex_coordinates(atlas: Atlas) -> NDArray[np.float64]:
+def vertex_coordinates(atlas: Atlas) -> NDArray[np.float64]:
     """Map coordinates of the mesh's vertices, [vertex_count, d], each in a triangle of its own sheet."""
     mesh = atlas.mesh
     triangle = np.zeros(len(mesh.V), np.int64)
@@ -181,32 +181,40 @@ def _vertex_coordinates(atlas: Atlas) -> NDArray[np.float64]:
     return atlas.chart_map.coordinates(mesh, triangle, mesh.V)
 
 
-FINENESS = 8.0  # vertices of the elements in a width of the bump, twice as many as texels
+FINENESS = 2.0  # vertices of the elements in the width of a texel
 
 
-def elements_front(mesh: Mesh, source: int, width: float, distance: float) -> NDArray[np.float64]:
-    """Times [s] of the front of the same bump at all vertices, by linear elements with lumped mass and leapfrog.
+def elements_waves(
+    mesh: Mesh, source: int, width: float, distance: float, texels: float = WIDTH
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times [s], [t], and heights at all vertices, [t, n], of the same bump's wave, by linear elements and leapfrog.
 
-    The triangles are cut in four until there are `FINENESS` vertices in a width [m]; a wave of 1 m/s is followed for
-    `distance` [m].
+    Masses are lumped. The triangles are cut in four until there are `FINENESS` vertices in a texel, of which the bump's
+    width [m] has `texels`; a wave of 1 m/s is followed for `distance` [m].
     """
     V, F = mesh.V, mesh.F
-    while np.sqrt(mesh.area / len(V)) > width / FINENESS:
+    while np.sqrt(mesh.area / len(V)) > width / (FINENESS * texels):
         V, F = igl.upsample(V, F, 1)
     stiffness = -igl.cotmatrix(V, F).tocsr()
     inverse_mass = 1 / igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_BARYCENTRIC).diagonal()
     height = np.exp(-((_distance_near(V, F, source, 6 * width) / width) ** 2) / 2)
     longest = 1.9 / np.sqrt((abs(stiffness).sum(axis=1).A1 * inverse_mass).max())  # by Gershgorin's circles
-    sample = width / _SAMPLES_PER_WIDTH
-    substeps = int(np.ceil(sample / longest))
-    dt, signal = sample / substeps, [height[: len(mesh.V)].copy()]
+    times = _times(width, distance)
+    substeps = int(np.ceil(times[1] / longest))
+    dt, heights = times[1] / substeps, [height[: len(mesh.V)].copy()]
     velocity = -dt / 2 * inverse_mass * (stiffness @ height)
-    for _ in range(int(np.ceil((1.1 * distance + 3 * width) / sample))):
+    for _ in times[1:]:
         for _ in range(substeps):
             height += dt * velocity
             velocity -= dt * inverse_mass * (stiffness @ height)
-        signal.append(height[: len(mesh.V)].copy())
-    return front_and_crest(sample * np.arange(len(signal)), np.array(signal))[0]
+        heights.append(height[: len(mesh.V)].copy())
+    return times, np.array(heights)
+
+
+def _times(width: float, distance: float) -> NDArray[np.float64]:
+    """When waves are looked at [s], that a wave of 1 m/s takes for a distance [m]."""
+    dt = width / _SAMPLES_PER_WIDTH
+    return dt * np.arange(int(np.ceil((1.1 * distance + 3 * width) / dt)) + 1)
 
 
 def _distance_near(V: NDArray, F: NDArray, source: int, limit: float) -> NDArray[np.float64]:
@@ -228,12 +236,12 @@ def against_elements(meshes: dict[str, Mesh], resolution: int, sources: int) -> 
     rows = []
     for name, mesh in meshes.items():
         atlas = build_atlas(mesh, resolution)
-        width, coordinates = ideal_width(atlas), _vertex_coordinates(atlas)
+        width, coordinates = ideal_width(atlas), vertex_coordinates(atlas)
         for source in spread_sources(mesh, sources):
             distance = geodesic_distance(atlas.mesh, source)
             far = np.isfinite(distance) & (distance > NEAREST * width)
             farthest = distance[far].max()
-            elements = elements_front(atlas.mesh, source, width, farthest)[far]
+            elements = front_and_crest(*elements_waves(atlas.mesh, source, width, farthest))[0][far]
             ours, _ = arrival_times(atlas, atlas.mesh.V[source], coordinates[far], width, farthest)
             plane = plane_arrival(distance[far] / width)[0] * width
             figures = [
@@ -268,7 +276,7 @@ def distance_from_point(
     return reached, distance
 
 
-def arrival_times(
+def waves_of(
     atlas: Atlas,
     source: NDArray[np.float64],
     probes: NDArray[np.float64],
@@ -277,7 +285,7 @@ def arrival_times(
     operator: str = "fem",
     speed: float = 1.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times [s] at which the front and the first crest of a bump's wave arrive; NaN where there is none.
+    """Times [s], [t], and heights at probes, [t, k], of a bump's wave.
 
     Parameters
     ----------
@@ -301,12 +309,24 @@ def arrival_times(
     bump = np.zeros(atlas.areas.size)
     bump[texels] = np.exp(-((away / width) ** 2) / 2)
     waves.height = bump.reshape(shape)
-    dt = width / _SAMPLES_PER_WIDTH
-    signal = [sample @ waves.height.ravel()]
-    for _ in range(int(np.ceil((1.1 * distance + 3 * width) / dt))):
-        waves.step(dt)
-        signal.append(sample @ waves.height.ravel())
-    return front_and_crest(dt * np.arange(len(signal)), np.array(signal))
+    times, heights = _times(width, distance), [sample @ waves.height.ravel()]
+    for _ in times[1:]:
+        waves.step(times[1])
+        heights.append(sample @ waves.height.ravel())
+    return times, np.array(heights)
+
+
+def arrival_times(
+    atlas: Atlas,
+    source: NDArray[np.float64],
+    probes: NDArray[np.float64],
+    width: float,
+    distance: float,
+    operator: str = "fem",
+    speed: float = 1.0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times [s] at which the front and the first crest of a bump's wave arrive, see `waves_of`; NaN for none."""
+    return front_and_crest(*waves_of(atlas, source, probes, width, distance, operator, speed))
 
 
 def spread_sources(mesh: Mesh, count: int) -> list[int]:

@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 from eigenvalues import cases, errors_against, mean_error, of_polyhedron
 from plates import PLATES, atlas_of, frequencies
+from surfaces import sphere
+from waveforms import rows
 
 from ripple_sim.solver import build_atlas, load_mesh
 
 ROOT = Path(__file__).parents[2]
 DOCS, LIMBED = ROOT / "docs", ROOT / "scenes" / "meshes" / "limbed.obj"
-RUNS = {name: (DOCS / "runs" / f"{name}.txt").read_text("utf-8") for name in ("eigenvalues", "polyhedra", "plates")}
+RUNS = {path.stem: path.read_text("utf-8") for path in sorted((DOCS / "runs").glob("*.txt"))}
 
 
 @pytest.mark.parametrize("run", RUNS)
 def test_the_printed_table_is_the_stored_run(run: str) -> None:
-    page = "validation.md" if run == "plates" else "accuracy.md"
+    page = "validation.md" if run in ("plates", "waveforms") else "accuracy.md"
     assert f"```\n{RUNS[run]}```" in (DOCS / page).read_text("utf-8")
 
 
@@ -31,16 +33,18 @@ def test_eigenvalues_are_of_todays_operator(name: str) -> None:
 
 
 def test_eigenvalues_of_a_polyhedron_are_of_todays_sphere_map() -> None:
-    rows = RUNS["polyhedra"].partition("limbed.obj")[2].splitlines()[1:3]
-    mesh = load_mesh(LIMBED)
+    lines, mesh = RUNS["polyhedra"].partition("limbed.obj")[2].splitlines()[1:3], load_mesh(LIMBED)
     errors = errors_against(of_polyhedron(mesh, 1), build_atlas(mesh, 32))
-    stored = [float(row.split()[3]) for row in rows]
-    assert [errors.mean(), errors.max()] == pytest.approx(stored, rel=0.03)
+    assert [errors.mean(), errors.max()] == pytest.approx([float(line.split()[3]) for line in lines], rel=0.03)
 
 
 def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
     case = cases()["square, free"]
     np.testing.assert_allclose(of_polyhedron(case.mesh(), 0)[1:], np.sort(case.exact)[1:20], rtol=5e-5)
+
+
+def test_waveforms_are_those_of_finite_elements() -> None:
+    assert min(float(row[3]) for row in rows("sphere", sphere(4), 16, 6.0)) > 0.9995
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,6 @@ def test_a_surface_too_long_for_its_width_is_refused_at_once(stretch: float) -> 
 
 
 def test_a_surface_a_little_too_long_for_so_many_cells_has_fewer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As a strip 100 times as long as wide at N = 96, in less time."""
     monkeypatch.setattr(quads, "_FARTHEST", 20**2)
     assert_atlas_carries_waves(build_atlas(ANY_MESH["strip"](), 16, cache=False, layout="patches"))
 
