@@ -162,7 +162,8 @@ def arrival(atlas: Atlas, source: int, operator: str = "fem", speed: float = 1.0
     distance = distance[vertices]
     width = ideal_width(atlas)
     probes = vertex_coordinates(atlas)[vertices]
-    front, crest = arrival_times(atlas, mesh.V[source], probes, width, distance.max(), operator, speed)
+    waves = waves_of(atlas, mesh.V[source], probes, width, distance.max(), operator, speed)
+    front, crest = front_and_crest(*waves)
     far = distance > NEAREST * width
     expected_front, expected_crest = plane_arrival(distance[far] / width)
     return Arrival(front[far] / (expected_front * width), crest[far] / (expected_crest * width))
@@ -242,7 +243,7 @@ def against_elements(meshes: dict[str, Mesh], resolution: int, sources: int) -> 
             far = np.isfinite(distance) & (distance > NEAREST * width)
             farthest = distance[far].max()
             elements = front_and_crest(*elements_waves(atlas.mesh, source, width, farthest))[0][far]
-            ours, _ = arrival_times(atlas, atlas.mesh.V[source], coordinates[far], width, farthest)
+            ours, _ = front_and_crest(*waves_of(atlas, atlas.mesh.V[source], coordinates[far], width, farthest))
             plane = plane_arrival(distance[far] / width)[0] * width
             figures = [
                 np.nan_to_num(np.abs(a / b - 1), nan=1.0)
@@ -314,19 +315,6 @@ def waves_of(
         waves.step(times[1])
         heights.append(sample @ waves.height.ravel())
     return times, np.array(heights)
-
-
-def arrival_times(
-    atlas: Atlas,
-    source: NDArray[np.float64],
-    probes: NDArray[np.float64],
-    width: float,
-    distance: float,
-    operator: str = "fem",
-    speed: float = 1.0,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times [s] at which the front and the first crest of a bump's wave arrive, see `waves_of`; NaN for none."""
-    return front_and_crest(*waves_of(atlas, source, probes, width, distance, operator, speed))
 
 
 def spread_sources(mesh: Mesh, count: int) -> list[int]:

@@ -21,7 +21,7 @@ from ripple_sim.solver import Atlas, build_atlas, load_mesh
 from ripple_sim.solver.texels import sampling_matrix
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-from arrival import NEAREST, arrival_times, geodesic_distance, ideal_width, plane_arrival
+from arrival import NEAREST, front_and_crest, geodesic_distance, ideal_width, plane_arrival, waves_of
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 VIEW = {"azimuth": 38.0, "elevation": 24.0}
@@ -62,7 +62,7 @@ def fields(atlas: Atlas, source: int, operator: str) -> tuple[np.ndarray, np.nda
     farthest = float(np.nanmax(distance))
     width = ideal_width(atlas)
     probes = atlas.chart_map.coordinates(mesh, atlas.triangles.ravel(), atlas.positions.reshape(-1, 3))
-    front, _ = arrival_times(atlas, mesh.V[source], probes, width, farthest, operator)
+    front, _ = front_and_crest(*waves_of(atlas, mesh.V[source], probes, width, farthest, operator))
     # a front on the plane is a little behind its distance: read off where it would be by now
     grid = np.linspace(NEAREST - 1, farthest / width * 1.3, 400)
     gone = np.interp(front / width, plane_arrival(grid)[0], grid) * width

@@ -65,6 +65,8 @@ def test_a_usage_error_reads_the_same_in_every_locale():
     ("options", "said"),
     [
         (["-o", "clip.avi"], r"clip\.avi.*valid is \.mp4"),
+        (["-o", ".mp4"], r"\.mp4', which is not a file name"),
+        (["-o", "x."], r"x\. ends in \.; valid is"),
         (["-o", "clip.mp4", "--size", "641x360"], "641x360.*even"),
         (["-o", "clip.gif", "--fps", "60"], "60.*1 to 50"),
         (["-o", "clip.mp4", "--size", "0x0"], r"size is \(0, 0\); valid is"),

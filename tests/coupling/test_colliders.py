@@ -82,7 +82,10 @@ def test_primitives_are_left_alone() -> None:
 
 @pytest.mark.parametrize(
     ("geom", "route", "message"),
-    [("nose", "sdf", "geoms are 'target', 'knob'"), ("target", "ghost", "valid are 'auto', 'sdf', 'flex', 'convex'")],
+    [
+        ("nose", "sdf", "geoms are 'target', 'knob'"),
+        ("target", "ghost", "valid are 'auto', 'sdf', 'flex', 'convex', 'hull'"),
+    ],
 )
 def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):

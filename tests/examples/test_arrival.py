@@ -26,7 +26,7 @@ def test_front_on_a_sphere_arrives_at_the_distance() -> None:
     probes /= np.linalg.norm(probes, axis=1, keepdims=True)
     distance = np.arccos(np.clip(probes @ pole, -1, 1))
     probes, distance = probes[(distance > 0.7) & (distance < 2.2)], distance[(distance > 0.7) & (distance < 2.2)]
-    times = fronts.arrival_times(atlas, pole, probes, width, 2.2)
+    times = fronts.front_and_crest(*fronts.waves_of(atlas, pole, probes, width, 2.2))
     for time, expected in zip(times, fronts.plane_arrival(distance / width), strict=True):
         assert np.abs(time / (expected * width) - 1).max() < 0.015
 
@@ -64,7 +64,10 @@ def test_same_object_otherwise_presented_has_the_same_times() -> None:
         there = scale * points @ rotation.T
         _, directions = other.project(there)
         start, _ = other.project(scale * source @ rotation.T)
-        return fronts.arrival_times(other, start[0], directions, scale * width, scale * reach)[0] / scale
+        return (
+            fronts.front_and_crest(*fronts.waves_of(other, start[0], directions, scale * width, scale * reach))[0]
+            / scale
+        )
 
     unit = np.eye(3)
     reference = times(atlas, unit, 1.0)

@@ -1,7 +1,7 @@
 """Materials in scene files: presets as in Python, strictly checked, and maps from pictures, through to the waves."""
 
+import dataclasses
 import inspect
-from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -34,23 +34,32 @@ def material_of(table: dict) -> Material:
         # beside the preset stand the wave equation's own coefficients, in their own units
         (
             {"preset": {"name": "jelly", "density": 900.0}, "density": 40.0, "damping": 0.0},
-            replace(Material.jelly(density=900.0), density=40.0, damping=0.0),
+            dataclasses.replace(Material.jelly(density=900.0), density=40.0, damping=0.0),
         ),
-        ({"preset": "jelly", "speed": {"map": "waves.png", "high": 0.3}}, replace(Material.jelly(), speed=0.3)),
+        (
+            {"preset": "jelly", "speed": {"map": "waves.png", "high": 0.3}},
+            dataclasses.replace(Material.jelly(), speed=0.3),
+        ),
     ],
 )
 def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
-    assert asdict(material_of(table)) == asdict(expected)
+    assert dataclasses.asdict(material_of(table)) == dataclasses.asdict(expected)
 
 
 @pytest.mark.parametrize(
     ("table", "message"),
     [
         ({"preset": "foam"}, "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, suited, g"),
-        ({"preset": {"name": "membrane", "modulus": 1.0}}, "no parameter 'modulus'; valid are tension, density, dampi"),
+        (
+            {"preset": {"name": "membrane", "modulus": 1.0}},
+            "no parameter 'modulus'; valid are tension, density, damping",
+        ),
         ({"preset": "dent"}, "needs yield_height: write dent,yield_height="),
         ({"preset": {"name": "jelly", "modulus": -1.0}}, "modulus is -1.0 Pa"),
-        ({"preset": {"name": "jelly", "elastic": 1.0}}, r"'elastic' in \[ripple.material.preset\]; valid are name, t"),
+        (
+            {"preset": {"name": "jelly", "elasticity": 1.0}},
+            r"'elasticity' in \[ripple.material.preset\]; valid are name, t",
+        ),
         ({"preset": {"modulus": 1.0}}, "missing required field `name`"),
         ({"preset": 3}, "Expected `str | object | null`"),
         ({"preset": {"name": "jelly", "modulus": float("inf")}}, "ripple.material.preset.modulus is inf"),
@@ -68,7 +77,7 @@ def test_what_is_the_same_everywhere_takes_no_map(name: str) -> None:
 
 
 def test_entries_have_the_coefficients_and_parameters_of_the_solver() -> None:
-    coefficients = {each.name for each in fields(Material) if isinstance(each.default, float)}
+    coefficients = {each.name for each in dataclasses.fields(Material) if isinstance(each.default, float)}
     assert set(MaterialChange.__struct_fields__) == coefficients
     assert set(MaterialEntry.__struct_fields__) == coefficients | {"preset"}
     parameters = {name for law in LAWS for name in inspect.signature(getattr(Material, law)).parameters}

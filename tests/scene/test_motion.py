@@ -110,7 +110,10 @@ def test_a_time_within_round_off_of_a_step_belongs_to_it(model) -> None:
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        (DropEntry("rock", 0.0), r"\[\[drop\]\] names the body 'rock'; the model's bodies are post, wall, stone, b"),
+        (
+            DropEntry("rock", 0.0),
+            r"\[\[drop\]\] names the body 'rock'; the model's bodies are post, wall, stone, brick",
+        ),
         (ThrowEntry("post", 0.0, (0, 0, 1)), r"\[\[throw\]\] .* 'post', which has no <freejoint/>; valid are free"),
         (DropEntry("wall", 0.0), "'wall', which has no <freejoint/>; only free bodies can drop"),
         (PlaceEntry("stone", np.nan, (0, 0, 0)), "time nan s; valid is 0 or greater"),

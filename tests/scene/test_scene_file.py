@@ -117,8 +117,9 @@ EGG = RippleEntry(geom="egg")
 
 
 def checked(*targets: RippleEntry, **others: object) -> None:
-    usual = {"name": "s", "model": EGGS, "targets": targets, "camera": CameraEntry(), "duration": 1.0}
-    scene.check_scene(Scene(**{**usual, **others}))
+    scene.check_scene(
+        Scene(**{"name": "s", "model": EGGS, "targets": targets, "camera": CameraEntry(), "duration": 1.0, **others})
+    )
 
 
 def still(radius: float) -> RippleEntry:
@@ -152,7 +153,7 @@ def test_an_event_after_the_end_is_told_of() -> None:
         (
             (RippleEntry(geom="egg", rim="bent"),),
             {},
-            "rim 'bent' does not exist; valid are free, supported, clamped",
+            "rim 'bent' does not exist; valid are free, supported, clamped, fixed",
         ),
         ((RippleEntry(geom="egg", color=(0, 0, 1.1)),), {}, "color of geom 'egg' is .*three numbers from 0 to 1"),
         ((RippleEntry(geom="egg", color=(0, float("nan"), 1)),), {}, "three numbers from 0 to 1"),
