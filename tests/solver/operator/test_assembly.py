@@ -213,5 +213,6 @@ def test_a_closed_surface_knows_no_rim_and_a_bad_name_is_refused() -> None:
         waves.step(0.2)
         heights.append(waves.height)
     np.testing.assert_array_equal(*heights)
-    with pytest.raises(SolverError, match="rim 'bent' does not exist; valid are 'free', 'supported', 'clamped', 'f"):
+    message = "rim 'bent' does not exist; valid are 'free', 'supported', 'clamped', 'fixed'"
+    with pytest.raises(SolverError, match=message):
         WaveSolver(atlas, backend="cpu", rim="bent")

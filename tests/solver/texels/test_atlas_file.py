@@ -35,7 +35,8 @@ def written(path: Path, arrays: dict[str, np.ndarray]) -> Path:
 def test_another_version_is_refused_with_the_advice_to_make_it_again(tmp_path: Path, arrays) -> None:
     for version in (12, FORMAT + 1):
         path = written(tmp_path / "other.atlas", {**arrays, "format": np.array([version])})
-        with pytest.raises(AtlasError, match=r"other\.atlas.* of another version; make it again with `ripple-sim at"):
+        message = r"other\.atlas.* of another version; make it again with `ripple-sim atlas"
+        with pytest.raises(AtlasError, match=message):
             read_atlas_file(path)
 
 
