@@ -112,7 +112,9 @@ def test_frames_beyond_the_highest_level_of_h264_are_refused_where_others_hold_t
         check_output(tmp_path / name, 8192, 8192, 25)
 
 
-@pytest.mark.parametrize("name", ["a:.mp4", "pipe:1.gif", "concat:.mp4", "file:.gif", "%d.webm", "http:.webp", "-.gif"])
+@pytest.mark.parametrize(
+    "name", ["a:b.mp4", "pipe:1.mp4", "concat:x.mp4", "file:z.gif", "%d.webm", "http:x.webp", "-.mp4"]
+)
 def test_no_name_is_taken_for_a_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.chdir(tmp_path)
     with open_writer(name, width=16, height=16, fps=25) as writer:

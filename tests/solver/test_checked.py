@@ -40,7 +40,10 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "long scene": (lambda: load_scene("a" * 5000), "there is no scene 'aaa"),
     "no mesh": (lambda: build_atlas(None), "mesh is None; valid is a Mesh"),
     "radius of text": (lambda: sphere_atlas(radius="a"), "radius is 'a'; valid is a finite number greater than 0"),
-    "steps of text": (lambda: RIPPLES.mj_step(mujoco.MjData(MODEL), nstep="a"), "nstep is 'a'; valid is a whole num"),
+    "steps of text": (
+        lambda: RIPPLES.mj_step(mujoco.MjData(MODEL), nstep="a"),
+        "nstep is 'a'; valid is a whole number, 0 or greater",
+    ),
 }
 
 

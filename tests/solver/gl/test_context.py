@@ -136,7 +136,13 @@ def test_a_fork_is_told_to_be_spawned_and_auto_takes_the_cpu(opengl: None) -> No
     assert all("is a fork; start processes with multiprocessing's method 'spawn'" in lines[i] for i in (0, 2))
 
 
-PROCESSOR = ["llvmpipe (LLVM 15.0.7, 256 bits)", "softpipe", "Mesa Software Rasterizer", "SWR (LLVM 12.0)", "LLVMPIPE"]
+PROCESSOR = [
+    "llvmpipe (LLVM 15.0.7, 256 bits)",
+    "softpipe",
+    "Mesa Software Rasterizer",
+    "SWR (LLVM 12.0.0, 256 bits)",
+    "LLVMPIPE",
+]
 AMD, INTEL = "AMD Radeon RX 6800 (radeonsi, navi21, LLVM 15.0.7, DRM 3.49)", "Mesa Intel(R) UHD Graphics 620 (KBL GT2)"
 GPU = [AMD, INTEL, "NVIDIA H200/PCIe/SSE2", "Apple M1", "D3D12 (NVIDIA GeForce RTX 3080)"]
 
@@ -152,7 +158,10 @@ def test_a_device_that_does_not_exist_is_named_in_the_error(opengl: None, device
         create_context(device)
 
 
-@pytest.mark.parametrize(("reason", "devices"), [("requested device index 0", 8), ("libEGL.so not loaded", 1)])
+NO_DEVICES = "requested device index 0, but found 0 devices"
+
+
+@pytest.mark.parametrize(("reason", "devices"), [(NO_DEVICES, 8), ("libEGL.so not loaded", 1)])
 def test_without_any_device_the_error_says_what_to_install(monkeypatch, reason: str, devices: int) -> None:
     """A library that cannot be loaded is not asked again for every device."""
     asked = []
