@@ -392,5 +392,5 @@ def _head(title: str) -> str:
         return importlib.resources.files(__package__).joinpath("html", name).read_text("utf-8")
 
     page = read("page.html")
-    scripts = "\n".join(f"<script>\n{read(name)}</script>" for name in _SCRIPTS)
+    scripts = "\n".join(read(name) for name in _SCRIPTS)
     return page.replace("TITLE", html.escape(title)).replace("MARK", MARK).replace("SCRIPTS", scripts)

@@ -1,4 +1,3 @@
-"use strict";
 // Vectors, and matrices of 16 numbers, column by column.
 const add = (a, b, s = 1) => a.map((x, i) => x + s * b[i]);
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);

@@ -1,4 +1,3 @@
-"use strict";
 // Reading the page's own data: arrays of meshes, and chunks of frames.
 
 async function bytesOf(text) {

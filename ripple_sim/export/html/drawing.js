@@ -1,4 +1,3 @@
-"use strict";
 // Draws a frame with WebGL 2: shadow map, shadows on the floor, surfaces, floor and background, transparent surfaces, arrows. Where pixels
 // are drawn by software, edges are smoothed afterwards: samples would cost more; with alpha, the canvas is copied for nothing.
 const SHADOW_CELL = 4;  // texels of the shadow map between the points of surfaces in it

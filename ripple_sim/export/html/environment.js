@@ -1,4 +1,3 @@
-"use strict";
 // The light of the studio's soft boxes by direction, as maps, which turn with the camera about the vertical: what surfaces
 // reflect of them, with the share of the sky against that of the floor, and their diffuse light (render/glsl/lights.glsl).
 const COAT_ROUGHNESS = 0.06;

@@ -1,4 +1,3 @@
-"use strict";
 // The floor in cells, of which only those are drawn that the camera sees. Only cells that a shadow may reach look into the
 // shadow map: where software draws, its samples take most of the time.
 const INNER = 14, OUTER = 8, HALF = INNER + OUTER;  // cells from the middle to a side: of one size up to the camera's distance, and growing

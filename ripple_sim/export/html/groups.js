@@ -1,4 +1,3 @@
-"use strict";
 // Solid parts that look the same but for their colours, as one mesh in the world, which is drawn at once.
 const SAME_LOOK = ["roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission"];
 const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];

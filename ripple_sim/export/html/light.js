@@ -1,4 +1,3 @@
-"use strict";
 const SHADOW_WIDTH = 1.5;  // of the shadow map [distances of the camera]
 const DARK = {position: null, size: 0, shadow: false};  // where there is no lamp
 

@@ -1,4 +1,3 @@
-"use strict";
 // The renderer's light (render/glsl/lights.glsl, render/passes/deferred.glsl) with a single shadow map and without its occlusion maps.
 // Loops are written out: in software an array at an index that changes takes longer than the sums.
 // With `lamps`: their number, `near`: whether any has a position.

@@ -1,4 +1,3 @@
-"use strict";
 // A target of one colour where pixels are drawn by software: its points are lit as the texels of a table, four at a time, and
 // its triangles take their colours there. Of a closed one only those points are lit whose triangles face the eye.
 const COLUMNS = 256;

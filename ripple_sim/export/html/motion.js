@@ -1,4 +1,3 @@
-"use strict";
 // Surfaces whose own vertices move: a finer point takes the mean of the linear maps about the corners of its triangle
 // (render/surfaces/moving.py).
 

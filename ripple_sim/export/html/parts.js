@@ -1,4 +1,3 @@
-"use strict";
 // Meshes as buffers: a drawn vertex for each point, or for each point and place in the texture.
 const FEWEST_CELLS = 60;  // of a mesh that has fewer triangles in shadows
 

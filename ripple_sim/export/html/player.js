@@ -1,4 +1,3 @@
-"use strict";
 // The player: time, camera and controls. Tests and other pages may use `ripplePlayer`.
 const ARROW_LENGTH = 0.25;  // of the strongest contact, in distances of the camera
 const RATE = 30, LATE = 1.1, COARSEST = 0.6;  // frames a second that it takes care to show, by how much they may be late before fewer pixels are drawn, and how few
@@ -141,8 +140,5 @@ function control(player) {
   requestAnimationFrame(tick);
 }
 
-const ripplePlayer = {};
-document.addEventListener("DOMContentLoaded", () => {
-  const player = new Player(document.getElementById("view"));
-  Object.assign(ripplePlayer, {player, ready: player.start().then(() => { control(player); return player; })});
-});
+const player = new Player(document.getElementById("view"));
+window.ripplePlayer = {player, ready: player.start().then(() => { control(player); return player; })};

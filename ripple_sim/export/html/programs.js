@@ -1,4 +1,3 @@
-"use strict";
 // Programs and textures of WebGL 2.
 
 // Whether WebGL runs on the processor, where every pixel costs.

@@ -1,4 +1,3 @@
-"use strict";
 // What is drawn. `light`, `lit` and `floor` are the parts of light_shaders.js.
 
 // A triangle that covers everything.
