@@ -1,5 +1,6 @@
 // Draws a frame with WebGL 2: shadow map, shadows on the floor, surfaces, floor and background, transparent surfaces, arrows. Where pixels
 // are drawn by software, edges are smoothed afterwards: samples would cost more; with alpha, the canvas is copied for nothing.
+const HEATED = [0.62, 0.62, 0.62];  // what is lit under the colours of heights
 const SHADOW_CELL = 4;  // texels of the shadow map between the points of surfaces in it
 
 class Drawing {
@@ -44,7 +45,7 @@ class Drawing {
     const light = lightShader(told), lit = litShader(told), onFloor = floorShader(told);
     const plain = floor && !(floor.texture in this.meta.images) && !near;
     this.floor = floor && new Floor(gl, floor, [floorVertex(light, onFloor), floorFragment(light, onFloor)], plain);
-    this.sky = programOf(gl, SKY_VERTEX, skyFragment(light));
+    this.sky = programOf(gl, EVERYWHERE_VERTEX, skyFragment(light));
     this.depth = programOf(gl, DEPTH_VERTEX, DEPTH_FRAGMENT);
     this.shading = programOf(gl, DEPTH_VERTEX, shadeFragment(shadowSize));
     this.smoothing = programOf(gl, EVERYWHERE_VERTEX, SMOOTH_FRAGMENT);
@@ -53,10 +54,9 @@ class Drawing {
     this.known = new Map();
   }
 
-  // The program that lights a part's pixels or, as `kind` tells, its points.
-  lighting(kind, part, heat) {
-    const {coat, metallic, sheen, translucency} = part;
-    const features = {COAT: coat, METAL: metallic, SHEEN: sheen, TRANSLUCENT: translucency, TEXTURED: this.imageOf(part), HEAT: heat && part.target};
+  // The program that lights pixels or, as `kind` tells, points.
+  lighting(kind, {coat, metallic, sheen, translucency}, image, heat) {
+    const features = {COAT: coat, METAL: metallic, SHEEN: sheen, TRANSLUCENT: translucency, TEXTURED: image, HEAT: heat};
     const defined = Object.keys(features).filter(name => features[name]), key = [kind, ...defined].join(" ");
     if (!this.known.has(key)) this.known.set(key, programOf(this.gl, ...this.shaders[kind], defined));
     return this.known.get(key);
@@ -70,30 +70,31 @@ class Drawing {
     for (const i of part.lit ? [0] : [0, 1, 3]) { gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]); gl.bufferSubData(gl.ARRAY_BUFFER, 0, part.data[i]); }
   }
 
-  // With what `view` and `bodies` say of the camera and the bodies' places; arrows are matrices. Everything is uploaded before
-  // anything is drawn, which would wait for it.
+  // With what `view` and `bodies` say of the camera and the bodies' places; arrows are matrices; `heat`: targets show their heights.
+  // Everything is uploaded before anything is drawn, which would wait for it.
   draw(view, bodies, arrows, heat) {
     const gl = this.gl, light = lightOf(this.meta, view, this.environment.diffuse([0, 0, 1]), this.shadowSize);
     const parts = this.placed(bodies, view.eye), casters = parts.filter(({part}) => part.opacity === 1);
     const floor = this.meta.floor && this.setFloor(view, bodies, light, casters);
     this.shared = {...light, eye: view.eye, viewProjection: view.matrix, shadowMap: 0, image: 1, heatColors: 2, places: 3, normals: 4, ambientMap: 5, coatMap: 6, mirrorMap: 7, shades: 8};
     this.ready = new Set();  // programs that have these
+    this.heated = heat;
     gl.enable(gl.DEPTH_TEST); gl.enable(gl.CULL_FACE); gl.depthMask(true); gl.disable(gl.BLEND);
     this.drawShadows(casters, light, floor);
     this.bind(8, this.shades); this.bind(0, this.shadow); this.bind(2, this.heat); this.bind(5, this.environment.ambient); this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
     gl.disable(gl.DEPTH_TEST);
-    for (const {part, model} of parts) if (part.lit) { this.look("points", part, model, heat); part.lit.light(); }
+    for (const {part, model} of parts) if (part.lit) { this.look("points", part, model); part.lit.light(); }
     gl.enable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clear(gl.DEPTH_BUFFER_BIT | gl.COLOR_BUFFER_BIT);
-    for (const each of parts) if (each.opacity === 1) this.drawPart(each, heat);
+    for (const each of parts) if (each.opacity === 1) this.drawPart(each);
     this.drawScreen(view, floor);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    for (const each of parts) if (each.opacity < 1) this.drawPart(each, heat);
+    for (const each of parts) if (each.opacity < 1) this.drawPart(each);
     gl.disable(gl.BLEND);
-    for (const model of arrows) this.drawPart({part: this.arrow, model}, false);
+    for (const model of arrows) this.drawPart({part: this.arrow, model});
     if (this.software) this.smooth();
   }
 
@@ -145,24 +146,25 @@ class Drawing {
     this.floor.drawCells(1);
   }
 
-  drawPart({part, model}, heat) {
+  drawPart({part, model}) {
     if (part.lit) {
       this.bind(3, part.lit.colors);
       this.gl.useProgram(this.triangles.program);
       this.triangles.set({modelProjection: times(this.shared.viewProjection, model), colors: 3});
     } else {
-      this.look("surface", part, model, heat);
-      if (part.color) this.gl.vertexAttrib3fv(COLOR, part.color);
+      this.look("surface", part, model);
     }
     const drawn = part.lit || part;
     this.mesh(drawn, drawn.all);
   }
 
   // The program that lights a part, with its look.
-  look(kind, part, model, heat) {
-    this.bind(1, this.imageOf(part) || this.blank);
+  look(kind, part, model) {
+    const heat = this.heated && part.target, image = heat ? null : this.imageOf(part), color = heat ? HEATED : part.color;
+    this.bind(1, image || this.blank);
     this.bind(7, this.environment.mirrored(Math.max(part.roughness, 0.0632)));
-    this.use(this.lighting(kind, part, heat), {model, open: Number(part.open), ...(part.color && {color: part.color}),
+    if (color) this.gl.vertexAttrib3fv(COLOR, color);
+    this.use(this.lighting(kind, part, image, heat), {model, open: Number(part.open), ...(color && {color}),
       base: [part.roughness, part.metallic, part.sheen, part.coat], volume: [part.translucency, part.transparency, part.emission, part.opacity]});
   }
 

@@ -127,23 +127,15 @@ ${i ? "" : CASTS}  reflected(radiance, way, ${i ? "1.0" : "shadow"}, ${gloss[i].
 #endif
   return shade;
 }
-float opacityAt(vec3 point, vec3 normal) { return volume.w * (1.0 - 0.6 * volume.y * clamp(dot(normalize(normal), normalize(eye - point)), 0.1, 1.0)); }
-
-#ifdef HEAT
 uniform sampler2D heatColors;
-vec3 heated(vec3 shown, float height) {
-  float light = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / 0.70, 0.45, 1.0);
-  return texture(heatColors, vec2(0.5 + 0.5 * clamp(height, -1.0, 1.0), 0.5)).rgb * light;
-}
-#endif
 // What the screen shows of a point, times its opacity.
 vec4 shownAt(vec3 point, vec3 normal, vec3 albedo, float height) {
-#ifdef HEAT
-  vec3 shown = heated(toneMapped(lit(point, normal, vec3(0.62))), height);
-#else
   vec3 shown = toneMapped(lit(point, normal, albedo));
+#ifdef HEAT
+  float light = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / 0.70, 0.45, 1.0);
+  shown = texture(heatColors, vec2(0.5 + 0.5 * clamp(height, -1.0, 1.0), 0.5)).rgb * light;
 #endif
-  float opacity = opacityAt(point, normal);
+  float opacity = volume.w * (1.0 - 0.6 * volume.y * clamp(dot(normalize(normal), normalize(eye - point)), 0.1, 1.0));
   return vec4(shown * opacity, opacity);
 }
 `;

@@ -1,8 +1,14 @@
 // What is drawn. `light`, `lit` and `floor` are the parts of light_shaders.js.
 
-// A triangle that covers everything.
+// A triangle that covers everything, behind all that is drawn, with the rays of its points from the eye.
 const EVERYWHERE_VERTEX = `
-void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.5, 1.0); }`;
+uniform vec3 rayMiddle, rayRight, rayUp;
+out vec3 ray;
+void main() {
+  vec2 p = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+  ray = rayMiddle + p.x * rayRight + p.y * rayUp;
+  gl_Position = vec4(p, 0.999999, 1.0);
+}`;
 
 const COLOR = 4;  // the attribute of vertices with a colour of their own
 const SURFACE_VERTEX = `
@@ -59,58 +65,37 @@ const floorVertex = (light, floor) => light + floor + `
 layout(location = 0) in vec2 inPlane;
 uniform mat4 floorFrame, viewProjection;
 out vec2 plane;
-#ifdef PLAIN
-out vec3 bright, dark, inMap;
-#else
-out vec3 point;
-#endif
+out vec3 point, bright, dark, inMap;
 void main() {
-  vec3 place = (floorFrame * vec4(inPlane, 0.0, 1.0)).xyz, up = floorFrame[2].xyz;
+  point = (floorFrame * vec4(inPlane, 0.0, 1.0)).xyz;
   plane = inPlane;
-  gl_Position = viewProjection * vec4(place, 1.0);
+  gl_Position = viewProjection * vec4(point, 1.0);
 #ifdef PLAIN
-  bright = floorAt(place, up, floorColor, 1.0); dark = floorAt(place, up, floorColor, 0.0); inMap = inShadowMap(place, vec3(0.0));
+  vec3 up = floorFrame[2].xyz;
+  bright = floorAt(point, up, floorColor, 1.0); dark = floorAt(point, up, floorColor, 0.0); inMap = inShadowMap(point, vec3(0.0));
   bright *= bright; dark *= dark;
-#else
-  point = place;
 #endif
 }`;
 
 const floorFragment = (light, floor) => light + floor + `
 in vec2 plane;
-#ifdef PLAIN
-in vec3 bright, dark, inMap;
-#else
-in vec3 point;
+in vec3 point, bright, dark, inMap;
 uniform mat4 floorFrame; uniform vec4 floorTiling;
 uniform sampler2D image;
-#endif
 out vec4 fragment;
 void main() {
-#ifdef PLAIN
-#ifdef SHADOW
+#if defined(PLAIN) && defined(SHADOW)
   fragment = vec4(sqrt(mix(dark, bright, shadowOn(inMap))), 1.0);
-#else
+#elif defined(PLAIN)
   fragment = vec4(sqrt(bright), 1.0);
-#endif
 #else
   vec3 albedo = floorColor * linear(texture(image, plane * floorTiling.xy + floorTiling.zw).rgb);
+  float shadow = 1.0;
 #ifdef SHADOW
-  float shadow = shadowOn(inShadowMap(point, vec3(0.0)));
-#else
-  const float shadow = 1.0;
+  shadow = shadowOn(inShadowMap(point, vec3(0.0)));
 #endif
   fragment = vec4(floorAt(point, floorFrame[2].xyz, albedo, shadow), 1.0);
 #endif
-}`;
-
-const SKY_VERTEX = `
-uniform vec3 rayMiddle, rayRight, rayUp;
-out vec3 ray;
-void main() {
-  vec2 p = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-  ray = rayMiddle + p.x * rayRight + p.y * rayUp;
-  gl_Position = vec4(p, 0.999999, 1.0);
 }`;
 
 const skyFragment = light => light + `
