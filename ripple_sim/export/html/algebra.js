@@ -4,18 +4,13 @@ const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const scaled = (a, s) => a.map(x => s * x);
 const unit = a => scaled(a, 1 / Math.max(Math.hypot(...a), 1e-12));
+const times = (a, b) => Array.from(new DOMMatrix(a).multiply(new DOMMatrix(b)).toFloat64Array());
 
 function placed(position, [w, x, y, z]) {
   return [
     1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y), 0,
     2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x), 0,
     2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y), 0, ...position, 1];
-}
-
-function times(a, b) {
-  const out = new Array(16).fill(0);
-  for (let c = 0; c < 4; c++) for (let r = 0; r < 4; r++) for (let k = 0; k < 4; k++) out[4 * c + r] += a[4 * k + r] * b[4 * c + k];
-  return out;
 }
 
 // World to eye coordinates of a camera: its axes are the columns right, up and backwards.

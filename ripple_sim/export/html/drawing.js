@@ -11,7 +11,6 @@ class Drawing {
     Object.assign(this, {gl, canvas, meta, software});
     this.shadowSize = software ? 512 : 1024;
     this.makePrograms();
-    this.empty = gl.createVertexArray();
     this.images = {};
     this.blank = colorsTexture(gl, [[255, 255, 255]]);
     this.heat = colorsTexture(gl, meta.heat);
@@ -41,7 +40,7 @@ class Drawing {
 
   makePrograms() {
     const {gl, meta: {light: {lamps}, floor}, shadowSize} = this, near = lamps.some(lamp => lamp.position);
-    const told = {lamps: lamps.length, near, gloss: lamps.map(lamp => lamp.gloss), taps: this.software ? 2 : 5, shadowSize};
+    const told = {lamps, near, taps: this.software ? 2 : 5, shadowSize};
     const light = lightShader(told), lit = litShader(told), onFloor = floorShader(told);
     const plain = floor && !(floor.texture in this.meta.images) && !near;
     this.floor = floor && new Floor(gl, floor, [floorVertex(light, onFloor), floorFragment(light, onFloor)], plain);
@@ -83,7 +82,7 @@ class Drawing {
     this.drawShadows(casters, light, floor);
     this.bind(8, this.shades); this.bind(0, this.shadow); this.bind(2, this.heat); this.bind(5, this.environment.ambient); this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
     gl.disable(gl.DEPTH_TEST);
-    for (const {part, model} of parts) if (part.lit) { this.look("points", part, model); part.lit.light(); }
+    for (const {part, model} of parts) if (part.lit) this.lightPoints(part, model);
     gl.enable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
@@ -96,6 +95,15 @@ class Drawing {
     gl.disable(gl.BLEND);
     for (const model of arrows) this.drawPart({part: this.arrow, model});
     if (this.software) this.smooth();
+  }
+
+  // Lights the points of a target for `drawPart`.
+  lightPoints(part, model) {
+    this.bind(3, part.lit.places); this.bind(4, part.lit.normals);
+    this.look("points", part, model);
+    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, part.lit.target);
+    this.gl.viewport(0, 0, COLUMNS, part.lit.rows);
+    this.cover();
   }
 
   // Smooths the edges on the canvas.
@@ -207,8 +215,5 @@ class Drawing {
   }
 
   // Draws everywhere with the present program.
-  cover() {
-    this.gl.bindVertexArray(this.empty);
-    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3);
-  }
+  cover() { this.gl.drawArrays(this.gl.TRIANGLES, 0, 3); }
 }

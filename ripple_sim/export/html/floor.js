@@ -16,7 +16,6 @@ class Floor {
     gl.bindVertexArray(this.array);
     this.points = vertexBuffer(gl, 0, 2, this.plane, true);
     indexBuffer(gl, this.triangles, true);
-    gl.bindVertexArray(null);
   }
 
   // Makes its cells for a frame.

@@ -28,7 +28,6 @@ class Group {
     this.buffers = [...this.data, colors].map((data, i) => vertexBuffer(gl, i < 2 ? i : COLOR, 3, data, i < 2));
     this.all = indexBuffer(gl, this.index, true);
     this.shadow = {...indexBuffer(gl, coarse), reaches: reachesOf(rest, coarse)};
-    gl.bindVertexArray(null);
   }
 
   // Puts its points where the bodies are, and lists the triangles that face the eye.

@@ -1,6 +1,6 @@
 // The renderer's light (render/glsl/lights.glsl, render/passes/deferred.glsl) with a single shadow map and without its occlusion maps.
 // Loops are written out: in software an array at an index that changes takes longer than the sums.
-// With `lamps`: their number, `near`: whether any has a position.
+// `near`: whether any of the lamps has a position.
 const lightShader = ({lamps, near}) => `
 uniform vec3 eye, horizon, zenith, sky, around, bounce;  // around: what lights the floor; bounce: what it sends back
 uniform vec2 turn;  // of the environment's maps
@@ -16,7 +16,7 @@ vec3 inShadowMap(vec3 p, vec3 n) {
 }
 bool outsideShadows(vec3 c) { return casts == 0.0 || any(lessThan(c, vec3(0.0))) || any(greaterThan(c, vec3(1.0))); }
 
-${lampNumbers(lamps).map(i => incident(i, near)).join("\n")}
+${lamps.map((_, i) => incident(i, near)).join("\n")}
 
 vec3 skyAt(vec3 d, float r) { return mix(horizon, zenith, smoothstep(-0.1 - 0.2 * r, 0.8 + 0.2 * r, d.z)); }
 
@@ -33,8 +33,6 @@ vec3 toneMapped(vec3 radiance) {
 // its inverse to half a hundredth, for the same reason
 vec3 linear(vec3 c) { return c * (c * (c * 0.305 + 0.682) + 0.013); }
 `;
-
-const lampNumbers = lamps => Array.from({length: lamps}, (_, i) => i);
 
 // Radiance of a lamp at a point, and the way to it.
 const incident = (i, near) => `vec3 incident${i}(vec3 p, out vec3 way) {
@@ -57,17 +55,17 @@ function samples(taps, size) {
   return `(${all.join(" + ")}) / ${all.length.toFixed(1)}`;
 }
 
-// The first lamp casts shadows; what turns away from it is dark without a look into their map.
-const CASTS = `
-#ifndef TRANSLUCENT
-  if (dot(n, way) > 0.0)
-#endif
-  shadow = shadowOf(inShadowMap(point, n));
-`;
+// What a surface reflects of a lamp. The first casts shadows; what turns away from it is dark without a look into their map, unless it is
+// translucent.
+const reflectedOf = ({gloss}, i) => `
+  radiance = incident${i}(point, way);
+  shadow = 1.0;
+  ${i ? "" : "if (dot(n, way) > 0.0 || volume.x > 0.0) shadow = shadowOf(inShadowMap(point, n));"}
+  reflected(radiance, way, shadow, ${gloss.toFixed(4)}, n, view, albedo, f0, rough, direct, highlight);`;
 
 // What a surface reflects, in linear light. Defined are COAT, METAL, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
-// With `taps` of the shadow map along each side, which has `shadowSize` texels, and each lamp's share of its radiance in highlights.
-const litShader = ({lamps, gloss, taps, shadowSize}) => `
+// With `taps` of the shadow map along each side, which has `shadowSize` texels.
+const litShader = ({lamps, taps, shadowSize}) => `
 uniform sampler2DShadow shadowMap;
 float shadowOf(vec3 c) { return outsideShadows(c) ? 1.0 : ${samples(taps, shadowSize)}; }
 uniform sampler2D ambientMap, mirrorMap, coatMap;
@@ -110,9 +108,8 @@ vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
 #endif
   vec3 direct = vec3(0.0), highlight = vec3(0.0);
   vec3 way, radiance;
-  float shadow = 1.0;
-${lampNumbers(lamps).map(i => `  radiance = incident${i}(point, way);
-${i ? "" : CASTS}  reflected(radiance, way, ${i ? "1.0" : "shadow"}, ${gloss[i].toFixed(4)}, n, view, albedo, f0, rough, direct, highlight);`).join("\n")}
+  float shadow;
+${lamps.map(reflectedOf).join("")}
   vec3 ambience = from(ambientMap, n).rgb + mix(bounce, sky, 0.5 + 0.5 * n.z), shade = albedo * (direct + ambience);
 #ifdef METAL
   shade *= 1.0 - base.y;
@@ -147,7 +144,7 @@ float shadowOn(vec3 c) { return outsideShadows(c) ? 1.0 : 1.0 - texture(shades, 
 uniform vec3 focus, floorColor, fade;
 vec3 floorAt(vec3 point, vec3 up, vec3 albedo, float shadow) {
   vec3 light = around, way, radiance;
-${lampNumbers(lamps).map(i => `  radiance = incident${i}(point, way); light += radiance * max(dot(way, up), 0.0)${i ? "" : " * shadow"};`).join("\n")}
+${lamps.map((_, i) => `  radiance = incident${i}(point, way); light += radiance * max(dot(way, up), 0.0)${i ? "" : " * shadow"};`).join("\n")}
   float share = smoothstep(fade.x, fade.y, distance(point, focus) / fade.z);
   return toneMapped(mix(albedo * light, skyAt(normalize(point - eye), 0.0), share));
 }

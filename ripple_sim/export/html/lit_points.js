@@ -16,7 +16,6 @@ class LitPoints {
     gl.bindVertexArray(this.array);
     this.points = vertexBuffer(gl, 0, 4, this.data[0], true);
     this.all = indexBuffer(gl, this.triangles, true);
-    gl.bindVertexArray(null);
   }
 
   // Takes the points that are seen from the eye into the tables.
@@ -31,15 +30,6 @@ class LitPoints {
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.data[0], 0, 4 * COLUMNS * this.rows);
     gl.bindVertexArray(this.array);
     gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, this.triangles.subarray(0, this.all.count));
-  }
-
-  // Lights them, with a program that is the present one and has its uniforms.
-  light() {
-    const gl = this.gl;
-    [this.places, this.normals].forEach((table, i) => { gl.activeTexture(gl.TEXTURE3 + i); gl.bindTexture(gl.TEXTURE_2D, table); });
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target);
-    gl.viewport(0, 0, COLUMNS, this.rows);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   // Puts the points into the table that triangles need which face the eye, all of an open target, and returns how many there are.

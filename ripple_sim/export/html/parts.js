@@ -11,7 +11,6 @@ function partOf(gl, part, cell) {
   const buffers = [3, 3, 2, 1].map((size, i) => vertexBuffer(gl, i, size, data[i], part.target && i !== 2));
   const coarse = clustered(data[0], index, cell), all = indexBuffer(gl, index);
   const shadow = {...indexBuffer(gl, coarse), index: coarse, reaches: reachesOf(data[0], coarse)};
-  gl.bindVertexArray(null);
   return Object.assign(part, {array, buffers, data, source, index, all, shadow, local: placed(part.position, part.quaternion)});
 }
 

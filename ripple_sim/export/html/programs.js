@@ -34,11 +34,10 @@ function settersOf(gl, program) {
 
 // A texture of an image, which repeats.
 function imageTexture(gl, image, software) {
-  const texture = gl.createTexture();
-  gl.bindTexture(gl.TEXTURE_2D, texture);
+  const smooth = {MIN_FILTER: software ? "LINEAR_MIPMAP_NEAREST" : "LINEAR_MIPMAP_LINEAR", MAG_FILTER: "LINEAR"};
+  const texture = tableOf(gl, "RGBA8", 0, 0, {...smooth, WRAP_S: "REPEAT", WRAP_T: "REPEAT"}, 0);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
   gl.generateMipmap(gl.TEXTURE_2D);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, software ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
   return texture;
 }
 
