@@ -63,21 +63,16 @@ const reflectedOf = ({gloss}, i) => `
   ${i ? "" : "if (dot(n, way) > 0.0 || volume.x > 0.0) shadow = shadowOf(inShadowMap(point, n));"}
   reflected(radiance, way, shadow, ${gloss.toFixed(4)}, n, view, albedo, f0, rough, direct, highlight);`;
 
-// What a surface reflects, in linear light. Defined are COAT, METAL, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
+// What a surface reflects, in linear light. Defined are COAT, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
 // With `taps` of the shadow map along each side, which has `shadowSize` texels.
 const litShader = ({lamps, taps, shadowSize}) => `
 uniform sampler2DShadow shadowMap;
 float shadowOf(vec3 c) { return outsideShadows(c) ? 1.0 : ${samples(taps, shadowSize)}; }
 uniform sampler2D ambientMap, mirrorMap, coatMap;
 uniform vec4 base, volume;  // roughness, metallic, sheen, coat; translucency, transparency, emission, opacity
-#ifdef METAL
-#define F0 vec3
-#else
-#define F0 float
-#endif
-F0 fresnel(F0 f0, float c) { float m = max(1.0 - c, 0.0), m2 = m * m; return f0 + (1.0 - f0) * (m2 * m2 * m); }
+vec3 fresnel(vec3 f0, float c) { float m = max(1.0 - c, 0.0), m2 = m * m; return f0 + (1.0 - f0) * (m2 * m2 * m); }
 float ggx(float nh, float r) { float a2 = r * r * r * r, d = nh * nh * (a2 - 1.0) + 1.0; return a2 / (d * d); }
-void reflected(vec3 radiance, vec3 way, float shadow, float gloss, vec3 n, vec3 view, vec3 albedo, F0 f0, float rough, inout vec3 direct, inout vec3 highlight) {
+void reflected(vec3 radiance, vec3 way, float shadow, float gloss, vec3 n, vec3 view, vec3 albedo, vec3 f0, float rough, inout vec3 direct, inout vec3 highlight) {
   vec3 halfway = normalize(view + way);
   float nl = dot(n, way);
 #ifdef TRANSLUCENT
@@ -101,23 +96,16 @@ vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
   n = normalize(n + max(0.1 - dot(n, view), 0.0) * view);
   float nv = clamp(dot(n, view), 0.1, 1.0), rough = max(base.x, 0.0632), edge = 1.0 - nv, edge3 = edge * edge * edge;
   vec3 mirror = reflect(-view, n);
-#ifdef METAL
-  vec3 f0 = mix(vec3(0.04), albedo, base.y);
-#else
-  float f0 = 0.04;
-#endif
-  vec3 direct = vec3(0.0), highlight = vec3(0.0);
+  vec3 f0 = mix(vec3(0.04), albedo, base.y), direct = vec3(0.0), highlight = vec3(0.0);
   vec3 way, radiance;
   float shadow;
 ${lamps.map(reflectedOf).join("")}
   vec3 ambience = from(ambientMap, n).rgb + mix(bounce, sky, 0.5 + 0.5 * n.z), shade = albedo * (direct + ambience);
-#ifdef METAL
   shade *= 1.0 - base.y;
-#endif
 #ifdef SHEEN
   shade += base.z * edge3 * albedo * ambience;
 #endif
-  shade += volume.z * albedo + mirrored(mirrorMap, mirror, rough) * (f0 + (max(F0(1.0 - rough), f0) - f0) * (edge3 * edge * edge)) + highlight;
+  shade += volume.z * albedo + mirrored(mirrorMap, mirror, rough) * (f0 + (max(vec3(1.0 - rough), f0) - f0) * (edge3 * edge * edge)) + highlight;
 #ifdef COAT
   float edge5 = edge3 * edge * edge, coat = base.w * (0.04 + 0.96 * edge5);
   shade = mix(shade, mirrored(coatMap, mirror, 0.06), coat);
