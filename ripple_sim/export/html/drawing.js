@@ -54,8 +54,8 @@ class Drawing {
   }
 
   // The program that lights pixels or, as `kind` tells, points.
-  lighting(kind, {coat, sheen, translucency}, image, heat) {
-    const features = {COAT: coat, SHEEN: sheen, TRANSLUCENT: translucency, TEXTURED: image, HEAT: heat};
+  lighting(kind, {coat}, image, heat) {
+    const features = {COAT: coat, TEXTURED: image, HEAT: heat};
     const defined = Object.keys(features).filter(name => features[name]), key = [kind, ...defined].join(" ");
     if (!this.known.has(key)) this.known.set(key, programOf(this.gl, ...this.shaders[kind], defined));
     return this.known.get(key);

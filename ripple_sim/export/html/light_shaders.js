@@ -63,7 +63,7 @@ const reflectedOf = ({gloss}, i) => `
   ${i ? "" : "if (dot(n, way) > 0.0 || volume.x > 0.0) shadow = shadowOf(inShadowMap(point, n));"}
   reflected(radiance, way, shadow, ${gloss.toFixed(4)}, n, view, albedo, f0, rough, direct, highlight);`;
 
-// What a surface reflects, in linear light. Defined are COAT, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
+// What a surface reflects, in linear light. COAT is defined where a look has one: without, its look-up costs nothing.
 // With `taps` of the shadow map along each side, which has `shadowSize` texels.
 const litShader = ({lamps, taps, shadowSize}) => `
 uniform sampler2DShadow shadowMap;
@@ -75,12 +75,8 @@ float ggx(float nh, float r) { float a2 = r * r * r * r, d = nh * nh * (a2 - 1.0
 void reflected(vec3 radiance, vec3 way, float shadow, float gloss, vec3 n, vec3 view, vec3 albedo, vec3 f0, float rough, inout vec3 direct, inout vec3 highlight) {
   vec3 halfway = normalize(view + way);
   float nl = dot(n, way);
-#ifdef TRANSLUCENT
-  vec3 wrap = 0.6 * volume.x * albedo;
+  vec3 wrap = 0.6 * volume.x * albedo;  // of what light goes through
   direct += radiance * max(nl + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap)) * mix(shadow, 1.0, 0.35 * volume.x);
-#else
-  direct += radiance * (max(nl, 0.0) * shadow);
-#endif
   highlight += radiance * (gloss * shadow * clamp(nl * 4.0, 0.0, 1.0) * ggx(max(dot(n, halfway), 0.0), rough) * 0.25) * fresnel(f0, max(dot(view, halfway), 0.0));
 }
 // A map of light by direction, the same for all that turn with the camera.
@@ -102,10 +98,7 @@ vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
 ${lamps.map(reflectedOf).join("")}
   vec3 ambience = from(ambientMap, n).rgb + mix(bounce, sky, 0.5 + 0.5 * n.z), shade = albedo * (direct + ambience);
   shade *= 1.0 - base.y;
-#ifdef SHEEN
-  shade += base.z * edge3 * albedo * ambience;
-#endif
-  shade += volume.z * albedo + mirrored(mirrorMap, mirror, rough) * (f0 + (max(vec3(1.0 - rough), f0) - f0) * (edge3 * edge * edge)) + highlight;
+  shade += (base.z * edge3 * ambience + volume.z) * albedo + mirrored(mirrorMap, mirror, rough) * (f0 + (max(vec3(1.0 - rough), f0) - f0) * (edge3 * edge * edge)) + highlight;
 #ifdef COAT
   float edge5 = edge3 * edge * edge, coat = base.w * (0.04 + 0.96 * edge5);
   shade = mix(shade, mirrored(coatMap, mirror, 0.06), coat);
