@@ -16,6 +16,7 @@ import pytest
 from chromium import PATIENCE, launched
 from mujoco_models import forwarded
 from PIL import Image
+from scipy import ndimage
 
 from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, Scene, Simulation, export_scene
 from ripple_sim.capture import FrameSource, snapshots
@@ -189,6 +190,22 @@ def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(browse
         tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(0); }}, {floor}.leaves = () => null)")
         tab.evaluate("ripplePlayer.player.redraw()")
         assert (np.abs(pixels(tab) - shown).max(axis=2) > 30).sum() > 100
+
+
+def test_the_floor_is_lit_right_up_to_what_stands_on_it(browser: Any, tmp_path: Path) -> None:
+    floor, drum = '<geom type="plane" size="9 9 1"/>', '<geom name="drum" type="cylinder" size="1 .3" pos="0 0 .3"/>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{floor}{drum}</worldbody></mujoco>")
+    data = forwarded(model)
+    ripples = Ripples(model, {"drum": Material()}, resolution=16, backend="cpu")
+    with Exporter(model, ripples, tmp_path / "run.html", size=(960, 540)) as exporter:
+        exporter.write(data)
+    ours = RippleRenderer(model, ripples, width=960, height=540).render(data).astype(float)
+    with opened(browser, tmp_path / "run.html") as tab:
+        tab.set_viewport_size({"width": 960, "height": 540})
+        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })")
+        darker = (ours - pixels(tab)).max(axis=2)
+    lit = ndimage.binary_erosion(np.abs(ours - ours[-1, 0]).max(axis=2) < 12, iterations=2)
+    assert darker[lit].max() < 13  # of 255
 
 
 def test_a_drag_turns_the_camera_and_the_button_brings_it_back(shown: Any) -> None:
