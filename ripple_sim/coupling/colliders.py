@@ -21,7 +21,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.cache import cache_path, make_room, mark_used
 from ripple_sim.solver.files import atomic_write
-from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.mesh.queries import RayScene
 from ripple_sim.solver.mesh.topology import corner_angles
 from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 

@@ -23,7 +23,7 @@ from ripple_sim.render.visuals.corners import bake, corner_normals
 from ripple_sim.solver import Atlas, AtlasError, TexelTopology, sphere_atlas
 from ripple_sim.solver.files import atomic_write, final_path
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
-from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.mesh.queries import RayScene
 
 OVERSAMPLING = 2  # finer pixels along each side of a pixel
 _LIGHT = np.array([-0.45, 0.55, 0.7]) / np.linalg.norm([-0.45, 0.55, 0.7])  # to the right, up, to the eye

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.mesh.rays import RayScene, downward_hits
+from ripple_sim.solver.mesh.queries import RayScene, downward_hits
 
 from .events import DropEntry
 

@@ -17,7 +17,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.render.camera import Camera
 from ripple_sim.solver import Material, Mesh, load_mesh
 from ripple_sim.solver.errors import shown
-from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.mesh.queries import RayScene
 
 from .bodies import BODY_SHAPES, TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
 from .events import Events

@@ -16,7 +16,7 @@ from ripple_sim.export.moving_mesh import Displaced, MovingMesh
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
-from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.mesh.queries import RayScene
 
 from .opening import FLIGHT, Balls, poke_strength, surface_size
 

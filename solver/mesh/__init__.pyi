@@ -1,9 +1,3 @@
-from .closest import (
-    TriangleTree as TriangleTree,
-    closest_points as closest_points,
-    refitted as refitted,
-    triangle_tree as triangle_tree,
-)
 from .files import check_mesh_file as check_mesh_file, load_mesh as load_mesh, repaired as repaired
 from .mesh import Mesh as Mesh, check_genus_zero as check_genus_zero, vertex_normals as vertex_normals
 from .ply import (
@@ -13,7 +7,7 @@ from .ply import (
     read_text as read_text,
     triangulate as triangulate,
 )
-from .rays import RayScene as RayScene, downward_hits as downward_hits
+from .queries import ClosestPoints as ClosestPoints, RayScene as RayScene, downward_hits as downward_hits
 from .topology import (
     SPLITS as SPLITS,
     Edges as Edges,

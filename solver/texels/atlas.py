@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import PATH, AtlasError, checked, shown
 from ..files import atomic_write, final_path
-from ..mesh.closest import TriangleTree, closest_points, triangle_tree
 from ..mesh.mesh import Mesh
+from ..mesh.queries import ClosestPoints
 from .chart_map import ChartMap, LinearChartMap, TextureCoordinates, texture_coordinates
 from .texel_mesh import TexelMesh, texel_quality
 from .topology import sampling_matrix
@@ -199,7 +199,7 @@ class Atlas:
         AtlasError
             If the points are not finite or not of shape [k, 3] or [3].
         """
-        triangle, closest = closest_points(self.tree, check_points(points))
+        triangle, closest = self.closest_points(check_points(points))
         return closest, self.chart_map.coordinates(self.mesh, triangle, closest)
 
     def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
@@ -215,12 +215,12 @@ class Atlas:
 
     def nearest_places(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """The same of points that need no check, [k, 3]."""
-        triangle, closest = closest_points(self.tree, points)
+        triangle, closest = self.closest_points(points)
         return closest, self.chart_map.texels_at(self.mesh, self.resolution, triangle, closest)
 
     def closest_places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Those surface points alone [m], [k, 3], where no texels are asked for."""
-        return closest_points(self.tree, points)[1]
+        return self.closest_points(points)[1]
 
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
         """Flat index (chart N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
@@ -292,9 +292,9 @@ class Atlas:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @functools.cached_property
-    def tree(self) -> TriangleTree:
-        """Search tree over the triangles of the mesh."""
-        return triangle_tree(self.mesh.V, self.mesh.F)
+    def closest_points(self) -> ClosestPoints:
+        """Finds the nearest points of the mesh."""
+        return ClosestPoints(self.mesh.V, self.mesh.F)
 
 
 def check_points(points: ArrayLike) -> NDArray[np.float64]:

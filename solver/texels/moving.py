@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Floats, Ints32, kernel
-from ..mesh.closest import closest_points
 from .atlas import Atlas
 from .chart_map import barycentrics_in
 from .stencil import NO_LINKS, IrregularLinks, Stencil
@@ -45,7 +44,7 @@ class SurfaceRide:
         corners, weights = F[atlas.triangles.reshape(-1)[halo]], atlas.barycentrics.reshape(-1, 3)[halo]
         rim = np.flatnonzero(topology.rim.reshape(-1) & ~nothing)
         if len(rim):
-            triangle, closest = closest_points(atlas.tree, np.ascontiguousarray(places[rim]))
+            triangle, closest = atlas.closest_points(np.ascontiguousarray(places[rim]))
             corners[rim], weights[rim] = F[triangle], barycentrics_in(V[F[triangle]], closest)
         weights[nothing] = np.nan
         # images of a periodic surface keep their way to the texels that they show

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..cache import kept_with
 from ..errors import AtlasError, RippleWarning, Valid, checked, instance
 from ..mesh.mesh import Mesh
-from ..mesh.rays import RayScene
+from ..mesh.queries import RayScene
 from ..mesh.volume import Volume
 from .atlas import Atlas
 from .texel_mesh import smoothed

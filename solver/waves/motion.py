@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import RippleWarning, SolverError, shown
 from ..kernel import Floats, Floats32, Ints, kernel
-from ..mesh.closest import refitted
 from ..mesh.mesh import Mesh
 from ..mesh.topology import Folds, edges_of
 from ..operator.assembly import MovingOperator
@@ -89,9 +88,7 @@ class Motion:
         positions, beyond = self._ride.positions(V)
         normals = self._ride.normals(mesh.vertex_normals)
         texels = TexelMesh(rest.texels.topology, positions, normals, self.areas, beyond, rest.texels.detours)
-        moved = Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
-        moved.__dict__["tree"] = refitted(rest.tree, V, mesh.F)
-        return moved
+        return Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
 
     def _checked(self, vertices: ArrayLike) -> NDArray[np.float64]:
         shape = self.rest.mesh.V.shape

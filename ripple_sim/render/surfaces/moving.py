@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from ripple_sim.render.visuals.corners import bounding_radius, cast, frames_about, smooth_normals
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
-from ripple_sim.solver.mesh.closest import closest_points, triangle_tree
+from ripple_sim.solver.mesh.queries import ClosestPoints
 from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 from .tessellation import coarse_mesh
@@ -44,7 +44,7 @@ class MovingVertices:
     def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, normals: NDArray) -> None:
         self._V, self._F = np.ascontiguousarray(V, np.float64), np.ascontiguousarray(F, np.int64)
         rest = [np.ascontiguousarray(each, np.float64) for each in (points, directions, normals)]
-        triangle, closest = closest_points(triangle_tree(self._V, self._F), rest[0])
+        triangle, closest = ClosestPoints(self._V, self._F)(rest[0])
         corners = self._F[triangle]
         weights = barycentrics_in(self._V[corners], closest)
         offset = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])

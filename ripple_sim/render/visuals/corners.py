@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.mesh.queries import RayScene
 from ripple_sim.solver.mesh.topology import edges_of, undirected
 
 _ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from ...errors import POSITIVE, AtlasError, checked
 from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
-from ...mesh.rays import RayScene
+from ...mesh.queries import RayScene
 from ...mesh.vectors import cross, dot
 from ...texels.atlas import Atlas, check_points, triangles_of
 from ...texels.chart_map import Parts, barycentrics_at, uncut

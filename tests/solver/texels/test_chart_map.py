@@ -10,7 +10,7 @@ from hand_made import polygon, square, two_squares
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas, texel_atlas
 from ripple_sim.solver.layouts.cube import CubeChartMap, cube_topology
-from ripple_sim.solver.mesh import closest_points, triangle_tree
+from ripple_sim.solver.mesh import ClosestPoints
 from ripple_sim.solver.texels import LinearChartMap, sampling_matrix, texture_coordinates, with_filled_halo
 
 
@@ -92,7 +92,7 @@ def test_a_triangle_without_area_gives_the_middle_of_its_place(corners: list) ->
 def test_the_border_belongs_to_the_last_texels() -> None:
     # on the plane of the first triangle, whose corners are at the corners of chart 2; the second is on chart 0
     points = [V[0], V[1], V[2], V[:3].mean(axis=0), 2 * V[2] - V[0]]
-    texels = MAP.texels_at(MESH, 4, *closest_points(triangle_tree(V, MESH.F), np.array(points)))
+    texels = MAP.texels_at(MESH, 4, *ClosestPoints(V, MESH.F)(np.array(points)))
     assert texels.tolist() == [2 * 16, 2 * 16 + 3, 2 * 16 + 15, 2 * 16 + 4 + 2, 2 * 16 + 15]
 
 

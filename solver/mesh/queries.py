@@ -1,15 +1,34 @@
-"""Rays onto triangles: which they meet, and how far away, by Embree in float32."""
+"""What is asked of triangles: which of them rays meet, by Embree in float32, and their nearest points, by libigl."""
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from ..kernel import Floats32, Ints
+from ..kernel import Floats, Floats32, Ints
 
 _FAR = 1e36  # Embree's distance of nothing is 1e37
+
+
+class ClosestPoints:
+    """The nearest points of triangles, by a tree of boxes.
+
+    Parameters
+    ----------
+    V : float64 [n, 3]
+    F : int64 [m, 3]
+    """
+
+    def __init__(self, V: Floats, F: Ints) -> None:
+        self._V, self._F, self._tree = np.ascontiguousarray(V), np.ascontiguousarray(F), igl.AABB()
+        self._tree.init(self._V, self._F)
+
+    def __call__(self, points: Floats) -> tuple[Ints, Floats]:
+        """Triangle nearest to each of some points [k, 3], [k], and the point nearest on it, [k, 3]."""
+        return self._tree.squared_distance(self._V, self._F, points)[1:]
 
 
 class RayScene:
