@@ -29,7 +29,7 @@ def barycentrics_in(corners: NDArray[np.float64], points: NDArray[np.float64]) -
     return np.stack([1 - s - t, s, t], axis=1)
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def barycentrics_at(corners: Floats, point: Floats) -> tuple[float, float]:
     """The second and third barycentric coordinate of a point in a triangle [3, 3], as in `barycentrics_in`."""
     uu = uv = vv = pu = pv = 0.0
@@ -218,7 +218,7 @@ def _texels_on_charts(triangles: Floats, charts: Ints, corners: Floats, n: int, 
 MOST_CORNERS = 12  # of a part of a triangle that a few lines have cut
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def clip(corners: Floats, count: int, ox: float, oy: float, nx: float, ny: float, axis: int, result: Floats) -> int:
     """Keep what lies on the side n of a line through o of a convex polygon (Sutherland and Hodgman 1974).
 
@@ -310,7 +310,7 @@ def _add_areas(
                 areas[chart[p], j, i] += triangles[p] * _share(cell, corners)
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _share(corners: Floats, count: int) -> float:
     """Area of a polygon over that of the triangle in which it lies, by its barycentrics up to a factor at each."""
     share, ux, uy = 0.0, 0.0, 0.0

@@ -56,46 +56,48 @@ def _measure(there: Ints, V: Floats, F: Ints, beside: Ints, triangles: Ints, wei
                     a, b = min(a, b), max(a, b)  # from the same end for all copies
                     if a < 0 or a == b or triangles[a] == triangles[b]:
                         continue
-                    p, q = _point(V, F[triangles[a]], weights[a]), _point(V, F[triangles[b]], weights[b])
+                    p, q = _point(V, F, triangles[a], weights, a), _point(V, F, triangles[b], weights, b)
                     square = dot(subtract(q, p), subtract(q, p))
                     if not square > 0.0:
                         continue
-                    start, end = (triangles[a], p, weights[a]), (triangles[b], q, weights[b])
-                    count = _cut(V, F, beside, start, end, edges, points)
+                    start, end = (a, triangles[a], p), (b, triangles[b], q)
+                    count = _cut(V, F, beside, weights, start, end, edges, points)
                     if count > 0:
                         length = _pulled(V, edges, points, count, p, q)
                         excess = length * length / square - 1.0
                         out[link, chart, r, c] = excess if _LEAST < excess < _GREATEST else 0.0
 
 
-@kernel
-def _point(V: Floats, corners: Ints, weights: Floats) -> tuple[float, float, float]:
-    """The point with such weights at the corners of a triangle."""
-    first = combine(weights[0], row(V, corners[0]), weights[1], row(V, corners[1]))
-    return combine(1.0, first, weights[2], row(V, corners[2]))
+@kernel(no_cpython_wrapper=True)
+def _point(V: Floats, F: Ints, triangle: int, weights: Floats, i: int) -> tuple[float, float, float]:
+    """The point with weights [i] at the corners of a triangle."""
+    first = combine(weights[i, 0], row(V, F[triangle, 0]), weights[i, 1], row(V, F[triangle, 1]))
+    return combine(1.0, first, weights[i, 2], row(V, F[triangle, 2]))
 
 
-@kernel
-def _holds(corners: Ints, others: Ints, weights: Floats) -> bool:
-    """Whether a triangle holds a point that is given by its weights in another."""
+@kernel(no_cpython_wrapper=True)
+def _holds(F: Ints, triangle: int, other: int, weights: Floats, i: int) -> bool:
+    """Whether a triangle holds the point that has weights [i] in another."""
     for k in range(3):
-        v = others[k]
-        if weights[k] > _ON_SIDE and v != corners[0] and v != corners[1] and v != corners[2]:
+        v = F[other, k]
+        if weights[i, k] > _ON_SIDE and v != F[triangle, 0] and v != F[triangle, 1] and v != F[triangle, 2]:
             return False
     return True
 
 
-@kernel
-def _cut(V: Floats, F: Ints, beside: Ints, start: tuple, end: tuple, edges: Ints, points: Floats) -> int:
-    """Edges, with the points on them, that the plane cuts from start to end, each triangle, point and weights.
+@kernel(no_cpython_wrapper=True)
+def _cut(
+    V: Floats, F: Ints, beside: Ints, weights: Floats, start: tuple, end: tuple, edges: Ints, points: Floats
+) -> int:
+    """Edges, with the points on them, that the plane cuts from start to end, each a texel, its triangle and its point.
 
     Returns how many there are, 0 where the end is in the same triangle, or is not found.
     """
-    (here, p, from_weights), (target, q, to_weights) = start, end
-    if _holds(F[target], F[here], from_weights) or _holds(F[here], F[target], to_weights):
+    (a, here, p), (b, target, q) = start, end
+    if _holds(F, target, here, weights, a) or _holds(F, here, target, weights, b):
         return 0
     way = subtract(q, p)
-    normal = cross(way, combine(1.0, _normal(V, F[here]), 1.0, _normal(V, F[target])))
+    normal = cross(way, combine(1.0, _normal(V, F, here), 1.0, _normal(V, F, target)))
     entered = -1
     for count in range(_MOST):
         best, leaving = -np.inf, -1
@@ -114,7 +116,7 @@ def _cut(V: Floats, F: Ints, beside: Ints, start: tuple, end: tuple, edges: Ints
         if leaving < 0 or beside[here, leaving] < 0:
             return 0
         here = beside[here, leaving]
-        if _holds(F[here], F[target], to_weights):
+        if _holds(F, here, target, weights, b):
             return count + 1
         entered = -1
         for k in range(3):
@@ -123,14 +125,14 @@ def _cut(V: Floats, F: Ints, beside: Ints, start: tuple, end: tuple, edges: Ints
     return 0
 
 
-@kernel
-def _normal(V: Floats, corners: Ints) -> tuple[float, float, float]:
+@kernel(no_cpython_wrapper=True)
+def _normal(V: Floats, F: Ints, triangle: int) -> tuple[float, float, float]:
     """Unit normal of a triangle."""
-    a = row(V, corners[0])
-    return unit(cross(subtract(row(V, corners[1]), a), subtract(row(V, corners[2]), a)))
+    a = row(V, F[triangle, 0])
+    return unit(cross(subtract(row(V, F[triangle, 1]), a), subtract(row(V, F[triangle, 2]), a)))
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _pulled(V: Floats, edges: Ints, points: Floats, count: int, p: tuple, q: tuple) -> float:
     """Length of the way from p to q through points on edges, once each has moved along its edge to where it is short.
 

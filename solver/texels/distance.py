@@ -159,7 +159,7 @@ def clean(scratch: Scratch, count: int) -> None:
         scratch.distance[scratch.touched[i]], scratch.known[scratch.touched[i]] = np.inf, False
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def distance_to(positions: Floats, t: int, point: Floats) -> float:
     """Straight distance of texel t from a point [m]."""
     x, y, z = positions[t, 0] - point[0], positions[t, 1] - point[1], positions[t, 2] - point[2]

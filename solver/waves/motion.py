@@ -138,7 +138,7 @@ def _stretches(V: Floats, edges: Ints, squares: Floats) -> bool:
     return i < len(edges)
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _squared(V: Floats, edges: Ints, i: int) -> float:
     """Squared length of an edge."""
     a, b, total = edges[i, 0], edges[i, 1], 0.0

@@ -118,7 +118,7 @@ def cast_rays(
     return hits, barycentrics
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _edge_products(sphere: Floats, corners: Ints, d: Floats) -> tuple[float, float, float]:
     """Triple products det(d, b, c) of the ray with the three edges: all >= 0 if and only if it passes inside."""
     a, b, c = sphere[corners[0]], sphere[corners[1]], sphere[corners[2]]
