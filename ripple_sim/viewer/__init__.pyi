@@ -13,7 +13,6 @@ from .session import OPERATORS as OPERATORS, SLIDERS as SLIDERS, Session as Sess
 from .stage import (
     BACKGROUND as BACKGROUND,
     add_floor as add_floor,
-    find_floor as find_floor,
     geom_mesh as geom_mesh,
     is_endless as is_endless,
 )

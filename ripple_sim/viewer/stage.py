@@ -16,6 +16,7 @@ from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.export.moving_mesh import Displaced
 from ripple_sim.overlay.notes import round_up
+from ripple_sim.render.passes.shadows import find_floor
 from ripple_sim.render.surfaces.surface import target_color
 from ripple_sim.render.visuals.shapes import shape_of, sizes
 from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
@@ -24,15 +25,8 @@ from .session import Session
 
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 BACKGROUND = (0.74, 0.77, 0.81)
+_LEVEL = 0.999  # how far up a floor faces that shadows are on, which fall straight down
 _FADE_RINGS, _FADE_SIDES = 24, 72
-
-
-def find_floor(model: mujoco.MjModel, data: mujoco.MjData) -> int | None:
-    """Geom id of the highest plane that faces up, or None."""
-    planes = [
-        geom for geom in range(model.ngeom) if model.geom_type[geom] == _PLANE and data.geom_xmat[geom, 8] > 0.999
-    ]
-    return max(planes, key=lambda geom: float(data.geom_xpos[geom, 2]), default=None)
 
 
 def is_endless(model: mujoco.MjModel, geom: int, reach: float) -> bool:
@@ -237,10 +231,11 @@ class Stage:
             for entry in simulation.scene.targets
         }
         self._bodies = BodyActors(plotter, session, pose.focus, _REACH * pose.distance)
-        floor = find_floor(simulation.model, simulation.data)
+        floor = find_floor(simulation.model, simulation.ripples.geom_ids.values())
         rigid = [geom for geom in simulation.ripples.geom_ids.values() if not is_soft(simulation.model, geom)]
         casting = [*rigid, *self._bodies.solid]
-        self.shadows = None if floor is None else Shadows(plotter, session, casting, floor)
+        level = floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL
+        self.shadows = Shadows(plotter, session, casting, floor) if level else None
         self._add_bar()
         camera = plotter.camera
         camera.position, camera.focal_point, camera.up = pose.position, pose.focus, (0.0, 0.0, 1.0)

@@ -1,33 +1,20 @@
-"""Which plane is the floor, and how a large one is drawn. The plotter of these tests keeps what it is given."""
+"""How a large floor is drawn. The plotter of these tests keeps what it is given."""
 
 from types import SimpleNamespace
 
-import mujoco
 import numpy as np
 import pytest
 from mujoco_models import posed
 
 from ripple_sim.overlay.notes import round_up
-from ripple_sim.viewer import BACKGROUND, add_floor, find_floor, is_endless
+from ripple_sim.viewer import BACKGROUND, add_floor, is_endless
 from ripple_sim.viewer.stage import _STEPS
-
-
-def state(body: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    return posed(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-
-
-def test_the_floor_is_the_highest_plane_that_faces_up() -> None:
-    low, high = '<geom type="plane" size="0 0 1" pos="0 0 -1"/>', '<geom type="plane" size="0 0 1" pos="0 0 .2"/>'
-    wall = '<geom type="plane" size="0 0 1" pos="0 0 5" euler="90 0 0"/>'
-    ceiling = '<geom type="plane" size="0 0 1" pos="0 0 9" euler="180 0 0"/>'
-    assert find_floor(*state(low + wall + high + ceiling)) == 2
-    assert find_floor(*state(high + low)) == 0
-    assert find_floor(*state(wall + ceiling + '<geom size="1"/>')) is None
 
 
 @pytest.mark.parametrize("size", ["0 0", "6 6", "0 6", "6 4", "1 1"])
 def test_a_plane_beyond_the_view_is_endless(size: str) -> None:
-    model, _ = state(f'<geom type="plane" size="{size} 1"/><geom type="box" size="9 9 9"/>')
+    plane = f'<geom type="plane" size="{size} 1"/>'
+    model, _ = posed(f'<mujoco><worldbody>{plane}<geom type="box" size="9 9 9"/></worldbody></mujoco>')
     assert is_endless(model, 0, 10.0) is (size in ("0 0", "6 6", "0 6"))
     assert not is_endless(model, 1, 10.0)
 

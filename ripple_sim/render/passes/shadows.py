@@ -201,12 +201,12 @@ _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # o
 
 
 def find_floor(model: Any, targets: Collection[int]) -> int | None:
-    """The visible plane that faces up most and is no target, or None."""
+    """The visible plane that faces up most and is no target, of several the highest, or None."""
     rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
     visible = [geom for geom in visible_geoms(model) if geom not in targets]
     planes = [geom for geom in visible if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE]
-    return max(planes, key=lambda geom: rest.geom_xmat[geom][8], default=None)
+    return max(planes, key=lambda geom: (round(rest.geom_xmat[geom, 8], 3), rest.geom_xpos[geom, 2]), default=None)
 
 
 class Floor:
