@@ -10,9 +10,7 @@ import pytest
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning
 
-N = 16
-GRAVITY = 9.81
-MASS = 0.3
+N, GRAVITY, MASS = 16, 9.81, 0.3
 BALL = f"""<mujoco model="bounce"><option timestep="0.001"/><worldbody>
 <geom name="block" type="box" size="0.5 0.5 0.2" pos="0 0 -0.2" solref="0.01 0.3"/>
 <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>

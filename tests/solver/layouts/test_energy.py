@@ -112,11 +112,6 @@ def full_hessian(A):
     return wd * SECOND_OF_D + wj * SECOND_OF_J + squares
 
 
-def positive_part(H):
-    values, vectors = np.linalg.eigh(H)
-    return (vectors * np.maximum(values, 0)) @ vectors.T
-
-
 def rotated(s1, s2):
     turn = [np.array([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]]) for t in (0.4, -1.1)]
     return turn[0] @ np.diag([s1, s2]) @ turn[1]
@@ -136,7 +131,8 @@ def test_projected_hessian_is_the_positive_part_of_the_full_one(s1, s2, area):
     mixed = np.outer(gd, gj)
     H = bend_d * SECOND_OF_D + bend_j * SECOND_OF_J + dd * np.outer(gd, gd) + dj * (mixed + mixed.T)
     H += jj * np.outer(gj, gj)
-    expected = area * positive_part(full_hessian(A))
+    values, vectors = np.linalg.eigh(full_hessian(A))
+    expected = area * (vectors * np.maximum(values, 0)) @ vectors.T
     np.testing.assert_allclose(H, expected, atol=1e-8 * np.abs(expected).max())
 
 

@@ -185,17 +185,12 @@ def noise(*shape: int) -> np.ndarray:
     return np.random.default_rng(0).standard_normal(shape).astype(np.float32)
 
 
-def at_corners(around: np.ndarray) -> np.ndarray:
-    """Bilinear interpolation at the four corners of each chart, [C, 4]."""
-    last = around.shape[1] - 2
-    places = (0, 0), (0, last), (last, last), (last, 0)
-    return np.stack([around[:, r : r + 2, c : c + 2].mean(axis=(1, 2)) for r, c in places], axis=1)
-
-
 @pytest.mark.parametrize("topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology])
 def test_charts_that_meet_in_a_corner_agree_on_its_value(topology) -> None:
     around = with_filled_halo(topology, noise(*topology.shape)).astype(np.float64)
-    values, inner = at_corners(around), topology.valence > 0
+    inner, last = topology.valence > 0, around.shape[1] - 2
+    places = (0, 0), (0, last), (last, last), (last, 0)
+    values = np.stack([around[:, r : r + 2, c : c + 2].mean(axis=(1, 2)) for r, c in places], axis=1)
     for point in np.unique(topology.corners[inner]):
         here = values[topology.corners == point]
         assert len(here) >= 3
