@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 import trimesh
 from page import Part
+from scipy.spatial.transform import Rotation
 from stills import strip
 
 from ripple_sim import drop_scene
@@ -54,9 +55,12 @@ def stills(mesh: Path, file: Path) -> Path:
     material = msgspec.structs.replace(scene.targets[0].material, stiffness=300.0, damping=0.5, density=150.0)
     target = msgspec.structs.replace(scene.targets[0], material=material)
     camera = msgspec.structs.replace(
-        scene.camera, azimuth=20.0 if lies else 60.0, elevation=-45.0, orbit=0.0, distance=1.1 * scene.camera.distance
+        scene.camera, azimuth=-70.0 if lies else 60.0, elevation=-45.0, orbit=0.0, distance=1.3 * scene.camera.distance
     )
-    events = Events(poke=(PokeEntry("target", 0.02, (0.5, 0.0, 0.3), 0.25, 0.05),))
+    geom = scene.model.geom("target")
+    V = scene.model.mesh_vert @ Rotation.from_quat(geom.quat, scalar_first=True).as_matrix().T + geom.pos
+    end = tuple(V[(V @ [0.5, 0.0, 0.3]).argmax()].tolist())
+    events = Events(poke=(PokeEntry("target", 0.02, end, 0.25, 0.05),))
     scene = dataclasses.replace(scene, targets=(target,), camera=camera, events=events)
     return strip(scene, TIMES, file, SIZE, overlay=["height"], columns=4)
 
