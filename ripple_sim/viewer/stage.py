@@ -234,8 +234,9 @@ class Stage:
         floor = find_floor(simulation.model, simulation.ripples.geom_ids.values())
         rigid = [geom for geom in simulation.ripples.geom_ids.values() if not is_soft(simulation.model, geom)]
         casting = [*rigid, *self._bodies.solid]
-        level = floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL
-        self.shadows = Shadows(plotter, session, casting, floor) if level else None
+        self.shadows: Shadows | None = None
+        if floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL:
+            self.shadows = Shadows(plotter, session, casting, floor)
         self._add_bar()
         camera = plotter.camera
         camera.position, camera.focal_point, camera.up = pose.position, pose.focus, (0.0, 0.0, 1.0)
