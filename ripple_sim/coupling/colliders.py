@@ -12,7 +12,6 @@ import importlib.metadata
 from collections.abc import Sequence
 from typing import TypeAlias
 
-import igl
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.cache import cache_path, make_room, mark_used
 from ripple_sim.solver.files import atomic_write
-from ripple_sim.solver.mesh.queries import RayScene
+from ripple_sim.solver.mesh.queries import ClosestPoints, RayScene
 from ripple_sim.solver.mesh.topology import corner_angles
 from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 
@@ -330,8 +329,7 @@ def flex_core(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> FlexCore:
     for share in _THICKNESSES:
         thickness = share * size
         core = inset(mesh, thickness)
-        squared, _, _ = igl.point_mesh_squared_distance(points, core, mesh.F)
-        if np.abs(np.sqrt(squared) - thickness).max() <= GAP_TOLERANCE * size:
+        if np.abs(ClosestPoints(core, mesh.F).distances(points) - thickness).max() <= GAP_TOLERANCE * size:
             break
     return core, mesh.F, thickness
 

@@ -30,6 +30,10 @@ class ClosestPoints:
         """Triangle nearest to each of some points [k, 3], [k], and the point nearest on it, [k, 3]."""
         return self._tree.squared_distance(self._V, self._F, points)[1:]
 
+    def distances(self, points: Floats) -> Floats:
+        """How far those points are from the triangles, [k]."""
+        return np.sqrt(self._tree.squared_distance(self._V, self._F, points)[0])
+
 
 class RayScene:
     """Triangles for rays to meet.

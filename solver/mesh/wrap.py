@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import MeshError
 from .clean import counted
 from .mesh import Mesh
+from .queries import ClosestPoints
 
 _COARSEST = 16  # spacings along the side of the largest blocks
 _MARGIN = 2  # layers of nodes beyond the surface, on all sides
@@ -40,8 +41,7 @@ def distance_grid(
     origin : [3]
         Place of the first node [m]; the outermost ones are farther from the mesh than `distance`.
     """
-    tree = igl.AABB()
-    tree.init(V, F)
+    closest_points = ClosestPoints(V, F)
     low, high = V.min(axis=0), V.max(axis=0)
     origin = low - (1 + _MARGIN) * distance
     shape = np.ceil((high - low) / distance).astype(int) + 3 + 2 * _MARGIN
@@ -51,7 +51,7 @@ def distance_grid(
     size = _COARSEST
     while True:
         middle = origin + distance * (corners + (size - 1) / 2)
-        found = np.sqrt(tree.squared_distance(V, F, middle)[0])
+        found = closest_points.distances(middle)
         places = corners[:, None] + _block(size)
         values[tuple(np.moveaxis(places, -1, 0))] = found[:, None]
         if size == 1:
@@ -172,8 +172,6 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
 
 def _nearest(mesh: Mesh, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangle and barycentric coordinates of the nearest point of a mesh to each of some points."""
-    tree = igl.AABB()
-    tree.init(mesh.V, mesh.F)
-    _, triangle, nearest = tree.squared_distance(mesh.V, mesh.F, points)
+    triangle, nearest = ClosestPoints(mesh.V, mesh.F)(points)
     a, b, c = (np.ascontiguousarray(mesh.V[mesh.F[triangle, k]]) for k in range(3))
     return triangle, igl.barycentric_coordinates(nearest, a, b, c)

@@ -130,7 +130,7 @@ void main() {
   shade = vec4(0.0);
   if (found.x > 1e-4) {
     found = covered(at, penumbra(found));
-    if (found.x > 1e-4) {  // what lies a texel above the floor casts nothing: about what stands there, texels are covered in part
+    if (found.x > 1e-4) {  // what lies less than a texel above the floor casts nothing: about what stands there, texels are covered in part
       found = covered(at, penumbra(found)); shade = vec4(clamp((gl_FragCoord.z * found.x - found.y) * ${size}.0 - found.x, 0.0, found.x));
     }
   }
