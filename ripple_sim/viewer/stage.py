@@ -207,7 +207,7 @@ class Stage:
     skins : dict
         `SkinActor` of each target, by the geom's name.
     shadows : Shadows or None
-        None without a floor.
+        None without a level floor.
     """
 
     def __init__(self, plotter: pv.Plotter, session: Session) -> None:

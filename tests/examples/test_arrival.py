@@ -64,10 +64,8 @@ def test_same_object_otherwise_presented_has_the_same_times() -> None:
         there = scale * points @ rotation.T
         _, directions = other.project(there)
         start, _ = other.project(scale * source @ rotation.T)
-        return (
-            fronts.front_and_crest(*fronts.waves_of(other, start[0], directions, scale * width, scale * reach))[0]
-            / scale
-        )
+        waves = fronts.waves_of(other, start[0], directions, scale * width, scale * reach)
+        return fronts.front_and_crest(*waves)[0] / scale
 
     unit = np.eye(3)
     reference = times(atlas, unit, 1.0)

@@ -13,10 +13,12 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+import pyvista
 from PIL import Image
 
 from ripple_sim.cli import main as cli
 from ripple_sim.viewer import BALLS, OPERATORS, SLIDERS, Session, Window, benchmark, run, window as viewing
+from ripple_sim.viewer.stage import Stage
 
 OFF_SCREEN = "DISPLAY" not in os.environ
 MIDDLE = (200, 160)  # of the sphere in the window, from the lower left [pixels]
@@ -252,7 +254,7 @@ def test_the_loop_runs_until_the_user_quits(closed: Window, monkeypatch: pytest.
     assert closed.session.time == pytest.approx(4 / 30)
 
 
-def test_shadows_darken_as_bodies_come_down(window: Window) -> None:
+def test_shadows_darken_as_bodies_come_down_on_a_level_floor_alone(window: Window) -> None:
     session = window.session
     model, data = session.simulation.model, session.simulation.data
     ball = model.geom("ball").id
@@ -264,6 +266,8 @@ def test_shadows_darken_as_bodies_come_down(window: Window) -> None:
         darkness.append(shadow.prop.opacity if shadow.GetVisibility() else 0.0)
     assert 0 == darkness[0] < darkness[1] < darkness[2]
     np.testing.assert_allclose(shadow.GetCenter(), [1.0, 0.5, 0.0], atol=2e-3)
+    data.geom_xmat[model.geom("floor").id, 8] = 0.9
+    assert Stage(pyvista.Plotter(off_screen=True), session).shadows is None
 
 
 @pytest.mark.skipif(not OFF_SCREEN, reason="has a window of its own, without a display")

@@ -18,21 +18,11 @@ CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 
 
 
 def test_the_floor_is_the_highest_of_the_planes_that_face_up_most() -> None:
-    low, high, away = (
-        '<geom type="plane" size="0 0 1" pos="0 0 -1"/>',
-        '<geom type="plane" size="0 0 1"/>',
-        'pos="0 0 9"',
-    )
-    wall, ceiling = (f'<geom type="plane" size="0 0 1" {away} euler="{turn} 0 0"/>' for turn in (90, 180))
-    for planes, floor in (
-        (low + wall + high + ceiling, 2),
-        (high + low, 0),
-        (ceiling + wall, 1),
-        ("<geom size='1'/>", None),
-    ):
-        assert (
-            find_floor(mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{planes}</worldbody></mujoco>"), []) == floor
-        )
+    places = 'pos="0 0 -1"', "", 'pos="0 0 9" euler="90 0 0"', 'pos="0 0 9" euler="180 0 0"'
+    low, high, wall, ceiling = (f'<geom type="plane" size="0 0 1" {place}/>' for place in places)
+    for planes, floor in ((low + wall + high + ceiling, 2), (high + low, 0), (ceiling + wall, 1), ("", None)):
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{planes}</worldbody></mujoco>")
+        assert find_floor(model, []) == floor
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):
