@@ -49,21 +49,16 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
         return mean
     chosen = np.isin(vertex, steep)
     vertex, beside = np.searchsorted(steep, vertex[chosen]), normal[triangle[chosen]]
-    other = _middles(mean[steep], vertex, beside)
-    better = _worst(other, vertex, beside) > _worst(mean[steep], vertex, beside)
-    mean[steep[better]] = other[better]
-    return mean
-
-
-def _middles(start: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Middles [k, 3] of the smallest caps that hold the normals [c, 3] at vertices [c] (Badoiu and Clarkson 2003)."""
-    middle = start.copy()
+    # middles of the smallest caps that hold the normals at each of these vertices (Badoiu and Clarkson 2003)
+    middle = mean[steep]
     for i in range(1, _STEPS):
-        cosine = np.einsum("ij,ij->i", middle[vertex], beside)
-        order = np.lexsort((cosine, vertex))
+        order = np.lexsort((np.einsum("ij,ij->i", middle[vertex], beside), vertex))
         farthest = order[np.searchsorted(vertex[order], np.arange(len(middle)))]
         middle += (beside[farthest] - middle) / (i + 1)
-    return _unit(middle)
+    middle = _unit(middle)
+    better = _worst(middle, vertex, beside) > _worst(mean[steep], vertex, beside)
+    mean[steep[better]] = middle[better]
+    return mean
 
 
 def _worst(normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -140,8 +135,7 @@ class Mesh:
         MeshError
             If there is no triangle with an area, or a vertex is not finite.
         """
-        points, triangles = _checked(V, F, name)
-        corner_uv = None if uv is None else _corner_uv(uv, points, triangles, name)
+        points, triangles, corner_uv = _checked(V, F, uv, name)
         with np.errstate(under="ignore"):
             points, corners, notes = _cleaned(points, triangles, corner_uv, name)
         vertex_uv = None
@@ -203,7 +197,9 @@ class Mesh:
         return vertex_normals(self.V, self.F)
 
 
-def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _checked(
+    V: ArrayLike, F: ArrayLike, uv: ArrayLike | None, name: str
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]:
     try:
         points, triangles = np.asarray(V, dtype=np.float64), np.asarray(F)
         if triangles.dtype.kind not in "iu":
@@ -225,7 +221,13 @@ def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64]
         extent = np.ptp(points[used], axis=0).max()
     if not _SMALLEST <= extent <= _LARGEST:
         raise MeshError(f"{name}: its size is {extent:.3g} m; valid is {_SMALLEST:g} to {_LARGEST:g} m")
-    return points, triangles
+    if uv is None:
+        return points, triangles, None
+    pairs = np.asarray(uv, dtype=np.float64)
+    valid = (len(points), 2), (*triangles.shape, 2)
+    if pairs.shape not in valid:
+        raise MeshError(f"{name}: uv has shape {pairs.shape}; valid is {valid[0]} or {valid[1]}")
+    return points, triangles, pairs[triangles] if pairs.ndim == 2 else pairs
 
 
 def _cleaned(
@@ -267,15 +269,6 @@ def _changes(corners: Corners) -> tuple[int, int]:
     pairs = distinct(given[old] * vertices + corners.F.ravel()[old])
     kept = len(distinct(pairs % vertices))
     return len(pairs) - kept, len(pairs) - len(distinct(given[old])) + int(vertices) - kept
-
-
-def _corner_uv(uv: ArrayLike, V: NDArray, F: NDArray, name: str) -> NDArray[np.float64]:
-    pairs = np.asarray(uv, dtype=np.float64)
-    if pairs.shape == (len(V), 2):
-        return pairs[F]
-    if pairs.shape == (*F.shape, 2):
-        return pairs
-    raise MeshError(f"{name}: uv has shape {pairs.shape}; valid is {(len(V), 2)} or {(*F.shape, 2)}")
 
 
 # A surface that encloses less, relative to the cube of its size, has no inside.

@@ -298,17 +298,16 @@ def turned(
     length = np.ones(len(pairs)) if cost is None else cost
     # of two triangles with two common sides, one link decides; coo would add both
     low, high = pairs.min(axis=1), pairs.max(axis=1)
-    order = np.lexsort((length, high, low))
-    key = (low * count + high)[order]
-    once = order[np.append(True, key[1:] != key[:-1])]
+    key = low * count + high
+    order = np.lexsort((length, key))
+    once = order[np.append(True, np.diff(key[order]) != 0)]
     graph = coo_array((length[once], (low[once], high[once])), shape=(count, count)).tocsr()
     roots = np.unique(labels(pairs, count), return_index=True)[1]
     _, before, _ = dijkstra(graph, directed=False, indices=roots, return_predecessors=True, min_only=True)
     rest = np.flatnonzero(before >= 0)
     up = np.arange(count)
     up[rest] = before[rest]
-    sorted_keys = (low * count + high)[once]
-    link = np.searchsorted(sorted_keys, np.minimum(rest, up[rest]) * count + np.maximum(rest, up[rest]))
+    link = np.searchsorted(key[once], np.minimum(rest, up[rest]) * count + np.maximum(rest, up[rest]))
     result[rest] = against[once][link]
     while (up[up] != up).any():  # the sum along the path, by doubling
         result ^= result[up]
