@@ -27,14 +27,7 @@ except ImportError:  # on Windows
 from .errors import RippleError, shown
 
 # Errors of the system that another name would have avoided.
-OF_THE_NAME = (
-    errno.ENAMETOOLONG,
-    errno.ENOENT,
-    errno.ENOTDIR,
-    errno.EISDIR,
-    errno.EINVAL,
-    errno.ELOOP,
-)
+OF_THE_NAME = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EINVAL, errno.ELOOP)
 
 # Those of them that hold in every folder.
 NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
@@ -86,10 +79,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
 _SMALL = 32e6
 
 # By cgroup version: folder of the memory controller, and the files of its limit and of what is taken.
-_CGROUPS = {
-    2: ("", "memory.max", "memory.current"),
-    1: ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
-}
+_CGROUPS = {2: ("", "memory.max", "memory.current"), 1: ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes")}
 
 
 def require_memory(error: type[RippleError], need: float, what: str, advice: str) -> None:

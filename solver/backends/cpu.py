@@ -100,17 +100,9 @@ class RowLayout:
             beside = rows.reshape(4, self.n + 1, count + 1, self.n + 2)
             beside[:, :, :count, : self.n + 1] = stencil.weights.transpose(1, 2, 0, 3)
         links, addresses = stencil.irregular, self.addresses
-        return Weights(
-            rows,
-            self.columns,
-            Links(
-                self.places[links.texels],
-                addresses[links.texels],
-                links.begins,
-                addresses[links.others],
-                links.weights.astype(np.float32),
-            ),
-        )
+        texels, weights = links.texels, links.weights.astype(np.float32)
+        irregular = Links(self.places[texels], addresses[texels], links.begins, addresses[links.others], weights)
+        return Weights(rows, self.columns, irregular)
 
     def texels(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texels of a field, without halo: a view [C, n, n]."""
@@ -167,18 +159,10 @@ def volume_balance(operator: WaveOperator, dt: float, fields: RowLayout) -> Bala
     follows = np.append(False, np.diff(addresses) == 1)
     follows[begins[:-1][begins[:-1] < len(follows)]] = False
     starts = np.flatnonzero(~follows)
+    runs = np.searchsorted(starts, begins), addresses[starts], np.append(starts, len(addresses))
     loaded, total = np.zeros((2, len(begins) - 1), np.float32)
-    return Balance(
-        np.searchsorted(starts, begins),
-        addresses[starts],
-        np.append(starts, len(addresses)),
-        heights,
-        velocities,
-        loaded,
-        total,
-        fields.coefficients(np.zeros(operator.mass.shape, np.float32)),
-        *part_runs(operator, fields),
-    )
+    pressure = fields.coefficients(np.zeros(operator.mass.shape, np.float32))
+    return Balance(*runs, heights, velocities, loaded, total, pressure, *part_runs(operator, fields))
 
 
 class CPUBackend(FieldBackend):
@@ -233,19 +217,10 @@ class CPUBackend(FieldBackend):
         features = self._features
         drags = self._plain and len(features.viscosity.rows) > 0
         self._sums = np.zeros((substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32)
-        kernels.advance(
-            substeps,
-            np.float32(dt),
-            *(field.reshape(-1) for field in (self._h, self._v, self._h_next)),
-            self._fields.halo,
-            kick,
-            *self._kicks,
-            features.viscosity if drags else None,
-            None if self._plain else features,
-            self._probes,
-            NO_WEIGHTS.irregular.weights if self._dent is None else self._dent.reshape(-1),
-            self._sums,
-        )
+        fields = (field.reshape(-1) for field in (self._h, self._v, self._h_next))
+        dent = NO_WEIGHTS.irregular.weights if self._dent is None else self._dent.reshape(-1)
+        acting = features.viscosity if drags else None, None if self._plain else features, self._probes, dent
+        kernels.advance(substeps, np.float32(dt), *fields, self._fields.halo, kick, *self._kicks, *acting, self._sums)
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
         if self._crests is not None:

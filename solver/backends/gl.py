@@ -19,16 +19,7 @@ from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_li
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
-from .gl_fields import (
-    DeviceField,
-    DeviceProbes,
-    Dispatch,
-    FieldLayout,
-    Pressure,
-    TexelList,
-    bind_buffers,
-    link_buffers,
-)
+from .gl_fields import DeviceField, DeviceProbes, Dispatch, FieldLayout, Pressure, TexelList, bind_buffers, link_buffers
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
@@ -298,7 +289,11 @@ class GLBackend(FieldBackend):
                 operator = self._stencil.buffer, self._coefficients, self._extra.field
                 bind_buffers(self._h, self._v, self._h_next, *operator, *pressure)
                 self._dispatch.run_texels(kick_drift)
-                self._kick_irregular(drift)
+                links, *buffers = self._links
+                if links:
+                    self._irregular_kick["dt"] = drift
+                    bind_buffers(self._h, self._v, self._h_next, *buffers)
+                    self._dispatch.run_list(self._irregular_kick, links)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
                 if self._probes is not None:
@@ -370,14 +365,6 @@ class GLBackend(FieldBackend):
     def _drop_kicks(self) -> None:
         self._waiting, self._shift = [], 0.0
 
-    def _kick_irregular(self, dt: float) -> None:
-        """What the irregular links add to a substep."""
-        count, *buffers = self._links
-        if count:
-            self._irregular_kick["dt"] = dt
-            bind_buffers(self._h, self._v, self._h_next, *buffers)
-            self._dispatch.run_list(self._irregular_kick, count)
-
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
         """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
         new_length = self._prepared != (dt, self.keeps_volume)
@@ -386,7 +373,10 @@ class GLBackend(FieldBackend):
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
             self._links = link_buffers(self._gl, self._fields, self._stencil.irregular, k.gain)
-            self._keep_volume(dt)
+            rate = volume_rate(self._operator, dt) if self.keeps_volume else None
+            if rate is not None or (self._held is not None and self._held.follow is not None):
+                needed = rate is not None or self._operator.parts is not None
+                self._held = Pressure(self._gl, self._fields, self._operator, self._dispatch, rate) if needed else None
             self._prepared = (dt, self.keeps_volume)
         k = self._step
         if new_length or self._load_is_new:
@@ -402,13 +392,6 @@ class GLBackend(FieldBackend):
         if not self._maps:
             kick_drift["decay"], kick_drift["spring"], kick_drift["span"] = k.decay, k.spring, k.span
         return kick_drift
-
-    def _keep_volume(self, dt: float) -> None:
-        operator = self._operator
-        rate = volume_rate(operator, dt) if self.keeps_volume else None
-        if rate is not None or (self._held is not None and self._held.follow is not None):
-            needed = rate is not None or operator.parts is not None
-            self._held = Pressure(self._gl, self._fields, operator, self._dispatch, rate) if needed else None
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:

@@ -281,7 +281,10 @@ class Pressure:
         self, rate: VolumeRate, fields: FieldLayout, dispatch: Dispatch
     ) -> Callable[[moderngl.Buffer, moderngl.Buffer], None]:
         begins, texels, heights, velocities = rate
-        chunks, bounds = _chunks(begins)
+        # the entries of each part in chunks: first and one after the last of each; where those of a part begin
+        cuts = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
+        chunks = np.concatenate([np.stack([each[:-1], each[1:]], axis=1) for each in cuts])
+        bounds = np.cumsum([0, *(len(each) - 1 for each in cuts)])
         tables = (
             fields.texels[texels].astype(np.int32),
             np.stack([heights, velocities if len(velocities) else np.zeros_like(heights)], axis=1),
@@ -302,13 +305,6 @@ class Pressure:
             dispatch.run_list(balance, count)
 
         return follow
-
-
-def _chunks(begins: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cut the entries of each part into chunks: first and one after the last of each; where those of a part begin."""
-    bounds = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
-    chunks = [np.stack([each[:-1], each[1:]], axis=1) for each in bounds]
-    return np.concatenate(chunks), np.cumsum([0, *map(len, chunks)])
 
 
 class DeviceProbes:
@@ -332,13 +328,9 @@ class DeviceProbes:
                 self._sums = ctx.buffer(reserve=4 * substeps * self._count)
 
     def take(
-        self,
-        step: int,
-        drifted: float,
-        height: moderngl.Buffer,
-        velocity: moderngl.Buffer,
+        self, step: int, drifted: float, height: moderngl.Buffer, velocity: moderngl.Buffer,
         dent: moderngl.Buffer | None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """The sums of a substep, whose heights have drifted beyond its velocities [s]."""
         shader = self._shaders[dent is not None]
         shader["first"], shader["drifted"] = step * self._count, drifted

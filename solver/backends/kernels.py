@@ -177,9 +177,7 @@ class Features(NamedTuple):
 _NO_INTS, _NO_FLOATS = np.zeros(0, np.int64), np.zeros(0, np.float32)
 NO_WEIGHTS = Weights(np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS))
 NO_BALANCE = Balance(
-    *(_NO_INTS, _NO_INTS, _NO_INTS),
-    *(_NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS),
-    *(_NO_INTS, _NO_INTS),
+    _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_INTS, _NO_INTS
 )
 NO_FEATURES = Features(NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, NO_BALANCE)
 
@@ -284,21 +282,10 @@ def flow(h: Floats32, limit: Floats32, dent: Floats32) -> None:
 
 @kernel
 def advance(
-    substeps: int,
-    dt: np.float32,
-    h: Floats32,
-    v: Floats32,
-    h_next: Floats32,
-    halo: Ints,
-    kick: Kick,
-    addresses: Ints,
-    kicks: Floats32,
-    viscosity: Weights | None,
-    features: Features | None,
-    probes: Probes | None,
-    dent: Floats32,
-    sums: Floats32,
-) -> None:
+    substeps: int, dt: np.float32, h: Floats32, v: Floats32, h_next: Floats32, halo: Ints,
+    kick: Kick, addresses: Ints, kicks: Floats32,
+    viscosity: Weights | None, features: Features | None, probes: Probes | None, dent: Floats32, sums: Floats32,
+) -> None:  # fmt: skip
     """Substeps of dt, from the first half drift to the last, and velocities [k] that kick the texels at addresses [k].
 
     The height ends in `h_next` where their number is odd.

@@ -275,7 +275,9 @@ def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> 
     texels = _around(atlas.texels.topology, center, 2)
     away = atlas.positions.reshape(-1, 3)[texels] - point
     normal = atlas.normals.reshape(-1, 3)[center]
-    u, v = _tangents(normal)
+    u = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
     size = np.sqrt(atlas.areas.reshape(-1)[center])
     x, y = away @ u / size, away @ v / size
     near = 1 / (x * x + y * y + 1e-3)
@@ -284,13 +286,6 @@ def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> 
     if laplacian is None:
         return texels, solved[0]
     return texels, laplacian * 2 * (solved[2] + solved[7]) / size**2
-
-
-def _tangents(normal: NDArray) -> NDArray[np.float64]:
-    """Two unit vectors across a normal, [2, 3]."""
-    u = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    u /= np.linalg.norm(u)
-    return np.stack([u, np.cross(normal, u)])
 
 
 def _resolved(atlas: Atlas, material: Material, center: int) -> float:
