@@ -225,8 +225,7 @@ def fingerprint(module: str) -> str:
         base = importlib.util.resolve_name(base, sys.modules[module].__package__ or "")
         for name in re.findall(r"\w+", names):
             imported.add(f"{base}.{name}" if f"{base}.{name}" in sys.modules else base)
-    texts = [source, *map(fingerprint, sorted(imported))]
-    return hashlib.sha256("\0".join(texts).encode()).hexdigest()
+    return hashlib.sha256("\0".join([source, *map(fingerprint, sorted(imported))]).encode()).hexdigest()
 
 
 def shared(function: Callable) -> Any:

@@ -116,9 +116,8 @@ def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Fl
         rising, risen, falling, fallen = w[chart, 2, r], w[chart, 2, r - 1], w[chart, 3, r], w[chart, 3, r - 1]
         factors, result = row_of(factor, i * columns, columns), out[at : at + pitch]
         for c in range(1, columns + 1):
-            force = value_in(factors, c - 1) * force_at(
-                below, row, above, east, north, south, rising, risen, falling, fallen, c
-            )
+            force = force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
+            force *= value_in(factors, c - 1)
             result[c] = result[c] + force if add else force
     irregular = stencil.irregular
     for i in range(len(irregular.texels)):
@@ -246,15 +245,8 @@ def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.fl
         extra, acceleration = row_of(kick.extra, at, pitch), row_of(kick.acceleration, first, columns)
         for c in range(1, columns + 1):
             held = value_in(span, c - 1) * value_in(acceleration, c - 1) - value_in(spring, c - 1) * row[c]
-            pushed = (
-                gain[c - 1]
-                * (
-                    force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
-                    + value_in(extra, c)
-                )
-                + held
-            )
-            new = value_in(decay, c - 1) * velocity[c] + pushed
+            force = force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
+            new = value_in(decay, c - 1) * velocity[c] + (gain[c - 1] * (force + value_in(extra, c)) + held)
             velocity[c] = new
             result[c] = row[c] + dt * new
     irregular = kick.stencil.irregular

@@ -11,8 +11,6 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .topology import distinct, labels, sides_of, split_triangles, turned, undirected
@@ -56,11 +54,10 @@ class Corners:
             Where it lies, from 0 at the side's first corner to 1 at the other.
         """
         parent, corner = split_triangles(point >= 0)
-        columns = np.arange(3)
         F, numbers = np.hstack([self.F, point]), np.hstack([self.given, given])
         uv = None
         if self.uv is not None:
-            along = self.uv + share[..., None] * (self.uv[:, (columns + 1) % 3] - self.uv)
+            along = self.uv + share[..., None] * (np.roll(self.uv, -1, axis=1) - self.uv)
             uv = np.concatenate([self.uv, along], axis=1)[parent[:, None], corner]
         return Corners(F[parent[:, None], corner], numbers[parent[:, None], corner], uv)
 
@@ -127,9 +124,7 @@ def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.i
     if len(rim) == 0:
         return F
     width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
-    pairs = cKDTree(V[rim]).query_pairs(width, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(rim), len(rim)))
-    _, label = connected_components(graph, directed=False)
+    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
     target = np.arange(len(V))
     target[rim] = rim[np.unique(label, return_index=True)[1]][label]
     # a needle is as thin as a crack, but no crack

@@ -124,8 +124,7 @@ def _lids(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.floa
     added = len(filled_V) - len(V)
     if added < 0 or not np.array_equal(filled_V[added:], V):
         raise MeshError("it changed the surface itself")
-    old_first = np.roll(np.arange(len(filled_V)), -added)
-    numbers = np.argsort(old_first)[filled_F]
+    numbers = (filled_F - added) % len(filled_V)
     known = {tuple(triangle) for triangle in np.sort(F, axis=1).tolist()}
     new = [tuple(triangle) not in known for triangle in np.sort(numbers, axis=1).tolist()]
     return filled_V[:added], numbers[np.array(new, dtype=bool)]

@@ -41,8 +41,7 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     for k, angle in enumerate(corner_angles(V, F).T):
         for axis in range(3):
             total[:, axis] += np.bincount(F[:, k], weights=angle * normal[:, axis], minlength=len(V))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    mean = np.where(length > 0, _unit(total), [0.0, 0.0, 1.0])
+    mean = np.where(np.linalg.norm(total, axis=1, keepdims=True) > 0, _unit(total), [0.0, 0.0, 1.0])
     vertex, triangle = F.ravel(), np.repeat(np.arange(len(F)), 3)
     steep = np.flatnonzero(_worst(mean, vertex, normal[triangle]) < _STEEP)
     if not len(steep):

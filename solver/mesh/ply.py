@@ -230,8 +230,7 @@ def read_ply(content: bytes) -> Soup:
     order, elements, data = _header(content)
     columns: dict[str, dict[str, Any]] = {}
     for element in elements:
-        read = read_text if order == "" else read_binary
-        columns[element.name], data = read(element, data, order)
+        columns[element.name], data = (read_binary if order else read_text)(element, data, order)
         if "face" in columns and "vertex" in columns:
             break
     vertex, faces = columns.get("vertex", {}), columns.get("face", {})

@@ -160,8 +160,7 @@ def genera(F: NDArray[np.int64], part: NDArray[np.int64], rims: tuple[NDArray[np
     vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=count)
     triangles = np.bincount(part)
     # every triangle has three sides; each inner edge has two of them, each edge of a rim one
-    on_rims = np.zeros(count, dtype=np.int64)
-    loops = np.zeros(count, dtype=np.int64)
+    on_rims, loops = np.zeros((2, count), dtype=np.int64)
     for rim in rims:
         on_rims[of_vertex[rim[0]]] += len(rim)
         loops[of_vertex[rim[0]]] += 1

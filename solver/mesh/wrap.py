@@ -50,8 +50,7 @@ def distance_grid(
     corners = _COARSEST * np.indices(blocks).reshape(3, -1).T
     size = _COARSEST
     while True:
-        middle = origin + distance * (corners + (size - 1) / 2)
-        found = closest_points.distances(middle)
+        found = closest_points.distances(origin + distance * (corners + (size - 1) / 2))  # of the blocks' middles
         places = corners[:, None] + np.indices([size] * 3).reshape(3, -1).T
         values[tuple(np.moveaxis(places, -1, 0))] = found[:, None]
         if size == 1:

@@ -18,8 +18,7 @@ from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from ..texels.moving import MovedPlaces, SurfaceRide
 from ..texels.texel_mesh import TexelMesh, tangents
-from ..texels.topology import fill_halo
-from .height_map import mirror_at_rim
+from .height_map import fill_around
 
 # The stiffness is made anew once the square of an edge's length has changed by this share since it was made.
 _CHANGED = 2e-3
@@ -161,8 +160,7 @@ class MovedGradients:
         """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [vertex_count, 3] [m]."""
         moved = np.array(height_map, np.float32)
         _carry(self._rest, np.stack(tangents(np.moveaxis(self._ride.around(V), 0, -1)), axis=3), moved)
-        fill_halo(self._texels.topology, moved)
-        mirror_at_rim(self._texels.topology, moved)
+        fill_around(self._texels.topology, moved)
         return moved
 
 

@@ -270,13 +270,11 @@ class WaveSolver:
         where, impulses = spread(self.atlas, "impulse", impulse, "N s", point, radius)
         momentum = -impulses * self.operator.source_share.reshape(-1)[where.texels]
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
-        fastest = check_kick(velocities, "impulse", impulse, "N s")
-        self._guard.note("impulse", impulse, "N s", self.time, fastest)
+        self._guard.note("impulse", impulse, "N s", self.time, check_kick(velocities, impulse))
         # sums too large for float32 become infinite here, and are reported later
         with np.errstate(over="ignore"):
-            self._backend.kick(
-                where.texels, velocities.astype(np.float32), self._held.counterpart(where.texels, momentum)
-            )
+            balance = self._held.counterpart(where.texels, momentum)
+            self._backend.kick(where.texels, velocities.astype(np.float32), balance)
         return where
 
     def add_force(self, point: ArrayLike, force: float, radius: float) -> Footprint:
@@ -384,10 +382,8 @@ class WaveSolver:
         height, velocity = elastic.astype(np.float64), self.velocity.astype(np.float64)
         with np.errstate(invalid="ignore"):  # NaN says enough
             kinetic = float((self.operator.momenta(velocity) * velocity).sum()) / 2
-            of_height, of_velocity = (
-                -float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity)
-            )
-            return kinetic + of_height - self._substep**2 / 4 * of_velocity
+            of_h, of_v = (-float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity))
+            return kinetic + of_h - self._substep**2 / 4 * of_v
 
     def volume(self) -> float:
         """Volume that the waves add to the target, to first order: sum of area times height [m^3]."""
