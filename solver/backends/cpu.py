@@ -203,6 +203,11 @@ class CPUBackend(FieldBackend):
         self._v.reshape(-1)[self._fields.addresses[texels]] += velocities
         self._shift = everywhere if self._shift is None else self._shift + everywhere
 
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
+        self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
+        self._load_is_new = True
+
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
         k, balance = self._prepare(dt), self._balance

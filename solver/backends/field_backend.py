@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..operator.wave_operator import WaveOperator
 from .gl_fields import DeviceField
-from .kernels import Amplitude
 
 
 class FieldBackend:
@@ -70,11 +69,6 @@ class FieldBackend:
         """Replace the velocity."""
         self._fields.write(self._v, velocity)
         self._drop_kicks()
-
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
-        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
-        self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
-        self._load_is_new = True
 
     def probed(self) -> NDArray[np.float32]:
         """The sums of the latest `advance`, [substeps, k]."""

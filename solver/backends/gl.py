@@ -19,7 +19,7 @@ from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_li
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
-from .gl_fields import DeviceField, DeviceProbes, Dispatch, FieldLayout, Pressure, TexelList, bind_buffers, link_buffers
+from .gl_fields import DeviceField, DeviceProbes, Dispatch, FieldLayout, Pressure, TexelList, bind_buffers, to_buffer
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
@@ -49,10 +49,10 @@ class DeviceStiffness:
             self._vertices = ctx.buffer(reserve=stencil.places.V.nbytes)
             self._places, self._sides = ctx.buffer(reserve=24 * self._count), ctx.buffer(reserve=24 * self._count)
             self._values, self._peak = ctx.buffer(reserve=4 * (1 + len(added))), ctx.buffer(bytes(4))
-        self._corners, self._texels = (_upload(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
-        self._weights, quads = _upload(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
+        self._corners, self._texels = (to_buffer(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
+        self._weights, quads = to_buffer(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
         self._conductance, self._per_area, self._detours, self._shares, self._masses, self._beside = (
-            _upload(gl, each, np.float32)
+            to_buffer(gl, each, np.float32)
             for each in (quads.conductance, quads.per_area, quads.detours, shares, mass, np.zeros(mass.size))
         )
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
@@ -61,7 +61,7 @@ class DeviceStiffness:
         self._shaders["quads"] = dispatch.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
 
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
-        """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
+        """Write the nine-point stencil into a buffer of `FieldLayout.links`; return the irregular links."""
         V, (quads, _) = stencil.places.V, stencil.coefficient
         interpolate(V, *self._special)
         self._around[:, stencil.cells.special_places] = self._special[-1]
@@ -112,13 +112,8 @@ def _link_groups(
     """
     charts, n, _ = topology.shape
     chart, link, r, c = np.unravel_index(links, (charts, 4, n + 1, n + 1))
-    places = _upload(gl, 4 * ((chart * (n + 2) + r) * (n + 2) + c) + link, np.int32)
-    return len(begins) - 1, places, _upload(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32)
-
-
-def _upload(gl: GLContext, values: NDArray, kind: type) -> moderngl.Buffer:
-    with gl as ctx:
-        return ctx.buffer(np.ascontiguousarray(values, kind).tobytes() or bytes(8))
+    places = to_buffer(gl, 4 * ((chart * (n + 2) + r) * (n + 2) + c) + link, np.int32)
+    return len(begins) - 1, places, to_buffer(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32)
 
 
 class StencilBuffer:
@@ -126,7 +121,7 @@ class StencilBuffer:
 
     def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, stencil: Stencil) -> None:
         self._gl, self._fields, self._dispatch = gl, fields, dispatch
-        self.buffer, self.irregular = fields.upload_stencil(stencil), stencil.irregular
+        self.buffer, self.irregular = to_buffer(gl, fields.links(stencil), np.float32), stencil.irregular
         self._device: DeviceStiffness | None = None
 
     def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
@@ -141,7 +136,8 @@ class StencilBuffer:
                 self._device = DeviceStiffness(self._gl, self._dispatch, moved, mass)
             self.irregular = self._device.write(moved, self.buffer)
         else:
-            self._fields.write_stencil(self.buffer, stencil)
+            with self._gl:
+                self.buffer.write(self._fields.links(stencil))
             self.irregular = stencil.irregular
 
 
@@ -202,10 +198,10 @@ class ExtraForces:
         """Upload the links at irregular vertices."""
         ones = np.ones_like(operator.mass)
         if self._viscosity:
-            self._viscosity_links = link_buffers(self._gl, self._fields, self._viscosity.irregular, ones)
+            self._viscosity_links = self._fields.upload_links(self._viscosity.irregular, ones)
         if self._laplace and operator.bending is not None:
             self._moment_links, self._bending_links = (
-                link_buffers(self._gl, self._fields, self._laplace.irregular, factors)
+                self._fields.upload_links(self._laplace.irregular, factors)
                 for factors in (operator.bending.rigidity, -ones)
             )
 
@@ -265,6 +261,11 @@ class GLBackend(FieldBackend):
         self._waiting.append((texels, velocities))
         self._shift = self._shift + everywhere
 
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
+        self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
+        self._load_is_new = True
+
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
         with self._gl:
@@ -311,7 +312,7 @@ class GLBackend(FieldBackend):
         self._stencil.write(operator.stencil, operator.mass)
         self._extra.move(operator)
         if self._prepared[0]:
-            self._links = link_buffers(self._gl, self._fields, self._stencil.irregular, self._step.gain)
+            self._links = self._fields.upload_links(self._stencil.irregular, self._step.gain)
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
@@ -367,7 +368,7 @@ class GLBackend(FieldBackend):
             self._step = k = step_coefficients(self._operator, dt)
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
-            self._links = link_buffers(self._gl, self._fields, self._stencil.irregular, k.gain)
+            self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
             rate = volume_rate(self._operator, dt) if self.keeps_volume else None
             if rate is not None or (self._held is not None and self._held.follow is not None):
                 needed = rate is not None or self._operator.parts is not None

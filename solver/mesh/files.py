@@ -167,10 +167,9 @@ def read_obj(content: bytes) -> Soup:
     vertex, pair = np.array(corners, dtype=np.int64).reshape(-1, 2).T
     wrong = (vertex < 0) | (vertex >= len(V))
     if wrong.any():
-        number = int(np.repeat(lines, sizes)[np.argmax(wrong)])
-        raise MeshError(
-            f"line {number} refers to vertex {vertex[np.argmax(wrong)] + 1}; valid is 1 to {len(V)}, the vertices given"
-        )
+        at = np.argmax(wrong)
+        number = np.repeat(lines, sizes)[at]
+        raise MeshError(f"line {number} refers to vertex {vertex[at] + 1}; valid is 1 to {len(V)}, the vertices given")
     counts = np.array(sizes, dtype=np.int64)
     triangles = triangulate(V[vertex], counts)
     uv = _numbers(pairs).reshape(-1, 2)
@@ -191,19 +190,17 @@ def read_off(content: bytes) -> Soup:
     if not rows or not re.fullmatch(r"(ST)?C?N?OFF", rows[0][0].upper()) or "BINARY" in rows[0]:
         raise MeshError("it does not start with OFF, as an OFF file in text form does")
     counts = rows[0][1:] or (rows[1] if len(rows) > 1 else [])
-    lines_left = rows[1:] if rows[0][1:] else rows[2:]
+    left = rows[1:] if rows[0][1:] else rows[2:]
     if len(counts) < 2 or not all(word.isdecimal() for word in counts[:2]):
         raise MeshError("the numbers of vertices and faces are missing after OFF")
     vertices, faces = int(counts[0]), int(counts[1])
-    if len(lines_left) < vertices + faces:
-        raise MeshError(
-            f"it ends early: {vertices} vertices and {faces} faces are announced, {len(lines_left)} lines follow"
-        )
+    if len(left) < vertices + faces:
+        raise MeshError(f"it ends early: {vertices} vertices and {faces} faces are announced, {len(left)} lines follow")
     # the numbers of the lines are lost with the comments, so vertices are counted instead
-    places = [_three(words, number, "vertex") for number, words in enumerate(lines_left[:vertices], 1)]
+    places = [_three(words, number, "vertex") for number, words in enumerate(left[:vertices], 1)]
     V = _numbers([word for row in places for word in row]).reshape(-1, 3)
     polygons = []
-    for words in lines_left[vertices : vertices + faces]:
+    for words in left[vertices : vertices + faces]:
         size = _whole(words[0])
         corners = [_whole(word) for word in words[1 : 1 + max(size, 0)]]
         if len(corners) != size:
