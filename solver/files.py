@@ -122,10 +122,9 @@ def _table(path: Path, scale: int = 1024) -> dict[str, float]:
 
 def _text(path: Path) -> str:
     """The text of a file, or nothing where there is none, as on other systems."""
-    try:
+    with contextlib.suppress(OSError):
         return path.read_text()
-    except OSError:
-        return ""
+    return ""
 
 
 def _shown(size: float) -> str:

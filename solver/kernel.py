@@ -161,14 +161,12 @@ class _KernelCache(FunctionCache):
     def load(self, key: Any) -> Any:
         """What was compiled for a key of numba's, or None."""
         path = self._path(key)
-        try:
+        with contextlib.suppress(Exception):  # whatever a file holds, a kernel can be compiled
             content = path.read_bytes()
             if content[:32] == _checksum(path, content[32:]):
                 stored, sources, data = pickle.loads(content[32:])
                 if stored == key and sources == fingerprint(self._py_func.__module__):
                     return data
-        except Exception:  # whatever a file holds, a kernel can be compiled
-            return None
         return None
 
     def save(self, key: Any, data: Any) -> None:

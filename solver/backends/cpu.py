@@ -271,9 +271,7 @@ class CPUBackend(FieldBackend):
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
         new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
-            self._balance = None
-            if self.keeps_volume:
-                self._balance = volume_balance(self._operator, dt, self._fields)
+            self._balance = volume_balance(self._operator, dt, self._fields) if self.keeps_volume else None
             self._features = self._features._replace(balance=self._balance or NO_BALANCE)
             k = step_coefficients(self._operator, dt)
             varied = any(np.ndim(each) for each in (k.decay, k.spring, k.span))

@@ -321,23 +321,8 @@ def _act(h: Floats32, v: Floats32, halo: Ints, features: Features, extra: Floats
         apply(features.laplace, h, features.rigidity, False, features.moment)
         fill(features.moment, halo)
         apply(features.laplace, features.moment, np.float32(-1), drags, extra)
-    if len(features.balance.loaded):
-        _balance(h, v, features.balance)
-
-
-@kernel(fastmath={"contract", "reassoc"}, no_cpython_wrapper=True)
-def _weighed(factors: Floats32, field: Floats32) -> float:
-    """Sum of factor times field over texels side by side."""
-    total = 0.0
-    for i in range(len(factors)):
-        total += np.float64(factors[i] * field[i])
-    return total
-
-
-@kernel(no_cpython_wrapper=True)
-def _balance(h: Floats32, v: Floats32, balance: Balance) -> None:
-    """The pressure that keeps the volume of each part, where the density varies."""
-    for part in range(len(balance.loaded)):
+    balance = features.balance
+    for part in range(len(balance.loaded)):  # of which there are none where the density does not vary
         total = 0.0
         for run in range(balance.begins[part], balance.begins[part + 1]):
             first, last, address = balance.runs[run], balance.runs[run + 1], balance.addresses[run]
@@ -347,3 +332,12 @@ def _balance(h: Floats32, v: Floats32, balance: Balance) -> None:
         balance.total[part] = balance.loaded[part] + np.float32(total)
     for i in range(len(balance.parts)):
         balance.pressure[balance.part_begins[i] : balance.part_begins[i + 1]] = balance.total[balance.parts[i]]
+
+
+@kernel(fastmath={"contract", "reassoc"}, no_cpython_wrapper=True)
+def _weighed(factors: Floats32, field: Floats32) -> float:
+    """Sum of factor times field over texels side by side."""
+    total = 0.0
+    for i in range(len(factors)):
+        total += np.float64(factors[i] * field[i])
+    return total

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from .topology import distinct, labels, sides_of, split_triangles, turned, undirected
+from .topology import SPLITS, distinct, labels, sides_of, turned, undirected
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +53,14 @@ class Corners:
         share : [triangle_count, 3]
             Where it lies, from 0 at the side's first corner to 1 at the other.
         """
-        parent, corner = split_triangles(point >= 0)
+        sets, parents, patterns = (point >= 0) @ [1, 2, 4], [], []
+        for number, pattern in {0: [[0, 1, 2]], **SPLITS}.items():
+            chosen = np.flatnonzero(sets == number)
+            parents.append(np.repeat(chosen, len(pattern)))
+            patterns.append(np.tile(pattern, (len(chosen), 1)))
+        # of each piece, the triangle of which it is a part, and its corners, as `SPLITS` numbers them
+        order = np.argsort(np.concatenate(parents), kind="stable")
+        parent, corner = np.concatenate(parents)[order], np.concatenate(patterns)[order]
         F, numbers = np.hstack([self.F, point]), np.hstack([self.given, given])
         uv = None
         if self.uv is not None:

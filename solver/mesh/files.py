@@ -307,17 +307,15 @@ def check_mesh_file(path: Path) -> None:
 
 
 def _read(path: Path) -> Soup:
-    kind = path.suffix[1:].upper()
+    kind, file = path.suffix[1:].upper(), f"mesh file {str(path)!r}"
     try:
         if path.stat().st_size == 0:
-            raise MeshError(f"mesh file {str(path)!r} is empty")
-        require_memory(MeshError, _BYTE * path.stat().st_size, f"mesh file {str(path)!r}", "take a coarser mesh")
+            raise MeshError(f"{file} is empty")
+        require_memory(MeshError, _BYTE * path.stat().st_size, file, "take a coarser mesh")
         if path.suffix.lower() in _READERS:
             return _READERS[path.suffix.lower()](path.read_bytes())
         if kind.lower() not in trimesh.available_formats() or kind.lower() in _ARCHIVES:
-            raise MeshError(
-                f"mesh file {str(path)!r} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb, unpacked"
-            )
+            raise MeshError(f"{file} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb, unpacked")
         if path.suffix.lower() == ".gltf":
             _check_buffers(path)
         with path.open("rb"), warnings.catch_warnings():
@@ -326,16 +324,14 @@ def _read(path: Path) -> Soup:
     except MeshError as error:
         if repr(str(path)) in str(error):
             raise
-        raise MeshError(f"mesh file {str(path)!r} cannot be read: {error}") from error
+        raise MeshError(f"{file} cannot be read: {error}") from error
     except OSError as error:
-        raise MeshError(f"mesh file {str(path)!r} cannot be read: {error.strerror or error}") from error
+        raise MeshError(f"{file} cannot be read: {error.strerror or error}") from error
     except MemoryError:
         raise
     except Exception as error:  # trimesh lets its parsers' exceptions through
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise MeshError(
-            f"mesh file {str(path)!r} cannot be read: it is damaged or not a {kind} file ({reason})"
-        ) from error
+        raise MeshError(f"{file} cannot be read: it is damaged or not a {kind} file ({reason})") from error
 
 
 def _check_buffers(path: Path) -> None:

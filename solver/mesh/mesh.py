@@ -24,7 +24,7 @@ from .clean import (
     without_slivers,
 )
 from .sheets import cut_apart
-from .topology import corner_angles, distinct, genera, labels, rims_of, sides_of, triangle_areas, triangles_beside
+from .topology import corner_angles, distinct, labels, rims_of, sides_of, triangle_areas, triangles_beside
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
 _STEPS = 300
@@ -171,7 +171,17 @@ class Mesh:
     @functools.cached_property
     def genus(self) -> NDArray[np.int64]:
         """Number of handles of every part, shape [component_count]; an open part has those that it has with lids."""
-        return genera(self.F, self.components, self.rims)
+        count, part_of = self.component_count, np.full(self.F.max() + 1, -1)  # the part of each vertex
+        part_of[self.F] = self.components[:, None]
+        vertices, triangles = np.bincount(part_of[part_of >= 0], minlength=count), np.bincount(self.components)
+        # every triangle has three sides; each inner edge has two of them, each edge of a rim one
+        on_rims, loops = np.zeros((2, count), dtype=np.int64)
+        for rim in self.rims:
+            on_rims[part_of[rim[0]]] += len(rim)
+            loops[part_of[rim[0]]] += 1
+        edges = (3 * triangles + on_rims) // 2
+        # Euler's formula is V - E + F = 2 - 2 genus - rims
+        return (2 - (vertices - edges + triangles) - loops) // 2
 
     @functools.cached_property
     def triangle_areas(self) -> NDArray[np.float64]:
@@ -208,10 +218,9 @@ def _checked(
         raise MeshError(f"{name}: V and F must be arrays of numbers: {error}") from error
     if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
         raise MeshError(f"{name}: V must be [n, 3] and F [m, 3] with m > 0, got {points.shape} and {triangles.shape}")
-    if triangles.min() < 0 or triangles.max() >= len(points):
-        raise MeshError(
-            f"{name}: triangle indices run from {triangles.min()} to {triangles.max()}, valid is 0 to {len(points) - 1}"
-        )
+    low, high = triangles.min(), triangles.max()
+    if low < 0 or high >= len(points):
+        raise MeshError(f"{name}: triangle indices run from {low} to {high}, valid is 0 to {len(points) - 1}")
     used = distinct(triangles)
     bad = used[~np.isfinite(points[used]).all(axis=1)]
     if len(bad):

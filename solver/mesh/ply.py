@@ -57,13 +57,8 @@ def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any]
 def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
     """Columns of an element by name, and the data after it; `order` is "<" or ">".
 
-    Raises `MeshError` if the data end early.
+    Rows that are all of one length are read in one go. Raises `MeshError` if the data end early.
     """
-    return _read_table(element, data, order) or _read_rows(element, data, order)
-
-
-def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:
-    """Read rows that are all of one length, in one go; None where their lists are not."""
     if not element.columns:
         return {}, data
     fields: list[Any] = []
@@ -75,19 +70,19 @@ def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, An
         first = np.dtype(fields).itemsize if fields else 0
         kind_of_length = np.dtype(order + length)
         if len(data) < first + kind_of_length.itemsize:
-            return None
+            return _read_rows(element, data, order)
         sizes[name] = int(np.frombuffer(data, kind_of_length, 1, first)[0])
         if not 0 <= sizes[name] * np.dtype(kind).itemsize <= len(data):
-            return None
+            return _read_rows(element, data, order)
         fields += [(f"{name} length", kind_of_length), (name, order + kind, (sizes[name],))]
     row = np.dtype(fields)
     if element.rows * row.itemsize > len(data):
         if sizes:
-            return None
+            return _read_rows(element, data, order)
         raise _ends_early(element)
     table = np.frombuffer(data, row, element.rows)
     if any((table[f"{name} length"] != size).any() for name, size in sizes.items()):
-        return None
+        return _read_rows(element, data, order)
     return {name: table[name] for name, _, _ in element.columns}, data[element.rows * row.itemsize :]
 
 

@@ -95,27 +95,6 @@ SPLITS = {
 }
 
 
-def split_triangles(cut: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cut triangles at points on their sides, `cut` [m, 3].
-
-    Returns
-    -------
-    parent : int64 [k]
-        Triangle of which each piece is a part, in ascending order.
-    corners : int64 [k, 3]
-        Of the pieces, numbered as in `SPLITS`.
-    """
-    parents, corners = [], []
-    sets = cut @ [1, 2, 4]
-    for number, pattern in {0: [[0, 1, 2]], **SPLITS}.items():
-        chosen = np.flatnonzero(sets == number)
-        parents.append(np.repeat(chosen, len(pattern)))
-        corners.append(np.tile(pattern, (len(chosen), 1)))
-    parent = np.concatenate(parents)
-    order = np.argsort(parent, kind="stable")
-    return parent[order], np.concatenate(corners)[order]
-
-
 def distinct(values: NDArray[np.int64]) -> NDArray[np.int64]:
     """Different values, in ascending order: `numpy.unique`, which on a million integers takes several times as long."""
     ordered = np.sort(values, axis=None)
@@ -139,33 +118,6 @@ def triangles_beside(F: NDArray[np.int64]) -> NDArray[np.int64]:
     beside, pairs = np.full(F.size, -1), sides_of(F)[0]
     beside[pairs] = pairs[:, ::-1] // 3
     return beside.reshape(-1, 3)
-
-
-def genera(F: NDArray[np.int64], part: NDArray[np.int64], rims: tuple[NDArray[np.int64], ...]) -> NDArray[np.int64]:
-    """Number of handles of every part of a manifold, oriented mesh.
-
-    By Euler's formula V - E + F = 2 - 2 genus - rims.
-
-    Parameters
-    ----------
-    F : [triangle_count, 3]
-    part : [triangle_count]
-        Part of every triangle, numbered from 0.
-    rims : tuple of [k]
-        See `rims_of`.
-    """
-    count = int(part.max()) + 1
-    of_vertex = np.full(F.max() + 1, -1)
-    of_vertex[F] = part[:, None]
-    vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=count)
-    triangles = np.bincount(part)
-    # every triangle has three sides; each inner edge has two of them, each edge of a rim one
-    on_rims, loops = np.zeros((2, count), dtype=np.int64)
-    for rim in rims:
-        on_rims[of_vertex[rim[0]]] += len(rim)
-        loops[of_vertex[rim[0]]] += 1
-    edges = (3 * triangles + on_rims) // 2
-    return (2 - (vertices - edges + triangles) - loops) // 2
 
 
 def rims_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:

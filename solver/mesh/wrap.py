@@ -60,14 +60,6 @@ def distance_grid(
         corners = (corners[near][:, None] + size * np.indices([2, 2, 2]).reshape(3, -1).T).reshape(-1, 3)
 
 
-def filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values on a grid with what is positive, but shut off from the first node, made negative."""
-    from scipy.ndimage import label  # takes long to import, for what few meshes need
-
-    region, _ = label(values > 0)
-    return np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
-
-
 # Corners of a grid cell as `igl.marching_cubes` counts them: along x, y, z.
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 
@@ -140,11 +132,16 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
     MeshError
         If the offset is not within 0.004 to 0.2.
     """
+    from scipy.ndimage import label  # takes long to import, for what few meshes need
+
     if not _SMALLEST <= offset <= _LARGEST:
         raise MeshError(f"the offset of the wrap is {offset}; valid is {_SMALLEST} to {_LARGEST} of the object's size")
     distance = float(offset * np.ptp(mesh.V, axis=0).max())
     values, origin = distance_grid(mesh.V, mesh.F, distance)
-    values = filled(values - distance)
+    values -= distance
+    # what is positive, but shut off from the first node, is inside
+    region, _ = label(values > 0)
+    values = np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
     values = np.where(values < 0, np.minimum(values, -_CLEAR * distance), np.maximum(values, _CLEAR * distance))
     V, F = zero_surface(values, origin, distance)
     found = Mesh.from_arrays(V, F, name=mesh.name)
