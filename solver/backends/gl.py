@@ -179,20 +179,13 @@ class ExtraForces:
         """Write the forces at a height, whose halo is filled, and a velocity."""
         if self.field is None:
             return
-        dispatch = self._dispatch
         if self._viscosity:
-            dispatch.fill_halo(velocity)
-            bind_buffers(velocity, self.field, None, self._viscosity.buffer)
-            dispatch.run_texels(self._apply_viscosity)
-            self._apply_links(self._viscosity_links, velocity, self.field)
+            self._dispatch.fill_halo(velocity)
+            self._apply(self._apply_viscosity, self._viscosity, self._viscosity_links, velocity, self.field)
         if self._laplace:
-            bind_buffers(height, self._moment, None, self._laplace.buffer, self._rigidity)
-            dispatch.run_texels(self._apply_rigidity)
-            self._apply_links(self._moment_links, height, self._moment)
-            dispatch.fill_halo(self._moment)
-            bind_buffers(self._moment, self.field, None, self._laplace.buffer)
-            dispatch.run_texels(self._subtract_laplace)
-            self._apply_links(self._bending_links, self._moment, self.field)
+            self._apply(self._apply_rigidity, self._laplace, self._moment_links, height, self._moment, self._rigidity)
+            self._dispatch.fill_halo(self._moment)
+            self._apply(self._subtract_laplace, self._laplace, self._bending_links, self._moment, self.field)
 
     def _link(self, operator: WaveOperator) -> None:
         """Upload the links at irregular vertices."""
@@ -205,9 +198,13 @@ class ExtraForces:
                 for factors in (operator.bending.rigidity, -ones)
             )
 
-    def _apply_links(
-        self, links: tuple[int, moderngl.Buffer, moderngl.Buffer], field: moderngl.Buffer, result: moderngl.Buffer
-    ) -> None:
+    def _apply(
+        self, shader: moderngl.ComputeShader, stencil: StencilBuffer,
+        links: tuple[int, moderngl.Buffer, moderngl.Buffer],
+        field: moderngl.Buffer, result: moderngl.Buffer, *factors: moderngl.Buffer,
+    ) -> None:  # fmt: skip
+        bind_buffers(field, result, None, stencil.buffer, *factors)
+        self._dispatch.run_texels(shader)
         count, *buffers = links
         if count:
             bind_buffers(field, result, None, *buffers)

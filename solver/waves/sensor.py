@@ -146,18 +146,16 @@ class Sensor:
         self.points, centers = atlas.nearest(check_points(points))
         self.kind, self.rate = kind, float(rate)
         laplacian = -thickness / 4 if thickness is not None else None
-        rows = [_row(atlas, point, int(center), laplacian) for point, center in zip(self.points, centers, strict=True)]
-        self.probes = Probes(
-            np.append(0, np.cumsum([len(texels) for texels, _ in rows])),
-            np.concatenate([texels for texels, _ in rows]),
-            np.concatenate([weights for _, weights in rows]).astype(np.float32),
-            np.full(len(rows), kind in ("height", "strain")),
-        )
+        rows = (_row(atlas, point, int(center), laplacian) for point, center in zip(self.points, centers, strict=True))
+        texels, weights = zip(*rows, strict=True)
+        begins = np.append(0, np.cumsum([len(each) for each in texels]))
+        of_heights = np.full(len(texels), kind in ("height", "strain"))
+        self.probes = Probes(begins, np.concatenate(texels), np.concatenate(weights).astype(np.float32), of_heights)
         # where substeps are longer than samples there is nothing between them to filter out
         self._base = min(self.rate, 1 / operator.stable_timestep)
         shortest = (_resolved(atlas, material, int(center)) for center in centers)
         self.bandwidth = min(*shortest, _PASSED * self._base)
-        self.begin(0.0, np.zeros(len(rows)))
+        self.begin(0.0, np.zeros(len(texels)))
 
     @property
     def latency(self) -> float:
