@@ -45,8 +45,7 @@ class FluidBackend(FieldBackend):
     _operator: FluidOperator
 
     def __init__(self, operator: FluidOperator, *, keeps_volume: bool = False) -> None:
-        self._operator = operator
-        self.keeps_volume = keeps_volume
+        self._operator, self.keeps_volume = operator, keeps_volume
         self._fields = RowLayout(operator.topology)
         self._h, self._v = self._fields.zeros(), self._fields.zeros()
         self._forces = np.zeros(operator.mass.size)

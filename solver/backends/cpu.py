@@ -72,14 +72,12 @@ class RowLayout:
         if np.ndim(field) == 0:
             return field
         field = np.asarray(field)
-        if self._alone:
-            laid = aligned(field.shape, 0, dtype=field.dtype)
-            laid[:] = field
-            return laid.reshape(-1)
-        spread = np.zeros((self.n, self._charts, self.n + 2), field.dtype)
-        spread[:, :, 1:-1] = field.transpose(1, 0, 2)
-        laid = aligned((1, self.n, self.columns), 0, dtype=field.dtype)
-        laid[0] = spread.reshape(self.n, -1)[:, 1:-1]
+        laid = aligned(field.shape if self._alone else (1, self.n, self.columns), 0, dtype=field.dtype)
+        if not self._alone:
+            beside = np.zeros((self.n, self._charts, self.n + 2), field.dtype)
+            beside[:, :, 1:-1] = field.transpose(1, 0, 2)
+            field = beside.reshape(self.n, -1)[:, 1:-1]
+        laid[:] = field
         return laid.reshape(-1)
 
     @functools.cached_property

@@ -78,19 +78,16 @@ class DeviceStiffness:
             for (groups, *links), factor in ((self._missing, 0.0), (self._copies, 1.0)):
                 self._run("close_links", groups, buffer, *links, factor=factor)
             self._run("add_links", self._added[0], buffer, self._added[1], self._values)
-            stencil.known_fastest = self._fastest(irregular, buffer)
+            # Gershgorin's bound
+            if len(irregular.texels):
+                beside = np.zeros(self._mass.size, np.float32)
+                beside[irregular.texels] = np.add.reduceat(np.abs(irregular.weights), irregular.begins[:-1])
+                self._beside.write(beside.tobytes())
+            self._peak.write(bytes(4))
+            buffers = buffer, self._peak, self._texels, self._shares, self._beside, self._masses
+            self._run("link_rates", self._mass.size, *buffers, width=self._width)
+            stencil.known_fastest = float(np.frombuffer(self._peak.read(), np.float32)[0])
         return irregular
-
-    def _fastest(self, links: IrregularLinks, buffer: moderngl.Buffer) -> float:
-        """Gershgorin's bound for what was made last."""
-        if len(links.texels):
-            beside = np.zeros(self._mass.size, np.float32)
-            beside[links.texels] = np.add.reduceat(np.abs(links.weights), links.begins[:-1])
-            self._beside.write(beside.tobytes())
-        self._peak.write(bytes(4))
-        buffers = buffer, self._peak, self._texels, self._shares, self._beside, self._masses
-        self._run("link_rates", self._mass.size, *buffers, width=self._width)
-        return float(np.frombuffer(self._peak.read(), np.float32)[0])
 
     def _run(self, name: str, count: int, *buffers: moderngl.Buffer, **uniforms: float) -> None:
         """Run a shader over a list of so many entries, if there are any."""
@@ -149,7 +146,6 @@ class ExtraForces:
 
     def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, operator: WaveOperator) -> None:
         self._gl, self._fields, self._dispatch = gl, fields, dispatch
-        self.field: moderngl.Buffer | None = None
         self._viscosity: StencilBuffer | None = None
         self._laplace: StencilBuffer | None = None
         if operator.viscosity_stencil is not None:
@@ -161,8 +157,7 @@ class ExtraForces:
             self._apply_rigidity = dispatch.texel_shader("apply", FACTOR=1)
             added = {"ADD": 1} if self._viscosity else {}
             self._subtract_laplace = dispatch.texel_shader("apply", SUBTRACT=1, **added)
-        if self._viscosity or self._laplace:
-            self.field = fields.zeros()
+        self.field = fields.zeros() if self._viscosity or self._laplace else None
         self._irregular = dispatch.shader("irregular", KICK=0)
         self._link(operator)
 

@@ -198,8 +198,7 @@ class Dispatch:
     """Runs the shaders in `shaders/` on fields of one layout."""
 
     def __init__(self, gl: GLContext, fields: FieldLayout) -> None:
-        self._gl = gl
-        self._fields = fields
+        self._gl, self._fields = gl, fields
         self._halo = self.shader("halo")
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:

@@ -100,8 +100,7 @@ class FiniteGuard:
     def clear(self) -> None:
         """Begin anew, at rest."""
         self._fastest, self._largest = -np.inf, ("", 0.0, "", 0.0)
-        self._reported = False
-        self._unseen = 0
+        self._reported, self._unseen = False, 0
 
     def note(self, kind: str, value: float, unit: str, time: float, speed: float) -> None:
         """Remember a source, if it is the largest: "impulse", 2.0, "N s", when [s], and a texel's speed by it [m/s]."""

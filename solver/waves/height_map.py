@@ -199,8 +199,7 @@ class HeightMap:
     """
 
     def __init__(self, texels: TexelMesh, limit: DisplacementLimit | None = None) -> None:
-        self._topology = texels.topology
-        self._limit = limit
+        self._topology, self._limit = texels.topology, limit
         count = texels.positions[..., 0].size
         require_memory(SolverError, _TEXEL * count, f"the height map of {count:,} texels", "take a lower resolution")
         self._weights = _gradient_weights(texels)

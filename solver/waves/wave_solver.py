@@ -168,8 +168,7 @@ class WaveSolver:
 
     def reset(self) -> None:
         """Flatten the surface, end all pressure, and set the time back to 0."""
-        self.height = self.velocity = 0.0
-        self.pressure = 0.0
+        self.height = self.velocity = self.pressure = 0.0
         self.time, self.substeps_taken = 0.0, 0
         self._guard.clear()
         self.listeners.begin(self.time)
