@@ -110,8 +110,7 @@ class Wrap:
 
     def interpolate(self, values: NDArray) -> NDArray:
         """Values at the vertices of `mesh`, [vertex_count, ...], as the vertices of `wrapped` see them, [n, ...]."""
-        corners = values[self.mesh.F[self.triangles]]
-        return np.einsum("ij,ij...->i...", self.barycentrics, corners)
+        return np.einsum("ij,ij...->i...", self.barycentrics, values[self.mesh.F[self.triangles]])
 
 
 def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:

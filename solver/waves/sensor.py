@@ -87,12 +87,6 @@ class Listeners:
             begin, end = end, end + len(listener.probes.heights)
             listener.take(time, dt, sums[:, begin:end])
 
-    def find(self, name: str) -> ArrayLike:
-        """Points by a name; `SolverError` where names are not known."""
-        if self.find_points is None:
-            raise SolverError(f"sensor at {name!r}: this surface knows no names; valid are points, [3] or [k, 3]")
-        return self.find_points(name)
-
     def _begin(self, listener: Listener, time: float) -> None:
         listener.begin(time, listener.probes.of(self._backend.height(), self._backend.velocity()))
 

@@ -189,8 +189,11 @@ class WaveSolver:
         thickness : float, optional
             Of the sheet [m], for "strain" alone.
         """
-        points = self.listeners.find(at) if isinstance(at, str) else at
-        sensor = Sensor(self.atlas, self.material, self.operator, points, kind, rate, thickness)
+        if isinstance(at, str):
+            if self.listeners.find_points is None:
+                raise SolverError(f"sensor at {at!r}: this surface knows no names; valid are points, [3] or [k, 3]")
+            at = self.listeners.find_points(at)
+        sensor = Sensor(self.atlas, self.material, self.operator, at, kind, rate, thickness)
         return self.listeners.add(sensor, self.time)
 
     def move(self, V: ArrayLike) -> None:
