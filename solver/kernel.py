@@ -226,6 +226,5 @@ def fingerprint(module: str) -> str:
     return hashlib.sha256("\0".join([source, *map(fingerprint, sorted(imported))]).encode()).hexdigest()
 
 
-def shared(function: Callable) -> Any:
-    """Declare a function, written for numbers and arrays alike, that both kernels and plain Python call."""
-    return register_jitable(function)
+# Declares a function, written for numbers and arrays alike, that both kernels and plain Python call.
+shared = register_jitable

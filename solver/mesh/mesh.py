@@ -24,7 +24,7 @@ from .clean import (
     without_slivers,
 )
 from .sheets import cut_apart
-from .topology import corner_angles, distinct, labels, rims_of, sides_of, triangle_areas, triangles_beside
+from .topology import corner_angles, distinct, labels, sides_of, triangle_areas, triangles_beside
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
 _STEPS = 300
@@ -160,8 +160,22 @@ class Mesh:
 
     @functools.cached_property
     def rims(self) -> tuple[NDArray[np.int64], ...]:
-        """Boundary loops: vertices of each in order, the surface to their left seen from outside."""
-        return rims_of(self.F)
+        """Boundary loops: vertices of each in order, the surface to their left seen from outside.
+
+        Each begins at its lowest vertex; they are sorted by it.
+        """
+        alone = sides_of(self.F)[1]
+        starts, ends = self.F.ravel()[alone], np.roll(self.F, -1, axis=1).ravel()[alone]
+        following = dict(zip(starts.tolist(), ends.tolist(), strict=True))
+        rims = []
+        for start in sorted(following):
+            rim = []
+            while start in following:
+                rim.append(start)
+                start = following.pop(start)
+            if rim:
+                rims.append(np.array(rim, dtype=np.int64))
+        return tuple(rims)
 
     @property
     def closed(self) -> bool:

@@ -1,4 +1,4 @@
-"""What a surface is: its edges, parts, rims and handles, how its triangles are wound, cut, and folded.
+"""What a surface is: its edges, its parts, how its triangles are wound, cut, and folded.
 
 Side k of a triangle runs from corner k to corner k + 1; the sides of all are numbered 3 x triangle + k.
 """
@@ -118,25 +118,6 @@ def triangles_beside(F: NDArray[np.int64]) -> NDArray[np.int64]:
     beside, pairs = np.full(F.size, -1), sides_of(F)[0]
     beside[pairs] = pairs[:, ::-1] // 3
     return beside.reshape(-1, 3)
-
-
-def rims_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
-    """Boundary loops of a manifold, oriented mesh: vertices in the order in which the triangles run along them.
-
-    Each begins at its lowest vertex; they are sorted by it.
-    """
-    alone = sides_of(F)[1]
-    starts, ends = F.ravel()[alone], np.roll(F, -1, axis=1).ravel()[alone]
-    following = dict(zip(starts.tolist(), ends.tolist(), strict=True))
-    rims = []
-    for start in sorted(following):
-        rim = []
-        while start in following:
-            rim.append(start)
-            start = following.pop(start)
-        if rim:
-            rims.append(np.array(rim, dtype=np.int64))
-    return tuple(rims)
 
 
 # A triangle with less than this share of its area at rest counts as crushed.
