@@ -131,11 +131,10 @@ def make_room(newest: Path) -> None:
 
 def removed(path: Path) -> bool:
     """Remove a file from the cache; return whether it is gone."""
-    try:
+    with contextlib.suppress(OSError):
         path.unlink(missing_ok=True)
-    except OSError:
-        return False
-    return True
+        return True
+    return False
 
 
 Owner = TypeVar("Owner")

@@ -88,17 +88,13 @@ PATH = Valid(_is_path, "a path: a str or pathlib.Path without a NUL")
 
 def whole(least: int) -> Valid:
     """A whole number from `least` on."""
-    return Valid(
-        lambda value: isinstance(value, numbers.Integral) and int(value) >= least, f"a whole number, {least} or greater"
-    )
+    return Valid(lambda x: isinstance(x, numbers.Integral) and int(x) >= least, f"a whole number, {least} or greater")
 
 
 def instance(kind: type, hint: str = "", *, optional: bool = False) -> Valid:
     """An instance of a class, or None where it is optional, with a hint where to get one."""
     article = "an" if kind.__name__[0] in "AEIO" else "a"
-    return Valid(
-        lambda value: isinstance(value, kind) or (optional and value is None), f"{article} {kind.__name__}{hint}"
-    )
+    return Valid(lambda x: isinstance(x, kind) or (optional and x is None), f"{article} {kind.__name__}{hint}")
 
 
 def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:

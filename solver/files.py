@@ -27,14 +27,7 @@ except ImportError:  # on Windows
 from .errors import RippleError, shown
 
 # Errors of the system that another name would have avoided.
-OF_THE_NAME = (
-    errno.ENAMETOOLONG,
-    errno.ENOENT,
-    errno.ENOTDIR,
-    errno.EISDIR,
-    errno.EINVAL,
-    errno.ELOOP,
-)
+OF_THE_NAME = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EINVAL, errno.ELOOP)
 
 # Those of them that hold in every folder.
 NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
@@ -85,11 +78,8 @@ def atomic_write(path: Path) -> Iterator[Path]:
 # What is smaller always fits, and costs no look [bytes].
 _SMALL = 32e6
 
-# By cgroup version: folder of the memory controller, and the files of its limit and of what is taken.
-_CGROUPS = {
-    2: ("", "memory.max", "memory.current"),
-    1: ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
-}
+# By the controller of a cgroup, which in version 2 has no name: the files of its limit and of what is taken.
+_CGROUPS = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
 
 
 def require_memory(error: type[RippleError], need: float, what: str, advice: str) -> None:
@@ -110,22 +100,18 @@ def rooms(root: Path = Path("/")) -> Iterator[tuple[float, str]]:
         used = _table(root / "proc/self/status")
         yield most - used.get("VmSize", 0.0), f"the limit of the address space (ulimit -v, {_shown(most)})"
     for line in _text(root / "proc/self/cgroup").splitlines():
-        _, controllers, name = line.split(":", 2)
-        if controllers in ("", "memory"):
-            yield from _of_cgroups(root, 1 if controllers else 2, name)
-
-
-def _of_cgroups(root: Path, version: int, name: str) -> Iterator[tuple[float, str]]:
-    """What the limits of a cgroup and of those above it leave; cached files, which make room, are not counted."""
-    controller, limit, usage = _CGROUPS[version]
-    top = root / "sys/fs/cgroup" / controller
-    for folder in (top / name.strip("/"), *(top / name.strip("/")).parents):
-        if not folder.is_relative_to(top):
-            return
-        most, used = _text(folder / limit).strip(), _text(folder / usage).strip()
-        if most.isdigit() and used.isdigit():
-            cached = _table(folder / "memory.stat", scale=1).get("inactive_file", 0.0)
-            yield int(most) - int(used) + cached, f"the memory limit of the cgroup ({_shown(int(most))})"
+        _, controller, name = line.split(":", 2)
+        if controller not in _CGROUPS:
+            continue
+        (limit, usage), top = _CGROUPS[controller], root / "sys/fs/cgroup" / controller
+        # its own limits and those of the groups above it; cached files, which make room, are not counted
+        for folder in (top / name.strip("/"), *(top / name.strip("/")).parents):
+            if not folder.is_relative_to(top):
+                break
+            allowed, taken = _text(folder / limit).strip(), _text(folder / usage).strip()
+            if allowed.isdigit() and taken.isdigit():
+                cached = _table(folder / "memory.stat", scale=1).get("inactive_file", 0.0)
+                yield int(allowed) - int(taken) + cached, f"the memory limit of the cgroup ({_shown(int(allowed))})"
 
 
 def _table(path: Path, scale: int = 1024) -> dict[str, float]:
@@ -136,10 +122,9 @@ def _table(path: Path, scale: int = 1024) -> dict[str, float]:
 
 def _text(path: Path) -> str:
     """The text of a file, or nothing where there is none, as on other systems."""
-    try:
+    with contextlib.suppress(OSError):
         return path.read_text()
-    except OSError:
-        return ""
+    return ""
 
 
 def _shown(size: float) -> str:

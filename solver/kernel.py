@@ -161,14 +161,12 @@ class _KernelCache(FunctionCache):
     def load(self, key: Any) -> Any:
         """What was compiled for a key of numba's, or None."""
         path = self._path(key)
-        try:
+        with contextlib.suppress(Exception):  # whatever a file holds, a kernel can be compiled
             content = path.read_bytes()
             if content[:32] == _checksum(path, content[32:]):
                 stored, sources, data = pickle.loads(content[32:])
                 if stored == key and sources == fingerprint(self._py_func.__module__):
                     return data
-        except Exception:  # whatever a file holds, a kernel can be compiled
-            return None
         return None
 
     def save(self, key: Any, data: Any) -> None:
@@ -225,10 +223,8 @@ def fingerprint(module: str) -> str:
         base = importlib.util.resolve_name(base, sys.modules[module].__package__ or "")
         for name in re.findall(r"\w+", names):
             imported.add(f"{base}.{name}" if f"{base}.{name}" in sys.modules else base)
-    texts = [source, *map(fingerprint, sorted(imported))]
-    return hashlib.sha256("\0".join(texts).encode()).hexdigest()
+    return hashlib.sha256("\0".join([source, *map(fingerprint, sorted(imported))]).encode()).hexdigest()
 
 
-def shared(function: Callable) -> Any:
-    """Declare a function, written for numbers and arrays alike, that both kernels and plain Python call."""
-    return register_jitable(function)
+# Declares a function, written for numbers and arrays alike, that both kernels and plain Python call.
+shared = register_jitable

@@ -11,6 +11,5 @@ from .gl_fields import (
     FieldLayout as FieldLayout,
     TexelList as TexelList,
     bind_buffers as bind_buffers,
-    link_buffers as link_buffers,
 )
 from .kernels import advance as advance, fill as fill

@@ -45,8 +45,7 @@ class FluidBackend(FieldBackend):
     _operator: FluidOperator
 
     def __init__(self, operator: FluidOperator, *, keeps_volume: bool = False) -> None:
-        self._operator = operator
-        self.keeps_volume = keeps_volume
+        self._operator, self.keeps_volume = operator, keeps_volume
         self._fields = RowLayout(operator.topology)
         self._h, self._v = self._fields.zeros(), self._fields.zeros()
         self._forces = np.zeros(operator.mass.size)
@@ -115,9 +114,7 @@ def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool = Fals
         name = auto_backend(operator.mass.size)
     if isinstance(operator, FluidOperator):
         return FluidBackend(operator, keeps_volume=keeps_volume)
-    if name == "gl":
-        return GLBackend(operator, keeps_volume=keeps_volume)
-    return CPUBackend(operator, keeps_volume=keeps_volume)
+    return (GLBackend if name == "gl" else CPUBackend)(operator, keeps_volume=keeps_volume)
 
 
 def auto_backend(texels: int = _TYPICAL) -> str:
@@ -163,14 +160,8 @@ class Measured(NamedTuple):
 @functools.cache
 def measured(gl: GLContext) -> Measured:
     """The measurement of a device and its driver on this machine, taken now if there is none in the cache."""
-    machine = (
-        gl.renderer,
-        gl.version,
-        platform.machine(),
-        str(os.cpu_count()),
-        importlib.metadata.version("ripple-sim"),
-    )
-    path = cache_path(f"backends {' '.join(machine)}", [])
+    program = importlib.metadata.version("ripple-sim")
+    path = cache_path(f"backends {gl.renderer} {gl.version} {platform.machine()} {os.cpu_count()} {program}", [])
     with contextlib.suppress(OSError, ValueError, KeyError):
         with np.load(path, allow_pickle=False) as kept:
             known = Measured(*(tuple(kept[name].tolist()) for name in Measured._fields))
@@ -188,18 +179,14 @@ def measure(gl: GLContext) -> Measured:
     """Time both backends at both sizes."""
     times: dict[str, list[float]] = {"gl": [], "cpu": []}
     for n in _SIZES:
-        operator = _plain_operator(n)
+        # on a cube, without links: the time does not depend on the numbers
+        topology = cube_topology(n)
+        ones = np.ones(topology.shape)
+        operator = WaveOperator(Stencil(topology, np.zeros((6, 4, n + 1, n + 1))), ones, 0 * ones, 0 * ones)
         for backend in (GLBackend(operator, gl), CPUBackend(operator)):
             times[backend.name].append(_seconds(backend))
     texels = [6.0 * n * n for n in _SIZES]
     return Measured(*(tuple(each) for each in (texels, times["gl"], times["cpu"])))  # type: ignore[arg-type]
-
-
-def _plain_operator(n: int) -> WaveOperator:
-    """An operator on a cube of n x n texels a face, without links: the time does not depend on the numbers."""
-    topology = cube_topology(n)
-    ones = np.ones(topology.shape)
-    return WaveOperator(Stencil(topology, np.zeros((6, 4, n + 1, n + 1))), ones, 0 * ones, 0 * ones)
 
 
 def _seconds(backend: GLBackend | CPUBackend) -> float:

@@ -72,14 +72,12 @@ class RowLayout:
         if np.ndim(field) == 0:
             return field
         field = np.asarray(field)
-        if self._alone:
-            laid = aligned(field.shape, 0, dtype=field.dtype)
-            laid[:] = field
-            return laid.reshape(-1)
-        spread = np.zeros((self.n, self._charts, self.n + 2), field.dtype)
-        spread[:, :, 1:-1] = field.transpose(1, 0, 2)
-        laid = aligned((1, self.n, self.columns), 0, dtype=field.dtype)
-        laid[0] = spread.reshape(self.n, -1)[:, 1:-1]
+        laid = aligned(field.shape if self._alone else (1, self.n, self.columns), 0, dtype=field.dtype)
+        if not self._alone:
+            beside = np.zeros((self.n, self._charts, self.n + 2), field.dtype)
+            beside[:, :, 1:-1] = field.transpose(1, 0, 2)
+            field = beside.reshape(self.n, -1)[:, 1:-1]
+        laid[:] = field
         return laid.reshape(-1)
 
     @functools.cached_property
@@ -100,17 +98,9 @@ class RowLayout:
             beside = rows.reshape(4, self.n + 1, count + 1, self.n + 2)
             beside[:, :, :count, : self.n + 1] = stencil.weights.transpose(1, 2, 0, 3)
         links, addresses = stencil.irregular, self.addresses
-        return Weights(
-            rows,
-            self.columns,
-            Links(
-                self.places[links.texels],
-                addresses[links.texels],
-                links.begins,
-                addresses[links.others],
-                links.weights.astype(np.float32),
-            ),
-        )
+        texels, weights = links.texels, links.weights.astype(np.float32)
+        irregular = Links(self.places[texels], addresses[texels], links.begins, addresses[links.others], weights)
+        return Weights(rows, self.columns, irregular)
 
     def texels(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texels of a field, without halo: a view [C, n, n]."""
@@ -167,18 +157,10 @@ def volume_balance(operator: WaveOperator, dt: float, fields: RowLayout) -> Bala
     follows = np.append(False, np.diff(addresses) == 1)
     follows[begins[:-1][begins[:-1] < len(follows)]] = False
     starts = np.flatnonzero(~follows)
+    runs = np.searchsorted(starts, begins), addresses[starts], np.append(starts, len(addresses))
     loaded, total = np.zeros((2, len(begins) - 1), np.float32)
-    return Balance(
-        np.searchsorted(starts, begins),
-        addresses[starts],
-        np.append(starts, len(addresses)),
-        heights,
-        velocities,
-        loaded,
-        total,
-        fields.coefficients(np.zeros(operator.mass.shape, np.float32)),
-        *part_runs(operator, fields),
-    )
+    pressure = fields.coefficients(np.zeros(operator.mass.shape, np.float32))
+    return Balance(*runs, heights, velocities, loaded, total, pressure, *part_runs(operator, fields))
 
 
 class CPUBackend(FieldBackend):
@@ -221,7 +203,7 @@ class CPUBackend(FieldBackend):
 
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
         """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
-        self._loaded, self._forces, self._acceleration = texels, forces, everywhere
+        self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
         self._load_is_new = True
 
     def advance(self, substeps: int, dt: float) -> None:
@@ -233,19 +215,10 @@ class CPUBackend(FieldBackend):
         features = self._features
         drags = self._plain and len(features.viscosity.rows) > 0
         self._sums = np.zeros((substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32)
-        kernels.advance(
-            substeps,
-            np.float32(dt),
-            *(field.reshape(-1) for field in (self._h, self._v, self._h_next)),
-            self._fields.halo,
-            kick,
-            *self._kicks,
-            features.viscosity if drags else None,
-            None if self._plain else features,
-            self._probes,
-            NO_WEIGHTS.irregular.weights if self._dent is None else self._dent.reshape(-1),
-            self._sums,
-        )
+        fields = (field.reshape(-1) for field in (self._h, self._v, self._h_next))
+        dent = NO_WEIGHTS.irregular.weights if self._dent is None else self._dent.reshape(-1)
+        acting = features.viscosity if drags else None, None if self._plain else features, self._probes, dent
+        kernels.advance(substeps, np.float32(dt), *fields, self._fields.halo, kick, *self._kicks, *acting, self._sums)
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
         if self._crests is not None:
@@ -296,9 +269,7 @@ class CPUBackend(FieldBackend):
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
         new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
-            self._balance = None
-            if self.keeps_volume:
-                self._balance = volume_balance(self._operator, dt, self._fields)
+            self._balance = volume_balance(self._operator, dt, self._fields) if self.keeps_volume else None
             self._features = self._features._replace(balance=self._balance or NO_BALANCE)
             k = step_coefficients(self._operator, dt)
             varied = any(np.ndim(each) for each in (k.decay, k.spring, k.span))
@@ -316,7 +287,7 @@ class CPUBackend(FieldBackend):
             self._prepared = (dt, self.keeps_volume)
         k = self._coefficients
         if new_length or self._load_is_new:
-            kicks = k.gain[self._fields.places[self._loaded]] * self._forces.astype(np.float32)
+            kicks = k.gain[self._fields.places[self._loaded]] * self._load_forces.astype(np.float32)
             self._kicks = self._fields.addresses[self._loaded], kicks
             if self._balance is not None:
                 self._balance.loaded[:] = self._acceleration

@@ -19,16 +19,7 @@ from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_li
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
-from .gl_fields import (
-    DeviceField,
-    DeviceProbes,
-    Dispatch,
-    FieldLayout,
-    Pressure,
-    TexelList,
-    bind_buffers,
-    link_buffers,
-)
+from .gl_fields import DeviceField, DeviceProbes, Dispatch, FieldLayout, Pressure, TexelList, bind_buffers, to_buffer
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
@@ -58,10 +49,10 @@ class DeviceStiffness:
             self._vertices = ctx.buffer(reserve=stencil.places.V.nbytes)
             self._places, self._sides = ctx.buffer(reserve=24 * self._count), ctx.buffer(reserve=24 * self._count)
             self._values, self._peak = ctx.buffer(reserve=4 * (1 + len(added))), ctx.buffer(bytes(4))
-        self._corners, self._texels = (_upload(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
-        self._weights, quads = _upload(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
+        self._corners, self._texels = (to_buffer(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
+        self._weights, quads = to_buffer(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
         self._conductance, self._per_area, self._detours, self._shares, self._masses, self._beside = (
-            _upload(gl, each, np.float32)
+            to_buffer(gl, each, np.float32)
             for each in (quads.conductance, quads.per_area, quads.detours, shares, mass, np.zeros(mass.size))
         )
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
@@ -70,7 +61,7 @@ class DeviceStiffness:
         self._shaders["quads"] = dispatch.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
 
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
-        """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
+        """Write the nine-point stencil into a buffer of `FieldLayout.links`; return the irregular links."""
         V, (quads, _) = stencil.places.V, stencil.coefficient
         interpolate(V, *self._special)
         self._around[:, stencil.cells.special_places] = self._special[-1]
@@ -87,19 +78,16 @@ class DeviceStiffness:
             for (groups, *links), factor in ((self._missing, 0.0), (self._copies, 1.0)):
                 self._run("close_links", groups, buffer, *links, factor=factor)
             self._run("add_links", self._added[0], buffer, self._added[1], self._values)
-            stencil.known_fastest = self._fastest(irregular, buffer)
+            # Gershgorin's bound
+            if len(irregular.texels):
+                beside = np.zeros(self._mass.size, np.float32)
+                beside[irregular.texels] = np.add.reduceat(np.abs(irregular.weights), irregular.begins[:-1])
+                self._beside.write(beside.tobytes())
+            self._peak.write(bytes(4))
+            buffers = buffer, self._peak, self._texels, self._shares, self._beside, self._masses
+            self._run("link_rates", self._mass.size, *buffers, width=self._width)
+            stencil.known_fastest = float(np.frombuffer(self._peak.read(), np.float32)[0])
         return irregular
-
-    def _fastest(self, links: IrregularLinks, buffer: moderngl.Buffer) -> float:
-        """Gershgorin's bound for what was made last."""
-        if len(links.texels):
-            beside = np.zeros(self._mass.size, np.float32)
-            beside[links.texels] = np.add.reduceat(np.abs(links.weights), links.begins[:-1])
-            self._beside.write(beside.tobytes())
-        self._peak.write(bytes(4))
-        buffers = buffer, self._peak, self._texels, self._shares, self._beside, self._masses
-        self._run("link_rates", self._mass.size, *buffers, width=self._width)
-        return float(np.frombuffer(self._peak.read(), np.float32)[0])
 
     def _run(self, name: str, count: int, *buffers: moderngl.Buffer, **uniforms: float) -> None:
         """Run a shader over a list of so many entries, if there are any."""
@@ -121,13 +109,8 @@ def _link_groups(
     """
     charts, n, _ = topology.shape
     chart, link, r, c = np.unravel_index(links, (charts, 4, n + 1, n + 1))
-    places = _upload(gl, 4 * ((chart * (n + 2) + r) * (n + 2) + c) + link, np.int32)
-    return len(begins) - 1, places, _upload(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32)
-
-
-def _upload(gl: GLContext, values: NDArray, kind: type) -> moderngl.Buffer:
-    with gl as ctx:
-        return ctx.buffer(np.ascontiguousarray(values, kind).tobytes() or bytes(8))
+    places = to_buffer(gl, 4 * ((chart * (n + 2) + r) * (n + 2) + c) + link, np.int32)
+    return len(begins) - 1, places, to_buffer(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32)
 
 
 class StencilBuffer:
@@ -135,7 +118,7 @@ class StencilBuffer:
 
     def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, stencil: Stencil) -> None:
         self._gl, self._fields, self._dispatch = gl, fields, dispatch
-        self.buffer, self.irregular = fields.upload_stencil(stencil), stencil.irregular
+        self.buffer, self.irregular = to_buffer(gl, fields.links(stencil), np.float32), stencil.irregular
         self._device: DeviceStiffness | None = None
 
     def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
@@ -150,7 +133,8 @@ class StencilBuffer:
                 self._device = DeviceStiffness(self._gl, self._dispatch, moved, mass)
             self.irregular = self._device.write(moved, self.buffer)
         else:
-            self._fields.write_stencil(self.buffer, stencil)
+            with self._gl:
+                self.buffer.write(self._fields.links(stencil))
             self.irregular = stencil.irregular
 
 
@@ -162,7 +146,6 @@ class ExtraForces:
 
     def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, operator: WaveOperator) -> None:
         self._gl, self._fields, self._dispatch = gl, fields, dispatch
-        self.field: moderngl.Buffer | None = None
         self._viscosity: StencilBuffer | None = None
         self._laplace: StencilBuffer | None = None
         if operator.viscosity_stencil is not None:
@@ -174,8 +157,7 @@ class ExtraForces:
             self._apply_rigidity = dispatch.texel_shader("apply", FACTOR=1)
             added = {"ADD": 1} if self._viscosity else {}
             self._subtract_laplace = dispatch.texel_shader("apply", SUBTRACT=1, **added)
-        if self._viscosity or self._laplace:
-            self.field = fields.zeros()
+        self.field = fields.zeros() if self._viscosity or self._laplace else None
         self._irregular = dispatch.shader("irregular", KICK=0)
         self._link(operator)
 
@@ -192,35 +174,32 @@ class ExtraForces:
         """Write the forces at a height, whose halo is filled, and a velocity."""
         if self.field is None:
             return
-        dispatch = self._dispatch
         if self._viscosity:
-            dispatch.fill_halo(velocity)
-            bind_buffers(velocity, self.field, None, self._viscosity.buffer)
-            dispatch.run_texels(self._apply_viscosity)
-            self._apply_links(self._viscosity_links, velocity, self.field)
+            self._dispatch.fill_halo(velocity)
+            self._apply(self._apply_viscosity, self._viscosity, self._viscosity_links, velocity, self.field)
         if self._laplace:
-            bind_buffers(height, self._moment, None, self._laplace.buffer, self._rigidity)
-            dispatch.run_texels(self._apply_rigidity)
-            self._apply_links(self._moment_links, height, self._moment)
-            dispatch.fill_halo(self._moment)
-            bind_buffers(self._moment, self.field, None, self._laplace.buffer)
-            dispatch.run_texels(self._subtract_laplace)
-            self._apply_links(self._bending_links, self._moment, self.field)
+            self._apply(self._apply_rigidity, self._laplace, self._moment_links, height, self._moment, self._rigidity)
+            self._dispatch.fill_halo(self._moment)
+            self._apply(self._subtract_laplace, self._laplace, self._bending_links, self._moment, self.field)
 
     def _link(self, operator: WaveOperator) -> None:
         """Upload the links at irregular vertices."""
         ones = np.ones_like(operator.mass)
         if self._viscosity:
-            self._viscosity_links = link_buffers(self._gl, self._fields, self._viscosity.irregular, ones)
+            self._viscosity_links = self._fields.upload_links(self._viscosity.irregular, ones)
         if self._laplace and operator.bending is not None:
             self._moment_links, self._bending_links = (
-                link_buffers(self._gl, self._fields, self._laplace.irregular, factors)
+                self._fields.upload_links(self._laplace.irregular, factors)
                 for factors in (operator.bending.rigidity, -ones)
             )
 
-    def _apply_links(
-        self, links: tuple[int, moderngl.Buffer, moderngl.Buffer], field: moderngl.Buffer, result: moderngl.Buffer
-    ) -> None:
+    def _apply(
+        self, shader: moderngl.ComputeShader, stencil: StencilBuffer,
+        links: tuple[int, moderngl.Buffer, moderngl.Buffer],
+        field: moderngl.Buffer, result: moderngl.Buffer, *factors: moderngl.Buffer,
+    ) -> None:  # fmt: skip
+        bind_buffers(field, result, None, stencil.buffer, *factors)
+        self._dispatch.run_texels(shader)
         count, *buffers = links
         if count:
             bind_buffers(field, result, None, *buffers)
@@ -298,7 +277,11 @@ class GLBackend(FieldBackend):
                 operator = self._stencil.buffer, self._coefficients, self._extra.field
                 bind_buffers(self._h, self._v, self._h_next, *operator, *pressure)
                 self._dispatch.run_texels(kick_drift)
-                self._kick_irregular(drift)
+                links, *buffers = self._links
+                if links:
+                    self._irregular_kick["dt"] = drift
+                    bind_buffers(self._h, self._v, self._h_next, *buffers)
+                    self._dispatch.run_list(self._irregular_kick, links)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
                 if self._probes is not None:
@@ -321,7 +304,7 @@ class GLBackend(FieldBackend):
         self._stencil.write(operator.stencil, operator.mass)
         self._extra.move(operator)
         if self._prepared[0]:
-            self._links = link_buffers(self._gl, self._fields, self._stencil.irregular, self._step.gain)
+            self._links = self._fields.upload_links(self._stencil.irregular, self._step.gain)
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
@@ -370,14 +353,6 @@ class GLBackend(FieldBackend):
     def _drop_kicks(self) -> None:
         self._waiting, self._shift = [], 0.0
 
-    def _kick_irregular(self, dt: float) -> None:
-        """What the irregular links add to a substep."""
-        count, *buffers = self._links
-        if count:
-            self._irregular_kick["dt"] = dt
-            bind_buffers(self._h, self._v, self._h_next, *buffers)
-            self._dispatch.run_list(self._irregular_kick, count)
-
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
         """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
         new_length = self._prepared != (dt, self.keeps_volume)
@@ -385,8 +360,11 @@ class GLBackend(FieldBackend):
             self._step = k = step_coefficients(self._operator, dt)
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
-            self._links = link_buffers(self._gl, self._fields, self._stencil.irregular, k.gain)
-            self._keep_volume(dt)
+            self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
+            rate = volume_rate(self._operator, dt) if self.keeps_volume else None
+            if rate is not None or (self._held is not None and self._held.follow is not None):
+                needed = rate is not None or self._operator.parts is not None
+                self._held = Pressure(self._gl, self._fields, self._operator, self._dispatch, rate) if needed else None
             self._prepared = (dt, self.keeps_volume)
         k = self._step
         if new_length or self._load_is_new:
@@ -402,13 +380,6 @@ class GLBackend(FieldBackend):
         if not self._maps:
             kick_drift["decay"], kick_drift["spring"], kick_drift["span"] = k.decay, k.spring, k.span
         return kick_drift
-
-    def _keep_volume(self, dt: float) -> None:
-        operator = self._operator
-        rate = volume_rate(operator, dt) if self.keeps_volume else None
-        if rate is not None or (self._held is not None and self._held.follow is not None):
-            needed = rate is not None or operator.parts is not None
-            self._held = Pressure(self._gl, self._fields, operator, self._dispatch, rate) if needed else None
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:

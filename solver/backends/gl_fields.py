@@ -34,6 +34,12 @@ def bind_buffers(*buffers: moderngl.Buffer | None) -> None:
             buffer.bind_to_storage_buffer(binding)
 
 
+def to_buffer(gl: GLContext, values: NDArray, kind: type) -> moderngl.Buffer:
+    """Numbers in a storage buffer, each of a kind; of no numbers it has eight bytes, since none can be empty."""
+    with gl as ctx:
+        return ctx.buffer(np.ascontiguousarray(values, kind).tobytes() or bytes(8))
+
+
 class DeviceField:
     """A frozen field [C, n, n] in a storage buffer, made by `gathered` or `blend`; `numpy.asarray` reads it back.
 
@@ -101,16 +107,12 @@ class FieldLayout:
         self._gl, self._places = gl, topology.halo.shape
         self.texels, ghosts, sources = topology.addresses
         self.n, self.count, self.halo_count = topology.shape[1], len(self.texels), len(ghosts)
-        with gl as ctx:
-            pairs = np.stack([ghosts, sources], axis=1).astype(np.int32)
-            # one chart within fixed rims has none
-            self.halo_pairs = ctx.buffer(pairs.tobytes() or bytes(8))
+        self.halo_pairs = to_buffer(gl, np.stack([ghosts, sources], axis=1), np.int32)
 
     @functools.cached_property
     def texel_addresses(self) -> moderngl.Buffer:
         """`texels`, on the GPU."""
-        with self._gl as ctx:
-            return ctx.buffer(self.texels.astype(np.int32).tobytes())
+        return to_buffer(self._gl, self.texels, np.int32)
 
     def zeros(self) -> moderngl.Buffer:
         """A field of zeros."""
@@ -121,15 +123,30 @@ class FieldLayout:
         with self._gl as ctx:
             return ctx.buffer(self._with_halo(*fields))
 
-    def upload_stencil(self, stencil: Stencil) -> moderngl.Buffer:
+    def links(self, stencil: Stencil) -> NDArray[np.float32]:
         """The four links of a stencil that start in each place, side by side, [C, n + 2, n + 2, 4]."""
-        with self._gl as ctx:
-            return ctx.buffer(self._links(stencil))
+        links = np.zeros((*self._places, 4), np.float32)
+        links[:, :-1, :-1] = np.moveaxis(stencil.weights, 1, -1)
+        return links
 
-    def write_stencil(self, buffer: moderngl.Buffer, stencil: Stencil) -> None:
-        """Write another stencil over one that was uploaded."""
-        with self._gl:
-            buffer.write(self._links(stencil))
+    def upload_links(self, links: IrregularLinks, factors: NDArray) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
+        """The irregular links of a stencil, with the addresses of their ends, as shaders read them.
+
+        `factors` [C, n, n] are those by which the forces on each texel are multiplied.
+
+        Returns
+        -------
+        int
+            Texels that have any.
+        texels, links : moderngl.Buffer
+            (address, first link, one after its last) of each such texel, and the address of each link's other end with
+            the bits of its weight.
+        """
+        scale = np.repeat(factors.reshape(-1)[links.texels], np.diff(links.begins))
+        texels = np.stack([self.texels[links.texels], links.begins[:-1], links.begins[1:]], axis=1)
+        bits = (scale * links.weights).astype(np.float32).view(np.int32)
+        others = np.stack([self.texels[links.others], bits], axis=1)
+        return len(links.texels), to_buffer(self._gl, texels, np.int32), to_buffer(self._gl, others, np.int32)
 
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [C, n, n]."""
@@ -154,59 +171,23 @@ class FieldLayout:
             around[:, 1:-1, 1:-1] = field
         return places
 
-    def _links(self, stencil: Stencil) -> NDArray[np.float32]:
-        links = np.zeros((*self._places, 4), np.float32)
-        links[:, :-1, :-1] = np.moveaxis(stencil.weights, 1, -1)
-        return links
-
-
-def link_buffers(
-    gl: GLContext, fields: FieldLayout, links: IrregularLinks, factors: NDArray
-) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
-    """The irregular links of a stencil, with the addresses of their ends, as shaders read them.
-
-    `factors` [C, n, n] are those by which the forces on each texel are multiplied.
-
-    Returns
-    -------
-    int
-        Texels that have any.
-    texels, links : moderngl.Buffer
-        (address, first link, one after its last) of each such texel, and the address of each link's other end with the
-        bits of its weight.
-    """
-    scale = np.repeat(factors.reshape(-1)[links.texels], np.diff(links.begins))
-    texels = np.stack([fields.texels[links.texels], links.begins[:-1], links.begins[1:]], axis=1)
-    bits = (scale * links.weights).astype(np.float32).view(np.int32)
-    others = np.stack([fields.texels[links.others].astype(np.int32), bits], axis=1)
-    with gl as ctx:
-        heads, tails = (ctx.buffer(each.astype(np.int32).tobytes() or bytes(4)) for each in (texels, others))
-    return len(links.texels), heads, tails
-
 
 class TexelList:
     """Places in a field and a number for each, in buffers that grow when they must."""
 
     def __init__(self, gl: GLContext) -> None:
-        self._gl = gl
-        self.count = 0
-        self._room = 1024
-        self._reserve()
+        self._gl, self._room, self.count = gl, 0, 0
 
     def set(self, places: NDArray[np.int64], values: NDArray) -> None:
         """Replace the list."""
         self.count = len(places)
-        with self._gl:
+        with self._gl as ctx:
             if self.count > self._room:
-                self._room = 2 * self.count
-                self._reserve()
+                self._room = max(2 * self.count, 1024)
+                self.places, self.values = ctx.buffer(reserve=4 * self._room), ctx.buffer(reserve=4 * self._room)
             if self.count:
                 self.places.write(places.astype(np.int32).tobytes())
                 self.values.write(values.astype(np.float32).tobytes())
-
-    def _reserve(self) -> None:
-        with self._gl as ctx:
-            self.places, self.values = ctx.buffer(reserve=4 * self._room), ctx.buffer(reserve=4 * self._room)
 
 
 # Threads of a group that works through a list.
@@ -217,8 +198,7 @@ class Dispatch:
     """Runs the shaders in `shaders/` on fields of one layout."""
 
     def __init__(self, gl: GLContext, fields: FieldLayout) -> None:
-        self._gl = gl
-        self._fields = fields
+        self._gl, self._fields = gl, fields
         self._halo = self.shader("halo")
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
@@ -281,15 +261,14 @@ class Pressure:
         self, rate: VolumeRate, fields: FieldLayout, dispatch: Dispatch
     ) -> Callable[[moderngl.Buffer, moderngl.Buffer], None]:
         begins, texels, heights, velocities = rate
-        chunks, bounds = _chunks(begins)
-        tables = (
-            fields.texels[texels].astype(np.int32),
-            np.stack([heights, velocities if len(velocities) else np.zeros_like(heights)], axis=1),
-            *(each.astype(np.int32) for each in (chunks, bounds)),
-        )
-        with self._gl as ctx:
-            *entries, first = (ctx.buffer(each.tobytes()) for each in tables)
-            sums = ctx.buffer(reserve=4 * len(chunks))
+        # the entries of each part in chunks: first and one after the last of each; where those of a part begin
+        cuts = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
+        chunks = np.concatenate([np.stack([each[:-1], each[1:]], axis=1) for each in cuts])
+        bounds = np.cumsum([0, *(len(each) - 1 for each in cuts)])
+        factors = np.stack([heights, velocities if len(velocities) else np.zeros_like(heights)], axis=1)
+        tables = ((fields.texels[texels], np.int32), (factors, np.float32), (chunks, np.int32), (bounds, np.int32))
+        *entries, first = (to_buffer(self._gl, *each) for each in tables)
+        sums = to_buffer(self._gl, np.zeros(len(chunks)), np.float32)
         weigh, balance = dispatch.shader("volume"), dispatch.shader("volume", PARTS=1)
         # by themselves: a circle with `self` would keep buffers until Python looks for garbage
         gl, asked, amplitudes, count = self._gl, self._asked, self.amplitudes, self._count
@@ -304,13 +283,6 @@ class Pressure:
         return follow
 
 
-def _chunks(begins: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cut the entries of each part into chunks: first and one after the last of each; where those of a part begin."""
-    bounds = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
-    chunks = [np.stack([each[:-1], each[1:]], axis=1) for each in bounds]
-    return np.concatenate(chunks), np.cumsum([0, *map(len, chunks)])
-
-
 class DeviceProbes:
     """The sums of `Probes`, one group of threads each; those of all substeps of a step are read back together."""
 
@@ -318,10 +290,9 @@ class DeviceProbes:
         self._gl, self._count, self._steps, self._room = gl, len(probes.heights), 0, 0
         self._shaders = dispatch.shader("probe"), dispatch.shader("probe", DENT=1)
         weights = probes.weights.astype(np.float32).view(np.int32)
-        entries = np.stack([fields.texels[probes.texels].astype(np.int32), weights], axis=1)
+        entries = np.stack([fields.texels[probes.texels], weights], axis=1)
         rows = np.stack([probes.begins[:-1], probes.begins[1:], probes.heights], axis=1)
-        with gl as ctx:
-            self._rows, self._entries = ctx.buffer(rows.astype(np.int32).tobytes()), ctx.buffer(entries.tobytes())
+        self._rows, self._entries = to_buffer(gl, rows, np.int32), to_buffer(gl, entries, np.int32)
 
     def begin(self, substeps: int) -> None:
         """Make room for the sums of so many substeps."""
@@ -332,13 +303,9 @@ class DeviceProbes:
                 self._sums = ctx.buffer(reserve=4 * substeps * self._count)
 
     def take(
-        self,
-        step: int,
-        drifted: float,
-        height: moderngl.Buffer,
-        velocity: moderngl.Buffer,
+        self, step: int, drifted: float, height: moderngl.Buffer, velocity: moderngl.Buffer,
         dent: moderngl.Buffer | None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """The sums of a substep, whose heights have drifted beyond its velocities [s]."""
         shader = self._shaders[dent is not None]
         shader["first"], shader["drifted"] = step * self._count, drifted

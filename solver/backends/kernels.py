@@ -116,9 +116,8 @@ def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Fl
         rising, risen, falling, fallen = w[chart, 2, r], w[chart, 2, r - 1], w[chart, 3, r], w[chart, 3, r - 1]
         factors, result = row_of(factor, i * columns, columns), out[at : at + pitch]
         for c in range(1, columns + 1):
-            force = value_in(factors, c - 1) * force_at(
-                below, row, above, east, north, south, rising, risen, falling, fallen, c
-            )
+            force = force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
+            force *= value_in(factors, c - 1)
             result[c] = result[c] + force if add else force
     irregular = stencil.irregular
     for i in range(len(irregular.texels)):
@@ -177,9 +176,7 @@ class Features(NamedTuple):
 _NO_INTS, _NO_FLOATS = np.zeros(0, np.int64), np.zeros(0, np.float32)
 NO_WEIGHTS = Weights(np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS))
 NO_BALANCE = Balance(
-    *(_NO_INTS, _NO_INTS, _NO_INTS),
-    *(_NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS),
-    *(_NO_INTS, _NO_INTS),
+    _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_INTS, _NO_INTS
 )
 NO_FEATURES = Features(NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, NO_BALANCE)
 
@@ -248,15 +245,8 @@ def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.fl
         extra, acceleration = row_of(kick.extra, at, pitch), row_of(kick.acceleration, first, columns)
         for c in range(1, columns + 1):
             held = value_in(span, c - 1) * value_in(acceleration, c - 1) - value_in(spring, c - 1) * row[c]
-            pushed = (
-                gain[c - 1]
-                * (
-                    force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
-                    + value_in(extra, c)
-                )
-                + held
-            )
-            new = value_in(decay, c - 1) * velocity[c] + pushed
+            force = force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
+            new = value_in(decay, c - 1) * velocity[c] + (gain[c - 1] * (force + value_in(extra, c)) + held)
             velocity[c] = new
             result[c] = row[c] + dt * new
     irregular = kick.stencil.irregular
@@ -284,21 +274,10 @@ def flow(h: Floats32, limit: Floats32, dent: Floats32) -> None:
 
 @kernel
 def advance(
-    substeps: int,
-    dt: np.float32,
-    h: Floats32,
-    v: Floats32,
-    h_next: Floats32,
-    halo: Ints,
-    kick: Kick,
-    addresses: Ints,
-    kicks: Floats32,
-    viscosity: Weights | None,
-    features: Features | None,
-    probes: Probes | None,
-    dent: Floats32,
-    sums: Floats32,
-) -> None:
+    substeps: int, dt: np.float32, h: Floats32, v: Floats32, h_next: Floats32, halo: Ints,
+    kick: Kick, addresses: Ints, kicks: Floats32,
+    viscosity: Weights | None, features: Features | None, probes: Probes | None, dent: Floats32, sums: Floats32,
+) -> None:  # fmt: skip
     """Substeps of dt, from the first half drift to the last, and velocities [k] that kick the texels at addresses [k].
 
     The height ends in `h_next` where their number is odd.
@@ -342,23 +321,8 @@ def _act(h: Floats32, v: Floats32, halo: Ints, features: Features, extra: Floats
         apply(features.laplace, h, features.rigidity, False, features.moment)
         fill(features.moment, halo)
         apply(features.laplace, features.moment, np.float32(-1), drags, extra)
-    if len(features.balance.loaded):
-        _balance(h, v, features.balance)
-
-
-@kernel(fastmath={"contract", "reassoc"}, no_cpython_wrapper=True)
-def _weighed(factors: Floats32, field: Floats32) -> float:
-    """Sum of factor times field over texels side by side."""
-    total = 0.0
-    for i in range(len(factors)):
-        total += np.float64(factors[i] * field[i])
-    return total
-
-
-@kernel(no_cpython_wrapper=True)
-def _balance(h: Floats32, v: Floats32, balance: Balance) -> None:
-    """The pressure that keeps the volume of each part, where the density varies."""
-    for part in range(len(balance.loaded)):
+    balance = features.balance
+    for part in range(len(balance.loaded)):  # of which there are none where the density does not vary
         total = 0.0
         for run in range(balance.begins[part], balance.begins[part + 1]):
             first, last, address = balance.runs[run], balance.runs[run + 1], balance.addresses[run]
@@ -368,3 +332,12 @@ def _balance(h: Floats32, v: Floats32, balance: Balance) -> None:
         balance.total[part] = balance.loaded[part] + np.float32(total)
     for i in range(len(balance.parts)):
         balance.pressure[balance.part_begins[i] : balance.part_begins[i + 1]] = balance.total[balance.parts[i]]
+
+
+@kernel(fastmath={"contract", "reassoc"}, no_cpython_wrapper=True)
+def _weighed(factors: Floats32, field: Floats32) -> float:
+    """Sum of factor times field over texels side by side."""
+    total = 0.0
+    for i in range(len(factors)):
+        total += np.float64(factors[i] * field[i])
+    return total

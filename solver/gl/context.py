@@ -313,7 +313,11 @@ class GLContext:
                 f"the OpenGL context on {self.renderer} is lost; something else in this process has shut EGL "
                 "down (a pyvista or VTK window does): run one of the two in a process of its own"
             )
-        self._free()
+        # what Python has collected; `moderngl.Context.gc` fails on objects released by hand
+        while self._ctx.objects:
+            collected = self._ctx.objects.popleft()
+            if hasattr(collected, "release"):
+                collected.release()
 
     def _leave(self, error: BaseException | None) -> None:
         recorded = self._ctx.error
@@ -410,13 +414,6 @@ class GLContext:
                 created = self._pool.give_back(created)
             if created is not None:
                 created.release()
-
-    def _free(self) -> None:
-        """Free the objects that Python has collected; `moderngl.Context.gc` fails on those released by hand."""
-        while self._ctx.objects:
-            collected = self._ctx.objects.popleft()
-            if hasattr(collected, "release"):
-                collected.release()
 
 
 def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:

@@ -11,11 +11,9 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .topology import distinct, labels, sides_of, split_triangles, turned, undirected
+from .topology import SPLITS, distinct, labels, sides_of, turned, undirected
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,12 +53,18 @@ class Corners:
         share : [triangle_count, 3]
             Where it lies, from 0 at the side's first corner to 1 at the other.
         """
-        parent, corner = split_triangles(point >= 0)
-        columns = np.arange(3)
+        sets, parents, patterns = (point >= 0) @ [1, 2, 4], [], []
+        for number, pattern in {0: [[0, 1, 2]], **SPLITS}.items():
+            chosen = np.flatnonzero(sets == number)
+            parents.append(np.repeat(chosen, len(pattern)))
+            patterns.append(np.tile(pattern, (len(chosen), 1)))
+        # of each piece, the triangle of which it is a part, and its corners, as `SPLITS` numbers them
+        order = np.argsort(np.concatenate(parents), kind="stable")
+        parent, corner = np.concatenate(parents)[order], np.concatenate(patterns)[order]
         F, numbers = np.hstack([self.F, point]), np.hstack([self.given, given])
         uv = None
         if self.uv is not None:
-            along = self.uv + share[..., None] * (self.uv[:, (columns + 1) % 3] - self.uv)
+            along = self.uv + share[..., None] * (np.roll(self.uv, -1, axis=1) - self.uv)
             uv = np.concatenate([self.uv, along], axis=1)[parent[:, None], corner]
         return Corners(F[parent[:, None], corner], numbers[parent[:, None], corner], uv)
 
@@ -127,9 +131,7 @@ def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.i
     if len(rim) == 0:
         return F
     width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
-    pairs = cKDTree(V[rim]).query_pairs(width, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(rim), len(rim)))
-    _, label = connected_components(graph, directed=False)
+    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
     target = np.arange(len(V))
     target[rim] = rim[np.unique(label, return_index=True)[1]][label]
     # a needle is as thin as a crack, but no crack

@@ -124,8 +124,7 @@ def _lids(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.floa
     added = len(filled_V) - len(V)
     if added < 0 or not np.array_equal(filled_V[added:], V):
         raise MeshError("it changed the surface itself")
-    old_first = np.roll(np.arange(len(filled_V)), -added)
-    numbers = np.argsort(old_first)[filled_F]
+    numbers = (filled_F - added) % len(filled_V)
     known = {tuple(triangle) for triangle in np.sort(F, axis=1).tolist()}
     new = [tuple(triangle) not in known for triangle in np.sort(numbers, axis=1).tolist()]
     return filled_V[:added], numbers[np.array(new, dtype=bool)]
@@ -168,10 +167,9 @@ def read_obj(content: bytes) -> Soup:
     vertex, pair = np.array(corners, dtype=np.int64).reshape(-1, 2).T
     wrong = (vertex < 0) | (vertex >= len(V))
     if wrong.any():
-        number = int(np.repeat(lines, sizes)[np.argmax(wrong)])
-        raise MeshError(
-            f"line {number} refers to vertex {vertex[np.argmax(wrong)] + 1}; valid is 1 to {len(V)}, the vertices given"
-        )
+        at = np.argmax(wrong)
+        number = np.repeat(lines, sizes)[at]
+        raise MeshError(f"line {number} refers to vertex {vertex[at] + 1}; valid is 1 to {len(V)}, the vertices given")
     counts = np.array(sizes, dtype=np.int64)
     triangles = triangulate(V[vertex], counts)
     uv = _numbers(pairs).reshape(-1, 2)
@@ -192,19 +190,17 @@ def read_off(content: bytes) -> Soup:
     if not rows or not re.fullmatch(r"(ST)?C?N?OFF", rows[0][0].upper()) or "BINARY" in rows[0]:
         raise MeshError("it does not start with OFF, as an OFF file in text form does")
     counts = rows[0][1:] or (rows[1] if len(rows) > 1 else [])
-    lines_left = rows[1:] if rows[0][1:] else rows[2:]
+    left = rows[1:] if rows[0][1:] else rows[2:]
     if len(counts) < 2 or not all(word.isdecimal() for word in counts[:2]):
         raise MeshError("the numbers of vertices and faces are missing after OFF")
     vertices, faces = int(counts[0]), int(counts[1])
-    if len(lines_left) < vertices + faces:
-        raise MeshError(
-            f"it ends early: {vertices} vertices and {faces} faces are announced, {len(lines_left)} lines follow"
-        )
+    if len(left) < vertices + faces:
+        raise MeshError(f"it ends early: {vertices} vertices and {faces} faces are announced, {len(left)} lines follow")
     # the numbers of the lines are lost with the comments, so vertices are counted instead
-    places = [_three(words, number, "vertex") for number, words in enumerate(lines_left[:vertices], 1)]
+    places = [_three(words, number, "vertex") for number, words in enumerate(left[:vertices], 1)]
     V = _numbers([word for row in places for word in row]).reshape(-1, 3)
     polygons = []
-    for words in lines_left[vertices : vertices + faces]:
+    for words in left[vertices : vertices + faces]:
         size = _whole(words[0])
         corners = [_whole(word) for word in words[1 : 1 + max(size, 0)]]
         if len(corners) != size:
@@ -311,17 +307,15 @@ def check_mesh_file(path: Path) -> None:
 
 
 def _read(path: Path) -> Soup:
-    kind = path.suffix[1:].upper()
+    kind, file = path.suffix[1:].upper(), f"mesh file {str(path)!r}"
     try:
         if path.stat().st_size == 0:
-            raise MeshError(f"mesh file {str(path)!r} is empty")
-        require_memory(MeshError, _BYTE * path.stat().st_size, f"mesh file {str(path)!r}", "take a coarser mesh")
+            raise MeshError(f"{file} is empty")
+        require_memory(MeshError, _BYTE * path.stat().st_size, file, "take a coarser mesh")
         if path.suffix.lower() in _READERS:
             return _READERS[path.suffix.lower()](path.read_bytes())
         if kind.lower() not in trimesh.available_formats() or kind.lower() in _ARCHIVES:
-            raise MeshError(
-                f"mesh file {str(path)!r} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb, unpacked"
-            )
+            raise MeshError(f"{file} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb, unpacked")
         if path.suffix.lower() == ".gltf":
             _check_buffers(path)
         with path.open("rb"), warnings.catch_warnings():
@@ -330,16 +324,14 @@ def _read(path: Path) -> Soup:
     except MeshError as error:
         if repr(str(path)) in str(error):
             raise
-        raise MeshError(f"mesh file {str(path)!r} cannot be read: {error}") from error
+        raise MeshError(f"{file} cannot be read: {error}") from error
     except OSError as error:
-        raise MeshError(f"mesh file {str(path)!r} cannot be read: {error.strerror or error}") from error
+        raise MeshError(f"{file} cannot be read: {error.strerror or error}") from error
     except MemoryError:
         raise
     except Exception as error:  # trimesh lets its parsers' exceptions through
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise MeshError(
-            f"mesh file {str(path)!r} cannot be read: it is damaged or not a {kind} file ({reason})"
-        ) from error
+        raise MeshError(f"{file} cannot be read: it is damaged or not a {kind} file ({reason})") from error
 
 
 def _check_buffers(path: Path) -> None:

@@ -24,7 +24,7 @@ from .clean import (
     without_slivers,
 )
 from .sheets import cut_apart
-from .topology import corner_angles, distinct, genera, labels, rims_of, sides_of, triangle_areas, triangles_beside
+from .topology import corner_angles, distinct, labels, sides_of, triangle_areas, triangles_beside
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
 _STEPS = 300
@@ -41,29 +41,23 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     for k, angle in enumerate(corner_angles(V, F).T):
         for axis in range(3):
             total[:, axis] += np.bincount(F[:, k], weights=angle * normal[:, axis], minlength=len(V))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    mean = np.where(length > 0, _unit(total), [0.0, 0.0, 1.0])
+    mean = np.where(np.linalg.norm(total, axis=1, keepdims=True) > 0, _unit(total), [0.0, 0.0, 1.0])
     vertex, triangle = F.ravel(), np.repeat(np.arange(len(F)), 3)
     steep = np.flatnonzero(_worst(mean, vertex, normal[triangle]) < _STEEP)
     if not len(steep):
         return mean
     chosen = np.isin(vertex, steep)
     vertex, beside = np.searchsorted(steep, vertex[chosen]), normal[triangle[chosen]]
-    other = _middles(mean[steep], vertex, beside)
-    better = _worst(other, vertex, beside) > _worst(mean[steep], vertex, beside)
-    mean[steep[better]] = other[better]
-    return mean
-
-
-def _middles(start: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Middles [k, 3] of the smallest caps that hold the normals [c, 3] at vertices [c] (Badoiu and Clarkson 2003)."""
-    middle = start.copy()
+    # middles of the smallest caps that hold the normals at each of these vertices (Badoiu and Clarkson 2003)
+    middle = mean[steep]
     for i in range(1, _STEPS):
-        cosine = np.einsum("ij,ij->i", middle[vertex], beside)
-        order = np.lexsort((cosine, vertex))
+        order = np.lexsort((np.einsum("ij,ij->i", middle[vertex], beside), vertex))
         farthest = order[np.searchsorted(vertex[order], np.arange(len(middle)))]
         middle += (beside[farthest] - middle) / (i + 1)
-    return _unit(middle)
+    middle = _unit(middle)
+    better = _worst(middle, vertex, beside) > _worst(mean[steep], vertex, beside)
+    mean[steep[better]] = middle[better]
+    return mean
 
 
 def _worst(normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -140,8 +134,7 @@ class Mesh:
         MeshError
             If there is no triangle with an area, or a vertex is not finite.
         """
-        points, triangles = _checked(V, F, name)
-        corner_uv = None if uv is None else _corner_uv(uv, points, triangles, name)
+        points, triangles, corner_uv = _checked(V, F, uv, name)
         with np.errstate(under="ignore"):
             points, corners, notes = _cleaned(points, triangles, corner_uv, name)
         vertex_uv = None
@@ -167,8 +160,22 @@ class Mesh:
 
     @functools.cached_property
     def rims(self) -> tuple[NDArray[np.int64], ...]:
-        """Boundary loops: vertices of each in order, the surface to their left seen from outside."""
-        return rims_of(self.F)
+        """Boundary loops: vertices of each in order, the surface to their left seen from outside.
+
+        Each begins at its lowest vertex; they are sorted by it.
+        """
+        alone = sides_of(self.F)[1]
+        starts, ends = self.F.ravel()[alone], np.roll(self.F, -1, axis=1).ravel()[alone]
+        following = dict(zip(starts.tolist(), ends.tolist(), strict=True))
+        rims = []
+        for start in sorted(following):
+            rim = []
+            while start in following:
+                rim.append(start)
+                start = following.pop(start)
+            if rim:
+                rims.append(np.array(rim, dtype=np.int64))
+        return tuple(rims)
 
     @property
     def closed(self) -> bool:
@@ -178,7 +185,17 @@ class Mesh:
     @functools.cached_property
     def genus(self) -> NDArray[np.int64]:
         """Number of handles of every part, shape [component_count]; an open part has those that it has with lids."""
-        return genera(self.F, self.components, self.rims)
+        count, part_of = self.component_count, np.full(self.F.max() + 1, -1)  # the part of each vertex
+        part_of[self.F] = self.components[:, None]
+        vertices, triangles = np.bincount(part_of[part_of >= 0], minlength=count), np.bincount(self.components)
+        # every triangle has three sides; each inner edge has two of them, each edge of a rim one
+        on_rims, loops = np.zeros((2, count), dtype=np.int64)
+        for rim in self.rims:
+            on_rims[part_of[rim[0]]] += len(rim)
+            loops[part_of[rim[0]]] += 1
+        edges = (3 * triangles + on_rims) // 2
+        # Euler's formula is V - E + F = 2 - 2 genus - rims
+        return (2 - (vertices - edges + triangles) - loops) // 2
 
     @functools.cached_property
     def triangle_areas(self) -> NDArray[np.float64]:
@@ -203,7 +220,9 @@ class Mesh:
         return vertex_normals(self.V, self.F)
 
 
-def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _checked(
+    V: ArrayLike, F: ArrayLike, uv: ArrayLike | None, name: str
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]:
     try:
         points, triangles = np.asarray(V, dtype=np.float64), np.asarray(F)
         if triangles.dtype.kind not in "iu":
@@ -213,10 +232,9 @@ def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64]
         raise MeshError(f"{name}: V and F must be arrays of numbers: {error}") from error
     if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
         raise MeshError(f"{name}: V must be [n, 3] and F [m, 3] with m > 0, got {points.shape} and {triangles.shape}")
-    if triangles.min() < 0 or triangles.max() >= len(points):
-        raise MeshError(
-            f"{name}: triangle indices run from {triangles.min()} to {triangles.max()}, valid is 0 to {len(points) - 1}"
-        )
+    low, high = triangles.min(), triangles.max()
+    if low < 0 or high >= len(points):
+        raise MeshError(f"{name}: triangle indices run from {low} to {high}, valid is 0 to {len(points) - 1}")
     used = distinct(triangles)
     bad = used[~np.isfinite(points[used]).all(axis=1)]
     if len(bad):
@@ -225,7 +243,13 @@ def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64]
         extent = np.ptp(points[used], axis=0).max()
     if not _SMALLEST <= extent <= _LARGEST:
         raise MeshError(f"{name}: its size is {extent:.3g} m; valid is {_SMALLEST:g} to {_LARGEST:g} m")
-    return points, triangles
+    if uv is None:
+        return points, triangles, None
+    pairs = np.asarray(uv, dtype=np.float64)
+    valid = (len(points), 2), (*triangles.shape, 2)
+    if pairs.shape not in valid:
+        raise MeshError(f"{name}: uv has shape {pairs.shape}; valid is {valid[0]} or {valid[1]}")
+    return points, triangles, pairs[triangles] if pairs.ndim == 2 else pairs
 
 
 def _cleaned(
@@ -267,15 +291,6 @@ def _changes(corners: Corners) -> tuple[int, int]:
     pairs = distinct(given[old] * vertices + corners.F.ravel()[old])
     kept = len(distinct(pairs % vertices))
     return len(pairs) - kept, len(pairs) - len(distinct(given[old])) + int(vertices) - kept
-
-
-def _corner_uv(uv: ArrayLike, V: NDArray, F: NDArray, name: str) -> NDArray[np.float64]:
-    pairs = np.asarray(uv, dtype=np.float64)
-    if pairs.shape == (len(V), 2):
-        return pairs[F]
-    if pairs.shape == (*F.shape, 2):
-        return pairs
-    raise MeshError(f"{name}: uv has shape {pairs.shape}; valid is {(len(V), 2)} or {(*F.shape, 2)}")
 
 
 # A surface that encloses less, relative to the cube of its size, has no inside.

@@ -57,13 +57,8 @@ def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any]
 def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
     """Columns of an element by name, and the data after it; `order` is "<" or ">".
 
-    Raises `MeshError` if the data end early.
+    Rows that are all of one length are read in one go. Raises `MeshError` if the data end early.
     """
-    return _read_table(element, data, order) or _read_rows(element, data, order)
-
-
-def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:
-    """Read rows that are all of one length, in one go; None where their lists are not."""
     if not element.columns:
         return {}, data
     fields: list[Any] = []
@@ -75,19 +70,19 @@ def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, An
         first = np.dtype(fields).itemsize if fields else 0
         kind_of_length = np.dtype(order + length)
         if len(data) < first + kind_of_length.itemsize:
-            return None
+            return _read_rows(element, data, order)
         sizes[name] = int(np.frombuffer(data, kind_of_length, 1, first)[0])
         if not 0 <= sizes[name] * np.dtype(kind).itemsize <= len(data):
-            return None
+            return _read_rows(element, data, order)
         fields += [(f"{name} length", kind_of_length), (name, order + kind, (sizes[name],))]
     row = np.dtype(fields)
     if element.rows * row.itemsize > len(data):
         if sizes:
-            return None
+            return _read_rows(element, data, order)
         raise _ends_early(element)
     table = np.frombuffer(data, row, element.rows)
     if any((table[f"{name} length"] != size).any() for name, size in sizes.items()):
-        return None
+        return _read_rows(element, data, order)
     return {name: table[name] for name, _, _ in element.columns}, data[element.rows * row.itemsize :]
 
 
@@ -164,24 +159,17 @@ def triangulate(points: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArra
     owner = np.repeat(np.arange(len(sizes)), count)
     step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     triangles = np.stack([first[owner], first[owner] + step + 1, first[owner] + step + 2], axis=1)
-    for polygon in _folded(points, triangles, owner, sizes):
-        corners = points[first[polygon] : first[polygon] + sizes[polygon]]
-        triangles[owner == polygon] = first[polygon] + _clip_ears(corners)
-    return triangles
-
-
-def _folded(
-    points: NDArray[np.float64], triangles: NDArray[np.int64], owner: NDArray[np.int64], sizes: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Polygons that are not convex: a triangle of their fan faces against the sum of all."""
+    # polygons that are not convex: a triangle of their fan faces against the sum of all
     many = np.flatnonzero(sizes[owner] > 3)
     a, b, c = (points[triangles[many, k]] for k in range(3))
     with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused later, by name
         normals = np.cross(b - a, c - a)
-    polygon = owner[many]
-    total = np.stack([np.bincount(polygon, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1)
-    against = np.einsum("ij,ij->i", normals, total[polygon]) < 0
-    return np.unique(polygon[against])
+    of = owner[many]
+    total = np.stack([np.bincount(of, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1)
+    for polygon in np.unique(of[np.einsum("ij,ij->i", normals, total[of]) < 0]):
+        corners = points[first[polygon] : first[polygon] + sizes[polygon]]
+        triangles[owner == polygon] = first[polygon] + _clip_ears(corners)
+    return triangles
 
 
 def _clip_ears(corners: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -237,8 +225,7 @@ def read_ply(content: bytes) -> Soup:
     order, elements, data = _header(content)
     columns: dict[str, dict[str, Any]] = {}
     for element in elements:
-        read = read_text if order == "" else read_binary
-        columns[element.name], data = read(element, data, order)
+        columns[element.name], data = (read_binary if order else read_text)(element, data, order)
         if "face" in columns and "vertex" in columns:
             break
     vertex, faces = columns.get("vertex", {}), columns.get("face", {})
@@ -254,20 +241,13 @@ def read_ply(content: bytes) -> Soup:
         )
     index = corners.astype(np.int64)
     triangles = triangulate(V[index], sizes)
-    uv = _corner_uv(vertex, faces, index, sizes)
-    return Soup(V, index[triangles], None if uv is None else uv[triangles], too_small(sizes))
-
-
-def _corner_uv(
-    vertex: dict[str, Any], faces: dict[str, Any], index: NDArray[np.int64], sizes: NDArray[np.int64]
-) -> NDArray[np.float64] | None:
-    pairs = faces.get("texcoord")
+    uv, pairs = None, faces.get("texcoord")
+    names = next((both for both in _UV_NAMES if vertex.keys() >= set(both)), None)
     if pairs is not None and all(len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)):
-        return np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
-    for u, v in _UV_NAMES:
-        if u in vertex and v in vertex:
-            return np.stack([vertex[u], vertex[v]], axis=1).astype(np.float64)[index]
-    return None
+        uv = np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
+    elif names is not None:
+        uv = np.stack([vertex[name] for name in names], axis=1).astype(np.float64)[index]
+    return Soup(V, index[triangles], None if uv is None else uv[triangles], too_small(sizes))
 
 
 def _header(content: bytes) -> tuple[str, list[Element], bytes]:

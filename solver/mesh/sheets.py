@@ -6,8 +6,6 @@ sheet goes on in which.
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -75,8 +73,7 @@ def _angles(
     axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
     across = V[F[triangle, (k + 2) % 3]] - V[a]
     across = across - np.einsum("ij,ij->i", across, axis)[:, None] * axis
-    begins = np.append(True, key[1:] != key[:-1])
-    first = across[np.flatnonzero(begins)[np.cumsum(begins) - 1]]
+    first = across[np.repeat(*_runs(key))]
     turn = np.einsum("ij,ij->i", np.cross(first, across), axis)
     return np.arctan2(turn, np.einsum("ij,ij->i", first, across)) % (2 * np.pi)
 
@@ -86,10 +83,8 @@ def _candidates(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.i
     starts, sizes = _runs(key)
     first, second = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for size in np.unique(sizes[sizes > 1]).tolist():
-        pairs = (
-            itertools.combinations(range(size), 2) if size <= _ALL_PAIRS else ((i, (i + 1) % size) for i in range(size))
-        )
-        i, j = np.array(list(pairs)).T
+        places = np.arange(size)
+        i, j = np.triu_indices(size, 1) if size <= _ALL_PAIRS else (places, np.roll(places, -1))
         base = starts[sizes == size][:, None]
         first.append((base + i).ravel())
         second.append((base + j).ravel())
@@ -264,10 +259,8 @@ def _without_double_edges(
     a, b = F.ravel(), np.roll(F, -1, axis=1).ravel()
     key = np.minimum(a, b) * len(V) + np.maximum(a, b)
     order = np.lexsort((leader, key))
-    ordered, lead = key[order], leader[order]
-    begins = np.append(True, ordered[1:] != ordered[:-1])
-    first = lead[begins][np.cumsum(begins) - 1]
-    again = order[lead != first]
+    lead = leader[order]
+    again = order[lead != lead[np.repeat(*_runs(key[order]))]]
     if len(again) == 0:
         return V, corners
     leaders, number = np.unique(leader[again], return_inverse=True)

@@ -1,4 +1,4 @@
-"""What a surface is: its edges, parts, rims and handles, how its triangles are wound, cut, and folded.
+"""What a surface is: its edges, its parts, how its triangles are wound, cut, and folded.
 
 Side k of a triangle runs from corner k to corner k + 1; the sides of all are numbered 3 x triangle + k.
 """
@@ -95,27 +95,6 @@ SPLITS = {
 }
 
 
-def split_triangles(cut: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cut triangles at points on their sides, `cut` [m, 3].
-
-    Returns
-    -------
-    parent : int64 [k]
-        Triangle of which each piece is a part, in ascending order.
-    corners : int64 [k, 3]
-        Of the pieces, numbered as in `SPLITS`.
-    """
-    parents, corners = [], []
-    sets = cut @ [1, 2, 4]
-    for number, pattern in {0: [[0, 1, 2]], **SPLITS}.items():
-        chosen = np.flatnonzero(sets == number)
-        parents.append(np.repeat(chosen, len(pattern)))
-        corners.append(np.tile(pattern, (len(chosen), 1)))
-    parent = np.concatenate(parents)
-    order = np.argsort(parent, kind="stable")
-    return parent[order], np.concatenate(corners)[order]
-
-
 def distinct(values: NDArray[np.int64]) -> NDArray[np.int64]:
     """Different values, in ascending order: `numpy.unique`, which on a million integers takes several times as long."""
     ordered = np.sort(values, axis=None)
@@ -139,53 +118,6 @@ def triangles_beside(F: NDArray[np.int64]) -> NDArray[np.int64]:
     beside, pairs = np.full(F.size, -1), sides_of(F)[0]
     beside[pairs] = pairs[:, ::-1] // 3
     return beside.reshape(-1, 3)
-
-
-def genera(F: NDArray[np.int64], part: NDArray[np.int64], rims: tuple[NDArray[np.int64], ...]) -> NDArray[np.int64]:
-    """Number of handles of every part of a manifold, oriented mesh.
-
-    By Euler's formula V - E + F = 2 - 2 genus - rims.
-
-    Parameters
-    ----------
-    F : [triangle_count, 3]
-    part : [triangle_count]
-        Part of every triangle, numbered from 0.
-    rims : tuple of [k]
-        See `rims_of`.
-    """
-    count = int(part.max()) + 1
-    of_vertex = np.full(F.max() + 1, -1)
-    of_vertex[F] = part[:, None]
-    vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=count)
-    triangles = np.bincount(part)
-    # every triangle has three sides; each inner edge has two of them, each edge of a rim one
-    on_rims = np.zeros(count, dtype=np.int64)
-    loops = np.zeros(count, dtype=np.int64)
-    for rim in rims:
-        on_rims[of_vertex[rim[0]]] += len(rim)
-        loops[of_vertex[rim[0]]] += 1
-    edges = (3 * triangles + on_rims) // 2
-    return (2 - (vertices - edges + triangles) - loops) // 2
-
-
-def rims_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
-    """Boundary loops of a manifold, oriented mesh: vertices in the order in which the triangles run along them.
-
-    Each begins at its lowest vertex; they are sorted by it.
-    """
-    alone = sides_of(F)[1]
-    starts, ends = F.ravel()[alone], np.roll(F, -1, axis=1).ravel()[alone]
-    following = dict(zip(starts.tolist(), ends.tolist(), strict=True))
-    rims = []
-    for start in sorted(following):
-        rim = []
-        while start in following:
-            rim.append(start)
-            start = following.pop(start)
-        if rim:
-            rims.append(np.array(rim, dtype=np.int64))
-    return tuple(rims)
 
 
 # A triangle with less than this share of its area at rest counts as crushed.
@@ -298,17 +230,16 @@ def turned(
     length = np.ones(len(pairs)) if cost is None else cost
     # of two triangles with two common sides, one link decides; coo would add both
     low, high = pairs.min(axis=1), pairs.max(axis=1)
-    order = np.lexsort((length, high, low))
-    key = (low * count + high)[order]
-    once = order[np.append(True, key[1:] != key[:-1])]
+    key = low * count + high
+    order = np.lexsort((length, key))
+    once = order[np.append(True, np.diff(key[order]) != 0)]
     graph = coo_array((length[once], (low[once], high[once])), shape=(count, count)).tocsr()
     roots = np.unique(labels(pairs, count), return_index=True)[1]
     _, before, _ = dijkstra(graph, directed=False, indices=roots, return_predecessors=True, min_only=True)
     rest = np.flatnonzero(before >= 0)
     up = np.arange(count)
     up[rest] = before[rest]
-    sorted_keys = (low * count + high)[once]
-    link = np.searchsorted(sorted_keys, np.minimum(rest, up[rest]) * count + np.maximum(rest, up[rest]))
+    link = np.searchsorted(key[once], np.minimum(rest, up[rest]) * count + np.maximum(rest, up[rest]))
     result[rest] = against[once][link]
     while (up[up] != up).any():  # the sum along the path, by doubling
         result ^= result[up]

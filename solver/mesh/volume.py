@@ -83,10 +83,7 @@ def is_volume(path: str | Path) -> bool:
 
 @checked(MeshError, path=PATH)
 def load_volume(
-    path: str | Path,
-    threshold: float,
-    spacing: float | ArrayLike | None = None,
-    origin: ArrayLike = (0.0, 0.0, 0.0),
+    path: str | Path, threshold: float, spacing: float | ArrayLike | None = None, origin: ArrayLike = (0.0, 0.0, 0.0)
 ) -> Volume:
     """Read a volume: a NIfTI or NRRD file, the folder of a DICOM series, or a .npy with its spacing.
 
@@ -119,17 +116,13 @@ def load_volume(
         return _scan(path, threshold)
     if spacing is None:
         raise MeshError(f"volume {str(path)!r} needs a spacing: the way between voxels in metres, such as 0.001")
-    return Volume(_array(path), threshold, spacing, origin)
-
-
-def _array(path: Path) -> NDArray:
     try:
         values = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise MeshError(f"volume {str(path)!r} cannot be read: {error}") from error
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "iuf":
         raise MeshError(f"volume {str(path)!r} holds no numbers; valid is an array [i, j, k]")
-    return values
+    return Volume(values, threshold, spacing, origin)
 
 
 def _scan(path: Path, threshold: float) -> Volume:

@@ -47,31 +47,17 @@ def distance_grid(
     shape = np.ceil((high - low) / distance).astype(int) + 3 + 2 * _MARGIN
     blocks = -(-shape // _COARSEST)
     values = np.empty(blocks * _COARSEST)
-    corners = _COARSEST * np.stack(np.meshgrid(*map(np.arange, blocks), indexing="ij"), axis=-1).reshape(-1, 3)
+    corners = _COARSEST * np.indices(blocks).reshape(3, -1).T
     size = _COARSEST
     while True:
-        middle = origin + distance * (corners + (size - 1) / 2)
-        found = closest_points.distances(middle)
-        places = corners[:, None] + _block(size)
+        found = closest_points.distances(origin + distance * (corners + (size - 1) / 2))  # of the blocks' middles
+        places = corners[:, None] + np.indices([size] * 3).reshape(3, -1).T
         values[tuple(np.moveaxis(places, -1, 0))] = found[:, None]
         if size == 1:
             return values, origin
         near = np.abs(found - distance) <= (2 + (size - 1) / 2 * np.sqrt(3)) * distance
         size //= 2
-        corners = (corners[near][:, None] + size * _block(2)).reshape(-1, 3)
-
-
-def filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values on a grid with what is positive, but shut off from the first node, made negative."""
-    from scipy.ndimage import label  # takes long to import, for what few meshes need
-
-    region, _ = label(values > 0)
-    return np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
-
-
-def _block(size: int) -> NDArray[np.int64]:
-    """Nodes of a cube, [size^3, 3], counted from its first corner."""
-    return np.stack(np.meshgrid(*[np.arange(size)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        corners = (corners[near][:, None] + size * np.indices([2, 2, 2]).reshape(3, -1).T).reshape(-1, 3)
 
 
 # Corners of a grid cell as `igl.marching_cubes` counts them: along x, y, z.
@@ -87,16 +73,9 @@ def zero_surface(
     count = np.sum(corners, axis=0)
     cells = np.argwhere((count > 0) & (count < 8))
     nodes = (cells[:, None] + _CORNERS).reshape(-1, 3)
-    number = np.ravel_multi_index(tuple(nodes.T), values.shape)
-    used, index = np.unique(number, return_inverse=True)
-    places = np.stack(np.unravel_index(used, values.shape), axis=1)
-    V, F, _ = igl.marching_cubes(
-        values.ravel()[used],
-        np.asarray(origin) + np.asarray(spacing) * places,
-        index.reshape(-1, 8).astype(np.int64),
-        0.0,
-    )
-    return V, F
+    used, index = np.unique(np.ravel_multi_index(tuple(nodes.T), values.shape), return_inverse=True)
+    points = np.asarray(origin) + np.asarray(spacing) * np.stack(np.unravel_index(used, values.shape), axis=1)
+    return igl.marching_cubes(values.ravel()[used], points, index.reshape(-1, 8), 0.0)[:2]
 
 
 # Below, the grid has more than some 20 million nodes; above, little of the object's shape is left.
@@ -131,8 +110,7 @@ class Wrap:
 
     def interpolate(self, values: NDArray) -> NDArray:
         """Values at the vertices of `mesh`, [vertex_count, ...], as the vertices of `wrapped` see them, [n, ...]."""
-        corners = values[self.mesh.F[self.triangles]]
-        return np.einsum("ij,ij...->i...", self.barycentrics, corners)
+        return np.einsum("ij,ij...->i...", self.barycentrics, values[self.mesh.F[self.triangles]])
 
 
 def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
@@ -153,11 +131,16 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
     MeshError
         If the offset is not within 0.004 to 0.2.
     """
+    from scipy.ndimage import label  # takes long to import, for what few meshes need
+
     if not _SMALLEST <= offset <= _LARGEST:
         raise MeshError(f"the offset of the wrap is {offset}; valid is {_SMALLEST} to {_LARGEST} of the object's size")
     distance = float(offset * np.ptp(mesh.V, axis=0).max())
     values, origin = distance_grid(mesh.V, mesh.F, distance)
-    values = filled(values - distance)
+    values -= distance
+    # what is positive, but shut off from the first node, is inside
+    region, _ = label(values > 0)
+    values = np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
     values = np.where(values < 0, np.minimum(values, -_CLEAR * distance), np.maximum(values, _CLEAR * distance))
     V, F = zero_surface(values, origin, distance)
     found = Mesh.from_arrays(V, F, name=mesh.name)
@@ -167,11 +150,6 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
         f"{counted(len(found.F), 'triangle')}"
     )
     surface = dataclasses.replace(found, notes=(*mesh.notes, note))
-    return Wrap(surface, mesh, *_nearest(surface, mesh.V), distance)
-
-
-def _nearest(mesh: Mesh, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Triangle and barycentric coordinates of the nearest point of a mesh to each of some points."""
-    triangle, nearest = ClosestPoints(mesh.V, mesh.F)(points)
-    a, b, c = (np.ascontiguousarray(mesh.V[mesh.F[triangle, k]]) for k in range(3))
-    return triangle, igl.barycentric_coordinates(nearest, a, b, c)
+    triangles, nearest = ClosestPoints(surface.V, surface.F)(mesh.V)
+    a, b, c = (np.ascontiguousarray(surface.V[surface.F[triangles, k]]) for k in range(3))
+    return Wrap(surface, mesh, triangles, igl.barycentric_coordinates(nearest, a, b, c), distance)

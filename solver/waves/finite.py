@@ -100,8 +100,7 @@ class FiniteGuard:
     def clear(self) -> None:
         """Begin anew, at rest."""
         self._fastest, self._largest = -np.inf, ("", 0.0, "", 0.0)
-        self._reported = False
-        self._unseen = 0
+        self._reported, self._unseen = False, 0
 
     def note(self, kind: str, value: float, unit: str, time: float, speed: float) -> None:
         """Remember a source, if it is the largest: "impulse", 2.0, "N s", when [s], and a texel's speed by it [m/s]."""
@@ -137,15 +136,15 @@ class FiniteGuard:
         raise SolverError(f"{name} is no longer finite {where}, at time {time:.6g} s; {cause}, and `reset()` the waves")
 
 
-def check_kick(velocities: NDArray[np.float64], kind: str, value: float, unit: str) -> float:
-    """The greatest of the velocities [k] that a source gives at once [m/s].
+def check_kick(velocities: NDArray[np.float64], impulse: float) -> float:
+    """The greatest of the velocities [k] that an impulse [N s] gives at once [m/s].
 
     Raises `SolverError` if it is beyond float32.
     """
     fastest = float(np.abs(velocities).max(initial=0.0))
     if not fastest <= _GREATEST:
         raise SolverError(
-            f"{kind} is {value:.4g} {unit}, which would move the surface at {fastest:.4g} m/s, beyond float32; "
+            f"impulse is {impulse:.4g} N s, which would move the surface at {fastest:.4g} m/s, beyond float32; "
             "valid is a smaller one, or a greater density of the material"
         )
     return fastest

@@ -95,16 +95,10 @@ class HeightMapShaders:
         sources, means, ends = _tables(topology)
         self._place_count, self._corner_counts = sources.size, (len(means), len(means) + len(ends))
         defines = {"GROUP": _GROUP, "N": n, "COLUMNS": ChartPage(charts, n).columns, "FREE": FREE, "MOST": MOST}
+        shader = functools.partial(gl.compute_shader, _SHADERS, **defines)
         with gl as ctx:
-            self._heights, self._limited, self._map, self._corners = (
-                gl.compute_shader(_SHADERS, f"waves/shaders/{name}", **defines, **more)
-                for name, more in (
-                    ("halo_heights", {}),
-                    ("halo_heights", {"LIMIT": 1}),
-                    ("height_map", {}),
-                    ("height_map", {"CORNERS": 1}),
-                )
-            )
+            self._heights, self._limited = (shader("waves/shaders/halo_heights", **each) for each in ({}, {"LIMIT": 1}))
+            self._map, self._corners = (shader("waves/shaders/height_map", **each) for each in ({}, {"CORNERS": 1}))
             self._sources = ctx.buffer(sources.tobytes())
             self._corner_places = ctx.buffer(np.concatenate([means, ends]).tobytes() or bytes(16))
             self._weights = ctx.buffer(weights.tobytes())
@@ -205,8 +199,7 @@ class HeightMap:
     """
 
     def __init__(self, texels: TexelMesh, limit: DisplacementLimit | None = None) -> None:
-        self._topology = texels.topology
-        self._limit = limit
+        self._topology, self._limit = texels.topology, limit
         count = texels.positions[..., 0].size
         require_memory(SolverError, _TEXEL * count, f"the height map of {count:,} texels", "take a lower resolution")
         self._weights = _gradient_weights(texels)
@@ -247,21 +240,20 @@ class HeightMap:
         fill_halo(self._topology, around)
         height_map = np.zeros((*around.shape, 4), np.float32)
         _differentiate(self._weights, around, height_map)
-        fill_halo(self._topology, height_map)
-        mirror_at_rim(self._topology, height_map)
+        fill_around(self._topology, height_map)
         return height_map
 
     def rates(self, height: NDArray[np.float32], velocity: NDArray[np.float32]) -> NDArray[np.float32]:
         """Rate of the heights in the height map [m/s], [C, n + 2, n + 2], under a height and a velocity [C, n, n]."""
         rates = np.zeros((*self._topology.halo.shape, 4), np.float32)
         rates[:, 1:-1, 1:-1, 3] = velocity if self._limit is None else self._limit.rate(height, velocity)
-        fill_halo(self._topology, rates)
-        mirror_at_rim(self._topology, rates)
+        fill_around(self._topology, rates)
         return rates[..., 3]
 
 
-def mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:
-    """Fill in what lies beyond a fixed rim, if there is one: the texels' mirror image, with heights turned over."""
+def fill_around(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:
+    """Fill in the halo, and beyond a fixed rim, if there is one, the texels' mirror image, with heights turned over."""
+    fill_halo(topology, height_map)
     if not topology.fixed_rim:
         return
     turned = np.array([1, 1, 1, -1], np.float32)

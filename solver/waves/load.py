@@ -117,9 +117,7 @@ class HeldLoad:
 
     def __init__(self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance) -> None:
         self._backend, self._balance = backend, balance
-        self._shape = share.shape
-        self._share = share.reshape(-1)
-        self._size = share.size
+        self._shape, self._size, self._share = share.shape, share.size, share.reshape(-1)
         self.load = self._uploaded = Load.none()
 
     def forces(self) -> NDArray[np.float64]:

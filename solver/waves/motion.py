@@ -18,8 +18,7 @@ from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from ..texels.moving import MovedPlaces, SurfaceRide
 from ..texels.texel_mesh import TexelMesh, tangents
-from ..texels.topology import fill_halo
-from .height_map import mirror_at_rim
+from .height_map import fill_around
 
 # The stiffness is made anew once the square of an edge's length has changed by this share since it was made.
 _CHANGED = 2e-3
@@ -54,7 +53,7 @@ class Motion:
         self._operator = MovingOperator(atlas, material, operator)
         self._folds = Folds(atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64))
         self._edges = edges_of(self._folds.F).ends
-        self._squares = _square_lengths(self.V, self._edges)
+        self._squares, _ = _square_lengths(self.V, self._edges, np.zeros(len(self._edges)))
         self._now = operator
         self._warned, self._looks = False, 0
 
@@ -65,9 +64,10 @@ class Motion:
         """
         self.V = self._checked(vertices)
         self.__dict__.pop("atlas", None)
-        if not _stretches(self.V, self._edges, self._squares):
+        squares, changed = _square_lengths(self.V, self._edges, self._squares)
+        if not changed:
             return None
-        self._squares = _square_lengths(self.V, self._edges)  # another array: copies have the one before
+        self._squares = squares  # another array: copies have the one before
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
         self.__dict__.pop("areas", None)
         self._warn_of_folds()
@@ -121,30 +121,20 @@ class Motion:
 
 
 @kernel
-def _square_lengths(V: Floats, edges: Ints) -> Floats:
-    """Squared lengths [k] of edges [k, 2]; NumPy takes as long as all else that a motion takes."""
-    squares = np.empty(len(edges))
+def _square_lengths(V: Floats, edges: Ints, before: Floats) -> tuple[Floats, bool]:
+    """Squared lengths [k] of edges [k, 2], and whether any is another than before [k].
+
+    NumPy takes as long as all else that a motion takes.
+    """
+    squares, changed = np.empty(len(edges)), False
     for i in range(len(edges)):
-        squares[i] = _squared(V, edges, i)
-    return squares
-
-
-@kernel
-def _stretches(V: Floats, edges: Ints, squares: Floats) -> bool:
-    """Whether any edge has another length than it had."""
-    i = 0
-    while i < len(edges) and abs(_squared(V, edges, i) - squares[i]) <= _CHANGED * squares[i]:
-        i += 1
-    return i < len(edges)
-
-
-@kernel(no_cpython_wrapper=True)
-def _squared(V: Floats, edges: Ints, i: int) -> float:
-    """Squared length of an edge."""
-    a, b, total = edges[i, 0], edges[i, 1], 0.0
-    for k in range(3):
-        total += (V[b, k] - V[a, k]) ** 2
-    return total
+        a, b, total = edges[i, 0], edges[i, 1], 0.0
+        for k in range(3):
+            total += (V[b, k] - V[a, k]) ** 2
+        squares[i] = total
+        if not abs(total - before[i]) <= _CHANGED * before[i]:
+            changed = True
+    return squares, changed
 
 
 class MovedGradients:
@@ -161,8 +151,7 @@ class MovedGradients:
         """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [vertex_count, 3] [m]."""
         moved = np.array(height_map, np.float32)
         _carry(self._rest, np.stack(tangents(np.moveaxis(self._ride.around(V), 0, -1)), axis=3), moved)
-        fill_halo(self._texels.topology, moved)
-        mirror_at_rim(self._texels.topology, moved)
+        fill_around(self._texels.topology, moved)
         return moved
 
 

@@ -87,12 +87,6 @@ class Listeners:
             begin, end = end, end + len(listener.probes.heights)
             listener.take(time, dt, sums[:, begin:end])
 
-    def find(self, name: str) -> ArrayLike:
-        """Points by a name; `SolverError` where names are not known."""
-        if self.find_points is None:
-            raise SolverError(f"sensor at {name!r}: this surface knows no names; valid are points, [3] or [k, 3]")
-        return self.find_points(name)
-
     def _begin(self, listener: Listener, time: float) -> None:
         listener.begin(time, listener.probes.of(self._backend.height(), self._backend.velocity()))
 
@@ -146,18 +140,16 @@ class Sensor:
         self.points, centers = atlas.nearest(check_points(points))
         self.kind, self.rate = kind, float(rate)
         laplacian = -thickness / 4 if thickness is not None else None
-        rows = [_row(atlas, point, int(center), laplacian) for point, center in zip(self.points, centers, strict=True)]
-        self.probes = Probes(
-            np.append(0, np.cumsum([len(texels) for texels, _ in rows])),
-            np.concatenate([texels for texels, _ in rows]),
-            np.concatenate([weights for _, weights in rows]).astype(np.float32),
-            np.full(len(rows), kind in ("height", "strain")),
-        )
+        rows = (_row(atlas, point, int(center), laplacian) for point, center in zip(self.points, centers, strict=True))
+        texels, weights = zip(*rows, strict=True)
+        begins = np.append(0, np.cumsum([len(each) for each in texels]))
+        of_heights = np.full(len(texels), kind in ("height", "strain"))
+        self.probes = Probes(begins, np.concatenate(texels), np.concatenate(weights).astype(np.float32), of_heights)
         # where substeps are longer than samples there is nothing between them to filter out
         self._base = min(self.rate, 1 / operator.stable_timestep)
         shortest = (_resolved(atlas, material, int(center)) for center in centers)
         self.bandwidth = min(*shortest, _PASSED * self._base)
-        self.begin(0.0, np.zeros(len(rows)))
+        self.begin(0.0, np.zeros(len(texels)))
 
     @property
     def latency(self) -> float:
@@ -275,7 +267,9 @@ def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> 
     texels = _around(atlas.texels.topology, center, 2)
     away = atlas.positions.reshape(-1, 3)[texels] - point
     normal = atlas.normals.reshape(-1, 3)[center]
-    u, v = _tangents(normal)
+    u = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
     size = np.sqrt(atlas.areas.reshape(-1)[center])
     x, y = away @ u / size, away @ v / size
     near = 1 / (x * x + y * y + 1e-3)
@@ -284,13 +278,6 @@ def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> 
     if laplacian is None:
         return texels, solved[0]
     return texels, laplacian * 2 * (solved[2] + solved[7]) / size**2
-
-
-def _tangents(normal: NDArray) -> NDArray[np.float64]:
-    """Two unit vectors across a normal, [2, 3]."""
-    u = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    u /= np.linalg.norm(u)
-    return np.stack([u, np.cross(normal, u)])
 
 
 def _resolved(atlas: Atlas, material: Material, center: int) -> float:

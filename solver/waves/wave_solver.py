@@ -168,8 +168,7 @@ class WaveSolver:
 
     def reset(self) -> None:
         """Flatten the surface, end all pressure, and set the time back to 0."""
-        self.height = self.velocity = 0.0
-        self.pressure = 0.0
+        self.height = self.velocity = self.pressure = 0.0
         self.time, self.substeps_taken = 0.0, 0
         self._guard.clear()
         self.listeners.begin(self.time)
@@ -190,8 +189,11 @@ class WaveSolver:
         thickness : float, optional
             Of the sheet [m], for "strain" alone.
         """
-        points = self.listeners.find(at) if isinstance(at, str) else at
-        sensor = Sensor(self.atlas, self.material, self.operator, points, kind, rate, thickness)
+        if isinstance(at, str):
+            if self.listeners.find_points is None:
+                raise SolverError(f"sensor at {at!r}: this surface knows no names; valid are points, [3] or [k, 3]")
+            at = self.listeners.find_points(at)
+        sensor = Sensor(self.atlas, self.material, self.operator, at, kind, rate, thickness)
         return self.listeners.add(sensor, self.time)
 
     def move(self, V: ArrayLike) -> None:
@@ -270,13 +272,11 @@ class WaveSolver:
         where, impulses = spread(self.atlas, "impulse", impulse, "N s", point, radius)
         momentum = -impulses * self.operator.source_share.reshape(-1)[where.texels]
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
-        fastest = check_kick(velocities, "impulse", impulse, "N s")
-        self._guard.note("impulse", impulse, "N s", self.time, fastest)
+        self._guard.note("impulse", impulse, "N s", self.time, check_kick(velocities, impulse))
         # sums too large for float32 become infinite here, and are reported later
         with np.errstate(over="ignore"):
-            self._backend.kick(
-                where.texels, velocities.astype(np.float32), self._held.counterpart(where.texels, momentum)
-            )
+            balance = self._held.counterpart(where.texels, momentum)
+            self._backend.kick(where.texels, velocities.astype(np.float32), balance)
         return where
 
     def add_force(self, point: ArrayLike, force: float, radius: float) -> Footprint:
@@ -384,10 +384,8 @@ class WaveSolver:
         height, velocity = elastic.astype(np.float64), self.velocity.astype(np.float64)
         with np.errstate(invalid="ignore"):  # NaN says enough
             kinetic = float((self.operator.momenta(velocity) * velocity).sum()) / 2
-            of_height, of_velocity = (
-                -float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity)
-            )
-            return kinetic + of_height - self._substep**2 / 4 * of_velocity
+            of_h, of_v = (-float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity))
+            return kinetic + of_h - self._substep**2 / 4 * of_v
 
     def volume(self) -> float:
         """Volume that the waves add to the target, to first order: sum of area times height [m^3]."""
