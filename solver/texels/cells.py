@@ -149,20 +149,6 @@ def triangle(a: Vector, b: Vector, c: Vector) -> tuple[Numbers, Numbers, Numbers
     return dot(ab, ac) / twice, -dot(ab, bc) / twice, dot(ac, bc) / twice, double_area / 2
 
 
-def strip(a: Vector, b: Vector, beside_a: Vector, beside_b: Vector) -> Floats:
-    """Weights of the links between two texels at a free rim, by the strips from them to the rim's points beside them.
-
-    Heights have no slope across a free rim (the natural condition). Their gradient in the strip is the difference of
-    the two texels over their distance along the rim, at whatever angle the grid lines meet that.
-    """
-    rim, link = subtract(beside_b, beside_a), subtract(b, a)
-    squared = dot(rim, rim)
-    along = dot(rim, link) ** 2 / np.maximum(squared, _TINY)
-    least = LEAST_AREA * np.maximum(squared, dot(link, link))
-    area = quad_area(link, subtract(beside_a, a), subtract(beside_b, a))
-    return np.where(squared > 0, area / np.maximum(np.maximum(along, least), _TINY), 0.0)
-
-
 # A polygon flatter than this, in units of its size, counts as flat: many combinations of its corners then make the node
 # in its middle. Its square is well above round-off.
 _FLAT = 1e-5
@@ -338,8 +324,8 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
         function.reduce([field[:, r : n + 1 + r, c : n + 1 + c] for r, c in CORNERS])
         for function, field in ((np.logical_and, there), (np.logical_or, rim))
     )
-    cells = np.stack(np.nonzero(exists & touches))
-    corners = _corner_places(topology, cells)
+    chart, r, c = cells = np.stack(np.nonzero(exists & touches))
+    corners = np.stack([(chart * (n + 2) + r + down) * (n + 2) + c + right for down, right in CORNERS])
     finite = np.isfinite(halo_positions.reshape(-1, 3)[corners]).all(axis=(0, 2))
     cells, corners = cells[:, finite], corners[:, finite]
     at_rim, shown = rim.reshape(-1)[corners], topology.halo.reshape(-1)[corners]
@@ -397,13 +383,6 @@ def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
         yield SpecialCells(corners, _polygon, (link, places), shares, (beside, pairs[beside]), on_all_copies=True)
 
 
-def _corner_places(topology: TexelTopology, cells: Ints) -> Ints:
-    """Flat places [4, k] of the corners of cells [3, k]: chart, row and column."""
-    width = topology.halo.shape[1]
-    chart, r, c = cells
-    return np.stack([(chart * width + r + down) * width + c + right for down, right in CORNERS])
-
-
 def _link_places(topology: TexelTopology, cells: Ints, links: tuple[tuple[int, int, int], ...]) -> tuple[Ints, Ints]:
     """Which links [l, k] of cells [3, k] are stored, and where in a stencil's weights; both flat."""
     n = topology.shape[1]
@@ -427,9 +406,17 @@ def _areas(x: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _strips(x: Floats) -> tuple[Floats, Floats, Floats]:
-    """The link of the first two corners."""
-    weight = strip(x[:, 0], x[:, 1], x[:, 2], x[:, 3])
-    return weight[None], np.zeros((0, len(weight))), quad_area(*_from_first(x))
+    """The link of the first two corners, texels at a free rim; the rim's points beside them are the others.
+
+    Heights have no slope across a free rim (the natural condition). Their gradient in the strip is the difference of
+    the two texels over their distance along the rim, at whatever angle the grid lines meet that.
+    """
+    link, rim, area = x[:, 1] - x[:, 0], x[:, 3] - x[:, 2], quad_area(*_from_first(x))
+    squared = dot(rim, rim)
+    along = dot(rim, link) ** 2 / np.maximum(squared, _TINY)
+    least = LEAST_AREA * np.maximum(squared, dot(link, link))
+    weight = np.where(squared > 0, area / np.maximum(np.maximum(along, least), _TINY), 0.0)
+    return weight[None], np.zeros((0, len(weight))), area
 
 
 def _triangle(x: Floats) -> tuple[Floats, Floats, Floats]:

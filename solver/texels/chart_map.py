@@ -363,19 +363,12 @@ def parts_mesh(chart_map: ChartMap, mesh: Mesh) -> PartsMesh:
     points = np.einsum("pij,pjk->pik", barycentrics, mesh.V[mesh.F[triangle]])
     step = np.ldexp(1.0, np.frexp(np.abs(mesh.V).max())[1] - _BITS)
     place = np.rint(points / step).astype(np.int64).reshape(-1, 3)
-    key = np.column_stack([_owners(mesh, triangle, barycentrics).reshape(-1, 2), place])
+    # what of the mesh each corner lies on: the ends of an edge, one vertex twice, or a triangle and -1; so sheets that
+    # touch have points of their own
+    held = barycentrics > _ON_SIDE
+    corners, inside = np.broadcast_to(mesh.F[triangle][:, None], held.shape), held.all(axis=2)
+    low = np.where(inside, triangle[:, None], np.where(held, corners, len(mesh.V)).min(axis=2))
+    high = np.where(inside, -1, np.where(held, corners, -1).max(axis=2))
+    key = np.column_stack([low.ravel(), high.ravel(), place])
     _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return PartsMesh(points.reshape(-1, 3)[first], number.reshape(-1, 3), triangle, barycentrics, coordinates)
-
-
-def _owners(mesh: Mesh, triangle: NDArray[np.int64], barycentrics: NDArray[np.float64]) -> NDArray[np.int64]:
-    """What of the mesh each corner lies on [p, 3, 2]: the ends of an edge, one vertex twice, or a triangle and -1.
-
-    Sheets that touch have points of their own.
-    """
-    corners = np.broadcast_to(mesh.F[triangle][:, None], barycentrics.shape)
-    held = barycentrics > _ON_SIDE
-    low = np.where(held, corners, len(mesh.V)).min(axis=2)
-    high = np.where(held, corners, -1).max(axis=2)
-    inside = held.all(axis=2)
-    return np.stack([np.where(inside, triangle[:, None], low), np.where(inside, -1, high)], axis=2)

@@ -39,11 +39,7 @@ def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
 
 
 def texture_map(
-    atlas: Atlas,
-    image: str | Path | ArrayLike,
-    low: float = 0.0,
-    high: float = 1.0,
-    channel: str = "luminance",
+    atlas: Atlas, image: str | Path | ArrayLike, low: float = 0.0, high: float = 1.0, channel: str = "luminance"
 ) -> NDArray[np.float64]:
     """Sample an image in the object's own texture coordinates, once a texel.
 
@@ -73,8 +69,16 @@ def texture_map(
     """
     if atlas.mesh.corner_uv is None:
         raise SolverError("the mesh has no texture coordinates for an image; give it some, or use `vertex_map`")
-    values = _channel(_pixels(image), channel)
-    return low + (high - low) * _bilinear(values, _interpolate(atlas, atlas.mesh.corner_uv))
+    values, uv = _channel(_pixels(image), channel), _interpolate(atlas, atlas.mesh.corner_uv)
+    height, width = values.shape
+    x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    s, t = x - column, y - row
+    upper, lower = (
+        (1 - s) * values[each % height, column % width] + s * values[each % height, (column + 1) % width]
+        for each in (row, row + 1)
+    )
+    return low + (high - low) * ((1 - t) * upper + t * lower)
 
 
 def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -86,8 +90,7 @@ def _pixels(image: str | Path | ArrayLike) -> NDArray[np.float64]:
     """Values from 0 to 1, [height, width, channels]."""
     if isinstance(image, str | Path):
         pixels = read_image(SolverError, image, "image", _brightness)
-        largest = 255.0 if pixels.dtype == np.uint8 else 65535.0
-        pixels = pixels / largest
+        pixels = pixels / (255.0 if pixels.dtype == np.uint8 else 65535.0)
     else:
         pixels = np.asarray(image, dtype=np.float64)
     if pixels.ndim == 2:
@@ -112,14 +115,3 @@ def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
     if place >= channels:
         raise SolverError(f"the image has no channel {channel!r}, only {channels}; use 'luminance'")
     return pixels[..., place]
-
-
-def _bilinear(values: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    height, width = values.shape
-    x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
-    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    s, t = x - column, y - row
-    left, right, top, bottom = column % width, (column + 1) % width, row % height, (row + 1) % height
-    return (1 - t) * ((1 - s) * values[top, left] + s * values[top, right]) + t * (
-        (1 - s) * values[bottom, left] + s * values[bottom, right]
-    )

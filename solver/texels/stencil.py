@@ -18,7 +18,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh_tridiagonal
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from ..kernel import Floats, Ints
 from .topology import TexelTopology
@@ -66,25 +66,21 @@ class IrregularLinks(NamedTuple):
 NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
 
 
-EAST, NORTH, NORTHEAST, NORTHWEST = range(4)
+EAST, NORTH = 0, 1
 
-_EVERY, _LOW, _HIGH = slice(None), slice(None, -1), slice(1, None)
-# For every link, the slices of a field with halo that hold its two ends.
-LINK_ENDS = (
-    ((_EVERY, _LOW, _LOW), (_EVERY, _LOW, _HIGH)),
-    ((_EVERY, _LOW, _LOW), (_EVERY, _HIGH, _LOW)),
-    ((_EVERY, _LOW, _LOW), (_EVERY, _HIGH, _HIGH)),
-    ((_EVERY, _LOW, _HIGH), (_EVERY, _HIGH, _LOW)),
-)
+_Places: TypeAlias = tuple[slice, slice, slice]
+
+# Row and column of the two ends of every link from the place where it is stored, and the slices of a field with halo
+# that hold them.
+_ENDS = (((0, 0), (0, 1)), ((0, 0), (1, 0)), ((0, 0), (1, 1)), ((0, 1), (1, 0)))
+_EVERY, _PARTS = slice(None), (slice(None, -1), slice(1, None))
+LINK_ENDS = [[(_EVERY, _PARTS[row], _PARTS[column]) for row, column in ends] for ends in _ENDS]
 
 
 def link_lengths(topology: TexelTopology, halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Real-space length of every link [m], [C, 4, n + 1, n + 1]; infinite where no link exists."""
-    charts, n, _ = topology.shape
-    lengths = np.full((charts, 4, n + 1, n + 1), np.inf)
-    for link, (a, b) in enumerate(LINK_ENDS):
-        exists = link_exists(topology, link) | ties_to_rim(topology, link)
-        lengths[:, link][exists] = np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1)[exists]
+    lengths = np.stack([np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1) for a, b in LINK_ENDS], axis=1)
+    lengths.reshape(-1)[missing_links(topology)] = np.inf
     crossing_links(topology).level(lengths)
     return lengths
 
@@ -173,11 +169,8 @@ def crossing_links(topology: TexelTopology) -> CrossingLinks:
 @functools.lru_cache(maxsize=4)
 def missing_links(topology: TexelTopology) -> Ints:
     """Flat places, among a stencil's weights, of what is no link."""
-    charts, n, _ = topology.shape
-    missing = np.zeros((charts, 4, n + 1, n + 1), bool)
-    for link in range(4):
-        missing[:, link] = ~(link_exists(topology, link) | ties_to_rim(topology, link))
-    return np.flatnonzero(missing)
+    there = [link_exists(topology, link) | ties_to_rim(topology, link) for link in range(4)]
+    return np.flatnonzero(~np.stack(there, axis=1))
 
 
 # Largest eigenvalue of an even grid's stencil times its spacing squared: that of the chessboard pattern.
@@ -299,24 +292,11 @@ class Stencil:
     def _links(self) -> Iterator[tuple[int, _Places, _Places]]:
         """Of the eight links of every texel, the direction, the places where it starts, and its other ends."""
         n = self.topology.shape[1]
-        for link, *places in _EIGHT:
-            start, end = ((_EVERY, slice(1 + r, n + 1 + r), slice(1 + c, n + 1 + c)) for r, c in places)
-            yield link, start, end
-
-
-_Places: TypeAlias = tuple[slice, slice, slice]
-
-# link, the place from which it starts relative to the texel (row, column), and its other end
-_EIGHT = (
-    (EAST, (0, 0), (0, 1)),
-    (EAST, (0, -1), (0, -1)),
-    (NORTH, (0, 0), (1, 0)),
-    (NORTH, (-1, 0), (-1, 0)),
-    (NORTHEAST, (0, 0), (1, 1)),
-    (NORTHEAST, (-1, -1), (-1, -1)),
-    (NORTHWEST, (0, -1), (1, -1)),
-    (NORTHWEST, (-1, 0), (-1, 1)),
-)
+        for link, ends in enumerate(_ENDS):
+            for (r, c), (row, column) in (ends, ends[::-1]):
+                places = ((1 - r, 1 - c), (1 - r + row, 1 - c + column))
+                start, end = ((_EVERY, slice(i, n + i), slice(j, n + j)) for i, j in places)
+                yield link, start, end
 
 
 def stiffness_matrix(stencil: Stencil) -> csr_array:
@@ -342,4 +322,4 @@ def stiffness_matrix(stencil: Stencil) -> csr_array:
     texels = np.arange(size)
     entries = np.concatenate([-weight, diagonal])
     places = np.concatenate([row, texels]), np.concatenate([column, texels])
-    return csr_array(coo_array((entries, places), shape=(size, size)))
+    return csr_array((entries, places), shape=(size, size))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Floats, Floats32, Ints, kernel
-from .cells import CORNERS, conductance, quad, quad_area, special_cells
+from .cells import CORNERS, LINKS, conductance, quad, quad_area, special_cells
 from .stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from .topology import TexelTopology
 
@@ -105,8 +105,9 @@ class TexelCells:
             part, above = (charts, slice(rows.start, rows.stop + 1)), slice(rows.start + 1, rows.stop + 1)
             x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
             factor = conductance(*(self._at_corners(each[part]) for each in fields))
+            detours = [self._at_corners(self._detours[link, *part])[2 * down + right] for link, down, right in LINKS]
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
-                quads = quad(*(each - x[0] for each in x[1:]), _of_cells(self._detours[:, *part]))
+                quads = quad(*(each - x[0] for each in x[1:]), detours)
                 links = np.where(self._whole[charts, rows], np.stack(quads[:6]), 0.0)
             south, north, west, east, rising, falling = factor * links
             link = weights[charts]
@@ -230,14 +231,6 @@ class TexelCells:
         """A field [..., r + 1, c + 1] at the four corners of each of r x c cells."""
         rows, columns = field.shape[-2] - 1, field.shape[-1] - 1
         return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
-
-
-def _of_cells(links: Floats32) -> tuple[Floats32, ...]:
-    """South, north, west, east, rising and falling of each of r x c cells, of links [4, ..., r + 1, c + 1]."""
-    east, north, rising, falling = links
-    low, high = slice(None, -1), slice(1, None)
-    sides = east[..., low, low], east[..., high, low], north[..., low, low], north[..., low, high]
-    return *sides, rising[..., low, low], falling[..., low, low]
 
 
 def _with_zeros(quads: Floats) -> Floats32:

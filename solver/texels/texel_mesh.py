@@ -50,23 +50,6 @@ _LEAST, _MOST = 0.5, 1.2
 _POSITIVE = 0.05  # of the mean round a texel; one may cover nothing but triangles without area
 
 
-def trimmed_areas(
-    topology: TexelTopology, spanned: NDArray[np.float64], covered: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Area of the surface that belongs to each texel [m^2], [C, n, n].
-
-    Parameters
-    ----------
-    spanned : float64 [C, n, n]
-        Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
-    covered : float64 [C, n, n]
-        Area of the surface that each texel covers [m^2].
-    """
-    around = smoothed(topology, covered)
-    level = np.maximum(around, 1e-300) / np.maximum(smoothed(topology, spanned), 1e-300)
-    return np.maximum(covered * (np.clip(level, _LEAST, _MOST) / level), _POSITIVE * around)
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class TexelMesh:
     """C charts of n x n texels on a surface.
@@ -106,21 +89,30 @@ class TexelMesh:
     ) -> TexelMesh:
         """Texel mesh with the normals of its grid lines where none are given.
 
-        Its areas are those that it spans itself, or those of the surface `covered`; see `trimmed_areas`. A few are
-        evened out for the sake of the time step; see `evened_areas`.
+        Its areas are those that it spans itself, or those of the surface `covered` [m^2], [C, n, n]. A few are evened
+        out for the sake of the time step; see `evened_areas`.
 
         Raises
         ------
         AtlasError
             If positions are not finite, or of another shape than the topology's.
         """
-        points = _checked(positions, (*topology.shape, 3))
+        points, shape = np.asarray(positions, dtype=np.float64), (*topology.shape, 3)
+        if points.shape != shape:
+            raise AtlasError(f"texel positions have shape {points.shape}; this topology needs {shape}, in metres")
+        if wrong := int((~np.isfinite(points)).sum()):
+            raise AtlasError(f"{wrong} numbers of the texel positions are not finite; valid are metres")
+        points = np.ascontiguousarray(points)
         around = _with_halo(topology, points, beyond)
         if normals is None:
             normals = np.cross(*tangents(around))
             normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
         cells = TexelCells(topology, around, detours)
-        areas = cells.areas if covered is None else trimmed_areas(topology, cells.areas, covered)
+        areas = cells.areas
+        if covered is not None:
+            mean = smoothed(topology, covered)
+            level = np.maximum(mean, 1e-300) / np.maximum(smoothed(topology, areas), 1e-300)
+            areas = np.maximum(covered * (np.clip(level, _LEAST, _MOST) / level), _POSITIVE * mean)
         if (areas > 0).all():
             areas = evened_areas(areas, cells.at_rest(np.ones_like(areas), np.ones_like(areas)))
         return cls(topology, points, normals, areas, beyond, detours)
@@ -218,17 +210,6 @@ class TexelGrid(NamedTuple):
     positions: Floats
     normals: Floats
     areas: Floats
-
-
-def _checked(positions: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    points = np.asarray(positions, dtype=np.float64)
-    if points.shape != shape:
-        raise AtlasError(f"texel positions have shape {points.shape}; this topology needs {shape}, in metres")
-    if not np.isfinite(points).all():
-        raise AtlasError(
-            f"{(~np.isfinite(points)).sum()} numbers of the texel positions are not finite; valid are metres"
-        )
-    return np.ascontiguousarray(points)
 
 
 def _with_halo(
@@ -350,13 +331,17 @@ def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
     """Longest and shortest texel edge, folded texels, coverage, spanned area and time step; see `Atlas.quality`."""
     edges = link_lengths(texels.topology, texels.halo_positions)[:, [EAST, NORTH]]
     edges = edges[np.isfinite(edges) & (edges > 0)]
+    # of waves of one speed, over that of an endless even grid of as many texels on the same area
+    stencil = texels.stencil(np.ones(texels.shape), softening(texels))
+    rate = largest_eigenvalue(stencil, texels.areas, np.ones(texels.shape, bool), stencil.fastest(texels.areas))
+    step = np.sqrt(EVEN_RATE * texels.topology.texel_count / mesh.area / rate) if rate > 0 else np.inf
     return {
         "edge_min": float(edges.min()),
         "edge_max": float(edges.max()),
         "folded": folded_texels(texels),
         "coverage": float(texels.areas.sum() / mesh.area),
         "spanned": float(texels.cells.areas.sum() / mesh.area),
-        "timestep": _timestep(texels, mesh.area),
+        "timestep": float(step),
     }
 
 
@@ -371,11 +356,3 @@ def folded_texels(texels: TexelMesh) -> int:
         facing = np.cross(beside[k] - own, beside[(k + 1) % 4] - own)
         folded |= np.einsum("...k,...k->...", facing, normals) < 0
     return int(folded.sum())
-
-
-def _timestep(texels: TexelMesh, area: float) -> float:
-    """Stable time step of waves of one speed, over that of an endless even grid of as many texels on the same area."""
-    stencil = texels.stencil(np.ones(texels.shape), softening(texels))
-    bound = float((2 * stencil.absolute_sums() / texels.areas).max())
-    rate = largest_eigenvalue(stencil, texels.areas, np.ones(texels.shape, bool), bound)
-    return float(np.sqrt(EVEN_RATE * texels.topology.texel_count / area / rate)) if rate > 0 else np.inf

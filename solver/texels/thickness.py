@@ -103,12 +103,6 @@ def half_thickness_at(mesh: Mesh, points: NDArray[np.float64], normals: NDArray[
 _LEAST_THICKNESS = 1e-4
 
 
-def _are_bodies(value: object) -> bool:
-    return isinstance(value, Mesh | Volume) or (
-        isinstance(value, Sequence) and all(isinstance(each, Mesh | Volume) for each in value)
-    )
-
-
 def _are_limits(value: Any) -> bool:
     try:
         least, greatest = value
@@ -117,7 +111,10 @@ def _are_limits(value: Any) -> bool:
         return False
 
 
-_BODIES = Valid(_are_bodies, "a Mesh, a Volume, or several of them")
+_BODIES = Valid(
+    lambda value: all(isinstance(each, Mesh | Volume) for each in (value if isinstance(value, Sequence) else [value])),
+    "a Mesh, a Volume, or several of them",
+)
 _LIMITS = Valid(_are_limits, "a least and a greatest thickness [m], 0 or greater")
 
 
@@ -149,8 +146,9 @@ def thickness_map(
     MeshError
         For an invalid volume.
     """
-    bodies = [inside] if isinstance(inside, Mesh | Volume) else list(inside)
-    corners = np.concatenate([np.zeros((0, 3, 3)), *(_triangles(body) for body in bodies)])
+    bodies = [inside] if isinstance(inside, Mesh | Volume) else inside
+    surfaces = [body.surface() if isinstance(body, Volume) else (body.V, body.F) for body in bodies]
+    corners = np.concatenate([np.zeros((0, 3, 3)), *(V[F] for V, F in surfaces)])
     points, normals = atlas.positions.reshape(-1, 3), atlas.normals.reshape(-1, 3)
     size = float(np.ptp(points, axis=0).max())
     way, out = _cast(corners, points, -normals, size)
@@ -168,12 +166,6 @@ def thickness_map(
         _warn(f"{1 - met.mean():.1%} of the texels have nothing below them; they get the greatest: {greatest:.3g} m")
         way = np.where(met, way, greatest)
     return smoothed(atlas.texels.topology, way.reshape(atlas.areas.shape))
-
-
-def _triangles(body: Mesh | Volume) -> NDArray[np.float64]:
-    """Corners of a body's triangles [m], [m, 3, 3]."""
-    V, F = body.surface() if isinstance(body, Volume) else (body.V, body.F)
-    return V[F]
 
 
 def _cast(

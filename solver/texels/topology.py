@@ -116,24 +116,23 @@ def close_corners(
     """Fill in the halo's corners; return how many charts meet in each, its number, and the cells that are polygons."""
     valence, corners = np.zeros((len(glued), 4), np.int64), np.full((len(glued), 4), -1)
     polygons = []
-    for chart in range(len(glued)):
-        for corner in range(4):
-            fan, closed = _fan(glued, chart, corner)
-            texels = np.array([c * n * n + _CORNERS[k] @ (n, 1) * (n - 1) for c, k in fan])
-            place = (chart, *_CORNERS[corner] * (n + 1))
-            count = len(fan)
-            if corners[chart, corner] < 0:
-                corners[tuple(np.transpose(fan))] = corners.max() + 1
-            if closed:
-                valence[chart, corner] = count
-            if closed and count == QUAD:
-                halo[place] = texels[2]
-            elif not closed and count <= 2:
-                # along a straight rim: beyond it lies what the chart on the other side of the corner has beside it
-                halo[place] = texels[(fan.index((chart, corner)) + 1) % count]
-                rim[place] = True
-            elif count > (TRIANGLE if closed else 2) and (chart, corner) == min(fan):
-                polygons.append(texels)
+    for chart, corner in np.ndindex(valence.shape):
+        fan, closed = _fan(glued, chart, corner)
+        texels = np.array([c * n * n + _CORNERS[k] @ (n, 1) * (n - 1) for c, k in fan])
+        place = (chart, *_CORNERS[corner] * (n + 1))
+        count = len(fan)
+        if corners[chart, corner] < 0:
+            corners[tuple(np.transpose(fan))] = corners.max() + 1
+        if closed:
+            valence[chart, corner] = count
+        if closed and count == QUAD:
+            halo[place] = texels[2]
+        elif not closed and count <= 2:
+            # along a straight rim: beyond it lies what the chart on the other side of the corner has beside it
+            halo[place] = texels[(fan.index((chart, corner)) + 1) % count]
+            rim[place] = True
+        elif count > (TRIANGLE if closed else 2) and (chart, corner) == min(fan):
+            polygons.append(texels)
     return valence, corners, polygons
 
 
@@ -174,7 +173,17 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     AtlasError
         If the table is of another shape, or not mutual.
     """
-    glued = _checked(glued)
+    glued = np.asarray(glued, dtype=np.int64)
+    if glued.ndim != 3 or glued.shape[1:] != (4, 2) or not len(glued):
+        raise AtlasError(
+            f"the table of glued sides has shape {glued.shape}; valid is [C, 4, 2]: chart and side beyond each"
+        )
+    for chart, side in np.argwhere(glued[..., 0] >= 0).tolist():
+        other, back = glued[chart, side].tolist()
+        if not (other < len(glued) and 0 <= back < 4 and glued[other, back].tolist() == [chart, side]):
+            raise AtlasError(
+                f"side {side} of chart {chart} is glued to side {back} of chart {other}, which is not glued back to it"
+            )
     charts, size = len(glued), n * n
     halo = np.full((charts, n + 2, n + 2), -1)
     rim = np.zeros(halo.shape, dtype=bool)
@@ -192,22 +201,6 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     for array in (halo, rim, valence, corners):
         array.setflags(write=False)
     return TexelTopology(glued, halo, rim, valence, corners, tuple(polygons))
-
-
-def _checked(glued: NDArray[np.int64]) -> NDArray[np.int64]:
-    table = np.asarray(glued, dtype=np.int64)
-    if table.ndim != 3 or table.shape[1:] != (4, 2) or not len(table):
-        raise AtlasError(
-            f"the table of glued sides has shape {table.shape}; valid is [C, 4, 2]: chart and side beyond each"
-        )
-    joined = np.argwhere(table[..., 0] >= 0)
-    for chart, side in joined.tolist():
-        other, back = table[chart, side].tolist()
-        if not (other < len(table) and 0 <= back < 4 and table[other, back].tolist() == [chart, side]):
-            raise AtlasError(
-                f"side {side} of chart {chart} is glued to side {back} of chart {other}, which is not glued back to it"
-            )
-    return table
 
 
 def _along_sides(along: NDArray[np.int64], width: int) -> NDArray[np.int64]:
