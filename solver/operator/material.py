@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import POSITIVE, RippleWarning, SolverError, is_finite, shown
 from ..texels.atlas import Atlas
 from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, require_positive
-from .presets import preset_named, suited_coefficients
+from .presets import PRESETS, suited_coefficients
 
 # omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the lowest normal mode of an
 # incompressible layer bonded to a rigid base: its frequency is within 3.0 % of the root of the mode's determinant. The
@@ -370,7 +370,9 @@ class Material:
         SolverError
             For an unknown name or parameter.
         """
-        chosen = preset_named(name)
+        if not isinstance(name, str) or name not in PRESETS:
+            raise SolverError(f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}")
+        chosen = PRESETS[name]
         law = getattr(cls, chosen.law)
         valid = inspect.signature(law).parameters
         unknown = [key for key in parameters if key not in valid]
@@ -428,16 +430,15 @@ def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
     finest = SHORTEST_TEXELS * texel
     if longest < finest:
         resolution = int(np.ceil(np.sqrt(areas.size / 6) * finest / longest))
-        warnings.warn(
+        message = (
             f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m carry none "
-            f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer",
-            RippleWarning,
-            stacklevel=4,
+            f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer"
         )
     elif shortest > whole:
-        warnings.warn(
+        message = (
             f"the material holds for waves from {shortest:.3g} m on, and the surface is {whole:.3g} m round; take a "
-            "thinner layer",
-            RippleWarning,
-            stacklevel=4,
+            "thinner layer"
         )
+    else:
+        return
+    warnings.warn(message, RippleWarning, stacklevel=4)

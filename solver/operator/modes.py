@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numbers
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh, qr
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..errors import SolverError, checked, instance, shown
+from ..kernel import Bools, Floats
 from ..texels.atlas import Atlas
 from ..texels.stencil import stiffness_matrix
 from .assembly import build_operator
@@ -19,8 +19,6 @@ from .deep_water import FluidOperator, factorised
 from .material import SHORTEST_TEXELS, Material, warn_of_wavelengths
 from .plate_rim import Rim
 from .wave_operator import WaveOperator
-
-Floats: TypeAlias = NDArray[np.float64]
 
 # Residual of a mode, as a share of it; squared frequencies that differ by a smaller share are the same.
 _RESIDUAL = 1e-9
@@ -114,9 +112,7 @@ def elastic_matrix(operator: WaveOperator) -> csr_array:
     return csr_array(matrix)
 
 
-def _are_tilts(
-    atlas: Atlas, material: Material, elastic: csr_array, mass: Floats, heights: Floats
-) -> NDArray[np.bool_]:
+def _are_tilts(atlas: Atlas, material: Material, elastic: csr_array, mass: Floats, heights: Floats) -> Bools:
     """Which of some heights [m, T] move a flat plate as if it were rigid, [m]; see `elastic_matrix`.
 
     They are linear in the place, and pulled back by no more than a hundredth of what bends waves of their length: the

@@ -59,8 +59,7 @@ def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
     if not callable(rim):
         raise SolverError(f"rim {shown(rim)} is no name; {valid}, or a function of points [k, 3] that gives them")
     points = texels.halo_positions[at]
-    shown_texels = texels.positions.reshape(-1, 3)[texels.topology.halo[at]]
-    points = np.where(np.isfinite(points), points, shown_texels)
+    points = np.where(np.isfinite(points), points, texels.positions.reshape(-1, 3)[texels.topology.halo[at]])
     found = np.asarray(rim(points))
     if found.shape != (len(points),) or found.dtype.kind not in "bU":
         raise SolverError(
@@ -119,27 +118,8 @@ def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
         along = np.concatenate([points[:, :1], points, points[:, -1:]], axis=1)
         lengths = np.linalg.norm(along[:, 2:] - along[:, :-2], axis=-1)
         lengths[:, 1:-1] /= 2
-        index = np.arange(topology.texel_count).reshape(topology.shape)[inside]
-        found.append((index[at], conditions[outside][at], points[at], lengths[at]))
+        found.append((topology.halo[outside][at], conditions[outside][at], points[at], lengths[at]))
     return RimPlaces(*(np.concatenate(each) for each in zip(*found, strict=True)))
-
-
-class Cells(NamedTuple):
-    """Cells between texels, with their gradients.
-
-    Attributes
-    ----------
-    pairs : int64 [p, 2]
-        Texels that share a cell.
-    edges : int64 [e, 4]
-        Texels i, j of each edge between two cells, the cell on its right, and that on its left.
-    gradients : tuple of csr [cells, T], three
-        From heights to the components of the gradient in space [1/m].
-    """
-
-    pairs: Ints
-    edges: Ints
-    gradients: tuple[csr_array, csr_array, csr_array]
 
 
 def _polygons(topology: TexelTopology) -> list[Ints]:
@@ -162,8 +142,18 @@ def _polygons(topology: TexelTopology) -> list[Ints]:
     return [each[first] for each, first in zip(kinds, firsts, strict=True) if len(each)]
 
 
-def plate_cells(texels: TexelMesh) -> Cells:
-    """The cells of a texel mesh."""
+def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:
+    """The cells of a texel mesh, with their gradients.
+
+    Returns
+    -------
+    pairs : int64 [p, 2]
+        Texels that share a cell.
+    edges : int64 [e, 4]
+        Texels i, j of each edge between two cells, the cell on its right, and that on its left.
+    gradients : list of csr [cells, T], three
+        From heights to the components of the gradient in space [1/m].
+    """
     points, count = texels.positions.reshape(-1, 3), texels.topology.texel_count
     directed, pairs, entries, cells = [], [], [], 0
     for corners in _polygons(texels.topology):
@@ -178,7 +168,7 @@ def plate_cells(texels: TexelMesh) -> Cells:
         pairs += [corners[:, [a, b]] for a in range(m) for b in range(a)]
         entries.append((np.repeat(number, m), corners.ravel(), turned.reshape(-1, 3)))
     row, column, turned = (np.concatenate(each) for each in zip(*entries, strict=True))
-    gradients = tuple(csr_array((turned[:, k], (row, column)), shape=(cells, count)) for k in range(3))
+    gradients = [csr_array((turned[:, k], (row, column)), shape=(cells, count)) for k in range(3)]
     sides = np.concatenate([each.reshape(-1, 3) for each in directed])
     # the cell on whose border an edge runs counter-clockwise lies on its left
     key = sides[:, 0] * count + sides[:, 1]
@@ -188,7 +178,7 @@ def plate_cells(texels: TexelMesh) -> Cells:
     other = order[place]
     both = (key[other] == back) & (sides[:, 0] < sides[:, 1])
     edges = np.column_stack([sides[both, :2], sides[other[both], 2], sides[both, 2]])
-    return Cells(np.concatenate(pairs), edges, gradients)
+    return np.concatenate(pairs), edges, gradients
 
 
 def fitted_rows(
@@ -265,12 +255,7 @@ def tension_springs(places: RimPlaces, texels: TexelMesh, tension: Floats) -> Fl
 
 
 def plate_matrix(
-    texels: TexelMesh,
-    places: RimPlaces,
-    softening: Floats,
-    rigidity: Floats,
-    poisson: float,
-    laplace: Stencil,
+    texels: TexelMesh, places: RimPlaces, softening: Floats, rigidity: Floats, poisson: float, laplace: Stencil
 ) -> tuple[csr_array, NDArray[np.bool_]]:
     """What bending adds to L B L beside rims.
 
@@ -296,15 +281,15 @@ def plate_matrix(
     count = texels.topology.texel_count
     D, areas, soft = rigidity.reshape(-1), texels.areas.reshape(-1), softening.reshape(-1) < 1
     L = -stiffness_matrix(laplace)
-    cells = plate_cells(texels)
+    pairs, edges, gradients = plate_cells(texels)
     clamped = places.conditions == CLAMPED
     outer = np.zeros(count, bool)
     outer[places.texels[~clamped]] = True
     outer[places.texels[clamped]] = False
-    first, second = cells.pairs.T
+    first, second = pairs.T
     outer[np.concatenate([np.flatnonzero(soft), first[soft[second]], second[soft[first]]])] = True
     at, held = np.flatnonzero(outer), places.texels[clamped]
-    rows, owners = fitted_rows(texels, at, cells.pairs, places, D, poisson)
+    rows, owners = fitted_rows(texels, at, pairs, places, D, poisson)
     # beside a clamp the height is d^2 / 2 times its second derivative
     way = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
     share = np.minimum(way**2 / (2 * areas[held]), 0.5)
@@ -313,7 +298,8 @@ def plate_matrix(
     rows = csr_array(vstack([rows, leaving]))
     owners = np.concatenate([owners, len(at) + np.arange(len(held))])
     total = rows.T @ diags_array(_evened(rows, owners, L, D, areas)) @ rows
-    return csr_array(total + _saddle(texels, cells, 2 * (1 - poisson) * D * ~outer)), ~outer.reshape(texels.shape)
+    saddle = _saddle(texels.normals.reshape(-1, 3), edges, gradients, 2 * (1 - poisson) * D * ~outer)
+    return csr_array(total + saddle), ~outer.reshape(texels.shape)
 
 
 def _evened(rows: csr_array, owners: Ints, laplace: csr_array, rigidity: Floats, areas: Floats) -> Floats:
@@ -340,19 +326,18 @@ def links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
     return IrregularLinks.of(np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data), springs
 
 
-def _saddle(texels: TexelMesh, cells: Cells, factor: Floats) -> csr_array:
+def _saddle(normals: Floats, edges: Ints, gradients: list[csr_array], factor: Floats) -> csr_array:
     """Minus the integral of a factor [T] times det H: only the edges count across which it changes."""
-    i, j, right, left = cells.edges.T
+    i, j, right, left = edges.T
     jump = factor[i] - factor[j]
     crossed = np.abs(jump) > _TINY * np.abs(factor).max(initial=0.0)
     i, j, right, left, jump = (each[crossed] for each in (i, j, right, left, jump))
-    normals = texels.normals.reshape(-1, 3)
     normal = normals[i] + normals[j]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _TINY)
     total = csr_array((len(factor), len(factor)))
     for k in range(3):
         share = diags_array(-jump * normal[:, k] / 4)
-        a, b = cells.gradients[(k + 1) % 3], cells.gradients[(k + 2) % 3]
+        a, b = gradients[(k + 1) % 3], gradients[(k + 2) % 3]
         wedge = a[right].T @ share @ b[left] - b[right].T @ share @ a[left]
         total = total + wedge + wedge.T
     return csr_array(total)
