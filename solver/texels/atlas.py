@@ -371,15 +371,13 @@ def _corner_points(texels: TexelMesh) -> NDArray[np.float64]:
     corners = topology.corners.ravel()
     number = np.bincount(corners)
     means = np.stack([np.bincount(corners, points[..., k].ravel()) / number for k in range(3)], axis=1)
-    beside = around[:, rows, inner_columns] + around[:, inner_rows, columns]
-    displaced = (beside != _shown(texels, rows, inner_columns) + _shown(texels, inner_rows, columns)).any(axis=-1)
+    beside, shown = (
+        each[:, rows, inner_columns] + each[:, inner_rows, columns]
+        for each in (around, topology.with_halo(texels.positions))
+    )
+    displaced = (beside != shown).any(axis=-1)
     periodic = displaced & ~topology.rim[:, rows, inner_columns] & ~topology.rim[:, inner_rows, columns]
     return np.where(periodic[..., None], beside / 2, means[topology.corners])
-
-
-def _shown(texels: TexelMesh, rows: list[int], columns: list[int]) -> NDArray[np.float64]:
-    """Positions of the texels that places of the halo show [m], [C, 4, 3]."""
-    return texels.positions.reshape(-1, 3)[texels.topology.halo[:, rows, columns]]
 
 
 def triangles_of(F: NDArray[np.int64], vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

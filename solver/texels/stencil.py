@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import csr_array
 
-from ..kernel import Floats, Ints
+from ..kernel import Bools, Floats, Ints
 from .topology import TexelTopology
 
 
@@ -44,7 +44,7 @@ class IrregularLinks(NamedTuple):
     weights: Floats
 
     @classmethod
-    def of(cls, ends: NDArray[np.int64], weights: NDArray[np.float64]) -> IrregularLinks:
+    def of(cls, ends: Ints, weights: Floats) -> IrregularLinks:
         """Sort links [k, 2] with weights [k]."""
         both, twice = np.concatenate([ends, ends[:, ::-1]]), np.tile(weights, 2)
         order = np.lexsort((both[:, 1], both[:, 0]))
@@ -77,7 +77,7 @@ _EVERY, _PARTS = slice(None), (slice(None, -1), slice(1, None))
 LINK_ENDS = [[(_EVERY, _PARTS[row], _PARTS[column]) for row, column in ends] for ends in _ENDS]
 
 
-def link_lengths(topology: TexelTopology, halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def link_lengths(topology: TexelTopology, halo_positions: Floats) -> Floats:
     """Real-space length of every link [m], [C, 4, n + 1, n + 1]; infinite where no link exists."""
     lengths = np.stack([np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1) for a, b in LINK_ENDS], axis=1)
     lengths.reshape(-1)[missing_links(topology)] = np.inf
@@ -85,14 +85,14 @@ def link_lengths(topology: TexelTopology, halo_positions: NDArray[np.float64]) -
     return lengths
 
 
-def link_exists(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
+def link_exists(topology: TexelTopology, link: int) -> Bools:
     """Where a link joins two texels of which one is the chart's own, [C, n + 1, n + 1]."""
     a, b = LINK_ENDS[link]
     there = (topology.halo >= 0) & ~topology.rim
     return there[a] & there[b] & (topology.own[a] | topology.own[b])
 
 
-def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
+def ties_to_rim(topology: TexelTopology, link: int) -> Bools:
     """Where a link joins one of the chart's own texels to a fixed rim, [C, n + 1, n + 1]."""
     a, b = LINK_ENDS[link]
     own, rim = topology.own, topology.rim & topology.fixed_rim
@@ -100,17 +100,11 @@ def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
 
 
 @functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
-def rim_ties(topology: TexelTopology) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def rim_ties(topology: TexelTopology) -> tuple[Ints, Ints]:
     """Flat texels [k] that links tie to a fixed rim, and the flat places [k] of these among a stencil's weights."""
-    charts, n, _ = topology.shape
-    place = np.arange(4 * charts * (n + 1) ** 2).reshape(charts, 4, n + 1, n + 1)
-    texels, places = [], []
-    for link, (a, b) in enumerate(LINK_ENDS):
-        tied = ties_to_rim(topology, link)
-        own = np.where(topology.own[a], topology.halo[a], topology.halo[b])
-        texels.append(own[tied])
-        places.append(place[:, link][tied])
-    return np.concatenate(texels), np.concatenate(places)
+    tied = np.stack([ties_to_rim(topology, link) for link in range(4)], axis=1)
+    own = np.stack([np.where(topology.own[a], topology.halo[a], topology.halo[b]) for a, b in LINK_ENDS], axis=1)
+    return own[tied], np.flatnonzero(tied)
 
 
 class CrossingLinks(NamedTuple):
@@ -152,18 +146,16 @@ class CrossingLinks(NamedTuple):
 @functools.lru_cache(maxsize=4)
 def crossing_links(topology: TexelTopology) -> CrossingLinks:
     """The links across glued sides of a topology."""
-    keys, places, size = [], [], topology.texel_count
-    n = topology.shape[1]
-    for link, (a, b) in enumerate(LINK_ENDS):
-        crossing = link_exists(topology, link) & (topology.own[a] != topology.own[b])
-        first, second = topology.halo[a][crossing], topology.halo[b][crossing]
-        keys.append(np.minimum(first, second) * size + np.maximum(first, second))
-        chart, row, column = np.nonzero(crossing)
-        places.append(((4 * chart + link) * (n + 1) + row) * (n + 1) + column)
-    key = np.concatenate(keys)
+    own, size = topology.own, topology.texel_count
+    each = [link_exists(topology, link) & (own[a] != own[b]) for link, (a, b) in enumerate(LINK_ENDS)]
+    crossing = np.stack(each, axis=1)
+    chart, link, row, column = np.nonzero(crossing)
+    down, right = np.array(_ENDS)[link].T
+    first, second = topology.halo[chart, row + down, column + right]
+    key = np.minimum(first, second) * size + np.maximum(first, second)
     order = np.argsort(key, kind="stable")
     unique, begins = np.unique(key[order], return_index=True)
-    return CrossingLinks(unique, np.concatenate(places)[order], np.append(begins, len(key)), size)
+    return CrossingLinks(unique, np.flatnonzero(crossing)[order], np.append(begins, len(key)), size)
 
 
 @functools.lru_cache(maxsize=4)
@@ -184,9 +176,9 @@ _RESIDUAL, _LOOK, _MOST = 2e-3, 5, 1000
 
 
 def largest_eigenvalue(
-    force: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    mass: NDArray[np.float64],
-    free: NDArray[np.bool_],
+    force: Callable[[Floats], Floats],
+    mass: Floats,
+    free: Bools,
     bound: float,
 ) -> float:
     """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
@@ -214,7 +206,7 @@ def largest_eigenvalue(
     return float(np.clip(1.005 * _lanczos(multiply, start, bound), 0, bound))
 
 
-def _lanczos(multiply: Callable[[NDArray], NDArray], start: NDArray[np.float64], bound: float) -> float:
+def _lanczos(multiply: Callable[[NDArray], NDArray], start: Floats, bound: float) -> float:
     """Largest eigenvalue of a symmetric matrix; the bound if it is not found.
 
     Plain Lanczos, without a basis that is kept orthogonal: lost orthogonality repeats eigenvalues and makes no new ones
@@ -251,10 +243,10 @@ class Stencil:
     """
 
     topology: TexelTopology
-    weights: NDArray[np.float64]
+    weights: Floats
     irregular: IrregularLinks = NO_LINKS
 
-    def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, field: Floats) -> Floats:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
         around, result = self.topology.with_boundary(field), np.zeros(self.topology.shape)
         for link, start, end in self._links():
@@ -270,7 +262,7 @@ class Stencil:
         links = self.irregular._replace(weights=factor * self.irregular.weights)
         return Stencil(self.topology, factor * self.weights, links)
 
-    def absolute_sums(self) -> NDArray[np.float64]:
+    def absolute_sums(self) -> Floats:
         """Sum of |w| over the links that meet in each texel, half of |w| for those to a fixed rim, [C, n, n].
 
         Twice that is Gershgorin's bound: the other end of a link to a rim does not move.
@@ -285,7 +277,7 @@ class Stencil:
         sums.reshape(-1)[links.texels] += np.add.reduceat(np.abs(links.weights), links.begins[:-1])
         return sums
 
-    def fastest(self, mass: NDArray[np.float64]) -> float:
+    def fastest(self, mass: Floats) -> float:
         """Gershgorin's bound of the largest eigenvalue over a lumped mass [C, n, n]."""
         return float((self.absolute_sums() * 2 / mass).max())
 

@@ -100,14 +100,12 @@ class TexelCells:
         """Stencil of values [C, n, n], see `TexelMesh.stencil`."""
         weights = np.zeros(self._shape)
         fields = [self.topology.with_halo(each) for each in (values, softening)]
-        for charts, rows in self._blocks():
-            # with the row of texels above
-            part, above = (charts, slice(rows.start, rows.stop + 1)), slice(rows.start + 1, rows.stop + 1)
-            x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
+        for charts, rows, part, ways in self._blocks():
+            above = slice(rows.start + 1, rows.stop + 1)
             factor = conductance(*(self._at_corners(each[part]) for each in fields))
             detours = [self._at_corners(self._detours[link, *part])[2 * down + right] for link, down, right in LINKS]
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
-                quads = quad(*(each - x[0] for each in x[1:]), detours)
+                quads = quad(*ways, detours)
                 links = np.where(self._whole[charts, rows], np.stack(quads[:6]), 0.0)
             south, north, west, east, rising, falling = factor * links
             link = weights[charts]
@@ -174,11 +172,9 @@ class TexelCells:
     def _quad_areas(self) -> Floats:
         """Areas of whole quads at rest in units of 1 / scale^2, [C, n + 1, n + 1]; 0 where there is none."""
         areas = np.empty(self._whole.shape)
-        for charts, rows in self._blocks():
-            part = charts, slice(rows.start, rows.stop + 1)
-            x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
+        for charts, rows, _, ways in self._blocks():
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
-                quads = quad_area(*(each - x[0] for each in x[1:]))
+                quads = quad_area(*ways)
             areas[charts, rows] = np.where(self._whole[charts, rows], quads, 0.0)
         return areas
 
@@ -218,13 +214,19 @@ class TexelCells:
             np.add.at(flat, link_places, values)
         return self._links._replace(weights=np.concatenate(irregular)[self._links.weights.astype(np.int64)])
 
-    def _blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Charts, and rows of the cells in them."""
+    def _blocks(self) -> Iterator[tuple[slice, slice, tuple[slice, slice], list[Floats]]]:
+        """Charts, rows of the cells in them, both with the row of texels above, and scaled ways from a corner to three.
+
+        They lead from the south-west to the south-east, north-west and north-east.
+        """
         charts, _, size, _ = self._shape
         together, high = max(1, _BLOCK // size**2), max(1, _BLOCK // size)
         for chart in range(0, charts, together):
             for row in range(0, size, high):
-                yield slice(chart, min(chart + together, charts)), slice(row, min(row + high, size))
+                rows = slice(row, min(row + high, size))
+                part = slice(chart, min(chart + together, charts)), slice(row, rows.stop + 1)
+                x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
+                yield part[0], rows, part, [each - x[0] for each in x[1:]]
 
     @staticmethod
     def _at_corners(field: NDArray) -> list[NDArray]:

@@ -30,7 +30,7 @@ from .topology import TexelTopology
 _PASSES = 4
 
 
-def smoothed(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[np.float64]:
+def smoothed(topology: TexelTopology, field: Floats) -> Floats:
     """Mean of a field [C, n, n] round each texel, by passes of the weights 1 2 1 along rows and columns."""
     exists = _sum_around(topology, np.ones_like(field))
     for _ in range(_PASSES):
@@ -39,7 +39,7 @@ def smoothed(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[np.
     return field
 
 
-def _sum_around(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sum_around(topology: TexelTopology, field: Floats) -> Floats:
     around = topology.with_halo(field)
     rows = around[:, :-2] + 2 * around[:, 1:-1] + around[:, 2:]
     return rows[:, :, :-2] + 2 * rows[:, :, 1:-1] + rows[:, :, 2:]
@@ -168,12 +168,8 @@ class TexelMesh:
     def bare_rim(self) -> NDArray[np.bool_]:
         """Texels in whose centres the surface ends: a rim beside them has no positions; [C, n, n]."""
         bare = self.topology.rim & ~np.isfinite(self.halo_positions[..., 0])
-        ends = np.zeros(self.shape, bool)
-        ends[:, 0] |= bare[:, 0, 1:-1]
-        ends[:, -1] |= bare[:, -1, 1:-1]
-        ends[:, :, 0] |= bare[:, 1:-1, 0]
-        ends[:, :, -1] |= bare[:, 1:-1, -1]
-        return ends
+        bare[:, [0, 0, -1, -1], [0, -1, 0, -1]] = False  # no texel lies beside a corner
+        return np.bincount(self.topology.halo[bare], minlength=self.topology.texel_count).reshape(self.shape) > 0
 
     def stencil(self, coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None) -> Stencil:
         """Stiffness weights of -div(coefficient grad): at a texel, the area integral of div(coefficient grad h).
@@ -212,9 +208,7 @@ class TexelGrid(NamedTuple):
     areas: Floats
 
 
-def _with_halo(
-    topology: TexelTopology, positions: NDArray[np.float64], beyond: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
+def _with_halo(topology: TexelTopology, positions: Floats, beyond: Floats | None) -> Floats:
     if beyond is not None:
         around = beyond.copy()
         around[:, 1:-1, 1:-1] = positions
@@ -224,7 +218,7 @@ def _with_halo(
     return around
 
 
-def tangents(around: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def tangents(around: Floats) -> tuple[Floats, Floats]:
     """Differences of positions with halo along rows and along columns, each [C, n, n, 3], one-sided at a bare rim."""
     own = around[:, 1:-1, 1:-1]
     beside = (around[:, 1:-1, 2:], around[:, 1:-1, :-2], around[:, 2:, 1:-1], around[:, :-2, 1:-1])
@@ -252,7 +246,7 @@ _SCARCE = 0.2  # of a part's area, at most, that its texels may lack together: t
 _MOST_TURNS, _HALVINGS = 50, 6
 
 
-def evened_areas(areas: NDArray[np.float64], stencil: Stencil) -> NDArray[np.float64]:
+def evened_areas(areas: Floats, stencil: Stencil) -> Floats:
     """Areas [C, n, n] with mass of their neighbours' moved to the few texels that would set the time step for all.
 
     To the areas is added K w, with the stiffness K of a uniform surface and the least w >= 0 for which no texel is
@@ -279,7 +273,7 @@ def evened_areas(areas: NDArray[np.float64], stencil: Stencil) -> NDArray[np.flo
     return best.reshape(areas.shape)
 
 
-def _least_potential(matrix: csr_array, lack: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _least_potential(matrix: csr_array, lack: Floats) -> Floats | None:
     """The least w >= 0 with K w >= lack, an obstacle problem; None if it is not found.
 
     Where it is not 0 is found by Newton's method (Hintermueller, Ito and Kunisch 2002).
@@ -296,12 +290,12 @@ def _least_potential(matrix: csr_array, lack: NDArray[np.float64]) -> NDArray[np
     return None
 
 
-def _even(areas: NDArray[np.float64]) -> float:
+def _even(areas: Floats) -> float:
     """Rate at which the time step is the least wanted share of an even grid's."""
     return float(EVEN_RATE / (2 * areas.mean() * _STEP**2))
 
 
-def softening(texels: TexelMesh) -> NDArray[np.float64]:
+def softening(texels: TexelMesh) -> Floats:
     """Factors that slow down those few texels that evened areas leave too fast for the others, [C, n, n].
 
     Where the texel mesh crosses a crease, single texels are needles, for which no mass of their neighbours would do.
@@ -320,7 +314,7 @@ def softening(texels: TexelMesh) -> NDArray[np.float64]:
     return np.minimum(1, max(bound, _FASTER * bulk) / rate)
 
 
-def _bulk(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
+def _bulk(rates: Floats, areas: Floats) -> float:
     """The rate that most of the surface has at most: tiny parts may have many texels."""
     order = np.argsort(rates)
     covered = np.cumsum(areas[order])

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..cache import kept_with
 from ..errors import AtlasError, RippleWarning, Valid, checked, instance
+from ..kernel import Bools, Floats
 from ..mesh.mesh import Mesh
 from ..mesh.queries import RayScene
 from ..mesh.volume import Volume
@@ -53,9 +54,7 @@ def medial_radius(atlas: Atlas) -> NDArray[np.float32]:
     return (1 / smoothed(atlas.texels.topology, curvature)).astype(np.float32)
 
 
-def _shrunk(
-    tree: cKDTree, points: NDArray[np.float64], normals: NDArray[np.float64], size: float
-) -> NDArray[np.float64]:
+def _shrunk(tree: cKDTree, points: Floats, normals: Floats, size: float) -> Floats:
     """Radii of the balls on the side of the normals, [k]: each shrinks until no point lies in it."""
     radius = np.full(len(points), _MOST_RADIUS * size)
     active = np.arange(len(points))
@@ -89,7 +88,7 @@ def half_thickness(atlas: Atlas) -> NDArray[np.float64]:
     return 1 / smoothed(atlas.texels.topology, 1 / radius.reshape(atlas.areas.shape))
 
 
-def half_thickness_at(mesh: Mesh, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def half_thickness_at(mesh: Mesh, points: Floats, normals: Floats) -> Floats:
     """Half the way from points of the surface [m], [k, 3], to the other side [m], [k]; normals [k, 3] are outward."""
     V, F = mesh.V, mesh.F
     middle, size = V.mean(axis=0), float(np.ptp(V, axis=0).max())
@@ -168,9 +167,7 @@ def thickness_map(
     return smoothed(atlas.texels.topology, way.reshape(atlas.areas.shape))
 
 
-def _cast(
-    corners: NDArray[np.float64], points: NDArray[np.float64], ways: NDArray[np.float64], size: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _cast(corners: Floats, points: Floats, ways: Floats, size: float) -> tuple[Floats, Bools]:
     """Distance from points along unit ways to triangles [m, 3, 3], infinite without; and where they begin inside.
 
     Embree finds the triangle in float32; the distance is that to its plane in float64.

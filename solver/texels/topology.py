@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..errors import AtlasError
+from ..kernel import Bools, Floats, Floats32, Ints
 
 # A corner where so many charts meet is a triangle or a quad of the nine-point stencil.
 TRIANGLE, QUAD = 3, 4
@@ -110,9 +111,7 @@ class TexelTopology:
 _CORNERS = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
 
 
-def close_corners(
-    glued: NDArray[np.int64], n: int, halo: NDArray[np.int64], rim: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], list[NDArray[np.int64]]]:
+def close_corners(glued: Ints, n: int, halo: Ints, rim: Bools) -> tuple[Ints, Ints, list[Ints]]:
     """Fill in the halo's corners; return how many charts meet in each, its number, and the cells that are polygons."""
     valence, corners = np.zeros((len(glued), 4), np.int64), np.full((len(glued), 4), -1)
     polygons = []
@@ -136,7 +135,7 @@ def close_corners(
     return valence, corners, polygons
 
 
-def _fan(glued: NDArray[np.int64], chart: int, corner: int) -> tuple[list[tuple[int, int]], bool]:
+def _fan(glued: Ints, chart: int, corner: int) -> tuple[list[tuple[int, int]], bool]:
     """The corners (chart, corner) that meet in one, counter-clockwise, and whether they surround it.
 
     From the one itself where they do, else from rim to rim.
@@ -203,7 +202,7 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     return TexelTopology(glued, halo, rim, valence, corners, tuple(polygons))
 
 
-def _along_sides(along: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+def _along_sides(along: Ints, width: int) -> Ints:
     """Flat places along each side of a square of so many rows and columns, [4, n]."""
     last = width - 1
     return np.stack([along, along * width + last, last * width + last - along, (last - along) * width])
@@ -226,16 +225,14 @@ def fill_halo(topology: TexelTopology, field: NDArray) -> None:
             field[missing, r, c] = mean[missing]
 
 
-def with_filled_halo(topology: TexelTopology, field: NDArray[np.float32]) -> NDArray[np.float32]:
+def with_filled_halo(topology: TexelTopology, field: Floats32) -> Floats32:
     """A field [C, n, n, ...] surrounded by its halo; see `fill_halo`."""
     around = topology.with_halo(field)
     fill_halo(topology, around)
     return around
 
 
-def sampling_matrix(
-    topology: TexelTopology, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
-) -> csr_array:
+def sampling_matrix(topology: TexelTopology, chart: Ints, row: Floats, column: Floats) -> csr_array:
     """Matrix that takes a flattened field [C n^2] to its values at chart points, each [k]; see `Atlas.locate`.
 
     In a corner where other than four charts meet the weight of the texel that is missing is shared out.
@@ -257,7 +254,7 @@ QUANTILES = {"q001": 0.001, "q01": 0.01, "q50": 0.5, "q99": 0.99, "q999": 0.999}
 STARVED = 4.0
 
 
-def stretch_summary(stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> dict[str, float]:
+def stretch_summary(stretch: Floats, areas: Floats) -> dict[str, float]:
     """Quantiles of the stretch over the real areas, both [m], and the starved share; see `Atlas.quality`."""
     order = np.argsort(stretch, kind="stable")
     share = np.cumsum(areas[order]) / areas.sum()
