@@ -139,8 +139,7 @@ def _difference_stencil(texels: TexelMesh, kind: str, area: float, coefficient: 
         lengths[finite] = lengths[finite].mean()
     lengths[lengths == 0] = np.inf
     c = texels.topology.with_halo(coefficient)
-    means = np.stack([(c[a] + c[b]) / 2 for a, b in LINK_ENDS], axis=1)
-    weights = area * means / lengths**2
+    weights = area * np.stack([(c[a] + c[b]) / 2 for a, b in LINK_ENDS], axis=1) / lengths**2
     crossing_links(texels.topology).level(weights)
     return Stencil(texels.topology, weights)
 

@@ -144,13 +144,13 @@ def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Flo
     shift = least - max((mean - least) / size**2, _RESIDUAL * mean)
     solve = factorised(matrix - shift * diags_array(np.ones(size)))
     random, found, squares, asked = np.random.default_rng(0), np.empty((size, 0)), np.empty(0), count + 2
+
+    def inverse(x: Floats) -> Floats:
+        y = solve(x)
+        return y - found @ (found.T @ y)
+
+    lanczos = LinearOperator((size, size), inverse, dtype=np.float64)
     while True:
-
-        def inverse(x: Floats, found: Floats = found) -> Floats:
-            y = solve(x)
-            return y - found @ (found.T @ y)
-
-        lanczos = LinearOperator((size, size), inverse, dtype=np.float64)
         start = random.standard_normal(size)
         values, new = eigsh(matrix, min(asked, size - 1), sigma=shift, OPinv=lanczos, v0=start, tol=_RESIDUAL)
         rigid = int((squares < _NOTHING * mean).sum())

@@ -68,11 +68,9 @@ def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
         )
     if found.dtype.kind == "b":
         found = np.where(found, "clamped", "free")
-    unknown = found[~np.isin(found, RIMS[:3])]
-    if len(unknown):
-        raise SolverError(
-            f"the function of the rim gives {str(unknown[0])!r}; valid are 'free', 'supported', 'clamped'"
-        )
+    wrong = found[~np.isin(found, RIMS[:3])]
+    if len(wrong):
+        raise SolverError(f"the function of the rim gives {str(wrong[0])!r}; valid are 'free', 'supported', 'clamped'")
     conditions[at] = sum((k + 1) * (found == name) for k, name in enumerate(RIMS[:3]))
     return conditions
 
@@ -126,17 +124,14 @@ def _polygons(topology: TexelTopology) -> list[Ints]:
     """Corners of all cells between texels, counter-clockwise, [k, m] for each number of corners m."""
     halo = np.where(topology.rim, -1, topology.halo)
     corners = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1).reshape(-1, 4)
-    quads = corners[(corners >= 0).all(axis=1)]
     n = topology.shape[1]
     triangles = []
     for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
         square = halo[:, [r, r, r + 1, r + 1], [c, c + 1, c + 1, c]]
         triangles.append(np.delete(square[topology.valence[:, corner] == TRIANGLE], corner, axis=1))
-    kinds = [quads, np.concatenate(triangles)]
-    kinds += [
-        np.array([each for each in topology.polygons if len(each) == m])
-        for m in sorted({len(each) for each in topology.polygons})
-    ]
+    kinds = [corners[(corners >= 0).all(axis=1)], np.concatenate(triangles)]
+    counts = sorted({len(each) for each in topology.polygons})
+    kinds += [np.array([each for each in topology.polygons if len(each) == m]) for m in counts]
     # those across a glued side come once from each chart
     firsts = [np.unique(np.sort(each, axis=1), axis=0, return_index=True)[1] for each in kinds]
     return [each[first] for each, first in zip(kinds, firsts, strict=True) if len(each)]
@@ -174,11 +169,9 @@ def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:
     key = sides[:, 0] * count + sides[:, 1]
     order = np.argsort(key)
     back = sides[:, 1] * count + sides[:, 0]
-    place = np.searchsorted(key[order], back).clip(0, len(key) - 1)
-    other = order[place]
+    other = order[np.searchsorted(key[order], back).clip(0, len(key) - 1)]
     both = (key[other] == back) & (sides[:, 0] < sides[:, 1])
-    edges = np.column_stack([sides[both, :2], sides[other[both], 2], sides[both, 2]])
-    return np.concatenate(pairs), edges, gradients
+    return np.concatenate(pairs), np.column_stack([sides[both, :2], sides[other[both], 2], sides[both, 2]]), gradients
 
 
 def fitted_rows(
@@ -242,15 +235,14 @@ def fitted_rows(
     rows = np.concatenate(energies, axis=1) * weights[:, None] * np.sqrt(rigidity[outer])[:, None, None]
     o, row, k = np.nonzero((rows != 0) & (column >= 0)[:, None])
     matrix = csr_array((rows[o, row, k], (o * (width + 4) + row, column[o, k])), shape=(size * (width + 4), count))
-    owners = np.where(np.arange(width + 4) < 4, index[:, None], -1)
-    return matrix, owners.ravel()
+    return matrix, np.where(np.arange(width + 4) < 4, index[:, None], -1).ravel()
 
 
 def tension_springs(places: RimPlaces, texels: TexelMesh, tension: Floats) -> Floats:
     """Springs by which a stretched surface is tied to the rims that hold it [N/m], [T]; `tension` [N/m] is [T]."""
     way = np.linalg.norm(places.points - texels.positions.reshape(-1, 3)[places.texels], axis=1)
-    held = (places.conditions != FREE) & (way > 0)
-    pull = tension[places.texels] * places.lengths / np.where(held, way, np.inf)
+    way[(places.conditions == FREE) | (way == 0)] = np.inf
+    pull = tension[places.texels] * places.lengths / way
     return np.bincount(places.texels, pull, len(tension)).astype(np.float64)
 
 

@@ -62,8 +62,7 @@ class VolumeBalance:
         if self._parts is None:
             return float(field.sum()) / float(total) if total else 0.0
         sums = np.bincount(self._parts, field.reshape(-1))
-        ratio = np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)
-        return ratio[self._parts].reshape(field.shape)
+        return np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)[self._parts].reshape(field.shape)
 
 
 # What is smaller than this, against the greatest, is round-off.

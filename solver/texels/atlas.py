@@ -365,9 +365,8 @@ def _corner_points(texels: TexelMesh) -> NDArray[np.float64]:
     topology, around = texels.topology, texels.halo_positions
     rows, columns = [0, 0, -1, -1], [0, -1, -1, 0]
     inner_rows, inner_columns = [1, 1, -2, -2], [1, -2, -2, 1]
-    at_rim = topology.rim[:, rows, columns]
     own = around[:, inner_rows, inner_columns]
-    points = np.where(at_rim[..., None], around[:, rows, columns], own)
+    points = np.where(topology.rim[:, rows, columns, None], around[:, rows, columns], own)
     corners = topology.corners.ravel()
     number = np.bincount(corners)
     means = np.stack([np.bincount(corners, points[..., k].ravel()) / number for k in range(3)], axis=1)

@@ -26,6 +26,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernel import Floats, Ints, kernel, shared
 from ..mesh.vectors import Vector, cross, dot, subtract
@@ -264,10 +265,16 @@ def conductance(coefficients: Sequence[Floats], softening: Sequence[Floats]) -> 
 # The four corners of a cell at (r, c), and its links in the order of `quad`: link, and the place where it is stored.
 CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 LINKS = ((0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 0, 1), (2, 0, 0), (3, 0, 0))
-_SOUTH, _NORTH, _WEST, _EAST = LINKS[:4]
 
-# Two corners of a strip on the surface, the two beyond the rim opposite to them, and the link of the first two.
-_STRIPS = ((0, 1, 2, 3, _SOUTH), (2, 3, 0, 1, _NORTH), (0, 2, 1, 3, _WEST), (1, 3, 0, 2, _EAST))
+
+def at_corners(field: NDArray) -> list[NDArray]:
+    """A field [..., r + 1, c + 1] at the four corners of each of r x c cells."""
+    rows, columns = field.shape[-2] - 1, field.shape[-1] - 1
+    return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
+
+
+# Two corners of each strip on the surface, joined by the first four of the links, and the two beyond the rim opposite.
+_STRIPS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 1, 3), (1, 3, 0, 2))
 
 _NOTHING = np.zeros(0, np.int64)
 
@@ -319,11 +326,8 @@ def special_cells(topology: TexelTopology, halo_positions: Floats) -> list[Speci
 def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[SpecialCells]:
     """Strips between the last texels and a rim: whole quads where it is fixed."""
     n = topology.shape[1]
-    there, rim = topology.halo >= 0, topology.rim
-    exists, touches = (
-        function.reduce([field[:, r : n + 1 + r, c : n + 1 + c] for r, c in CORNERS])
-        for function, field in ((np.logical_and, there), (np.logical_or, rim))
-    )
+    rim, exists = topology.rim, np.logical_and.reduce(at_corners(topology.halo >= 0))
+    touches = np.logical_or.reduce(at_corners(rim))
     chart, r, c = cells = np.stack(np.nonzero(exists & touches))
     corners = np.stack([(chart * (n + 2) + r + down) * (n + 2) + c + right for down, right in CORNERS])
     finite = np.isfinite(halo_positions.reshape(-1, 3)[corners]).all(axis=(0, 2))
@@ -341,7 +345,7 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
         yield SpecialCells(corners, _whole_quads, _link_places(topology, cells, LINKS), to_texels)
         return
     yield SpecialCells(corners, _areas, (_NOTHING, _NOTHING), to_texels)
-    for i, j, p, q, link in _STRIPS:
+    for (i, j, p, q), link in zip(_STRIPS, LINKS[:4], strict=True):
         here = ~at_rim[i] & ~at_rim[j] & at_rim[p] & at_rim[q]
         places = _link_places(topology, cells[:, here], (link,))
         yield SpecialCells(corners[[i, j, p, q]][:, here], _strips, places, (_NOTHING, _NOTHING))
@@ -350,23 +354,15 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
 def _triangles(topology: TexelTopology) -> SpecialCells:
     """The cells in corners of three charts; each chart adds what its own texel there, the first corner, has of it."""
     n, width = topology.shape[1], topology.halo.shape[1]
-    corners: list[Ints] = []
-    sources, places, count = [], [], (topology.valence == TRIANGLE).sum()
-    for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
-        chart = np.flatnonzero(topology.valence[:, corner] == TRIANGLE)
-        r0, r1 = (1, 0) if r == 0 else (r, r + 1)
-        c0, c1 = (1, 0) if c == 0 else (c, c + 1)
-        row, column = np.array([[r0, r0, r1], [c0, c1, c0]])[:, :, None]
-        before = sum(each.shape[1] for each in corners)
-        corners.append((chart * width + row) * width + column)
-        cells = np.stack([chart, np.full_like(chart, r), np.full_like(chart, c)])
-        for k, link in enumerate((_EAST if c == 0 else _WEST, _NORTH if r == 0 else _SOUTH)):
-            source, place = _link_places(topology, cells, (link,))
-            sources.append(k * count + before + source)
-            places.append(place)
-    found = np.concatenate(corners, axis=1)
-    own = np.arange(count), topology.halo.reshape(-1)[found[0]]
-    return SpecialCells(found, _triangle, (np.concatenate(sources), np.concatenate(places)), own)
+    corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
+    r, c = np.array([[0, 0, n, n], [0, n, n, 0]])[:, corner]
+    # of the chart's own texel, and beyond it
+    (row, next_row), (column, next_column) = (np.where(each == 0, [[1], [0]], [each, each + 1]) for each in (r, c))
+    corners = (chart * width + np.stack([row, row, next_row])) * width + np.stack([column, next_column, column])
+    # the east or west side, and the north or south one
+    links = _link_places(topology, np.stack([chart, r, c]), ((1, 0, c == 0), (0, r == 0, 0)))
+    own = np.arange(len(chart)), topology.halo.reshape(-1)[corners[0]]
+    return SpecialCells(corners, _triangle, links, own)
 
 
 def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
@@ -383,13 +379,12 @@ def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
         yield SpecialCells(corners, _polygon, (link, places), shares, (beside, pairs[beside]), on_all_copies=True)
 
 
-def _link_places(topology: TexelTopology, cells: Ints, links: tuple[tuple[int, int, int], ...]) -> tuple[Ints, Ints]:
+def _link_places(topology: TexelTopology, cells: Ints, links: Sequence[tuple]) -> tuple[Ints, Ints]:
     """Which links [l, k] of cells [3, k] are stored, and where in a stencil's weights; both flat."""
-    n = topology.shape[1]
-    link, down, right = np.transpose(links)[:, :, None]
-    chart, row, column = cells[0], cells[1] + down, cells[2] + right
-    stored = (row <= n) & (column <= n)
-    places = ((4 * chart + link) * (n + 1) + row) * (n + 1) + column
+    n, (chart, r, c) = topology.shape[1], cells
+    found = [(link, r + down, c + right) for link, down, right in links]
+    stored = np.stack([(row <= n) & (column <= n) for _, row, column in found])
+    places = np.stack([((4 * chart + link) * (n + 1) + row) * (n + 1) + column for link, row, column in found])
     return np.flatnonzero(stored), places[stored]
 
 

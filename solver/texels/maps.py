@@ -69,7 +69,7 @@ def texture_map(
     """
     if atlas.mesh.corner_uv is None:
         raise SolverError("the mesh has no texture coordinates for an image; give it some, or use `vertex_map`")
-    values, uv = _channel(_pixels(image), channel), _interpolate(atlas, atlas.mesh.corner_uv)
+    values, uv = _pixels(image, channel), _interpolate(atlas, atlas.mesh.corner_uv)
     height, width = values.shape
     x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
@@ -86,8 +86,8 @@ def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float
     return np.einsum("fijk,fijk...->fij...", atlas.barycentrics, corners[atlas.triangles])
 
 
-def _pixels(image: str | Path | ArrayLike) -> NDArray[np.float64]:
-    """Values from 0 to 1, [height, width, channels]."""
+def _pixels(image: str | Path | ArrayLike, channel: str) -> NDArray[np.float64]:
+    """Values from 0 to 1 of one channel, [height, width]."""
     if isinstance(image, str | Path):
         pixels = read_image(SolverError, image, "image", _brightness)
         pixels = pixels / (255.0 if pixels.dtype == np.uint8 else 65535.0)
@@ -97,15 +97,6 @@ def _pixels(image: str | Path | ArrayLike) -> NDArray[np.float64]:
         pixels = pixels[..., None]
     if pixels.ndim != 3 or 0 in pixels.shape or pixels.shape[2] > 4:
         raise SolverError(f"image has shape {pixels.shape}; valid is [height, width] with up to 4 channels")
-    return pixels
-
-
-def _brightness(mode: str) -> str:
-    """The numbers of a palette are not brightness."""
-    return mode if mode in ("L", "LA", "RGB", "RGBA") or mode[0] == "I" else "RGBA"
-
-
-def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
     channels = pixels.shape[2]
     if channel == "luminance":
         return pixels[..., : 3 if channels >= 3 else 1].mean(axis=2)
@@ -115,3 +106,8 @@ def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
     if place >= channels:
         raise SolverError(f"the image has no channel {channel!r}, only {channels}; use 'luminance'")
     return pixels[..., place]
+
+
+def _brightness(mode: str) -> str:
+    """The numbers of a palette are not brightness."""
+    return mode if mode in ("L", "LA", "RGB", "RGBA") or mode[0] == "I" else "RGBA"

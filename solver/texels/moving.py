@@ -54,8 +54,7 @@ class SurfaceRide:
         # along the triangle's first side, across it, and along its normal, in units of the root of twice its area
         off = np.nan_to_num(places - shift - np.einsum("ij,ijk->ik", weights, V[corners]))
         if np.abs(off).max(initial=0.0) > _OFF * np.ptp(V, axis=0).max():
-            frames = np.swapaxes(_frames(V, self.corners), 1, 2)
-            self._offsets = np.linalg.solve(frames, off[..., None])[..., 0]
+            self._offsets = np.linalg.solve(np.swapaxes(_frames(V, self.corners), 1, 2), off[..., None])[..., 0]
         self.on_triangles = not (len(self._offsets) or len(self._images))
 
     def around(self, V: Floats) -> Floats:
@@ -123,10 +122,11 @@ class MovedStencil(Stencil):
 
     @functools.cached_property
     def _made(self) -> tuple[Stencil, Floats]:
-        if self._multiple is not None:
-            stencil, factor = self._multiple
-            return stencil._made[0].scaled(factor), stencil.areas
-        return self.cells.moved(self.places.around, self.coefficient)
+        if self._multiple is None:
+            return self.cells.moved(self.places.around, self.coefficient)
+        (stencil, areas), factor = self._multiple[0]._made, self._multiple[1]
+        links = stencil.irregular._replace(weights=factor * stencil.irregular.weights)
+        return Stencil(self.topology, factor * stencil.weights, links), areas
 
     @functools.cached_property
     def weights(self) -> Floats:  # type: ignore[override]

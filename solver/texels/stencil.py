@@ -257,11 +257,6 @@ class Stencil:
         result.reshape(-1)[links.texels] += np.bincount(row, forces)
         return result
 
-    def scaled(self, factor: float) -> Stencil:
-        """The same with all weights multiplied by a factor."""
-        links = self.irregular._replace(weights=factor * self.irregular.weights)
-        return Stencil(self.topology, factor * self.weights, links)
-
     def absolute_sums(self) -> Floats:
         """Sum of |w| over the links that meet in each texel, half of |w| for those to a fixed rim, [C, n, n].
 
@@ -312,6 +307,5 @@ def stiffness_matrix(stencil: Stencil) -> csr_array:
         tied, ties = rim_ties(topology)
         diagonal += np.bincount(tied, stencil.weights.reshape(-1)[ties], size)
     texels = np.arange(size)
-    entries = np.concatenate([-weight, diagonal])
     places = np.concatenate([row, texels]), np.concatenate([column, texels])
-    return csr_array((entries, places), shape=(size, size))
+    return csr_array((np.concatenate([-weight, diagonal]), places), shape=(size, size))

@@ -92,9 +92,7 @@ def half_thickness_at(mesh: Mesh, points: Floats, normals: Floats) -> Floats:
     """Half the way from points of the surface [m], [k, 3], to the other side [m], [k]; normals [k, 3] are outward."""
     V, F = mesh.V, mesh.F
     middle, size = V.mean(axis=0), float(np.ptp(V, axis=0).max())
-    scene = RayScene(((V - middle) / size)[F])
-    start = (points - middle) / size - _START * normals
-    distance = scene.distances(start, -normals)
+    distance = RayScene(((V - middle) / size)[F]).distances((points - middle) / size - _START * normals, -normals)
     return size * np.clip((distance.astype(np.float64) + _START) / 2, _LEAST, _MOST)
 
 

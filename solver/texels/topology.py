@@ -239,15 +239,12 @@ def sampling_matrix(topology: TexelTopology, chart: Ints, row: Floats, column: F
     """
     r, c = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
     s, t = row - r, column - c
-    texels, weights = [], []
-    for i, j, weight in ((0, 0, (1 - s) * (1 - t)), (0, 1, (1 - s) * t), (1, 0, s * (1 - t)), (1, 1, s * t)):
-        texel = topology.halo[chart, r + 1 + i, c + 1 + j]
-        texels.append(np.maximum(texel, 0))
-        weights.append(np.where(texel < 0, 0, weight))
-    share = np.array(weights)
+    i, j = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, :, None]
+    texel = topology.halo[chart, r + 1 + i, c + 1 + j]
+    share = np.where(texel < 0, 0, [(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t])
     share /= share.sum(axis=0)
-    rows = np.tile(np.arange(len(chart)), 4)
-    return csr_array((share.ravel(), (rows, np.concatenate(texels))), shape=(len(chart), topology.texel_count))
+    places = np.tile(np.arange(len(chart)), 4), np.maximum(texel, 0).ravel()
+    return csr_array((share.ravel(), places), shape=(len(chart), topology.texel_count))
 
 
 QUANTILES = {"q001": 0.001, "q01": 0.01, "q50": 0.5, "q99": 0.99, "q999": 0.999}
@@ -259,10 +256,8 @@ def stretch_summary(stretch: Floats, areas: Floats) -> dict[str, float]:
     order = np.argsort(stretch, kind="stable")
     share = np.cumsum(areas[order]) / areas.sum()
     at = np.minimum(np.searchsorted(share, list(QUANTILES.values())), len(order) - 1)
-    return {
-        **{name: float(value) for name, value in zip(QUANTILES, stretch[order][at], strict=True)},
-        "starved": float(areas[stretch > STARVED].sum() / areas.sum()),
-    }
+    starved = float(areas[stretch > STARVED].sum() / areas.sum())
+    return {**dict(zip(QUANTILES, stretch[order][at].tolist(), strict=True)), "starved": starved}
 
 
 @dataclasses.dataclass(frozen=True)
