@@ -35,7 +35,7 @@ SHORTEST, LONGEST = 2 * np.pi / 8, 2 * np.pi / 1.3
 # mean for 5 <= q d <= 16, where it falls from 0.68 to 0.31.
 _SHORT_STIFF, _SHORT_FAST, _SHORT_MASS, _SHORT_LONGEST = 4.263, 0.8781, 0.517, 2 * np.pi / 5
 
-_STEEPEST = 8.0  # power with which tension may follow the area
+_MOST = 8.0  # power with which tension may follow the area
 
 
 class Default(float):
@@ -113,10 +113,8 @@ class Material:
         for name in LIMITS:
             check_numbers(name, getattr(self, name))
         check_mask("fixed", self.fixed)
-        if not (is_finite(self.tightening) and -_STEEPEST <= self.tightening <= _STEEPEST):
-            raise SolverError(
-                f"material tightening is {shown(self.tightening)}; valid is from {-_STEEPEST:g} to {_STEEPEST:g}"
-            )
+        if not (is_finite(self.tightening) and -_MOST <= self.tightening <= _MOST):
+            raise SolverError(f"material tightening is {shown(self.tightening)}; valid is from {-_MOST:g} to {_MOST:g}")
         if not (is_finite(self.poisson) and 0 <= self.poisson <= 0.5):
             raise SolverError(f"material poisson is {shown(self.poisson)}; valid is a number from 0 to 0.5")
         if np.ndim(self.deep):

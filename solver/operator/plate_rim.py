@@ -110,8 +110,7 @@ def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
     found = []
     for outside, inside in _SIDES:
         at = conditions[outside] > 0
-        own, points = texels.positions[inside], around[outside]
-        points = np.where(np.isfinite(points), points, own)
+        points = np.where(np.isfinite(around[outside]), around[outside], texels.positions[inside])
         # ends of a side count one-sided
         along = np.concatenate([points[:, :1], points, points[:, -1:]], axis=1)
         lengths = np.linalg.norm(along[:, 2:] - along[:, :-2], axis=-1)
@@ -123,18 +122,14 @@ def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
 def _polygons(topology: TexelTopology) -> list[Ints]:
     """Corners of all cells between texels, counter-clockwise, [k, m] for each number of corners m."""
     halo = np.where(topology.rim, -1, topology.halo)
-    corners = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1).reshape(-1, 4)
-    n = topology.shape[1]
-    triangles = []
-    for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
-        square = halo[:, [r, r, r + 1, r + 1], [c, c + 1, c + 1, c]]
-        triangles.append(np.delete(square[topology.valence[:, corner] == TRIANGLE], corner, axis=1))
-    kinds = [corners[(corners >= 0).all(axis=1)], np.concatenate(triangles)]
+    cells = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1)
+    corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
+    triangles = cells[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]  # a place of theirs shows nothing
+    kinds = [cells[(cells >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
     counts = sorted({len(each) for each in topology.polygons})
     kinds += [np.array([each for each in topology.polygons if len(each) == m]) for m in counts]
     # those across a glued side come once from each chart
-    firsts = [np.unique(np.sort(each, axis=1), axis=0, return_index=True)[1] for each in kinds]
-    return [each[first] for each, first in zip(kinds, firsts, strict=True) if len(each)]
+    return [each[np.unique(np.sort(each, axis=1), axis=0, return_index=True)[1]] for each in kinds if len(each)]
 
 
 def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:

@@ -99,11 +99,10 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)
     scale = np.where(kept & (inertia > 0), -1 / np.where(inertia > 0, inertia, 1), 0)[parts]
-    # what an even surface has as well: its mean is damped, and swings on its spring
-    even_decay, even_span = _mean(decay), _mean(span)
     moved = span * operator.inverse_density
-    heights = operator.link_force(moved) - weight * operator.stiffness * (span - even_span)
-    velocities = weight * (decay - even_decay)
+    # without what an even surface has as well: its mean is damped, and swings on its spring
+    heights = operator.link_force(moved) - weight * operator.stiffness * (span - _mean(span))
+    velocities = weight * (decay - _mean(decay))
     if operator.viscosity_stencil is not None:
         velocities = velocities + operator.viscosity_stencil(moved)
     heights, velocities = ((scale * each).reshape(-1) for each in (heights, velocities))

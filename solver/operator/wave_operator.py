@@ -18,16 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import SolverError
 from ..kernel import Bools, Floats, Floats32, Ints32
 from ..mesh.topology import labels
-from ..texels.stencil import (
-    EAST,
-    NO_LINKS,
-    NORTH,
-    IrregularLinks,
-    Stencil,
-    largest_eigenvalue,
-    link_exists,
-    stiffness_matrix,
-)
+from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
 from ..texels.topology import TexelTopology
 
 # What joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours.
@@ -76,7 +67,7 @@ def floating_parts(ties: Sequence[Tie], held: Bools, movable: Bools) -> Ints32 |
 def _joins_all(tie: Tie) -> bool:
     """Whether the sides of all quads are links, so that every part of the mesh is one."""
     stencil, rigidity = tie
-    sides = (stencil.weights[:, link][link_exists(stencil.topology, link)] for link in (EAST, NORTH))
+    sides = (stencil.weights[:, link][link_exists(stencil.topology, link)] for link in range(2))  # not the diagonals
     return (rigidity is None or bool((rigidity > 0).all())) and all(side.all() for side in sides)
 
 
@@ -92,9 +83,6 @@ def _graph(tie: Tie) -> csr_array:
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
 SAFETY = 0.99
-
-# What does not change as the surface moves.
-_OF_REST = ("free", "movable", "anchored", "source_share", "inverse_density", "response", "parts")
 
 
 class Bending(NamedTuple):
@@ -211,7 +199,7 @@ class WaveOperator:
         moved = dataclasses.replace(
             self, stencil=stencil, viscosity_stencil=viscosity_stencil, bending=bending, bounded=True
         )
-        for name in _OF_REST:
+        for name in ("free", "movable", "anchored", "source_share", "inverse_density", "response", "parts"):
             object.__setattr__(moved, name, getattr(self, name))
         return moved
 

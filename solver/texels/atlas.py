@@ -339,9 +339,7 @@ def _welded_nodes(texels: TexelMesh) -> tuple[NDArray[np.float64], NDArray[np.in
     count = topology.texel_count
     nodes = np.where(topology.own, topology.halo, -1)
     # a node on a border belongs to the two texels that it lies between, one in a corner to all that meet there
-    own = topology.halo.copy()
-    for inner, outer in ((1, 0), (-2, -1)):
-        own[:, outer], own[:, :, outer] = own[:, inner], own[:, :, inner]
+    own = np.pad(topology.halo[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
     border = ~topology.own & np.isfinite(around[..., 0])
     border[:, [0, 0, -1, -1], [0, -1, 0, -1]] = False
     points = texels.positions.reshape(-1, 3)

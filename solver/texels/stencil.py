@@ -65,9 +65,6 @@ class IrregularLinks(NamedTuple):
 
 NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
 
-
-EAST, NORTH = 0, 1
-
 _Places: TypeAlias = tuple[slice, slice, slice]
 
 # Row and column of the two ends of every link from the place where it is stored, and the slices of a field with halo
@@ -175,12 +172,7 @@ _LANCZOS_FROM = 6
 _RESIDUAL, _LOOK, _MOST = 2e-3, 5, 1000
 
 
-def largest_eigenvalue(
-    force: Callable[[Floats], Floats],
-    mass: Floats,
-    free: Bools,
-    bound: float,
-) -> float:
+def largest_eigenvalue(force: Callable[[Floats], Floats], mass: Floats, free: Bools, bound: float) -> float:
     """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
 
     Parameters

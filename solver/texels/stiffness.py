@@ -76,7 +76,7 @@ class TexelCells:
         self._detours = np.zeros((4, *topology.halo.shape), np.float32) if detours is None else detours
         charts, n, _ = topology.shape
         self._shape, self._special = (charts, 4, n + 1, n + 1), special_cells(topology, halo_positions)
-        self._whole = functools.reduce(np.logical_and, at_corners((topology.halo >= 0) & ~topology.rim))
+        self._whole = np.logical_and.reduce(at_corners((topology.halo >= 0) & ~topology.rim))
         extent = float(np.ptp(halo_positions[:, 1:-1, 1:-1], axis=(0, 1, 2)).max())
         self._scale = float(np.float32(np.sqrt(topology.texel_count) / extent)) if extent > 0 else 1.0
         ends = np.concatenate([np.zeros((0, 2), np.int64), *(each.irregular[1] for each in self._special)])
@@ -213,10 +213,7 @@ class TexelCells:
         return self._links._replace(weights=np.concatenate(irregular)[self._links.weights.astype(np.int64)])
 
     def _blocks(self) -> Iterator[tuple[slice, slice, tuple[slice, slice], list[Floats]]]:
-        """Charts, rows of the cells in them, both with the row of texels above, and scaled ways from a corner to three.
-
-        They lead from the south-west to the south-east, north-west and north-east.
-        """
+        """Charts, rows of cells, both with the row of texels above, and the ways, scaled, that make a `quad`."""
         charts, _, size, _ = self._shape
         together, high = max(1, _BLOCK // size**2), max(1, _BLOCK // size)
         for chart in range(0, charts, together):

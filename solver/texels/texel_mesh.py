@@ -22,7 +22,7 @@ from scipy.sparse.linalg import spsolve
 from ..errors import AtlasError, shown
 from ..kernel import Floats, Ints
 from ..mesh.mesh import Mesh
-from .stencil import EAST, EVEN_RATE, NORTH, Stencil, largest_eigenvalue, link_lengths, stiffness_matrix
+from .stencil import EVEN_RATE, Stencil, largest_eigenvalue, link_lengths, stiffness_matrix
 from .stiffness import TexelCells
 from .topology import TexelTopology
 
@@ -323,7 +323,7 @@ def _bulk(rates: Floats, areas: Floats) -> float:
 
 def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
     """Longest and shortest texel edge, folded texels, coverage, spanned area and time step; see `Atlas.quality`."""
-    edges = link_lengths(texels.topology, texels.halo_positions)[:, [EAST, NORTH]]
+    edges = link_lengths(texels.topology, texels.halo_positions)[:, :2]  # not the diagonals
     edges = edges[np.isfinite(edges) & (edges > 0)]
     # of waves of one speed, over that of an endless even grid of as many texels on the same area
     stencil = texels.stencil(np.ones(texels.shape), softening(texels))
