@@ -189,9 +189,7 @@ class WaveOperator:
     @functools.cached_property
     def parts(self) -> Ints32 | None:
         """Number of the freely floating part to which each texel belongs, [C, n, n], or None: `floating_parts`."""
-        ties: list[Tie] = [(self.stencil, None)]
-        if self.bending is not None:
-            ties.append(self.bending)
+        ties: list[Tie] = [(self.stencil, None), *([] if self.bending is None else [self.bending])]
         return floating_parts(ties, (self.stiffness > 0) | self.anchored, self.movable)
 
     def moved(self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | None) -> WaveOperator:

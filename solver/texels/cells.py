@@ -367,12 +367,11 @@ def _triangles(topology: TexelTopology) -> SpecialCells:
 
 def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
     """Polygons by their number of corners: their sides belong to the nine points, their diagonals do not."""
-    crossing = crossing_links(topology)
     for count in sorted({len(each) for each in topology.polygons}):
         texels = np.stack([each for each in topology.polygons if len(each) == count], axis=1)
         first, second = np.triu_indices(count, 1)
         pairs = np.stack([texels[first], texels[second]], axis=-1).reshape(-1, 2)
-        link, places = crossing.between(pairs)
+        link, places = crossing_links(topology).between(pairs)
         beside = np.setdiff1d(np.arange(len(pairs)), link)
         corners = topology.addresses[0][texels]
         shares = np.arange(texels.size), texels.ravel()
