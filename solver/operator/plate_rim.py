@@ -145,28 +145,25 @@ def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:
         From heights to the components of the gradient in space [1/m].
     """
     points, count = texels.positions.reshape(-1, 3), texels.topology.texel_count
-    directed, pairs, entries, cells = [], [], [], 0
+    pairs, entries, cells = [], [], 0
     for corners in _polygons(texels.topology):
         x, m = points[corners], corners.shape[1]
         after, before = np.roll(x, -1, axis=1), np.roll(x, 1, axis=1)
         area = np.cross(x, after).sum(axis=1) / 2
         # along the boundary the outward normal is the side turned by the cell's own
         turned = np.cross(after - before, area[:, None]) / (2 * (area**2).sum(axis=1))[:, None, None]
-        number = cells + np.arange(len(corners))
+        number, ahead = np.repeat(cells + np.arange(len(corners)), m), np.roll(corners, -1, axis=1)
         cells += len(corners)
-        directed.append(np.stack([corners, np.roll(corners, -1, axis=1), np.repeat(number, m).reshape(-1, m)], axis=-1))
         pairs += [corners[:, [a, b]] for a in range(m) for b in range(a)]
-        entries.append((np.repeat(number, m), corners.ravel(), turned.reshape(-1, 3)))
-    row, column, turned = (np.concatenate(each) for each in zip(*entries, strict=True))
-    gradients = [csr_array((turned[:, k], (row, column)), shape=(cells, count)) for k in range(3)]
-    sides = np.concatenate([each.reshape(-1, 3) for each in directed])
+        entries.append((number, corners.ravel(), ahead.ravel(), turned.reshape(-1, 3)))
+    cell, start, end, turned = (np.concatenate(each) for each in zip(*entries, strict=True))
+    gradients = [csr_array((turned[:, k], (cell, start)), shape=(cells, count)) for k in range(3)]
     # the cell on whose border an edge runs counter-clockwise lies on its left
-    key = sides[:, 0] * count + sides[:, 1]
+    key, back = start * count + end, end * count + start
     order = np.argsort(key)
-    back = sides[:, 1] * count + sides[:, 0]
     other = order[np.searchsorted(key[order], back).clip(0, len(key) - 1)]
-    both = (key[other] == back) & (sides[:, 0] < sides[:, 1])
-    return np.concatenate(pairs), np.column_stack([sides[both, :2], sides[other[both], 2], sides[both, 2]]), gradients
+    both = (key[other] == back) & (start < end)
+    return np.concatenate(pairs), np.column_stack([start, end, cell[other], cell])[both], gradients
 
 
 def fitted_rows(

@@ -44,9 +44,12 @@ def floating_parts(ties: Sequence[Tie], held: Bools, movable: Bools) -> Ints32 |
     chart, side = np.nonzero(topology.glued[..., 0] >= 0)
     # part of the mesh to which each chart belongs, [C], from 0
     of_chart = labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
-    if any(_joins_all(tie) for tie in ties):
-        charts = of_chart[:, None, None]
-        return None if not of_chart.any() else np.ascontiguousarray(np.broadcast_to(charts, topology.shape), np.int32)
+    for stencil, rigidity in ties:
+        sides = (stencil.weights[:, link][link_exists(topology, link)] for link in range(2))
+        # where the sides of all quads are links, every part of the mesh is one
+        if (rigidity is None or (rigidity > 0).all()) and all(side.all() for side in sides):
+            charts = np.broadcast_to(of_chart[:, None, None], topology.shape)
+            return np.ascontiguousarray(charts, np.int32) if of_chart.any() else None
     part = connected_components(sum(_graph(tie) for tie in ties), directed=False)[1].astype(np.int64)
     is_held = np.bincount(part, held.reshape(-1)) > 0
     # those that are held bear the number of their part of the mesh, after all others
@@ -62,13 +65,6 @@ def floating_parts(ties: Sequence[Tie], held: Bools, movable: Bools) -> Ints32 |
     charts = part.reshape(len(of_chart), -1)
     filled = np.where(charts < 0, charts.max(axis=1, keepdims=True).clip(0), charts)
     return filled.astype(np.int32).reshape(topology.shape)
-
-
-def _joins_all(tie: Tie) -> bool:
-    """Whether the sides of all quads are links, so that every part of the mesh is one."""
-    stencil, rigidity = tie
-    sides = (stencil.weights[:, link][link_exists(stencil.topology, link)] for link in range(2))  # not the diagonals
-    return (rigidity is None or bool((rigidity > 0).all())) and all(side.all() for side in sides)
 
 
 def _graph(tie: Tie) -> csr_array:

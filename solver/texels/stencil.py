@@ -281,18 +281,14 @@ class Stencil:
 def stiffness_matrix(stencil: Stencil) -> csr_array:
     """A stencil as a matrix [T, T] whose product with a field is minus the stencil's value."""
     topology = stencil.topology
-    rows, columns, weights = [], [], []
+    found = []
     for link, (a, b) in enumerate(LINK_ENDS):
         for end, other in ((a, b), (b, a)):
             own = link_exists(topology, link) & topology.own[end]
-            rows.append(topology.halo[end][own])
-            columns.append(topology.halo[other][own])
-            weights.append(stencil.weights[:, link][own])
-    irregular = stencil.irregular
-    rows.append(np.repeat(irregular.texels, np.diff(irregular.begins)))
-    columns.append(irregular.others)
-    weights.append(irregular.weights)
-    row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
+            found.append((topology.halo[end][own], topology.halo[other][own], stencil.weights[:, link][own]))
+    links = stencil.irregular
+    found.append((np.repeat(links.texels, np.diff(links.begins)), links.others, links.weights))
+    row, column, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     size = topology.texel_count
     diagonal = np.bincount(row, weight, size)
     if topology.fixed_rim:
