@@ -152,10 +152,10 @@ def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:
         area = np.cross(x, after).sum(axis=1) / 2
         # along the boundary the outward normal is the side turned by the cell's own
         turned = np.cross(after - before, area[:, None]) / (2 * (area**2).sum(axis=1))[:, None, None]
-        number, ahead = np.repeat(cells + np.arange(len(corners)), m), np.roll(corners, -1, axis=1)
+        number, following = np.repeat(cells + np.arange(len(corners)), m), np.roll(corners, -1, axis=1)
         cells += len(corners)
         pairs += [corners[:, [a, b]] for a in range(m) for b in range(a)]
-        entries.append((number, corners.ravel(), ahead.ravel(), turned.reshape(-1, 3)))
+        entries.append((number, corners.ravel(), following.ravel(), turned.reshape(-1, 3)))
     cell, start, end, turned = (np.concatenate(each) for each in zip(*entries, strict=True))
     gradients = [csr_array((turned[:, k], (cell, start)), shape=(cells, count)) for k in range(3)]
     # the cell on whose border an edge runs counter-clockwise lies on its left
