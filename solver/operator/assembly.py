@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError
+from ..kernel import Floats
 from ..texels.atlas import Atlas
 from ..texels.distance import depth_in_region
 from ..texels.moving import MovedPlaces, MovedStencil
-from ..texels.stencil import EAST, LINK_ENDS, NO_LINKS, NORTH, IrregularLinks, Stencil, crossing_links, link_lengths
+from ..texels.stencil import LINK_ENDS, NO_LINKS, IrregularLinks, Stencil, crossing_links, link_lengths
 from ..texels.texel_mesh import TexelMesh, smoothed, softening
 from .coefficients import LIMITS
 from .deep_water import FluidOperator, over_fluid
@@ -68,7 +68,6 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
         assemble = functools.partial(_difference_stencil, texels, kind, area[0, 0, 0])
-    drags, yields = field["viscosity"].any(), np.isfinite(field["yield_height"]).any()
     grip = source_grip(field["speed"] ** 2, field["stiffness"], field["bending"])
     tension = density * field["speed"] ** 2
     stencil, laplace = assemble(tension), assemble(np.ones_like(area)) if bends else None
@@ -91,9 +90,9 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
         mass=density * area,
         damping=field["damping"],
         stiffness=field["stiffness"],
-        viscosity_stencil=assemble(density * field["viscosity"]) if drags else None,
+        viscosity_stencil=assemble(density * field["viscosity"]) if field["viscosity"].any() else None,
         bending=bending,
-        yield_height=field["yield_height"] if yields else None,
+        yield_height=field["yield_height"] if np.isfinite(field["yield_height"]).any() else None,
         fixed=field["fixed"] if field["fixed"].any() else None,
         density=density if np.ptp(density) else None,
         rim_links=links,
@@ -116,7 +115,7 @@ def texel_fields(atlas: Atlas, material: Material, fixed_rim: bool) -> tuple[Tex
     return texels, field
 
 
-def source_grip(*pulls: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def source_grip(*pulls: Floats) -> Floats | None:
     """Share of a source that sets each texel in motion, [C, n, n], by what pulls it back, each [C, n, n]; None: all.
 
     A texel without a pull is rigid. One with next to none would sink ever deeper under a load: as the strongest pull
@@ -133,19 +132,15 @@ def _difference_stencil(texels: TexelMesh, kind: str, area: float, coefficient: 
     """Link weights area coefficient / distance^2 of the baselines, which know no links beyond the nine points."""
     lengths = link_lengths(texels.topology, texels.halo_positions)
     if kind != "dynamic-paint":
-        lengths[:, [link for link in range(4) if link not in (EAST, NORTH)]] = np.inf
+        lengths[:, 2:] = np.inf  # of the diagonals
     if kind == "uncorrected":
         finite = np.isfinite(lengths)
         lengths[finite] = lengths[finite].mean()
     lengths[lengths == 0] = np.inf
     c = texels.topology.with_halo(coefficient)
-    means = np.stack([(c[a] + c[b]) / 2 for a, b in LINK_ENDS], axis=1)
-    weights = area * means / lengths**2
+    weights = area * np.stack([(c[a] + c[b]) / 2 for a, b in LINK_ENDS], axis=1) / lengths**2
     crossing_links(texels.topology).level(weights)
     return Stencil(texels.topology, weights)
-
-
-Floats: TypeAlias = NDArray[np.float64]
 
 
 class MovingOperator:
@@ -177,9 +172,13 @@ class MovingOperator:
         soft, density = softening(texels), field["density"]
         self._tension = self._cells.coefficient(density * field["speed"] ** 2, soft, material.tightening - 1.0)
         self._viscosity = self._laplace = None
-        self._viscosity_share = None
+        self._viscosity_share: float | None = None
         if operator.viscosity_stencil is not None:
-            self._viscosity_share = _share(field["viscosity"], field["speed"] ** 2, material.tightening)
+            squared = field["speed"] ** 2
+            if not material.tightening and squared.all():
+                # of tension's stencil, where it is the same share everywhere and at any time
+                share = field["viscosity"] / squared
+                self._viscosity_share = float(share.flat[0]) if (share == share.flat[0]).all() else None
             self._viscosity = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
         if operator.bending is not None and not len(operator.rim_links.texels):
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
@@ -205,14 +204,6 @@ class MovingOperator:
         if not isinstance(stencil, MovedStencil):
             return self._areas
         return np.maximum(stencil.areas * self._level, 1e-3 * self._areas)
-
-
-def _share(viscosity: Floats, squared_speed: Floats, tightening: float) -> float | None:
-    """What the stencil of viscosity is of that of tension, where it is the same share everywhere and at any time."""
-    if tightening or not squared_speed.all():
-        return None
-    share = viscosity / squared_speed
-    return float(share.flat[0]) if (share == share.flat[0]).all() else None
 
 
 def absorbing_damping(
@@ -264,9 +255,6 @@ def absorbing_damping(
     return 3 * speed * np.log(1 / reflection) / width * np.minimum(depth / width, 1) ** 2
 
 
-# Stiffness of the rim, in units of what a texel's neighbours have: a wave falls to 1/e within a texel.
-_STIFFNESS = 1.0
-
 # Where so much of the neighbourhood is held a texel is held wholly: at the outline it is a half.
 _WHOLE = 0.8
 
@@ -309,7 +297,6 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
     speed, bending, stiffness, fixed = (
         material.texels(name, atlas.areas.shape) for name in ("speed", "bending", "stiffness", "fixed")
     )
-    neighbours = speed**2 / atlas.areas + bending / atlas.areas**2
-    return dataclasses.replace(
-        material, stiffness=stiffness + _STIFFNESS * share**2 * neighbours, fixed=fixed | (share >= _CLAMPED)
-    )
+    # as stiff as what a texel's neighbours have: a wave falls to 1/e within a texel
+    springs = share**2 * (speed**2 / atlas.areas + bending / atlas.areas**2)
+    return dataclasses.replace(material, stiffness=stiffness + springs, fixed=fixed | (share >= _CLAMPED))

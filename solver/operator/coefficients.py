@@ -27,11 +27,8 @@ def check_numbers(name: str, value: ArrayLike) -> None:
     """Raise `SolverError` unless a coefficient is within its limits, and one number or one value a texel."""
     unit, strict, endless = LIMITS[name]
     numbers = _numbers(name, value)
-    wrong = (
-        (numbers < (1 / _HIGHEST if strict else 0))
-        | np.isnan(numbers)
-        | ((numbers > _HIGHEST) & ~(np.isinf(numbers) & endless))
-    )
+    # NaN is not at least anything
+    wrong = ~(numbers >= (1 / _HIGHEST if strict else 0)) | ((numbers > _HIGHEST) & ~(np.isinf(numbers) & endless))
     if wrong.any():
         worst = numbers.flat[np.argmax(wrong)]
         bound = f"greater than 0 and at least {1 / _HIGHEST:g}" if strict else "0 or greater"
@@ -68,8 +65,7 @@ def _numbers(name: str, value: object) -> NDArray[np.float64]:
 
 
 def _check_shape(name: str, value: NDArray) -> None:
-    charts = value.ndim == 3 and value.shape[1] == value.shape[2]
-    if value.ndim != 0 and not charts:
+    if value.ndim != 0 and not (value.ndim == 3 and value.shape[1] == value.shape[2]):
         raise SolverError(f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a texel")
 
 

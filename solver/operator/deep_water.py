@@ -10,12 +10,12 @@ import functools
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import diags_array, sparray
 from scipy.sparse.linalg import splu
 from scipy.special import ellipj, ellipk
 
 from ..errors import SolverError
+from ..kernel import Floats
 from ..texels.stencil import Stencil, largest_eigenvalue, stiffness_matrix
 from .wave_operator import WaveOperator
 
@@ -24,7 +24,7 @@ from .wave_operator import WaveOperator
 _POLES = 5
 
 
-def factorised(matrix: sparray) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def factorised(matrix: sparray) -> Callable[[Floats], Floats]:
     """Solves with a matrix that is symmetric and positive, so that no pivots are needed."""
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     return splu(matrix.tocsc(), **options).solve
@@ -51,21 +51,25 @@ class HalfLaplacian:
         Greatest eigenvalue, the square root's greatest wave number [1/m].
     """
 
-    def __init__(self, stencil: Stencil, areas: NDArray[np.float64]) -> None:
+    def __init__(self, stencil: Stencil, areas: Floats) -> None:
         self._areas = areas.ravel()
         self._matrix = stiffness_matrix(stencil)
-        bound = float((2 * stencil.absolute_sums() / areas).max())
-        square = largest_eigenvalue(stencil, areas, np.ones(areas.shape, np.bool_), bound)
+        square = largest_eigenvalue(stencil, areas, np.ones(areas.shape, np.bool_), stencil.fastest(areas))
         self.most = float(np.sqrt(square))
         # few waves on a surface are longer than twice the way round a sphere of its area
-        self._weights, shifts = _poles(min(np.pi / areas.sum(), square / 4), square)
+        least = min(np.pi / areas.sum(), square / 4)
+        complement = 1 - least / square
+        quarter = ellipk(complement)
+        sn, cn, dn, _ = ellipj((np.arange(_POLES) + 0.5) / _POLES * quarter, complement)
+        self._weights = 2 * quarter * np.sqrt(least) / (np.pi * _POLES) * dn / cn**2
+        shifts = least * (sn / cn) ** 2
         self._solvers = [factorised(self._matrix + diags_array(shift * self._areas)) for shift in shifts]
 
-    def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, field: Floats) -> Floats:
         """Apply it to a field [C, n, n]: the unit times 1/m."""
         return (self._matrix @ self._inverse(field.ravel()) / self._areas).reshape(field.shape)
 
-    def inverse(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def inverse(self, field: Floats) -> Floats:
         """The field [C, n, n] without a mean whose half Laplacian a field without a mean is: the unit times m."""
         wanted = field.ravel()
         found = self._inverse(wanted)
@@ -73,18 +77,10 @@ class HalfLaplacian:
             found += self._inverse(wanted - self._matrix @ self._inverse(found) / self._areas)
         return (found - (self._areas @ found) / self._areas.sum()).reshape(field.shape)
 
-    def _inverse(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _inverse(self, field: Floats) -> Floats:
         """Approximate inverse root: sum w_i (L + s_i)^-1."""
         load = self._areas * field
         return sum(weight * solve(load) for weight, solve in zip(self._weights, self._solvers, strict=True))
-
-
-def _poles(least: float, most: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weights and shifts of the inverse root's approximation between two eigenvalues."""
-    complement = 1 - least / most
-    quarter = ellipk(complement)
-    sn, cn, dn, _ = ellipj((np.arange(_POLES) + 0.5) / _POLES * quarter, complement)
-    return 2 * quarter * np.sqrt(least) / (np.pi * _POLES) * dn / cn**2, least * (sn / cn) ** 2
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -103,18 +99,18 @@ class FluidOperator(WaveOperator):
 
     deep: float
     geometry: Stencil
-    areas: NDArray[np.float64]
+    areas: Floats
 
     @functools.cached_property
     def root(self) -> HalfLaplacian:
         """The surface's half Laplacian, factorised when it is first needed."""
         return HalfLaplacian(self.geometry, self.areas)
 
-    def acceleration(self, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
+    def acceleration(self, momentum: Floats) -> Floats:
         """What forces [N] make of the height [m/s^2], or momenta [N s] of the velocity [m/s], [C, n, n]."""
         return np.where(self.free, self.root(np.where(self.free, momentum / self.mass, 0.0)) / self.deep, 0.0)
 
-    def momenta(self, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+    def momenta(self, velocity: Floats) -> Floats:
         """Momentum of the fluid that moves with the surface [N s], float64 [C, n, n]."""
         return self.mass * self.deep * self.root.inverse(velocity)
 
@@ -123,7 +119,7 @@ class FluidOperator(WaveOperator):
         return rate * self.root.most / self.deep
 
 
-def over_fluid(operator: WaveOperator, deep: float, geometry: Stencil, areas: NDArray[np.float64]) -> FluidOperator:
+def over_fluid(operator: WaveOperator, deep: float, geometry: Stencil, areas: Floats) -> FluidOperator:
     """The operator of a surface with deep fluid below; see `FluidOperator`.
 
     Raises `SolverError` if the density varies, or the surface bends or yields.

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import POSITIVE, RippleWarning, SolverError, is_finite, shown
 from ..texels.atlas import Atlas
 from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, require_positive
-from .presets import preset_named, suited_coefficients
+from .presets import PRESETS, suited_coefficients
 
 # omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the lowest normal mode of an
 # incompressible layer bonded to a rigid base: its frequency is within 3.0 % of the root of the mode's determinant. The
@@ -35,7 +35,7 @@ SHORTEST, LONGEST = 2 * np.pi / 8, 2 * np.pi / 1.3
 # mean for 5 <= q d <= 16, where it falls from 0.68 to 0.31.
 _SHORT_STIFF, _SHORT_FAST, _SHORT_MASS, _SHORT_LONGEST = 4.263, 0.8781, 0.517, 2 * np.pi / 5
 
-_STEEPEST = 8.0  # power with which tension may follow the area
+_MOST = 8.0  # power with which tension may follow the area
 
 
 class Default(float):
@@ -113,10 +113,8 @@ class Material:
         for name in LIMITS:
             check_numbers(name, getattr(self, name))
         check_mask("fixed", self.fixed)
-        if not (is_finite(self.tightening) and -_STEEPEST <= self.tightening <= _STEEPEST):
-            raise SolverError(
-                f"material tightening is {shown(self.tightening)}; valid is from {-_STEEPEST:g} to {_STEEPEST:g}"
-            )
+        if not (is_finite(self.tightening) and -_MOST <= self.tightening <= _MOST):
+            raise SolverError(f"material tightening is {shown(self.tightening)}; valid is from {-_MOST:g} to {_MOST:g}")
         if not (is_finite(self.poisson) and 0 <= self.poisson <= 0.5):
             raise SolverError(f"material poisson is {shown(self.poisson)}; valid is a number from 0 to 0.5")
         if np.ndim(self.deep):
@@ -370,7 +368,9 @@ class Material:
         SolverError
             For an unknown name or parameter.
         """
-        chosen = preset_named(name)
+        if not isinstance(name, str) or name not in PRESETS:
+            raise SolverError(f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}")
+        chosen = PRESETS[name]
         law = getattr(cls, chosen.law)
         valid = inspect.signature(law).parameters
         unknown = [key for key in parameters if key not in valid]
@@ -428,16 +428,15 @@ def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
     finest = SHORTEST_TEXELS * texel
     if longest < finest:
         resolution = int(np.ceil(np.sqrt(areas.size / 6) * finest / longest))
-        warnings.warn(
+        message = (
             f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m carry none "
-            f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer",
-            RippleWarning,
-            stacklevel=4,
+            f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer"
         )
     elif shortest > whole:
-        warnings.warn(
+        message = (
             f"the material holds for waves from {shortest:.3g} m on, and the surface is {whole:.3g} m round; take a "
-            "thinner layer",
-            RippleWarning,
-            stacklevel=4,
+            "thinner layer"
         )
+    else:
+        return
+    warnings.warn(message, RippleWarning, stacklevel=4)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numbers
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh, qr
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..errors import SolverError, checked, instance, shown
+from ..kernel import Bools, Floats
 from ..texels.atlas import Atlas
 from ..texels.stencil import stiffness_matrix
 from .assembly import build_operator
@@ -19,8 +19,6 @@ from .deep_water import FluidOperator, factorised
 from .material import SHORTEST_TEXELS, Material, warn_of_wavelengths
 from .plate_rim import Rim
 from .wave_operator import WaveOperator
-
-Floats: TypeAlias = NDArray[np.float64]
 
 # Residual of a mode, as a share of it; squared frequencies that differ by a smaller share are the same.
 _RESIDUAL = 1e-9
@@ -114,9 +112,7 @@ def elastic_matrix(operator: WaveOperator) -> csr_array:
     return csr_array(matrix)
 
 
-def _are_tilts(
-    atlas: Atlas, material: Material, elastic: csr_array, mass: Floats, heights: Floats
-) -> NDArray[np.bool_]:
+def _are_tilts(atlas: Atlas, material: Material, elastic: csr_array, mass: Floats, heights: Floats) -> Bools:
     """Which of some heights [m, T] move a flat plate as if it were rigid, [m]; see `elastic_matrix`.
 
     They are linear in the place, and pulled back by no more than a hundredth of what bends waves of their length: the
@@ -148,13 +144,13 @@ def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Flo
     shift = least - max((mean - least) / size**2, _RESIDUAL * mean)
     solve = factorised(matrix - shift * diags_array(np.ones(size)))
     random, found, squares, asked = np.random.default_rng(0), np.empty((size, 0)), np.empty(0), count + 2
+
+    def inverse(x: Floats) -> Floats:
+        y = solve(x)
+        return y - found @ (found.T @ y)
+
+    lanczos = LinearOperator((size, size), inverse, dtype=np.float64)
     while True:
-
-        def inverse(x: Floats, found: Floats = found) -> Floats:
-            y = solve(x)
-            return y - found @ (found.T @ y)
-
-        lanczos = LinearOperator((size, size), inverse, dtype=np.float64)
         start = random.standard_normal(size)
         values, new = eigsh(matrix, min(asked, size - 1), sigma=shift, OPinv=lanczos, v0=start, tol=_RESIDUAL)
         rigid = int((squares < _NOTHING * mean).sum())

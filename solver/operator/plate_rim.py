@@ -59,8 +59,7 @@ def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
     if not callable(rim):
         raise SolverError(f"rim {shown(rim)} is no name; {valid}, or a function of points [k, 3] that gives them")
     points = texels.halo_positions[at]
-    shown_texels = texels.positions.reshape(-1, 3)[texels.topology.halo[at]]
-    points = np.where(np.isfinite(points), points, shown_texels)
+    points = np.where(np.isfinite(points), points, texels.positions.reshape(-1, 3)[texels.topology.halo[at]])
     found = np.asarray(rim(points))
     if found.shape != (len(points),) or found.dtype.kind not in "bU":
         raise SolverError(
@@ -69,11 +68,9 @@ def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
         )
     if found.dtype.kind == "b":
         found = np.where(found, "clamped", "free")
-    unknown = found[~np.isin(found, RIMS[:3])]
-    if len(unknown):
-        raise SolverError(
-            f"the function of the rim gives {str(unknown[0])!r}; valid are 'free', 'supported', 'clamped'"
-        )
+    wrong = found[~np.isin(found, RIMS[:3])]
+    if len(wrong):
+        raise SolverError(f"the function of the rim gives {str(wrong[0])!r}; valid are 'free', 'supported', 'clamped'")
     conditions[at] = sum((k + 1) * (found == name) for k, name in enumerate(RIMS[:3]))
     return conditions
 
@@ -113,82 +110,60 @@ def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
     found = []
     for outside, inside in _SIDES:
         at = conditions[outside] > 0
-        own, points = texels.positions[inside], around[outside]
-        points = np.where(np.isfinite(points), points, own)
+        points = np.where(np.isfinite(around[outside]), around[outside], texels.positions[inside])
         # ends of a side count one-sided
         along = np.concatenate([points[:, :1], points, points[:, -1:]], axis=1)
         lengths = np.linalg.norm(along[:, 2:] - along[:, :-2], axis=-1)
         lengths[:, 1:-1] /= 2
-        index = np.arange(topology.texel_count).reshape(topology.shape)[inside]
-        found.append((index[at], conditions[outside][at], points[at], lengths[at]))
+        found.append((topology.halo[outside][at], conditions[outside][at], points[at], lengths[at]))
     return RimPlaces(*(np.concatenate(each) for each in zip(*found, strict=True)))
-
-
-class Cells(NamedTuple):
-    """Cells between texels, with their gradients.
-
-    Attributes
-    ----------
-    pairs : int64 [p, 2]
-        Texels that share a cell.
-    edges : int64 [e, 4]
-        Texels i, j of each edge between two cells, the cell on its right, and that on its left.
-    gradients : tuple of csr [cells, T], three
-        From heights to the components of the gradient in space [1/m].
-    """
-
-    pairs: Ints
-    edges: Ints
-    gradients: tuple[csr_array, csr_array, csr_array]
 
 
 def _polygons(topology: TexelTopology) -> list[Ints]:
     """Corners of all cells between texels, counter-clockwise, [k, m] for each number of corners m."""
     halo = np.where(topology.rim, -1, topology.halo)
-    corners = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1).reshape(-1, 4)
-    quads = corners[(corners >= 0).all(axis=1)]
-    n = topology.shape[1]
-    triangles = []
-    for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
-        square = halo[:, [r, r, r + 1, r + 1], [c, c + 1, c + 1, c]]
-        triangles.append(np.delete(square[topology.valence[:, corner] == TRIANGLE], corner, axis=1))
-    kinds = [quads, np.concatenate(triangles)]
-    kinds += [
-        np.array([each for each in topology.polygons if len(each) == m])
-        for m in sorted({len(each) for each in topology.polygons})
-    ]
+    cells = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1)
+    corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
+    triangles = cells[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]  # a place of theirs shows nothing
+    kinds = [cells[(cells >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
+    counts = sorted({len(each) for each in topology.polygons})
+    kinds += [np.array([each for each in topology.polygons if len(each) == m]) for m in counts]
     # those across a glued side come once from each chart
-    firsts = [np.unique(np.sort(each, axis=1), axis=0, return_index=True)[1] for each in kinds]
-    return [each[first] for each, first in zip(kinds, firsts, strict=True) if len(each)]
+    return [each[np.unique(np.sort(each, axis=1), axis=0, return_index=True)[1]] for each in kinds if len(each)]
 
 
-def plate_cells(texels: TexelMesh) -> Cells:
-    """The cells of a texel mesh."""
+def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:
+    """The cells of a texel mesh, with their gradients.
+
+    Returns
+    -------
+    pairs : int64 [p, 2]
+        Texels that share a cell.
+    edges : int64 [e, 4]
+        Texels i, j of each edge between two cells, the cell on its right, and that on its left.
+    gradients : list of csr [cells, T], three
+        From heights to the components of the gradient in space [1/m].
+    """
     points, count = texels.positions.reshape(-1, 3), texels.topology.texel_count
-    directed, pairs, entries, cells = [], [], [], 0
+    pairs, entries, cells = [], [], 0
     for corners in _polygons(texels.topology):
         x, m = points[corners], corners.shape[1]
         after, before = np.roll(x, -1, axis=1), np.roll(x, 1, axis=1)
         area = np.cross(x, after).sum(axis=1) / 2
         # along the boundary the outward normal is the side turned by the cell's own
         turned = np.cross(after - before, area[:, None]) / (2 * (area**2).sum(axis=1))[:, None, None]
-        number = cells + np.arange(len(corners))
+        number, following = np.repeat(cells + np.arange(len(corners)), m), np.roll(corners, -1, axis=1)
         cells += len(corners)
-        directed.append(np.stack([corners, np.roll(corners, -1, axis=1), np.repeat(number, m).reshape(-1, m)], axis=-1))
         pairs += [corners[:, [a, b]] for a in range(m) for b in range(a)]
-        entries.append((np.repeat(number, m), corners.ravel(), turned.reshape(-1, 3)))
-    row, column, turned = (np.concatenate(each) for each in zip(*entries, strict=True))
-    gradients = tuple(csr_array((turned[:, k], (row, column)), shape=(cells, count)) for k in range(3))
-    sides = np.concatenate([each.reshape(-1, 3) for each in directed])
+        entries.append((number, corners.ravel(), following.ravel(), turned.reshape(-1, 3)))
+    cell, start, end, turned = (np.concatenate(each) for each in zip(*entries, strict=True))
+    gradients = [csr_array((turned[:, k], (cell, start)), shape=(cells, count)) for k in range(3)]
     # the cell on whose border an edge runs counter-clockwise lies on its left
-    key = sides[:, 0] * count + sides[:, 1]
+    key, back = start * count + end, end * count + start
     order = np.argsort(key)
-    back = sides[:, 1] * count + sides[:, 0]
-    place = np.searchsorted(key[order], back).clip(0, len(key) - 1)
-    other = order[place]
-    both = (key[other] == back) & (sides[:, 0] < sides[:, 1])
-    edges = np.column_stack([sides[both, :2], sides[other[both], 2], sides[both, 2]])
-    return Cells(np.concatenate(pairs), edges, gradients)
+    other = order[np.searchsorted(key[order], back).clip(0, len(key) - 1)]
+    both = (key[other] == back) & (start < end)
+    return np.concatenate(pairs), np.column_stack([start, end, cell[other], cell])[both], gradients
 
 
 def fitted_rows(
@@ -252,25 +227,19 @@ def fitted_rows(
     rows = np.concatenate(energies, axis=1) * weights[:, None] * np.sqrt(rigidity[outer])[:, None, None]
     o, row, k = np.nonzero((rows != 0) & (column >= 0)[:, None])
     matrix = csr_array((rows[o, row, k], (o * (width + 4) + row, column[o, k])), shape=(size * (width + 4), count))
-    owners = np.where(np.arange(width + 4) < 4, index[:, None], -1)
-    return matrix, owners.ravel()
+    return matrix, np.where(np.arange(width + 4) < 4, index[:, None], -1).ravel()
 
 
 def tension_springs(places: RimPlaces, texels: TexelMesh, tension: Floats) -> Floats:
     """Springs by which a stretched surface is tied to the rims that hold it [N/m], [T]; `tension` [N/m] is [T]."""
     way = np.linalg.norm(places.points - texels.positions.reshape(-1, 3)[places.texels], axis=1)
-    held = (places.conditions != FREE) & (way > 0)
-    pull = tension[places.texels] * places.lengths / np.where(held, way, np.inf)
+    way[(places.conditions == FREE) | (way == 0)] = np.inf
+    pull = tension[places.texels] * places.lengths / way
     return np.bincount(places.texels, pull, len(tension)).astype(np.float64)
 
 
 def plate_matrix(
-    texels: TexelMesh,
-    places: RimPlaces,
-    softening: Floats,
-    rigidity: Floats,
-    poisson: float,
-    laplace: Stencil,
+    texels: TexelMesh, places: RimPlaces, softening: Floats, rigidity: Floats, poisson: float, laplace: Stencil
 ) -> tuple[csr_array, NDArray[np.bool_]]:
     """What bending adds to L B L beside rims.
 
@@ -296,15 +265,15 @@ def plate_matrix(
     count = texels.topology.texel_count
     D, areas, soft = rigidity.reshape(-1), texels.areas.reshape(-1), softening.reshape(-1) < 1
     L = -stiffness_matrix(laplace)
-    cells = plate_cells(texels)
+    pairs, edges, gradients = plate_cells(texels)
     clamped = places.conditions == CLAMPED
     outer = np.zeros(count, bool)
     outer[places.texels[~clamped]] = True
     outer[places.texels[clamped]] = False
-    first, second = cells.pairs.T
+    first, second = pairs.T
     outer[np.concatenate([np.flatnonzero(soft), first[soft[second]], second[soft[first]]])] = True
     at, held = np.flatnonzero(outer), places.texels[clamped]
-    rows, owners = fitted_rows(texels, at, cells.pairs, places, D, poisson)
+    rows, owners = fitted_rows(texels, at, pairs, places, D, poisson)
     # beside a clamp the height is d^2 / 2 times its second derivative
     way = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
     share = np.minimum(way**2 / (2 * areas[held]), 0.5)
@@ -313,7 +282,8 @@ def plate_matrix(
     rows = csr_array(vstack([rows, leaving]))
     owners = np.concatenate([owners, len(at) + np.arange(len(held))])
     total = rows.T @ diags_array(_evened(rows, owners, L, D, areas)) @ rows
-    return csr_array(total + _saddle(texels, cells, 2 * (1 - poisson) * D * ~outer)), ~outer.reshape(texels.shape)
+    saddle = _saddle(texels.normals.reshape(-1, 3), edges, gradients, 2 * (1 - poisson) * D * ~outer)
+    return csr_array(total + saddle), ~outer.reshape(texels.shape)
 
 
 def _evened(rows: csr_array, owners: Ints, laplace: csr_array, rigidity: Floats, areas: Floats) -> Floats:
@@ -340,19 +310,18 @@ def links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
     return IrregularLinks.of(np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data), springs
 
 
-def _saddle(texels: TexelMesh, cells: Cells, factor: Floats) -> csr_array:
+def _saddle(normals: Floats, edges: Ints, gradients: list[csr_array], factor: Floats) -> csr_array:
     """Minus the integral of a factor [T] times det H: only the edges count across which it changes."""
-    i, j, right, left = cells.edges.T
+    i, j, right, left = edges.T
     jump = factor[i] - factor[j]
     crossed = np.abs(jump) > _TINY * np.abs(factor).max(initial=0.0)
     i, j, right, left, jump = (each[crossed] for each in (i, j, right, left, jump))
-    normals = texels.normals.reshape(-1, 3)
     normal = normals[i] + normals[j]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _TINY)
     total = csr_array((len(factor), len(factor)))
     for k in range(3):
         share = diags_array(-jump * normal[:, k] / 4)
-        a, b = cells.gradients[(k + 1) % 3], cells.gradients[(k + 2) % 3]
+        a, b = gradients[(k + 1) % 3], gradients[(k + 2) % 3]
         wedge = a[right].T @ share @ b[left] - b[right].T @ share @ a[left]
         total = total + wedge + wedge.T
     return csr_array(total)

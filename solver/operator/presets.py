@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from ..errors import SolverError, shown
+from ..errors import SolverError
 from .coefficients import require_positive
 
 _GELATINE = (
@@ -126,13 +126,6 @@ PRESETS: dict[str, Preset] = {
 }
 
 
-def preset_named(name: str) -> Preset:
-    """The preset of a name; raises `SolverError` if there is none."""
-    if not isinstance(name, str) or name not in PRESETS:
-        raise SolverError(f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}")
-    return PRESETS[name]
-
-
 # Standard deviation of a footprint (1 - (d/r)^2)^3 along an axis, over its radius r.
 SPREAD = 10**-0.5
 
@@ -207,21 +200,22 @@ _GRAVITY = 9.81
 
 
 def suited_coefficients(
-    size: float,
-    hit: float | tuple[float, float],
-    radius: float | None,
-    amplitude: float,
-    crossing: float,
-    decay: float,
+    size: float, hit: float | tuple[float, float], radius: float | None, amplitude: float, crossing: float, decay: float
 ) -> dict[str, float]:
     """Coefficients by their names; see `Material.suited`."""
     require_positive(size=(size, "m"))
     radius = _RADIUS * size if radius is None else radius
-    impulse, mass = _impulse(hit)
-    require_positive(
-        size=(size, "m"), radius=(radius, "m"), amplitude=(amplitude, "of the size"), crossing=(crossing, "s"),
-        decay=(decay, "s"),
-    )  # fmt: skip
+    if isinstance(hit, tuple | list):
+        if len(hit) != 2:
+            raise SolverError(f"hit is {hit!r}; valid is an impulse [N s], or a mass [kg] and a speed [m/s]")
+        mass, velocity = hit
+        require_positive(**{"mass of the hit": (mass, "kg"), "speed of the hit": (velocity, "m/s")})
+        impulse = BOUNCE * mass * velocity
+    else:
+        require_positive(hit=(hit, "N s"))
+        impulse, mass = hit, 0.0  # that of the body is not known
+    require_positive(radius=(radius, "m"), amplitude=(amplitude, "of the size"))
+    require_positive(crossing=(crossing, "s"), decay=(decay, "s"))
     speed, depth, radius = size / crossing, amplitude * size, max(radius, FOOTPRINT * size)
     density = density_for(impulse, depth, radius=radius, speed=speed)
     resting = stiffness_under(_GRAVITY * mass, depth / 2, radius=radius, density=density, speed=speed)
@@ -242,15 +236,3 @@ def narrow_stiffness(size: float, speed: float) -> float:
 def damping_for(decay: float) -> float:
     """Damping with which waves fall to a tenth in a time [s], in 1/s."""
     return 2 * math.log(10) / decay
-
-
-def _impulse(hit: float | tuple[float, float]) -> tuple[float, float]:
-    """Impulse [N s] of a hit, and the mass of the body [kg], or 0 where it is not known."""
-    if isinstance(hit, tuple | list):
-        if len(hit) != 2:
-            raise SolverError(f"hit is {hit!r}; valid is an impulse [N s], or a mass [kg] and a speed [m/s]")
-        mass, speed = hit
-        require_positive(**{"mass of the hit": (mass, "kg"), "speed of the hit": (speed, "m/s")})
-        return BOUNCE * mass * speed, mass
-    require_positive(hit=(hit, "N s"))
-    return hit, 0.0

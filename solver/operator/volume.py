@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..kernel import Floats32, Ints
+from ..kernel import Floats, Floats32, Ints
 from .wave_operator import WaveOperator, damped_step
 
 
@@ -30,7 +29,7 @@ class VolumeBalance:
         self._inverse_density = operator.inverse_density.reshape(-1)
         self._least = self._sum(operator.mass * operator.inverse_density * operator.response)
 
-    def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
+    def counterpart(self, texels: Ints, momenta: Floats) -> float | Floats:
         """Amplitude of the operator's `response` that balances momenta [k] on some texels [k].
 
         [m/s], or for forces [m/s^2]; a number, or one for each part.
@@ -42,29 +41,28 @@ class VolumeBalance:
         sums = np.bincount(self._parts[texels], weighed, len(self._least)).astype(np.float64)
         return np.divide(-sums, self._least, out=np.zeros_like(sums), where=self._least > 0)
 
-    def balanced_velocity(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def balanced_velocity(self, field: Floats) -> Floats:
         """A velocity field [C, n, n] without its volume rate."""
         operator = self._operator
         return field - operator.response * self._ratio(operator.mass * operator.inverse_density * field, self._least)
 
-    def balanced_height(self, field: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[np.float64]:
+    def balanced_height(self, field: Floats, areas: Floats) -> Floats:
         """A height field [C, n, n] without its mean."""
         return field - self._operator.movable * self._ratio(areas * field, self._sum(areas))
 
-    def _sum(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _sum(self, field: Floats) -> Floats:
         """Sum over the movable texels of each part, [p]; a number where there is one."""
         movable = self._operator.movable
         if self._parts is None:
             return field[movable].sum()
         return np.bincount(self._parts, (field * movable).reshape(-1)).astype(np.float64)
 
-    def _ratio(self, field: NDArray[np.float64], total: NDArray[np.float64]) -> NDArray[np.float64] | float:
+    def _ratio(self, field: Floats, total: Floats) -> Floats | float:
         """Sum of a field over each part, over a total of that part: at every texel, [C, n, n]."""
         if self._parts is None:
             return float(field.sum()) / float(total) if total else 0.0
         sums = np.bincount(self._parts, field.reshape(-1))
-        ratio = np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)
-        return ratio[self._parts].reshape(field.shape)
+        return np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)[self._parts].reshape(field.shape)
 
 
 # What is smaller than this, against the greatest, is round-off.
@@ -101,11 +99,10 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)
     scale = np.where(kept & (inertia > 0), -1 / np.where(inertia > 0, inertia, 1), 0)[parts]
-    # what an even surface has as well: its mean is damped, and swings on its spring
-    even_decay, even_span = _mean(decay), _mean(span)
     moved = span * operator.inverse_density
-    heights = operator.link_force(moved) - weight * operator.stiffness * (span - even_span)
-    velocities = weight * (decay - even_decay)
+    # without what an even surface has as well: its mean is damped, and swings on its spring
+    heights = operator.link_force(moved) - weight * operator.stiffness * (span - _mean(span))
+    velocities = weight * (decay - _mean(decay))
     if operator.viscosity_stencil is not None:
         velocities = velocities + operator.viscosity_stencil(moved)
     heights, velocities = ((scale * each).reshape(-1) for each in (heights, velocities))
@@ -120,6 +117,6 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     return begins, texels, heights[texels].astype(np.float32), counting.astype(np.float32)
 
 
-def _mean(field: NDArray[np.float64]) -> float:
+def _mean(field: Floats) -> float:
     """Mean of a field; of a uniform one its value, to the last bit."""
     return float(field.flat[0]) if not np.ptp(field) else float(field.mean())

@@ -16,26 +16,16 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SolverError
+from ..kernel import Bools, Floats, Floats32, Ints32
 from ..mesh.topology import labels
-from ..texels.stencil import (
-    EAST,
-    NO_LINKS,
-    NORTH,
-    IrregularLinks,
-    Stencil,
-    largest_eigenvalue,
-    link_exists,
-    stiffness_matrix,
-)
+from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
 from ..texels.topology import TexelTopology
 
 # What joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours.
-Tie: TypeAlias = tuple[Stencil, NDArray[np.float64] | None]
+Tie: TypeAlias = tuple[Stencil, Floats | None]
 
 
-def floating_parts(
-    ties: Sequence[Tie], held: NDArray[np.bool_], movable: NDArray[np.bool_]
-) -> NDArray[np.int32] | None:
+def floating_parts(ties: Sequence[Tie], held: Bools, movable: Bools) -> Ints32 | None:
     """Number of the part to which each texel belongs, [C, n, n]; None where there is one part only.
 
     Texels belong together where something joins them. Of each of the mesh's own parts, all those that are held count as
@@ -51,10 +41,15 @@ def floating_parts(
         The others are rigid, and belong to any part.
     """
     topology = ties[0][0].topology
-    of_chart = _chart_parts(topology)
-    if any(_joins_all(tie) for tie in ties):
-        charts = of_chart[:, None, None]
-        return None if not of_chart.any() else np.ascontiguousarray(np.broadcast_to(charts, topology.shape), np.int32)
+    chart, side = np.nonzero(topology.glued[..., 0] >= 0)
+    # part of the mesh to which each chart belongs, [C], from 0
+    of_chart = labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
+    for stencil, rigidity in ties:
+        sides = (stencil.weights[:, link][link_exists(topology, link)] for link in range(2))
+        # where the sides of all quads are links, every part of the mesh is one
+        if (rigidity is None or (rigidity > 0).all()) and all(side.all() for side in sides):
+            charts = np.broadcast_to(of_chart[:, None, None], topology.shape)
+            return np.ascontiguousarray(charts, np.int32) if of_chart.any() else None
     part = connected_components(sum(_graph(tie) for tie in ties), directed=False)[1].astype(np.int64)
     is_held = np.bincount(part, held.reshape(-1)) > 0
     # those that are held bear the number of their part of the mesh, after all others
@@ -72,19 +67,6 @@ def floating_parts(
     return filled.astype(np.int32).reshape(topology.shape)
 
 
-def _chart_parts(topology: TexelTopology) -> NDArray[np.int64]:
-    """Part of the mesh to which each chart belongs, [C], from 0."""
-    chart, side = np.nonzero(topology.glued[..., 0] >= 0)
-    return labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
-
-
-def _joins_all(tie: Tie) -> bool:
-    """Whether the sides of all quads are links, so that every part of the mesh is one."""
-    stencil, rigidity = tie
-    sides = (stencil.weights[:, link][link_exists(stencil.topology, link)] for link in (EAST, NORTH))
-    return (rigidity is None or bool((rigidity > 0).all())) and all(side.all() for side in sides)
-
-
 def _graph(tie: Tie) -> csr_array:
     """Texels that are joined, [C n^2, C n^2]; not symmetric."""
     stencil, rigidity = tie
@@ -97,9 +79,6 @@ def _graph(tie: Tie) -> csr_array:
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
 SAFETY = 0.99
-
-# What does not change as the surface moves.
-_OF_REST = ("free", "movable", "anchored", "source_share", "inverse_density", "response", "parts")
 
 
 class Bending(NamedTuple):
@@ -114,7 +93,7 @@ class Bending(NamedTuple):
     """
 
     laplace: Stencil
-    rigidity: NDArray[np.float64]
+    rigidity: Floats
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -148,16 +127,16 @@ class WaveOperator:
     """
 
     stencil: Stencil
-    mass: NDArray[np.float64]
-    damping: NDArray[np.float64]
-    stiffness: NDArray[np.float64]
+    mass: Floats
+    damping: Floats
+    stiffness: Floats
     viscosity_stencil: Stencil | None = None
     bending: Bending | None = None
-    yield_height: NDArray[np.float64] | None = None
-    fixed: NDArray[np.bool_] | None = None
+    yield_height: Floats | None = None
+    fixed: Bools | None = None
     rim_links: IrregularLinks = NO_LINKS
-    grip: NDArray[np.float64] | None = None
-    density: NDArray[np.float64] | None = None
+    grip: Floats | None = None
+    density: Floats | None = None
     bounded: bool = False
 
     @property
@@ -166,12 +145,12 @@ class WaveOperator:
         return self.stencil.topology
 
     @functools.cached_property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Bools:
         """Texels that are not clamped, [C, n, n]."""
         return np.ones(self.mass.shape, bool) if self.fixed is None else ~self.fixed
 
     @functools.cached_property
-    def movable(self) -> NDArray[np.bool_]:
+    def movable(self) -> Bools:
         """Texels that sources may move: free, and with something that pulls back. All, where nothing pulls anywhere."""
         pulled = (self.stencil.absolute_sums() > 0) | (self.stiffness > 0)
         if self.bending is not None:
@@ -180,7 +159,7 @@ class WaveOperator:
         return movable if movable.any() else self.free
 
     @functools.cached_property
-    def anchored(self) -> NDArray[np.bool_]:
+    def anchored(self) -> Bools:
         """Free texels that a link ties to what is clamped, [C, n, n]."""
         free = self.free.astype(np.float64)
         tied = self.stencil(free) != 0
@@ -189,26 +168,24 @@ class WaveOperator:
         return tied & self.free
 
     @functools.cached_property
-    def source_share(self) -> NDArray[np.float64]:
+    def source_share(self) -> Floats:
         """Share of a source that sets each texel in motion, [C, n, n]; what lies below the surface takes the rest."""
         return np.where(self.movable, 1.0 if self.grip is None else self.grip, 0.0)
 
     @functools.cached_property
-    def inverse_density(self) -> NDArray[np.float64]:
+    def inverse_density(self) -> Floats:
         """Greatest density over that of each texel, [C, n, n]: how much more a pressure moves it."""
         return np.ones(self.mass.shape) if self.density is None else self.density.max() / self.density
 
     @functools.cached_property
-    def response(self) -> NDArray[np.float64]:
+    def response(self) -> Floats:
         """How the surface moves under a pressure that acts everywhere, [C, n, n]; 1 where all of it is alike."""
         return self.source_share * self.inverse_density
 
     @functools.cached_property
-    def parts(self) -> NDArray[np.int32] | None:
+    def parts(self) -> Ints32 | None:
         """Number of the freely floating part to which each texel belongs, [C, n, n], or None: `floating_parts`."""
-        ties: list[Tie] = [(self.stencil, None)]
-        if self.bending is not None:
-            ties.append(self.bending)
+        ties: list[Tie] = [(self.stencil, None), *([] if self.bending is None else [self.bending])]
         return floating_parts(ties, (self.stiffness > 0) | self.anchored, self.movable)
 
     def moved(self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | None) -> WaveOperator:
@@ -216,19 +193,19 @@ class WaveOperator:
         moved = dataclasses.replace(
             self, stencil=stencil, viscosity_stencil=viscosity_stencil, bending=bending, bounded=True
         )
-        for name in _OF_REST:
+        for name in ("free", "movable", "anchored", "source_share", "inverse_density", "response", "parts"):
             object.__setattr__(moved, name, getattr(self, name))
         return moved
 
-    def momenta(self, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+    def momenta(self, velocity: Floats) -> Floats:
         """Momentum of what moves with the surface [N s], float64 [C, n, n]."""
         return self.mass * velocity
 
-    def elastic_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
+    def elastic_force(self, height: Floats) -> Floats:
         """-(K + L B L + M k) h [N], float64 [C, n, n]; what holds the clamped texels is left out."""
         return self.link_force(height) - self.mass * self.stiffness * height
 
-    def link_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
+    def link_force(self, height: Floats) -> Floats:
         """-(K + L B L) h [N], float64 [C, n, n]: what neighbours exert on each other, by tension and bending."""
         force = self.stencil(height)
         if self.bending is not None:
@@ -253,8 +230,7 @@ class WaveOperator:
             wave = self._lightened(self._rate(self.link_force, bound) + self.stiffness.max())
         viscous = 0.0
         if self.viscosity_stencil is not None:
-            bound = self.viscosity_stencil.fastest(self.mass)
-            viscous = self._rate(self.viscosity_stencil, bound)
+            viscous = self._rate(self.viscosity_stencil, self.viscosity_stencil.fastest(self.mass))
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
         return np.inf if rate == 0 else float(SAFETY * 4 / rate)
@@ -263,7 +239,7 @@ class WaveOperator:
         """What a squared frequency is at most, whatever moves with the surface."""
         return rate
 
-    def _rate(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
+    def _rate(self, force: Callable[[Floats], Floats], bound: float) -> float:
         """Largest eigenvalue of -M^-1 force, or its bound."""
         return bound if self.bounded else largest_eigenvalue(force, self.mass, self.free, bound)
 
@@ -284,10 +260,10 @@ class StepCoefficients:
         how long the acceleration of a pressure that acts everywhere counts: 0 where sources move nothing.
     """
 
-    gain: NDArray[np.float32]
-    decay: NDArray[np.float32] | np.float32
-    spring: NDArray[np.float32] | np.float32
-    span: NDArray[np.float32] | np.float32
+    gain: Floats32
+    decay: Floats32 | np.float32
+    spring: Floats32 | np.float32
+    span: Floats32 | np.float32
 
 
 def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
@@ -314,13 +290,13 @@ def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
     return kick
 
 
-def damped_step(operator: WaveOperator, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def damped_step(operator: WaveOperator, dt: float) -> tuple[Floats, Floats]:
     """Decay of the velocity over a substep of dt [s], and how long a force counts [s], each [C, n, n]."""
     half = operator.damping * (dt / 2)
     return np.maximum((1 - half) / (1 + half), 0), dt / (1 + np.maximum(half, 2 * half - 1))
 
 
-def number_or_field(field: NDArray) -> NDArray[np.float32] | np.float32:
+def number_or_field(field: NDArray) -> Floats32 | np.float32:
     """One float32 number where a field has one value, else the field as float32."""
     first = field.flat[0]
     return np.float32(first) if (field == first).all() else field.astype(np.float32)

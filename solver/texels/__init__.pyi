@@ -47,10 +47,8 @@ from .moving import (
     interpolate as interpolate,
 )
 from .stencil import (
-    EAST as EAST,
     LINK_ENDS as LINK_ENDS,
     NO_LINKS as NO_LINKS,
-    NORTH as NORTH,
     IrregularLinks as IrregularLinks,
     Stencil as Stencil,
     crossing_links as crossing_links,

@@ -316,25 +316,18 @@ def texel_atlas(texels: TexelMesh) -> Atlas:
     Each chart is a grid of its texel centres, closed by half a texel up to the points in the middle between them and
     those beyond its border, or up to the rim; so every triangle of the mesh lies in one chart.
     """
-    charts, n, _ = texels.shape
+    n = texels.resolution
     V, nodes = _welded_nodes(texels)
-    cells = np.stack([nodes[:, :-1, :-1], nodes[:, :-1, 1:], nodes[:, 1:, 1:], nodes[:, 1:, :-1]], axis=-1)
-    place = np.concatenate([[-0.5], np.arange(n), [n - 0.5]])
-    column, row = np.meshgrid(place, place)
-    places = np.stack([row, column], axis=-1)
-    corners = np.stack([places[:-1, :-1], places[:-1, 1:], places[1:, 1:], places[1:, :-1]], axis=-2)
-    corners = np.broadcast_to(corners, (charts, *corners.shape))
-    chart = np.broadcast_to(np.arange(charts)[:, None, None], cells.shape[:3])
+    # of the corners of each cell, counter-clockwise, [n + 1, n + 1, 4]
+    rows, columns = np.indices((n + 1, n + 1))[..., None] + np.array([[0, 0, 1, 1], [0, 1, 1, 0]])[:, None, None]
+    cells, place = nodes[:, rows, columns], np.concatenate([[-0.5], np.arange(n), [n - 0.5]])
     # the surface may end at the last texels: nothing lies between them and a rim without positions
     exists = (cells >= 0).all(axis=-1)
-    F = np.concatenate([cells[exists][:, [0, 1, 2]], cells[exists][:, [0, 2, 3]]])
-    linear = LinearChartMap(
-        np.tile(chart[exists], 2),
-        np.concatenate([corners[exists][:, [0, 1, 2]], corners[exists][:, [0, 2, 3]]]),
-        n,
-    )
+    chart, r, c = np.nonzero(exists)
+    places = np.stack([place[rows], place[columns]], axis=-1)[r, c]
+    F, corners = (np.concatenate([each[:, [0, 1, 2]], each[:, [0, 2, 3]]]) for each in (cells[exists], places))
     triangles, barycentrics = triangles_of(F, nodes[:, 1:-1, 1:-1])
-    return Atlas(Mesh(V, F), texels, linear, triangles, barycentrics)
+    return Atlas(Mesh(V, F), texels, LinearChartMap(np.tile(chart, 2), corners, n), triangles, barycentrics)
 
 
 def _welded_nodes(texels: TexelMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -344,13 +337,9 @@ def _welded_nodes(texels: TexelMesh) -> tuple[NDArray[np.float64], NDArray[np.in
     """
     topology, around = texels.topology, texels.halo_positions
     count = topology.texel_count
-    nodes = topology.halo.copy()
-    nodes[~topology.own] = -1
+    nodes = np.where(topology.own, topology.halo, -1)
     # a node on a border belongs to the two texels that it lies between, one in a corner to all that meet there
-    own = np.empty_like(topology.halo)
-    own[:, 1:-1, 1:-1] = topology.halo[:, 1:-1, 1:-1]
-    for inner, outer in ((1, 0), (-2, -1)):
-        own[:, outer], own[:, :, outer] = own[:, inner], own[:, :, inner]
+    own = np.pad(topology.halo[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
     border = ~topology.own & np.isfinite(around[..., 0])
     border[:, [0, 0, -1, -1], [0, -1, 0, -1]] = False
     points = texels.positions.reshape(-1, 3)
@@ -374,21 +363,18 @@ def _corner_points(texels: TexelMesh) -> NDArray[np.float64]:
     topology, around = texels.topology, texels.halo_positions
     rows, columns = [0, 0, -1, -1], [0, -1, -1, 0]
     inner_rows, inner_columns = [1, 1, -2, -2], [1, -2, -2, 1]
-    at_rim = topology.rim[:, rows, columns]
     own = around[:, inner_rows, inner_columns]
-    points = np.where(at_rim[..., None], around[:, rows, columns], own)
+    points = np.where(topology.rim[:, rows, columns, None], around[:, rows, columns], own)
     corners = topology.corners.ravel()
     number = np.bincount(corners)
     means = np.stack([np.bincount(corners, points[..., k].ravel()) / number for k in range(3)], axis=1)
-    beside = around[:, rows, inner_columns] + around[:, inner_rows, columns]
-    displaced = (beside != _shown(texels, rows, inner_columns) + _shown(texels, inner_rows, columns)).any(axis=-1)
+    beside, shown = (
+        each[:, rows, inner_columns] + each[:, inner_rows, columns]
+        for each in (around, topology.with_halo(texels.positions))
+    )
+    displaced = (beside != shown).any(axis=-1)
     periodic = displaced & ~topology.rim[:, rows, inner_columns] & ~topology.rim[:, inner_rows, columns]
     return np.where(periodic[..., None], beside / 2, means[topology.corners])
-
-
-def _shown(texels: TexelMesh, rows: list[int], columns: list[int]) -> NDArray[np.float64]:
-    """Positions of the texels that places of the halo show [m], [C, 4, 3]."""
-    return texels.positions.reshape(-1, 3)[texels.topology.halo[:, rows, columns]]
 
 
 def triangles_of(F: NDArray[np.int64], vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -26,6 +26,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernel import Floats, Ints, kernel, shared
 from ..mesh.vectors import Vector, cross, dot, subtract
@@ -149,20 +150,6 @@ def triangle(a: Vector, b: Vector, c: Vector) -> tuple[Numbers, Numbers, Numbers
     return dot(ab, ac) / twice, -dot(ab, bc) / twice, dot(ac, bc) / twice, double_area / 2
 
 
-def strip(a: Vector, b: Vector, beside_a: Vector, beside_b: Vector) -> Floats:
-    """Weights of the links between two texels at a free rim, by the strips from them to the rim's points beside them.
-
-    Heights have no slope across a free rim (the natural condition). Their gradient in the strip is the difference of
-    the two texels over their distance along the rim, at whatever angle the grid lines meet that.
-    """
-    rim, link = subtract(beside_b, beside_a), subtract(b, a)
-    squared = dot(rim, rim)
-    along = dot(rim, link) ** 2 / np.maximum(squared, _TINY)
-    least = LEAST_AREA * np.maximum(squared, dot(link, link))
-    area = quad_area(link, subtract(beside_a, a), subtract(beside_b, a))
-    return np.where(squared > 0, area / np.maximum(np.maximum(along, least), _TINY), 0.0)
-
-
 # A polygon flatter than this, in units of its size, counts as flat: many combinations of its corners then make the node
 # in its middle. Its square is well above round-off.
 _FLAT = 1e-5
@@ -278,10 +265,16 @@ def conductance(coefficients: Sequence[Floats], softening: Sequence[Floats]) -> 
 # The four corners of a cell at (r, c), and its links in the order of `quad`: link, and the place where it is stored.
 CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 LINKS = ((0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 0, 1), (2, 0, 0), (3, 0, 0))
-_SOUTH, _NORTH, _WEST, _EAST = LINKS[:4]
 
-# Two corners of a strip on the surface, the two beyond the rim opposite to them, and the link of the first two.
-_STRIPS = ((0, 1, 2, 3, _SOUTH), (2, 3, 0, 1, _NORTH), (0, 2, 1, 3, _WEST), (1, 3, 0, 2, _EAST))
+
+def at_corners(field: NDArray) -> list[NDArray]:
+    """A field [..., r + 1, c + 1] at the four corners of each of r x c cells."""
+    rows, columns = field.shape[-2] - 1, field.shape[-1] - 1
+    return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
+
+
+# Two corners of each strip on the surface, joined by the first four of the links, and the two beyond the rim opposite.
+_STRIPS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 1, 3), (1, 3, 0, 2))
 
 _NOTHING = np.zeros(0, np.int64)
 
@@ -333,13 +326,10 @@ def special_cells(topology: TexelTopology, halo_positions: Floats) -> list[Speci
 def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[SpecialCells]:
     """Strips between the last texels and a rim: whole quads where it is fixed."""
     n = topology.shape[1]
-    there, rim = topology.halo >= 0, topology.rim
-    exists, touches = (
-        function.reduce([field[:, r : n + 1 + r, c : n + 1 + c] for r, c in CORNERS])
-        for function, field in ((np.logical_and, there), (np.logical_or, rim))
-    )
-    cells = np.stack(np.nonzero(exists & touches))
-    corners = _corner_places(topology, cells)
+    rim, exists = topology.rim, np.logical_and.reduce(at_corners(topology.halo >= 0))
+    touches = np.logical_or.reduce(at_corners(rim))
+    chart, r, c = cells = np.stack(np.nonzero(exists & touches))
+    corners = np.stack([(chart * (n + 2) + r + down) * (n + 2) + c + right for down, right in CORNERS])
     finite = np.isfinite(halo_positions.reshape(-1, 3)[corners]).all(axis=(0, 2))
     cells, corners = cells[:, finite], corners[:, finite]
     at_rim, shown = rim.reshape(-1)[corners], topology.halo.reshape(-1)[corners]
@@ -355,7 +345,7 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
         yield SpecialCells(corners, _whole_quads, _link_places(topology, cells, LINKS), to_texels)
         return
     yield SpecialCells(corners, _areas, (_NOTHING, _NOTHING), to_texels)
-    for i, j, p, q, link in _STRIPS:
+    for (i, j, p, q), link in zip(_STRIPS, LINKS[:4], strict=True):
         here = ~at_rim[i] & ~at_rim[j] & at_rim[p] & at_rim[q]
         places = _link_places(topology, cells[:, here], (link,))
         yield SpecialCells(corners[[i, j, p, q]][:, here], _strips, places, (_NOTHING, _NOTHING))
@@ -364,53 +354,36 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
 def _triangles(topology: TexelTopology) -> SpecialCells:
     """The cells in corners of three charts; each chart adds what its own texel there, the first corner, has of it."""
     n, width = topology.shape[1], topology.halo.shape[1]
-    corners: list[Ints] = []
-    sources, places, count = [], [], (topology.valence == TRIANGLE).sum()
-    for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
-        chart = np.flatnonzero(topology.valence[:, corner] == TRIANGLE)
-        r0, r1 = (1, 0) if r == 0 else (r, r + 1)
-        c0, c1 = (1, 0) if c == 0 else (c, c + 1)
-        row, column = np.array([[r0, r0, r1], [c0, c1, c0]])[:, :, None]
-        before = sum(each.shape[1] for each in corners)
-        corners.append((chart * width + row) * width + column)
-        cells = np.stack([chart, np.full_like(chart, r), np.full_like(chart, c)])
-        for k, link in enumerate((_EAST if c == 0 else _WEST, _NORTH if r == 0 else _SOUTH)):
-            source, place = _link_places(topology, cells, (link,))
-            sources.append(k * count + before + source)
-            places.append(place)
-    found = np.concatenate(corners, axis=1)
-    own = np.arange(count), topology.halo.reshape(-1)[found[0]]
-    return SpecialCells(found, _triangle, (np.concatenate(sources), np.concatenate(places)), own)
+    corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
+    r, c = np.array([[0, 0, n, n], [0, n, n, 0]])[:, corner]
+    # of the chart's own texel, and beyond it
+    (row, next_row), (column, next_column) = (np.where(each == 0, [[1], [0]], [each, each + 1]) for each in (r, c))
+    corners = (chart * width + np.stack([row, row, next_row])) * width + np.stack([column, next_column, column])
+    # the east or west side, and the north or south one
+    links = _link_places(topology, np.stack([chart, r, c]), ((1, 0, c == 0), (0, r == 0, 0)))
+    own = np.arange(len(chart)), topology.halo.reshape(-1)[corners[0]]
+    return SpecialCells(corners, _triangle, links, own)
 
 
 def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
     """Polygons by their number of corners: their sides belong to the nine points, their diagonals do not."""
-    crossing = crossing_links(topology)
     for count in sorted({len(each) for each in topology.polygons}):
         texels = np.stack([each for each in topology.polygons if len(each) == count], axis=1)
         first, second = np.triu_indices(count, 1)
         pairs = np.stack([texels[first], texels[second]], axis=-1).reshape(-1, 2)
-        link, places = crossing.between(pairs)
+        link, places = crossing_links(topology).between(pairs)
         beside = np.setdiff1d(np.arange(len(pairs)), link)
         corners = topology.addresses[0][texels]
         shares = np.arange(texels.size), texels.ravel()
         yield SpecialCells(corners, _polygon, (link, places), shares, (beside, pairs[beside]), on_all_copies=True)
 
 
-def _corner_places(topology: TexelTopology, cells: Ints) -> Ints:
-    """Flat places [4, k] of the corners of cells [3, k]: chart, row and column."""
-    width = topology.halo.shape[1]
-    chart, r, c = cells
-    return np.stack([(chart * width + r + down) * width + c + right for down, right in CORNERS])
-
-
-def _link_places(topology: TexelTopology, cells: Ints, links: tuple[tuple[int, int, int], ...]) -> tuple[Ints, Ints]:
+def _link_places(topology: TexelTopology, cells: Ints, links: Sequence[tuple]) -> tuple[Ints, Ints]:
     """Which links [l, k] of cells [3, k] are stored, and where in a stencil's weights; both flat."""
-    n = topology.shape[1]
-    link, down, right = np.transpose(links)[:, :, None]
-    chart, row, column = cells[0], cells[1] + down, cells[2] + right
-    stored = (row <= n) & (column <= n)
-    places = ((4 * chart + link) * (n + 1) + row) * (n + 1) + column
+    n, (chart, r, c) = topology.shape[1], cells
+    found = [(link, r + down, c + right) for link, down, right in links]
+    stored = np.stack([(row <= n) & (column <= n) for _, row, column in found])
+    places = np.stack([((4 * chart + link) * (n + 1) + row) * (n + 1) + column for link, row, column in found])
     return np.flatnonzero(stored), places[stored]
 
 
@@ -427,9 +400,17 @@ def _areas(x: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _strips(x: Floats) -> tuple[Floats, Floats, Floats]:
-    """The link of the first two corners."""
-    weight = strip(x[:, 0], x[:, 1], x[:, 2], x[:, 3])
-    return weight[None], np.zeros((0, len(weight))), quad_area(*_from_first(x))
+    """The link of the first two corners, texels at a free rim; the rim's points beside them are the others.
+
+    Heights have no slope across a free rim (the natural condition). Their gradient in the strip is the difference of
+    the two texels over their distance along the rim, at whatever angle the grid lines meet that.
+    """
+    link, rim, area = x[:, 1] - x[:, 0], x[:, 3] - x[:, 2], quad_area(*_from_first(x))
+    squared = dot(rim, rim)
+    along = dot(rim, link) ** 2 / np.maximum(squared, _TINY)
+    least = LEAST_AREA * np.maximum(squared, dot(link, link))
+    weight = np.where(squared > 0, area / np.maximum(np.maximum(along, least), _TINY), 0.0)
+    return weight[None], np.zeros((0, len(weight))), area
 
 
 def _triangle(x: Floats) -> tuple[Floats, Floats, Floats]:

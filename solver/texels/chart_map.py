@@ -16,7 +16,7 @@ from ..kernel import Floats, Ints, kernel
 from ..mesh.mesh import Mesh
 
 
-def barycentrics_in(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def barycentrics_in(corners: Floats, points: Floats) -> Floats:
     """Barycentric coordinates [k, 3], not negative, of points [k, 3] in triangles [k, 3, 3]."""
     u, v, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
     uu, uv, vv, pu, pv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v), (p, u), (p, v)))
@@ -45,7 +45,7 @@ def barycentrics_at(corners: Floats, point: Floats) -> tuple[float, float]:
 
 # Parts of triangles: the triangle of each, in ascending order, [p]; where in it the part's three corners lie, in its
 # winding, [p, 3, 3]; and what belongs to the parts, [p, ...].
-Parts: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float64], NDArray]
+Parts: TypeAlias = tuple[Ints, Floats, NDArray]
 
 
 class ChartMap(Protocol):
@@ -59,12 +59,10 @@ class ChartMap(Protocol):
     def layout(self) -> str:
         """Name of the layout."""
 
-    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, mesh: Mesh, triangles: Ints, points: Floats) -> Floats:
         """Map coordinates [k, d] of points [k, 3] [m] that lie on triangles [k]."""
 
-    def chart_points(
-        self, coordinates: NDArray[np.float64], resolution: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def chart_points(self, coordinates: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
         """Chart, row and column, each [k], of map coordinates; 0.0 is the centre of the first texel."""
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
@@ -73,10 +71,10 @@ class ChartMap(Protocol):
     def linear_parts(self, mesh: Mesh) -> Parts:
         """Parts of the mesh's triangles in which map coordinates are linear, and these at their corners [p, 3, d]."""
 
-    def split(self, corners: NDArray[np.float64]) -> Parts:
+    def split(self, corners: Floats) -> Parts:
         """Triangles, with map coordinates [m, 3, d] at their corners, cut where they leave a chart; the charts [p]."""
 
-    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    def uv(self, coordinates: Floats, chart: Ints) -> Floats:
         """Place [k, ..., 2] in charts [k], 0 to 1, of map coordinates [k, ..., d] that belong to them."""
 
     def quality(self, mesh: Mesh) -> dict[str, float]:
@@ -110,13 +108,13 @@ class TextureCoordinates:
         In a layer with a halo of one texel it is at (1 + n uv) / (n + 2).
     """
 
-    triangle: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    chart: NDArray[np.int64]
-    coordinates: NDArray[np.float64]
-    uv: NDArray[np.float64]
+    triangle: Ints
+    barycentrics: Floats
+    chart: Ints
+    coordinates: Floats
+    uv: Floats
 
-    def carry(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def carry(self, corner_values: Floats) -> Floats:
         """Values at the pieces' corners of what is linear in each triangle of the mesh.
 
         Parameters
@@ -153,8 +151,8 @@ class LinearChartMap:
         Texels along a chart's side, n.
     """
 
-    charts: NDArray[np.int64]
-    corners: NDArray[np.float64]
+    charts: Ints
+    corners: Floats
     resolution: int
 
     @property
@@ -162,15 +160,13 @@ class LinearChartMap:
         """Name of the layout."""
         return "given"
 
-    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, mesh: Mesh, triangles: Ints, points: Floats) -> Floats:
         """Chart, row and column, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
         weights = barycentrics_in(mesh.V[mesh.F[triangles]], points)
         places = np.einsum("kc,kcj->kj", weights, self.corners[triangles])
         return np.concatenate([self.charts[triangles, None], places], axis=1)
 
-    def chart_points(
-        self, coordinates: NDArray[np.float64], resolution: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def chart_points(self, coordinates: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
         """Chart, row and column, each [k]."""
         return coordinates[:, 0].astype(np.int64), coordinates[:, 1], coordinates[:, 2]
 
@@ -184,11 +180,11 @@ class LinearChartMap:
         chart = np.broadcast_to(self.charts[:, None, None], (len(self.charts), 3, 1))
         return uncut(np.concatenate([chart, self.corners], axis=2))
 
-    def split(self, corners: NDArray[np.float64]) -> Parts:
+    def split(self, corners: Floats) -> Parts:
         """The triangles as they are: each lies in one chart."""
         return uncut(corners[:, 0, 0].astype(np.int64))
 
-    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    def uv(self, coordinates: Floats, chart: Ints) -> Floats:
         """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
         return np.clip((coordinates[..., [2, 1]] + 0.5) / self.resolution, 0.0, 1.0)
 
@@ -344,13 +340,13 @@ class PartsMesh(NamedTuple):
         Map coordinates of the corners.
     """
 
-    V: NDArray[np.float64]
-    F: NDArray[np.int64]
-    triangle: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    coordinates: NDArray[np.float64]
+    V: Floats
+    F: Ints
+    triangle: Ints
+    barycentrics: Floats
+    coordinates: Floats
 
-    def carry(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def carry(self, corner_values: Floats) -> Floats:
         """Values at the parts' corners [m, 3, ...] of what is linear in each triangle [triangle_count, 3, ...]."""
         return np.einsum("pij,pj...->pi...", self.barycentrics, corner_values[self.triangle])
 
@@ -363,19 +359,12 @@ def parts_mesh(chart_map: ChartMap, mesh: Mesh) -> PartsMesh:
     points = np.einsum("pij,pjk->pik", barycentrics, mesh.V[mesh.F[triangle]])
     step = np.ldexp(1.0, np.frexp(np.abs(mesh.V).max())[1] - _BITS)
     place = np.rint(points / step).astype(np.int64).reshape(-1, 3)
-    key = np.column_stack([_owners(mesh, triangle, barycentrics).reshape(-1, 2), place])
+    # what of the mesh each corner lies on: the ends of an edge, one vertex twice, or a triangle and -1; so sheets that
+    # touch have points of their own
+    held = barycentrics > _ON_SIDE
+    corners, inside = np.broadcast_to(mesh.F[triangle][:, None], held.shape), held.all(axis=2)
+    low = np.where(inside, triangle[:, None], np.where(held, corners, len(mesh.V)).min(axis=2))
+    high = np.where(inside, -1, np.where(held, corners, -1).max(axis=2))
+    key = np.column_stack([low.ravel(), high.ravel(), place])
     _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return PartsMesh(points.reshape(-1, 3)[first], number.reshape(-1, 3), triangle, barycentrics, coordinates)
-
-
-def _owners(mesh: Mesh, triangle: NDArray[np.int64], barycentrics: NDArray[np.float64]) -> NDArray[np.int64]:
-    """What of the mesh each corner lies on [p, 3, 2]: the ends of an edge, one vertex twice, or a triangle and -1.
-
-    Sheets that touch have points of their own.
-    """
-    corners = np.broadcast_to(mesh.F[triangle][:, None], barycentrics.shape)
-    held = barycentrics > _ON_SIDE
-    low = np.where(held, corners, len(mesh.V)).min(axis=2)
-    high = np.where(held, corners, -1).max(axis=2)
-    inside = held.all(axis=2)
-    return np.stack([np.where(inside, triangle[:, None], low), np.where(inside, -1, high)], axis=2)

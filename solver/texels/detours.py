@@ -159,8 +159,8 @@ def _pulled(V: Floats, edges: Ints, points: Floats, count: int, p: tuple, q: tup
         if count == 1 or moved < _TIGHT * _TIGHT:
             break
     length, last = 0.0, p
-    for i in range(count):
-        step = subtract(row(points, i), last)
-        length, last = length + np.sqrt(dot(step, step)), row(points, i)
-    step = subtract(q, last)
-    return length + np.sqrt(dot(step, step))
+    for i in range(count + 1):
+        x = q if i == count else row(points, i)
+        step = subtract(x, last)
+        length, last = length + np.sqrt(dot(step, step)), x
+    return length

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Bools, Floats, Ints, kernel
+from ..mesh.vectors import dot, row, subtract
 from .texel_mesh import TexelMesh
 
 # Rows and columns in a halo table of the eight neighbours of a texel, in order round it
@@ -44,11 +45,13 @@ def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.
 
     Infinite where there is no outside.
     """
-    grid, scratch = texels.grid, _new_scratch(region.size)
+    grid, scratch = texels.grid, distance_scratch(region.size)
     outside = np.flatnonzero(~region)
     scratch.distance[outside], scratch.touched[: len(outside)] = 0.0, outside
-    march(grid.halo, grid.positions, len(outside), np.inf, scratch)
-    return scratch.distance.reshape(region.shape)
+    count, _ = march(grid.halo, grid.positions, len(outside), np.inf, scratch)
+    depth = scratch.distance.reshape(region.shape).copy()
+    clean(scratch, count)
+    return depth
 
 
 def distance_scratch(size: int) -> Scratch:
@@ -58,10 +61,6 @@ def distance_scratch(size: int) -> Scratch:
 
 @functools.lru_cache(maxsize=8)
 def _distance_scratch(size: int, thread: int) -> Scratch:
-    return _new_scratch(size)
-
-
-def _new_scratch(size: int) -> Scratch:
     touched, order = np.empty((2, size), np.int64)
     return Scratch(np.full(size, np.inf), touched, order, np.zeros(size, bool))
 
@@ -79,15 +78,13 @@ def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -
         q = around[(k + _TURNS[turn]) % 8]
         if q < 0 or distance[q] == np.inf:
             continue
-        length2 = ps2 = along = 0.0
-        for i in range(3):
-            pq, ps = positions[q, i] - positions[t, i], positions[s, i] - positions[t, i]
-            length2, ps2, along = length2 + pq * pq, ps2 + ps * ps, along + ps * pq
-        length = np.sqrt(length2)
-        if length == 0:
+        pq, ps = subtract(row(positions, q), row(positions, t)), subtract(row(positions, s), row(positions, t))
+        length2 = dot(pq, pq)
+        if length2 == 0:
             continue
-        along /= length
-        above = np.sqrt(max(ps2 - along * along, 0.0))
+        length = np.sqrt(length2)
+        along = dot(ps, pq) / length
+        above = np.sqrt(max(dot(ps, ps) - along * along, 0.0))
         source_along = (dp * dp - distance[q] * distance[q] + length2) / (2 * length)
         below2 = dp * dp - source_along * source_along
         if below2 < 0:
@@ -162,5 +159,5 @@ def clean(scratch: Scratch, count: int) -> None:
 @kernel(no_cpython_wrapper=True)
 def distance_to(positions: Floats, t: int, point: Floats) -> float:
     """Straight distance of texel t from a point [m]."""
-    x, y, z = positions[t, 0] - point[0], positions[t, 1] - point[1], positions[t, 2] - point[2]
-    return np.sqrt(x * x + y * y + z * z)
+    way = subtract(row(positions, t), point)
+    return np.sqrt(dot(way, way))

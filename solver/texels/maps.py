@@ -39,11 +39,7 @@ def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
 
 
 def texture_map(
-    atlas: Atlas,
-    image: str | Path | ArrayLike,
-    low: float = 0.0,
-    high: float = 1.0,
-    channel: str = "luminance",
+    atlas: Atlas, image: str | Path | ArrayLike, low: float = 0.0, high: float = 1.0, channel: str = "luminance"
 ) -> NDArray[np.float64]:
     """Sample an image in the object's own texture coordinates, once a texel.
 
@@ -73,8 +69,16 @@ def texture_map(
     """
     if atlas.mesh.corner_uv is None:
         raise SolverError("the mesh has no texture coordinates for an image; give it some, or use `vertex_map`")
-    values = _channel(_pixels(image), channel)
-    return low + (high - low) * _bilinear(values, _interpolate(atlas, atlas.mesh.corner_uv))
+    values, uv = _pixels(image, channel), _interpolate(atlas, atlas.mesh.corner_uv)
+    height, width = values.shape
+    x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    s, t = x - column, y - row
+    upper, lower = (
+        (1 - s) * values[each % height, column % width] + s * values[each % height, (column + 1) % width]
+        for each in (row, row + 1)
+    )
+    return low + (high - low) * ((1 - t) * upper + t * lower)
 
 
 def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -82,27 +86,17 @@ def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float
     return np.einsum("fijk,fijk...->fij...", atlas.barycentrics, corners[atlas.triangles])
 
 
-def _pixels(image: str | Path | ArrayLike) -> NDArray[np.float64]:
-    """Values from 0 to 1, [height, width, channels]."""
+def _pixels(image: str | Path | ArrayLike, channel: str) -> NDArray[np.float64]:
+    """Values from 0 to 1 of one channel, [height, width]."""
     if isinstance(image, str | Path):
         pixels = read_image(SolverError, image, "image", _brightness)
-        largest = 255.0 if pixels.dtype == np.uint8 else 65535.0
-        pixels = pixels / largest
+        pixels = pixels / (255.0 if pixels.dtype == np.uint8 else 65535.0)
     else:
         pixels = np.asarray(image, dtype=np.float64)
     if pixels.ndim == 2:
         pixels = pixels[..., None]
     if pixels.ndim != 3 or 0 in pixels.shape or pixels.shape[2] > 4:
         raise SolverError(f"image has shape {pixels.shape}; valid is [height, width] with up to 4 channels")
-    return pixels
-
-
-def _brightness(mode: str) -> str:
-    """The numbers of a palette are not brightness."""
-    return mode if mode in ("L", "LA", "RGB", "RGBA") or mode[0] == "I" else "RGBA"
-
-
-def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
     channels = pixels.shape[2]
     if channel == "luminance":
         return pixels[..., : 3 if channels >= 3 else 1].mean(axis=2)
@@ -114,12 +108,6 @@ def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
     return pixels[..., place]
 
 
-def _bilinear(values: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    height, width = values.shape
-    x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
-    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    s, t = x - column, y - row
-    left, right, top, bottom = column % width, (column + 1) % width, row % height, (row + 1) % height
-    return (1 - t) * ((1 - s) * values[top, left] + s * values[top, right]) + t * (
-        (1 - s) * values[bottom, left] + s * values[bottom, right]
-    )
+def _brightness(mode: str) -> str:
+    """The numbers of a palette are not brightness."""
+    return mode if mode in ("L", "LA", "RGB", "RGBA") or mode[0] == "I" else "RGBA"

@@ -40,28 +40,24 @@ class SurfaceRide:
         self._shape = topology.halo.shape
         self._has_beyond = atlas.texels.beyond is not None
         V, F, places = atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64), around.reshape(-1, 3)
-        halo, nothing = topology.halo.reshape(-1), ~np.isfinite(places[:, 0])
+        halo, rim, nothing = topology.halo.reshape(-1), topology.rim.reshape(-1), ~np.isfinite(places[:, 0])
         corners, weights = F[atlas.triangles.reshape(-1)[halo]], atlas.barycentrics.reshape(-1, 3)[halo]
-        rim = np.flatnonzero(topology.rim.reshape(-1) & ~nothing)
-        if len(rim):
-            triangle, closest = atlas.closest_points(np.ascontiguousarray(places[rim]))
-            corners[rim], weights[rim] = F[triangle], barycentrics_in(V[F[triangle]], closest)
+        if (at := rim & ~nothing).any():
+            triangle, closest = atlas.closest_points(np.ascontiguousarray(places[at]))
+            corners[at], weights[at] = F[triangle], barycentrics_in(V[F[triangle]], closest)
         weights[nothing] = np.nan
         # images of a periodic surface keep their way to the texels that they show
-        shift = np.where(
-            (topology.rim.reshape(-1) | nothing)[:, None], 0.0, places - atlas.positions.reshape(-1, 3)[halo]
-        )
+        shift = np.where((rim | nothing)[:, None], 0.0, places - atlas.positions.reshape(-1, 3)[halo])
         self._images = np.flatnonzero(shift.any(axis=1))
         self._shift = shift[self._images].T
         self.corners, self.weights, self._offsets = corners.astype(np.int32), weights, np.zeros((0, 3))
         # along the triangle's first side, across it, and along its normal, in units of the root of twice its area
         off = np.nan_to_num(places - shift - np.einsum("ij,ijk->ik", weights, V[corners]))
         if np.abs(off).max(initial=0.0) > _OFF * np.ptp(V, axis=0).max():
-            frames = np.swapaxes(_frames(V, self.corners), 1, 2)
-            self._offsets = np.linalg.solve(frames, off[..., None])[..., 0]
+            self._offsets = np.linalg.solve(np.swapaxes(_frames(V, self.corners), 1, 2), off[..., None])[..., 0]
         self.on_triangles = not (len(self._offsets) or len(self._images))
 
-    def around(self, V: Floats) -> NDArray[np.float64]:
+    def around(self, V: Floats) -> Floats:
         """Coordinates of the texels with halo, [3, C, n + 2, n + 2]; NaN where there is nothing."""
         points = np.empty((3, len(self.corners)))
         interpolate(V, self.corners, self.weights, points)
@@ -71,12 +67,12 @@ class SurfaceRide:
             points[:, self._images] += self._shift
         return points.reshape(3, *self._shape)
 
-    def positions(self, V: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    def positions(self, V: Floats) -> tuple[Floats, Floats | None]:
         """Positions of the texels [C, n, n, 3] and what lies beyond them; see `TexelMesh`."""
         around = np.ascontiguousarray(np.moveaxis(self.around(V), 0, -1))
         return around[:, 1:-1, 1:-1].copy(), around if self._has_beyond else None
 
-    def normals(self, vertex_normals: Floats) -> NDArray[np.float64]:
+    def normals(self, vertex_normals: Floats) -> Floats:
         """Unit normals of the texels [C, n, n, 3], from those of the vertices [n, 3]."""
         charts, width, _ = self._shape
         normals = np.empty((charts, width - 2, width - 2, 3))
@@ -87,11 +83,11 @@ class SurfaceRide:
 class MovedPlaces:
     """Where the places of an atlas are, with its vertices at V [n, 3] [m]."""
 
-    def __init__(self, ride: SurfaceRide, V: NDArray[np.float64]) -> None:
+    def __init__(self, ride: SurfaceRide, V: Floats) -> None:
         self.ride, self.V = ride, V
 
     @functools.cached_property
-    def around(self) -> NDArray[np.float64]:
+    def around(self) -> Floats:
         """Coordinates of the texels with halo [m], [3, C, n + 2, n + 2]."""
         return self.ride.around(self.V)
 
@@ -125,14 +121,15 @@ class MovedStencil(Stencil):
         self.known_fastest: float | None = None
 
     @functools.cached_property
-    def _made(self) -> tuple[Stencil, NDArray[np.float64]]:
-        if self._multiple is not None:
-            stencil, factor = self._multiple
-            return stencil._made[0].scaled(factor), stencil.areas
-        return self.cells.moved(self.places.around, self.coefficient)
+    def _made(self) -> tuple[Stencil, Floats]:
+        if self._multiple is None:
+            return self.cells.moved(self.places.around, self.coefficient)
+        (stencil, areas), factor = self._multiple[0]._made, self._multiple[1]
+        links = stencil.irregular._replace(weights=factor * stencil.irregular.weights)
+        return Stencil(self.topology, factor * stencil.weights, links), areas
 
     @functools.cached_property
-    def weights(self) -> NDArray[np.float64]:  # type: ignore[override]
+    def weights(self) -> Floats:  # type: ignore[override]
         """Weights of the nine-point stencil, [C, 4, n + 1, n + 1]."""
         return self._made[0].weights
 
@@ -146,16 +143,16 @@ class MovedStencil(Stencil):
         return IrregularLinks.joined(links, self._added)
 
     @property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """Area of the texel mesh that belongs to each texel [m^2], [C, n, n]."""
         return self._made[1]
 
-    def fastest(self, mass: NDArray[np.float64]) -> float:
+    def fastest(self, mass: Floats) -> float:
         """Bound of the largest eigenvalue as for any stencil, or the one that is known."""
         return super().fastest(mass) if self.known_fastest is None else self.known_fastest
 
 
-def _frames(V: Floats, corners: NDArray[np.integer]) -> NDArray[np.float64]:
+def _frames(V: Floats, corners: NDArray[np.integer]) -> Floats:
     """First side, direction across it, and normal of triangles, as rows as long as the root of twice the area."""
     x = V[corners]
     along, across = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]

@@ -18,9 +18,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh_tridiagonal
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
-from ..kernel import Floats, Ints
+from ..kernel import Bools, Floats, Ints
 from .topology import TexelTopology
 
 
@@ -44,7 +44,7 @@ class IrregularLinks(NamedTuple):
     weights: Floats
 
     @classmethod
-    def of(cls, ends: NDArray[np.int64], weights: NDArray[np.float64]) -> IrregularLinks:
+    def of(cls, ends: Ints, weights: Floats) -> IrregularLinks:
         """Sort links [k, 2] with weights [k]."""
         both, twice = np.concatenate([ends, ends[:, ::-1]]), np.tile(weights, 2)
         order = np.lexsort((both[:, 1], both[:, 0]))
@@ -65,38 +65,31 @@ class IrregularLinks(NamedTuple):
 
 NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
 
+_Places: TypeAlias = tuple[slice, slice, slice]
 
-EAST, NORTH, NORTHEAST, NORTHWEST = range(4)
-
-_EVERY, _LOW, _HIGH = slice(None), slice(None, -1), slice(1, None)
-# For every link, the slices of a field with halo that hold its two ends.
-LINK_ENDS = (
-    ((_EVERY, _LOW, _LOW), (_EVERY, _LOW, _HIGH)),
-    ((_EVERY, _LOW, _LOW), (_EVERY, _HIGH, _LOW)),
-    ((_EVERY, _LOW, _LOW), (_EVERY, _HIGH, _HIGH)),
-    ((_EVERY, _LOW, _HIGH), (_EVERY, _HIGH, _LOW)),
-)
+# Row and column of the two ends of every link from the place where it is stored, and the slices of a field with halo
+# that hold them.
+_ENDS = (((0, 0), (0, 1)), ((0, 0), (1, 0)), ((0, 0), (1, 1)), ((0, 1), (1, 0)))
+_EVERY, _PARTS = slice(None), (slice(None, -1), slice(1, None))
+LINK_ENDS = [[(_EVERY, _PARTS[row], _PARTS[column]) for row, column in ends] for ends in _ENDS]
 
 
-def link_lengths(topology: TexelTopology, halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def link_lengths(topology: TexelTopology, halo_positions: Floats) -> Floats:
     """Real-space length of every link [m], [C, 4, n + 1, n + 1]; infinite where no link exists."""
-    charts, n, _ = topology.shape
-    lengths = np.full((charts, 4, n + 1, n + 1), np.inf)
-    for link, (a, b) in enumerate(LINK_ENDS):
-        exists = link_exists(topology, link) | ties_to_rim(topology, link)
-        lengths[:, link][exists] = np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1)[exists]
+    lengths = np.stack([np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1) for a, b in LINK_ENDS], axis=1)
+    lengths.reshape(-1)[missing_links(topology)] = np.inf
     crossing_links(topology).level(lengths)
     return lengths
 
 
-def link_exists(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
+def link_exists(topology: TexelTopology, link: int) -> Bools:
     """Where a link joins two texels of which one is the chart's own, [C, n + 1, n + 1]."""
     a, b = LINK_ENDS[link]
     there = (topology.halo >= 0) & ~topology.rim
     return there[a] & there[b] & (topology.own[a] | topology.own[b])
 
 
-def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
+def ties_to_rim(topology: TexelTopology, link: int) -> Bools:
     """Where a link joins one of the chart's own texels to a fixed rim, [C, n + 1, n + 1]."""
     a, b = LINK_ENDS[link]
     own, rim = topology.own, topology.rim & topology.fixed_rim
@@ -104,17 +97,11 @@ def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
 
 
 @functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
-def rim_ties(topology: TexelTopology) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def rim_ties(topology: TexelTopology) -> tuple[Ints, Ints]:
     """Flat texels [k] that links tie to a fixed rim, and the flat places [k] of these among a stencil's weights."""
-    charts, n, _ = topology.shape
-    place = np.arange(4 * charts * (n + 1) ** 2).reshape(charts, 4, n + 1, n + 1)
-    texels, places = [], []
-    for link, (a, b) in enumerate(LINK_ENDS):
-        tied = ties_to_rim(topology, link)
-        own = np.where(topology.own[a], topology.halo[a], topology.halo[b])
-        texels.append(own[tied])
-        places.append(place[:, link][tied])
-    return np.concatenate(texels), np.concatenate(places)
+    tied = np.stack([ties_to_rim(topology, link) for link in range(4)], axis=1)
+    own = np.stack([np.where(topology.own[a], topology.halo[a], topology.halo[b]) for a, b in LINK_ENDS], axis=1)
+    return own[tied], np.flatnonzero(tied)
 
 
 class CrossingLinks(NamedTuple):
@@ -156,28 +143,23 @@ class CrossingLinks(NamedTuple):
 @functools.lru_cache(maxsize=4)
 def crossing_links(topology: TexelTopology) -> CrossingLinks:
     """The links across glued sides of a topology."""
-    keys, places, size = [], [], topology.texel_count
-    n = topology.shape[1]
-    for link, (a, b) in enumerate(LINK_ENDS):
-        crossing = link_exists(topology, link) & (topology.own[a] != topology.own[b])
-        first, second = topology.halo[a][crossing], topology.halo[b][crossing]
-        keys.append(np.minimum(first, second) * size + np.maximum(first, second))
-        chart, row, column = np.nonzero(crossing)
-        places.append(((4 * chart + link) * (n + 1) + row) * (n + 1) + column)
-    key = np.concatenate(keys)
+    own, size = topology.own, topology.texel_count
+    each = [link_exists(topology, link) & (own[a] != own[b]) for link, (a, b) in enumerate(LINK_ENDS)]
+    crossing = np.stack(each, axis=1)
+    chart, link, row, column = np.nonzero(crossing)
+    down, right = np.array(_ENDS)[link].T
+    first, second = topology.halo[chart, row + down, column + right]
+    key = np.minimum(first, second) * size + np.maximum(first, second)
     order = np.argsort(key, kind="stable")
     unique, begins = np.unique(key[order], return_index=True)
-    return CrossingLinks(unique, np.concatenate(places)[order], np.append(begins, len(key)), size)
+    return CrossingLinks(unique, np.flatnonzero(crossing)[order], np.append(begins, len(key)), size)
 
 
 @functools.lru_cache(maxsize=4)
 def missing_links(topology: TexelTopology) -> Ints:
     """Flat places, among a stencil's weights, of what is no link."""
-    charts, n, _ = topology.shape
-    missing = np.zeros((charts, 4, n + 1, n + 1), bool)
-    for link in range(4):
-        missing[:, link] = ~(link_exists(topology, link) | ties_to_rim(topology, link))
-    return np.flatnonzero(missing)
+    there = [link_exists(topology, link) | ties_to_rim(topology, link) for link in range(4)]
+    return np.flatnonzero(~np.stack(there, axis=1))
 
 
 # Largest eigenvalue of an even grid's stencil times its spacing squared: that of the chessboard pattern.
@@ -190,12 +172,7 @@ _LANCZOS_FROM = 6
 _RESIDUAL, _LOOK, _MOST = 2e-3, 5, 1000
 
 
-def largest_eigenvalue(
-    force: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    mass: NDArray[np.float64],
-    free: NDArray[np.bool_],
-    bound: float,
-) -> float:
+def largest_eigenvalue(force: Callable[[Floats], Floats], mass: Floats, free: Bools, bound: float) -> float:
     """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
 
     Parameters
@@ -221,7 +198,7 @@ def largest_eigenvalue(
     return float(np.clip(1.005 * _lanczos(multiply, start, bound), 0, bound))
 
 
-def _lanczos(multiply: Callable[[NDArray], NDArray], start: NDArray[np.float64], bound: float) -> float:
+def _lanczos(multiply: Callable[[NDArray], NDArray], start: Floats, bound: float) -> float:
     """Largest eigenvalue of a symmetric matrix; the bound if it is not found.
 
     Plain Lanczos, without a basis that is kept orthogonal: lost orthogonality repeats eigenvalues and makes no new ones
@@ -258,10 +235,10 @@ class Stencil:
     """
 
     topology: TexelTopology
-    weights: NDArray[np.float64]
+    weights: Floats
     irregular: IrregularLinks = NO_LINKS
 
-    def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, field: Floats) -> Floats:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
         around, result = self.topology.with_boundary(field), np.zeros(self.topology.shape)
         for link, start, end in self._links():
@@ -272,12 +249,7 @@ class Stencil:
         result.reshape(-1)[links.texels] += np.bincount(row, forces)
         return result
 
-    def scaled(self, factor: float) -> Stencil:
-        """The same with all weights multiplied by a factor."""
-        links = self.irregular._replace(weights=factor * self.irregular.weights)
-        return Stencil(self.topology, factor * self.weights, links)
-
-    def absolute_sums(self) -> NDArray[np.float64]:
+    def absolute_sums(self) -> Floats:
         """Sum of |w| over the links that meet in each texel, half of |w| for those to a fixed rim, [C, n, n].
 
         Twice that is Gershgorin's bound: the other end of a link to a rim does not move.
@@ -292,54 +264,36 @@ class Stencil:
         sums.reshape(-1)[links.texels] += np.add.reduceat(np.abs(links.weights), links.begins[:-1])
         return sums
 
-    def fastest(self, mass: NDArray[np.float64]) -> float:
+    def fastest(self, mass: Floats) -> float:
         """Gershgorin's bound of the largest eigenvalue over a lumped mass [C, n, n]."""
         return float((self.absolute_sums() * 2 / mass).max())
 
     def _links(self) -> Iterator[tuple[int, _Places, _Places]]:
         """Of the eight links of every texel, the direction, the places where it starts, and its other ends."""
         n = self.topology.shape[1]
-        for link, *places in _EIGHT:
-            start, end = ((_EVERY, slice(1 + r, n + 1 + r), slice(1 + c, n + 1 + c)) for r, c in places)
-            yield link, start, end
-
-
-_Places: TypeAlias = tuple[slice, slice, slice]
-
-# link, the place from which it starts relative to the texel (row, column), and its other end
-_EIGHT = (
-    (EAST, (0, 0), (0, 1)),
-    (EAST, (0, -1), (0, -1)),
-    (NORTH, (0, 0), (1, 0)),
-    (NORTH, (-1, 0), (-1, 0)),
-    (NORTHEAST, (0, 0), (1, 1)),
-    (NORTHEAST, (-1, -1), (-1, -1)),
-    (NORTHWEST, (0, -1), (1, -1)),
-    (NORTHWEST, (-1, 0), (-1, 1)),
-)
+        for link, ends in enumerate(_ENDS):
+            for (r, c), (row, column) in (ends, ends[::-1]):
+                places = ((1 - r, 1 - c), (1 - r + row, 1 - c + column))
+                start, end = ((_EVERY, slice(i, n + i), slice(j, n + j)) for i, j in places)
+                yield link, start, end
 
 
 def stiffness_matrix(stencil: Stencil) -> csr_array:
     """A stencil as a matrix [T, T] whose product with a field is minus the stencil's value."""
     topology = stencil.topology
-    rows, columns, weights = [], [], []
+    found = []
     for link, (a, b) in enumerate(LINK_ENDS):
         for end, other in ((a, b), (b, a)):
             own = link_exists(topology, link) & topology.own[end]
-            rows.append(topology.halo[end][own])
-            columns.append(topology.halo[other][own])
-            weights.append(stencil.weights[:, link][own])
-    irregular = stencil.irregular
-    rows.append(np.repeat(irregular.texels, np.diff(irregular.begins)))
-    columns.append(irregular.others)
-    weights.append(irregular.weights)
-    row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
+            found.append((topology.halo[end][own], topology.halo[other][own], stencil.weights[:, link][own]))
+    links = stencil.irregular
+    found.append((np.repeat(links.texels, np.diff(links.begins)), links.others, links.weights))
+    row, column, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     size = topology.texel_count
     diagonal = np.bincount(row, weight, size)
     if topology.fixed_rim:
         tied, ties = rim_ties(topology)
         diagonal += np.bincount(tied, stencil.weights.reshape(-1)[ties], size)
     texels = np.arange(size)
-    entries = np.concatenate([-weight, diagonal])
     places = np.concatenate([row, texels]), np.concatenate([column, texels])
-    return csr_array(coo_array((entries, places), shape=(size, size)))
+    return csr_array((np.concatenate([-weight, diagonal]), places), shape=(size, size))

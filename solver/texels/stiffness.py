@@ -14,10 +14,9 @@ from collections.abc import Iterator
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kernel import Floats, Floats32, Ints, kernel
-from .cells import CORNERS, conductance, quad, quad_area, special_cells
+from .cells import LINKS, at_corners, conductance, quad, quad_area, special_cells
 from .stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from .topology import TexelTopology
 
@@ -77,8 +76,7 @@ class TexelCells:
         self._detours = np.zeros((4, *topology.halo.shape), np.float32) if detours is None else detours
         charts, n, _ = topology.shape
         self._shape, self._special = (charts, 4, n + 1, n + 1), special_cells(topology, halo_positions)
-        there = (topology.halo >= 0) & ~topology.rim
-        self._whole = functools.reduce(np.logical_and, self._at_corners(there))
+        self._whole = np.logical_and.reduce(at_corners((topology.halo >= 0) & ~topology.rim))
         extent = float(np.ptp(halo_positions[:, 1:-1, 1:-1], axis=(0, 1, 2)).max())
         self._scale = float(np.float32(np.sqrt(topology.texel_count) / extent)) if extent > 0 else 1.0
         ends = np.concatenate([np.zeros((0, 2), np.int64), *(each.irregular[1] for each in self._special)])
@@ -88,7 +86,7 @@ class TexelCells:
     def areas(self) -> Floats:
         """Area of the mesh of texel centres that belongs to each texel at rest [m^2], [C, n, n]."""
         around, quarters = np.zeros(self._positions.shape[:3]), self._quad_areas() / (4 * self._scale**2)
-        for corner in self._at_corners(around)[::-1]:
+        for corner in at_corners(around)[::-1]:
             corner += quarters
         areas = np.ascontiguousarray(around[:, 1:-1, 1:-1])
         for cells in self._special:
@@ -100,13 +98,12 @@ class TexelCells:
         """Stencil of values [C, n, n], see `TexelMesh.stencil`."""
         weights = np.zeros(self._shape)
         fields = [self.topology.with_halo(each) for each in (values, softening)]
-        for charts, rows in self._blocks():
-            # with the row of texels above
-            part, above = (charts, slice(rows.start, rows.stop + 1)), slice(rows.start + 1, rows.stop + 1)
-            x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
-            factor = conductance(*(self._at_corners(each[part]) for each in fields))
+        for charts, rows, part, ways in self._blocks():
+            above = slice(rows.start + 1, rows.stop + 1)
+            factor = conductance(*(at_corners(each[part]) for each in fields))
+            detours = [at_corners(self._detours[link, *part])[2 * down + right] for link, down, right in LINKS]
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
-                quads = quad(*(each - x[0] for each in x[1:]), _of_cells(self._detours[:, *part]))
+                quads = quad(*ways, detours)
                 links = np.where(self._whole[charts, rows], np.stack(quads[:6]), 0.0)
             south, north, west, east, rising, falling = factor * links
             link = weights[charts]
@@ -121,7 +118,7 @@ class TexelCells:
     def coefficient(self, values: Floats, softening: Floats, power: float) -> CellCoefficient:
         """Coefficient of a surface that moves, of values at the texels at rest [C, n, n]; see `TexelMesh.stencil`."""
         fields = [self.topology.with_halo(each) for each in (values, softening)]
-        quads = np.where(self._per_area > 0, _with_zeros(conductance(*map(self._at_corners, fields))), _ZERO)
+        quads = np.where(self._per_area > 0, _with_zeros(conductance(*map(at_corners, fields))), _ZERO)
         return QuadCells(quads, self._per_area, self._scale, power, self._detours), self._special_coefficient(*fields)
 
     def moved(self, around: Floats, coefficient: CellCoefficient) -> tuple[Stencil, Floats]:
@@ -173,11 +170,9 @@ class TexelCells:
     def _quad_areas(self) -> Floats:
         """Areas of whole quads at rest in units of 1 / scale^2, [C, n + 1, n + 1]; 0 where there is none."""
         areas = np.empty(self._whole.shape)
-        for charts, rows in self._blocks():
-            part = charts, slice(rows.start, rows.stop + 1)
-            x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
+        for charts, rows, _, ways in self._blocks():
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
-                quads = quad_area(*(each - x[0] for each in x[1:]))
+                quads = quad_area(*ways)
             areas[charts, rows] = np.where(self._whole[charts, rows], quads, 0.0)
         return areas
 
@@ -217,27 +212,16 @@ class TexelCells:
             np.add.at(flat, link_places, values)
         return self._links._replace(weights=np.concatenate(irregular)[self._links.weights.astype(np.int64)])
 
-    def _blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Charts, and rows of the cells in them."""
+    def _blocks(self) -> Iterator[tuple[slice, slice, tuple[slice, slice], list[Floats]]]:
+        """Charts, rows of cells, both with the row of texels above, and the ways, scaled, that make a `quad`."""
         charts, _, size, _ = self._shape
         together, high = max(1, _BLOCK // size**2), max(1, _BLOCK // size)
         for chart in range(0, charts, together):
             for row in range(0, size, high):
-                yield slice(chart, min(chart + together, charts)), slice(row, min(row + high, size))
-
-    @staticmethod
-    def _at_corners(field: NDArray) -> list[NDArray]:
-        """A field [..., r + 1, c + 1] at the four corners of each of r x c cells."""
-        rows, columns = field.shape[-2] - 1, field.shape[-1] - 1
-        return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
-
-
-def _of_cells(links: Floats32) -> tuple[Floats32, ...]:
-    """South, north, west, east, rising and falling of each of r x c cells, of links [4, ..., r + 1, c + 1]."""
-    east, north, rising, falling = links
-    low, high = slice(None, -1), slice(1, None)
-    sides = east[..., low, low], east[..., high, low], north[..., low, low], north[..., low, high]
-    return *sides, rising[..., low, low], falling[..., low, low]
+                rows = slice(row, min(row + high, size))
+                part = slice(chart, min(chart + together, charts)), slice(row, rows.stop + 1)
+                x = at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
+                yield part[0], rows, part, [each - x[0] for each in x[1:]]
 
 
 def _with_zeros(quads: Floats) -> Floats32:

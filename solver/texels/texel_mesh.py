@@ -22,7 +22,7 @@ from scipy.sparse.linalg import spsolve
 from ..errors import AtlasError, shown
 from ..kernel import Floats, Ints
 from ..mesh.mesh import Mesh
-from .stencil import EAST, EVEN_RATE, NORTH, Stencil, largest_eigenvalue, link_lengths, stiffness_matrix
+from .stencil import EVEN_RATE, Stencil, largest_eigenvalue, link_lengths, stiffness_matrix
 from .stiffness import TexelCells
 from .topology import TexelTopology
 
@@ -30,7 +30,7 @@ from .topology import TexelTopology
 _PASSES = 4
 
 
-def smoothed(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[np.float64]:
+def smoothed(topology: TexelTopology, field: Floats) -> Floats:
     """Mean of a field [C, n, n] round each texel, by passes of the weights 1 2 1 along rows and columns."""
     exists = _sum_around(topology, np.ones_like(field))
     for _ in range(_PASSES):
@@ -39,7 +39,7 @@ def smoothed(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[np.
     return field
 
 
-def _sum_around(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sum_around(topology: TexelTopology, field: Floats) -> Floats:
     around = topology.with_halo(field)
     rows = around[:, :-2] + 2 * around[:, 1:-1] + around[:, 2:]
     return rows[:, :, :-2] + 2 * rows[:, :, 1:-1] + rows[:, :, 2:]
@@ -48,23 +48,6 @@ def _sum_around(topology: TexelTopology, field: NDArray[np.float64]) -> NDArray[
 # Least and most area in units of what the texel mesh spans. A limb that falls between the texels is not theirs.
 _LEAST, _MOST = 0.5, 1.2
 _POSITIVE = 0.05  # of the mean round a texel; one may cover nothing but triangles without area
-
-
-def trimmed_areas(
-    topology: TexelTopology, spanned: NDArray[np.float64], covered: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Area of the surface that belongs to each texel [m^2], [C, n, n].
-
-    Parameters
-    ----------
-    spanned : float64 [C, n, n]
-        Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
-    covered : float64 [C, n, n]
-        Area of the surface that each texel covers [m^2].
-    """
-    around = smoothed(topology, covered)
-    level = np.maximum(around, 1e-300) / np.maximum(smoothed(topology, spanned), 1e-300)
-    return np.maximum(covered * (np.clip(level, _LEAST, _MOST) / level), _POSITIVE * around)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -106,21 +89,30 @@ class TexelMesh:
     ) -> TexelMesh:
         """Texel mesh with the normals of its grid lines where none are given.
 
-        Its areas are those that it spans itself, or those of the surface `covered`; see `trimmed_areas`. A few are
-        evened out for the sake of the time step; see `evened_areas`.
+        Its areas are those that it spans itself, or those of the surface `covered` [m^2], [C, n, n]. A few are evened
+        out for the sake of the time step; see `evened_areas`.
 
         Raises
         ------
         AtlasError
             If positions are not finite, or of another shape than the topology's.
         """
-        points = _checked(positions, (*topology.shape, 3))
+        points, shape = np.asarray(positions, dtype=np.float64), (*topology.shape, 3)
+        if points.shape != shape:
+            raise AtlasError(f"texel positions have shape {points.shape}; this topology needs {shape}, in metres")
+        if wrong := int((~np.isfinite(points)).sum()):
+            raise AtlasError(f"{wrong} numbers of the texel positions are not finite; valid are metres")
+        points = np.ascontiguousarray(points)
         around = _with_halo(topology, points, beyond)
         if normals is None:
             normals = np.cross(*tangents(around))
             normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
         cells = TexelCells(topology, around, detours)
-        areas = cells.areas if covered is None else trimmed_areas(topology, cells.areas, covered)
+        areas = cells.areas
+        if covered is not None:
+            mean = smoothed(topology, covered)
+            level = np.maximum(mean, 1e-300) / np.maximum(smoothed(topology, areas), 1e-300)
+            areas = np.maximum(covered * (np.clip(level, _LEAST, _MOST) / level), _POSITIVE * mean)
         if (areas > 0).all():
             areas = evened_areas(areas, cells.at_rest(np.ones_like(areas), np.ones_like(areas)))
         return cls(topology, points, normals, areas, beyond, detours)
@@ -176,12 +168,8 @@ class TexelMesh:
     def bare_rim(self) -> NDArray[np.bool_]:
         """Texels in whose centres the surface ends: a rim beside them has no positions; [C, n, n]."""
         bare = self.topology.rim & ~np.isfinite(self.halo_positions[..., 0])
-        ends = np.zeros(self.shape, bool)
-        ends[:, 0] |= bare[:, 0, 1:-1]
-        ends[:, -1] |= bare[:, -1, 1:-1]
-        ends[:, :, 0] |= bare[:, 1:-1, 0]
-        ends[:, :, -1] |= bare[:, 1:-1, -1]
-        return ends
+        bare[:, [0, 0, -1, -1], [0, -1, 0, -1]] = False  # no texel lies beside a corner
+        return np.bincount(self.topology.halo[bare], minlength=self.topology.texel_count).reshape(self.shape) > 0
 
     def stencil(self, coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None) -> Stencil:
         """Stiffness weights of -div(coefficient grad): at a texel, the area integral of div(coefficient grad h).
@@ -220,20 +208,7 @@ class TexelGrid(NamedTuple):
     areas: Floats
 
 
-def _checked(positions: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    points = np.asarray(positions, dtype=np.float64)
-    if points.shape != shape:
-        raise AtlasError(f"texel positions have shape {points.shape}; this topology needs {shape}, in metres")
-    if not np.isfinite(points).all():
-        raise AtlasError(
-            f"{(~np.isfinite(points)).sum()} numbers of the texel positions are not finite; valid are metres"
-        )
-    return np.ascontiguousarray(points)
-
-
-def _with_halo(
-    topology: TexelTopology, positions: NDArray[np.float64], beyond: NDArray[np.float64] | None
-) -> NDArray[np.float64]:
+def _with_halo(topology: TexelTopology, positions: Floats, beyond: Floats | None) -> Floats:
     if beyond is not None:
         around = beyond.copy()
         around[:, 1:-1, 1:-1] = positions
@@ -243,7 +218,7 @@ def _with_halo(
     return around
 
 
-def tangents(around: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def tangents(around: Floats) -> tuple[Floats, Floats]:
     """Differences of positions with halo along rows and along columns, each [C, n, n, 3], one-sided at a bare rim."""
     own = around[:, 1:-1, 1:-1]
     beside = (around[:, 1:-1, 2:], around[:, 1:-1, :-2], around[:, 2:, 1:-1], around[:, :-2, 1:-1])
@@ -271,7 +246,7 @@ _SCARCE = 0.2  # of a part's area, at most, that its texels may lack together: t
 _MOST_TURNS, _HALVINGS = 50, 6
 
 
-def evened_areas(areas: NDArray[np.float64], stencil: Stencil) -> NDArray[np.float64]:
+def evened_areas(areas: Floats, stencil: Stencil) -> Floats:
     """Areas [C, n, n] with mass of their neighbours' moved to the few texels that would set the time step for all.
 
     To the areas is added K w, with the stiffness K of a uniform surface and the least w >= 0 for which no texel is
@@ -298,7 +273,7 @@ def evened_areas(areas: NDArray[np.float64], stencil: Stencil) -> NDArray[np.flo
     return best.reshape(areas.shape)
 
 
-def _least_potential(matrix: csr_array, lack: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _least_potential(matrix: csr_array, lack: Floats) -> Floats | None:
     """The least w >= 0 with K w >= lack, an obstacle problem; None if it is not found.
 
     Where it is not 0 is found by Newton's method (Hintermueller, Ito and Kunisch 2002).
@@ -315,12 +290,12 @@ def _least_potential(matrix: csr_array, lack: NDArray[np.float64]) -> NDArray[np
     return None
 
 
-def _even(areas: NDArray[np.float64]) -> float:
+def _even(areas: Floats) -> float:
     """Rate at which the time step is the least wanted share of an even grid's."""
     return float(EVEN_RATE / (2 * areas.mean() * _STEP**2))
 
 
-def softening(texels: TexelMesh) -> NDArray[np.float64]:
+def softening(texels: TexelMesh) -> Floats:
     """Factors that slow down those few texels that evened areas leave too fast for the others, [C, n, n].
 
     Where the texel mesh crosses a crease, single texels are needles, for which no mass of their neighbours would do.
@@ -339,7 +314,7 @@ def softening(texels: TexelMesh) -> NDArray[np.float64]:
     return np.minimum(1, max(bound, _FASTER * bulk) / rate)
 
 
-def _bulk(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
+def _bulk(rates: Floats, areas: Floats) -> float:
     """The rate that most of the surface has at most: tiny parts may have many texels."""
     order = np.argsort(rates)
     covered = np.cumsum(areas[order])
@@ -348,15 +323,19 @@ def _bulk(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
 
 def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
     """Longest and shortest texel edge, folded texels, coverage, spanned area and time step; see `Atlas.quality`."""
-    edges = link_lengths(texels.topology, texels.halo_positions)[:, [EAST, NORTH]]
+    edges = link_lengths(texels.topology, texels.halo_positions)[:, :2]  # not the diagonals
     edges = edges[np.isfinite(edges) & (edges > 0)]
+    # of waves of one speed, over that of an endless even grid of as many texels on the same area
+    stencil = texels.stencil(np.ones(texels.shape), softening(texels))
+    rate = largest_eigenvalue(stencil, texels.areas, np.ones(texels.shape, bool), stencil.fastest(texels.areas))
+    step = np.sqrt(EVEN_RATE * texels.topology.texel_count / mesh.area / rate) if rate > 0 else np.inf
     return {
         "edge_min": float(edges.min()),
         "edge_max": float(edges.max()),
         "folded": folded_texels(texels),
         "coverage": float(texels.areas.sum() / mesh.area),
         "spanned": float(texels.cells.areas.sum() / mesh.area),
-        "timestep": _timestep(texels, mesh.area),
+        "timestep": float(step),
     }
 
 
@@ -371,11 +350,3 @@ def folded_texels(texels: TexelMesh) -> int:
         facing = np.cross(beside[k] - own, beside[(k + 1) % 4] - own)
         folded |= np.einsum("...k,...k->...", facing, normals) < 0
     return int(folded.sum())
-
-
-def _timestep(texels: TexelMesh, area: float) -> float:
-    """Stable time step of waves of one speed, over that of an endless even grid of as many texels on the same area."""
-    stencil = texels.stencil(np.ones(texels.shape), softening(texels))
-    bound = float((2 * stencil.absolute_sums() / texels.areas).max())
-    rate = largest_eigenvalue(stencil, texels.areas, np.ones(texels.shape, bool), bound)
-    return float(np.sqrt(EVEN_RATE * texels.topology.texel_count / area / rate)) if rate > 0 else np.inf

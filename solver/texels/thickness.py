@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..cache import kept_with
 from ..errors import AtlasError, RippleWarning, Valid, checked, instance
+from ..kernel import Bools, Floats
 from ..mesh.mesh import Mesh
 from ..mesh.queries import RayScene
 from ..mesh.volume import Volume
@@ -53,9 +54,7 @@ def medial_radius(atlas: Atlas) -> NDArray[np.float32]:
     return (1 / smoothed(atlas.texels.topology, curvature)).astype(np.float32)
 
 
-def _shrunk(
-    tree: cKDTree, points: NDArray[np.float64], normals: NDArray[np.float64], size: float
-) -> NDArray[np.float64]:
+def _shrunk(tree: cKDTree, points: Floats, normals: Floats, size: float) -> Floats:
     """Radii of the balls on the side of the normals, [k]: each shrinks until no point lies in it."""
     radius = np.full(len(points), _MOST_RADIUS * size)
     active = np.arange(len(points))
@@ -89,24 +88,16 @@ def half_thickness(atlas: Atlas) -> NDArray[np.float64]:
     return 1 / smoothed(atlas.texels.topology, 1 / radius.reshape(atlas.areas.shape))
 
 
-def half_thickness_at(mesh: Mesh, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def half_thickness_at(mesh: Mesh, points: Floats, normals: Floats) -> Floats:
     """Half the way from points of the surface [m], [k, 3], to the other side [m], [k]; normals [k, 3] are outward."""
     V, F = mesh.V, mesh.F
     middle, size = V.mean(axis=0), float(np.ptp(V, axis=0).max())
-    scene = RayScene(((V - middle) / size)[F])
-    start = (points - middle) / size - _START * normals
-    distance = scene.distances(start, -normals)
+    distance = RayScene(((V - middle) / size)[F]).distances((points - middle) / size - _START * normals, -normals)
     return size * np.clip((distance.astype(np.float64) + _START) / 2, _LEAST, _MOST)
 
 
 # Over the longest extent: what lies so little above the surface is taken for touching it, and no layer is thinner.
 _LEAST_THICKNESS = 1e-4
-
-
-def _are_bodies(value: object) -> bool:
-    return isinstance(value, Mesh | Volume) or (
-        isinstance(value, Sequence) and all(isinstance(each, Mesh | Volume) for each in value)
-    )
 
 
 def _are_limits(value: Any) -> bool:
@@ -117,7 +108,10 @@ def _are_limits(value: Any) -> bool:
         return False
 
 
-_BODIES = Valid(_are_bodies, "a Mesh, a Volume, or several of them")
+_BODIES = Valid(
+    lambda value: all(isinstance(each, Mesh | Volume) for each in (value if isinstance(value, Sequence) else [value])),
+    "a Mesh, a Volume, or several of them",
+)
 _LIMITS = Valid(_are_limits, "a least and a greatest thickness [m], 0 or greater")
 
 
@@ -149,8 +143,9 @@ def thickness_map(
     MeshError
         For an invalid volume.
     """
-    bodies = [inside] if isinstance(inside, Mesh | Volume) else list(inside)
-    corners = np.concatenate([np.zeros((0, 3, 3)), *(_triangles(body) for body in bodies)])
+    bodies = [inside] if isinstance(inside, Mesh | Volume) else inside
+    surfaces = [body.surface() if isinstance(body, Volume) else (body.V, body.F) for body in bodies]
+    corners = np.concatenate([np.zeros((0, 3, 3)), *(V[F] for V, F in surfaces)])
     points, normals = atlas.positions.reshape(-1, 3), atlas.normals.reshape(-1, 3)
     size = float(np.ptp(points, axis=0).max())
     way, out = _cast(corners, points, -normals, size)
@@ -170,15 +165,7 @@ def thickness_map(
     return smoothed(atlas.texels.topology, way.reshape(atlas.areas.shape))
 
 
-def _triangles(body: Mesh | Volume) -> NDArray[np.float64]:
-    """Corners of a body's triangles [m], [m, 3, 3]."""
-    V, F = body.surface() if isinstance(body, Volume) else (body.V, body.F)
-    return V[F]
-
-
-def _cast(
-    corners: NDArray[np.float64], points: NDArray[np.float64], ways: NDArray[np.float64], size: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _cast(corners: Floats, points: Floats, ways: Floats, size: float) -> tuple[Floats, Bools]:
     """Distance from points along unit ways to triangles [m, 3, 3], infinite without; and where they begin inside.
 
     Embree finds the triangle in float32; the distance is that to its plane in float64.

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..errors import AtlasError
+from ..kernel import Bools, Floats, Floats32, Ints
 
 # A corner where so many charts meet is a triangle or a quad of the nine-point stencil.
 TRIANGLE, QUAD = 3, 4
@@ -110,34 +111,31 @@ class TexelTopology:
 _CORNERS = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
 
 
-def close_corners(
-    glued: NDArray[np.int64], n: int, halo: NDArray[np.int64], rim: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], list[NDArray[np.int64]]]:
+def close_corners(glued: Ints, n: int, halo: Ints, rim: Bools) -> tuple[Ints, Ints, list[Ints]]:
     """Fill in the halo's corners; return how many charts meet in each, its number, and the cells that are polygons."""
     valence, corners = np.zeros((len(glued), 4), np.int64), np.full((len(glued), 4), -1)
     polygons = []
-    for chart in range(len(glued)):
-        for corner in range(4):
-            fan, closed = _fan(glued, chart, corner)
-            texels = np.array([c * n * n + _CORNERS[k] @ (n, 1) * (n - 1) for c, k in fan])
-            place = (chart, *_CORNERS[corner] * (n + 1))
-            count = len(fan)
-            if corners[chart, corner] < 0:
-                corners[tuple(np.transpose(fan))] = corners.max() + 1
-            if closed:
-                valence[chart, corner] = count
-            if closed and count == QUAD:
-                halo[place] = texels[2]
-            elif not closed and count <= 2:
-                # along a straight rim: beyond it lies what the chart on the other side of the corner has beside it
-                halo[place] = texels[(fan.index((chart, corner)) + 1) % count]
-                rim[place] = True
-            elif count > (TRIANGLE if closed else 2) and (chart, corner) == min(fan):
-                polygons.append(texels)
+    for chart, corner in np.ndindex(valence.shape):
+        fan, closed = _fan(glued, chart, corner)
+        texels = np.array([c * n * n + _CORNERS[k] @ (n, 1) * (n - 1) for c, k in fan])
+        place = (chart, *_CORNERS[corner] * (n + 1))
+        count = len(fan)
+        if corners[chart, corner] < 0:
+            corners[tuple(np.transpose(fan))] = corners.max() + 1
+        if closed:
+            valence[chart, corner] = count
+        if closed and count == QUAD:
+            halo[place] = texels[2]
+        elif not closed and count <= 2:
+            # along a straight rim: beyond it lies what the chart on the other side of the corner has beside it
+            halo[place] = texels[(fan.index((chart, corner)) + 1) % count]
+            rim[place] = True
+        elif count > (TRIANGLE if closed else 2) and (chart, corner) == min(fan):
+            polygons.append(texels)
     return valence, corners, polygons
 
 
-def _fan(glued: NDArray[np.int64], chart: int, corner: int) -> tuple[list[tuple[int, int]], bool]:
+def _fan(glued: Ints, chart: int, corner: int) -> tuple[list[tuple[int, int]], bool]:
     """The corners (chart, corner) that meet in one, counter-clockwise, and whether they surround it.
 
     From the one itself where they do, else from rim to rim.
@@ -174,7 +172,17 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     AtlasError
         If the table is of another shape, or not mutual.
     """
-    glued = _checked(glued)
+    glued = np.asarray(glued, dtype=np.int64)
+    if glued.ndim != 3 or glued.shape[1:] != (4, 2) or not len(glued):
+        raise AtlasError(
+            f"the table of glued sides has shape {glued.shape}; valid is [C, 4, 2]: chart and side beyond each"
+        )
+    for chart, side in np.argwhere(glued[..., 0] >= 0).tolist():
+        other, back = glued[chart, side].tolist()
+        if not (other < len(glued) and 0 <= back < 4 and glued[other, back].tolist() == [chart, side]):
+            raise AtlasError(
+                f"side {side} of chart {chart} is glued to side {back} of chart {other}, which is not glued back to it"
+            )
     charts, size = len(glued), n * n
     halo = np.full((charts, n + 2, n + 2), -1)
     rim = np.zeros(halo.shape, dtype=bool)
@@ -194,23 +202,7 @@ def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
     return TexelTopology(glued, halo, rim, valence, corners, tuple(polygons))
 
 
-def _checked(glued: NDArray[np.int64]) -> NDArray[np.int64]:
-    table = np.asarray(glued, dtype=np.int64)
-    if table.ndim != 3 or table.shape[1:] != (4, 2) or not len(table):
-        raise AtlasError(
-            f"the table of glued sides has shape {table.shape}; valid is [C, 4, 2]: chart and side beyond each"
-        )
-    joined = np.argwhere(table[..., 0] >= 0)
-    for chart, side in joined.tolist():
-        other, back = table[chart, side].tolist()
-        if not (other < len(table) and 0 <= back < 4 and table[other, back].tolist() == [chart, side]):
-            raise AtlasError(
-                f"side {side} of chart {chart} is glued to side {back} of chart {other}, which is not glued back to it"
-            )
-    return table
-
-
-def _along_sides(along: NDArray[np.int64], width: int) -> NDArray[np.int64]:
+def _along_sides(along: Ints, width: int) -> Ints:
     """Flat places along each side of a square of so many rows and columns, [4, n]."""
     last = width - 1
     return np.stack([along, along * width + last, last * width + last - along, (last - along) * width])
@@ -233,46 +225,39 @@ def fill_halo(topology: TexelTopology, field: NDArray) -> None:
             field[missing, r, c] = mean[missing]
 
 
-def with_filled_halo(topology: TexelTopology, field: NDArray[np.float32]) -> NDArray[np.float32]:
+def with_filled_halo(topology: TexelTopology, field: Floats32) -> Floats32:
     """A field [C, n, n, ...] surrounded by its halo; see `fill_halo`."""
     around = topology.with_halo(field)
     fill_halo(topology, around)
     return around
 
 
-def sampling_matrix(
-    topology: TexelTopology, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
-) -> csr_array:
+def sampling_matrix(topology: TexelTopology, chart: Ints, row: Floats, column: Floats) -> csr_array:
     """Matrix that takes a flattened field [C n^2] to its values at chart points, each [k]; see `Atlas.locate`.
 
     In a corner where other than four charts meet the weight of the texel that is missing is shared out.
     """
     r, c = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
     s, t = row - r, column - c
-    texels, weights = [], []
-    for i, j, weight in ((0, 0, (1 - s) * (1 - t)), (0, 1, (1 - s) * t), (1, 0, s * (1 - t)), (1, 1, s * t)):
-        texel = topology.halo[chart, r + 1 + i, c + 1 + j]
-        texels.append(np.maximum(texel, 0))
-        weights.append(np.where(texel < 0, 0, weight))
-    share = np.array(weights)
+    i, j = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, :, None]
+    texel = topology.halo[chart, r + 1 + i, c + 1 + j]
+    share = np.where(texel < 0, 0, [(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t])
     share /= share.sum(axis=0)
-    rows = np.tile(np.arange(len(chart)), 4)
-    return csr_array((share.ravel(), (rows, np.concatenate(texels))), shape=(len(chart), topology.texel_count))
+    places = np.tile(np.arange(len(chart)), 4), np.maximum(texel, 0).ravel()
+    return csr_array((share.ravel(), places), shape=(len(chart), topology.texel_count))
 
 
 QUANTILES = {"q001": 0.001, "q01": 0.01, "q50": 0.5, "q99": 0.99, "q999": 0.999}
 STARVED = 4.0
 
 
-def stretch_summary(stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> dict[str, float]:
+def stretch_summary(stretch: Floats, areas: Floats) -> dict[str, float]:
     """Quantiles of the stretch over the real areas, both [m], and the starved share; see `Atlas.quality`."""
     order = np.argsort(stretch, kind="stable")
     share = np.cumsum(areas[order]) / areas.sum()
     at = np.minimum(np.searchsorted(share, list(QUANTILES.values())), len(order) - 1)
-    return {
-        **{name: float(value) for name, value in zip(QUANTILES, stretch[order][at], strict=True)},
-        "starved": float(areas[stretch > STARVED].sum() / areas.sum()),
-    }
+    starved = float(areas[stretch > STARVED].sum() / areas.sum())
+    return {**dict(zip(QUANTILES, stretch[order][at].tolist(), strict=True)), "starved": starved}
 
 
 @dataclasses.dataclass(frozen=True)
