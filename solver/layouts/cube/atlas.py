@@ -222,7 +222,14 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
     # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
     stride = math.gcd(resolution, STRIDE) if directions.size > 3 * len(mesh.F) else 1
     triangles, barycentrics = cast_rays(sphere, mesh, directions.reshape(-1, 3), stride)
-    positions, normals = _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics)
+    corners = mesh.F[triangles]
+    begins = np.arange(0, corners.size + 1, 3)
+    weights = csr_array((barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(mesh.V)))
+    normals = weights @ mesh.vertex_normals
+    lengths = np.linalg.norm(normals, axis=1)
+    cancelled = lengths <= 1e-9  # opposite normals: any corner's will do
+    normals[cancelled], lengths[cancelled] = mesh.vertex_normals[corners[cancelled, 0]], 1.0
+    normals /= lengths[:, None]
     shape = directions.shape[:3]
     triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)
     topology = cube_topology(resolution)
@@ -230,7 +237,7 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
         mesh=mesh,
         texels=TexelMesh.of(
             topology,
-            positions.reshape(*shape, 3),
+            (weights @ mesh.V).reshape(*shape, 3),
             normals=normals.reshape(*shape, 3),
             covered=covered_areas(mesh, sphere, resolution),
             detours=link_detours(mesh, topology, triangles, barycentrics),
@@ -239,21 +246,6 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
         triangles=triangles,
         barycentrics=barycentrics,
     )
-
-
-def _interpolate(
-    at_vertices: tuple[Floats, Floats], F: Ints, triangles: Ints, barycentrics: Floats
-) -> tuple[Floats, Floats]:
-    """Positions and unit normals, [n, 3] at the vertices, at barycentric coordinates in triangles, [k, 3]."""
-    (V, vertex_normals), corners = at_vertices, F[triangles]
-    begins = np.arange(0, corners.size + 1, 3)
-    weights = csr_array((barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(V)))
-    normals = weights @ vertex_normals
-    lengths = np.linalg.norm(normals, axis=1)
-    cancelled = lengths <= 1e-9  # opposite normals: any corner's will do
-    normals[cancelled], lengths[cancelled] = vertex_normals[corners[cancelled, 0]], 1.0
-    normals /= lengths[:, None]
-    return weights @ V, normals
 
 
 class SphereAtlas(Atlas):

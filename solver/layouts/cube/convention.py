@@ -24,6 +24,7 @@ from ...errors import AtlasError
 from ...files import require_memory
 from ...kernel import log
 from ...mesh.mesh import Mesh
+from ...mesh.vectors import cross, dot
 from ...texels.chart_map import Parts, texel_areas
 from ...texels.topology import TexelTopology, glue
 
@@ -62,12 +63,10 @@ def check_memory(resolution: int) -> None:
 
 def texel_directions(resolution: int) -> NDArray[np.float64]:
     """Unit vectors through the texel centres, shape [6, N, N, 3]."""
-    half_width = resolution
-    offset = 2 * np.arange(resolution) + 1 - half_width
+    offset = 2 * np.arange(resolution) + 1 - resolution
     # tan is evaluated once per distance from the chart's middle, so that mirrored texels are mirrored to the last bit
-    tangent = np.sign(offset) * np.tan(np.pi / 4 * np.abs(offset) / half_width)
-    a = tangent[None, None, :, None]
-    b = tangent[None, :, None, None]
+    tangent = np.sign(offset) * np.tan(np.pi / 4 * np.abs(offset) / resolution)
+    a, b = tangent[None, None, :, None], tangent[None, :, None, None]
     directions = CHART_NORMALS[:, None, None, :] + a * CHART_U[:, None, None, :] + b * CHART_V[:, None, None, :]
     # the sum of squares in one order for all charts, for the same reason
     return directions / np.sqrt(1.0 + np.minimum(a * a, b * b) + np.maximum(a * a, b * b))
@@ -116,7 +115,7 @@ def split_at_edges(corners: NDArray[np.float64]) -> Parts:
     chart = 2 * axis + (np.take_along_axis(middles, axis[:, None], axis=1)[:, 0] < 0)
     inside = (np.einsum("mki,msi->mks", corners, _SIDES[chart]) >= -_ROUND_OFF).all(axis=(1, 2))
     whole, crossing = np.flatnonzero(inside), np.flatnonzero(~inside)
-    owner, piece_chart, pieces = _cut(corners[crossing], _SIDES)
+    owner, piece_chart, pieces = _cut(corners[crossing])
     triangle = np.concatenate([whole, crossing[owner]])
     order = np.argsort(triangle, kind="stable")
     barycentrics = np.concatenate([np.tile(np.eye(3), (len(whole), 1, 1)), pieces])[order]
@@ -140,23 +139,20 @@ def chart_uv(directions: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArr
     return np.clip(0.5 + np.arctan(sides / depth[..., None]) * (2 / np.pi), 0.0, 1.0)
 
 
-def _cut(
-    corners: NDArray[np.float64], sides: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _cut(corners: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Cut triangles [k, 3, 3] into their parts in each chart: owner, chart, and barycentrics [pieces, 3, 3]."""
     owner, chart = np.divmod(np.arange(6 * len(corners)), 6)
     # a triangle that is cut by four planes has seven corners at most
     polygons, sizes = np.zeros((len(owner), _MOST, 3)), np.full(len(owner), 3)
     polygons[:, :3] = np.eye(3)
     for s in range(4):
-        polygons, sizes = _clip(polygons, sizes, corners[owner], sides[chart, s])
+        polygons, sizes = _clip(polygons, sizes, corners[owner], _SIDES[chart, s])
         left = sizes > 0
         owner, chart, polygons, sizes = owner[left], chart[left], polygons[left], sizes[left]
     fan, k = np.nonzero(np.arange(2, _MOST) < sizes[:, None])
     pieces = np.stack([polygons[fan, 0], polygons[fan, k + 1], polygons[fan, k + 2]], axis=1)
     a, b, c = pieces.transpose(1, 2, 0)
-    area = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-    real = area > _ROUND_OFF
+    real = dot(a, cross(b, c)) > _ROUND_OFF  # their areas
     return owner[fan[real]], chart[fan[real]], pieces[real]
 
 
@@ -187,6 +183,4 @@ def _distance(
     weights: NDArray[np.float64], corners: NDArray[np.float64], planes: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Distance [p] of points in triangles, by barycentrics [p, 3] and corners [p, 3, 3], from planes [p, 3]."""
-    x, y, z = planes.T
-    a, b, c = (corners[:, i, 0] * x + corners[:, i, 1] * y + corners[:, i, 2] * z for i in range(3))
-    return weights[:, 0] * a + weights[:, 1] * b + weights[:, 2] * c
+    return dot(weights.T, [dot(corners[:, i].T, planes.T) for i in range(3)])

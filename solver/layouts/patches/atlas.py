@@ -177,13 +177,7 @@ def _place_corners(patches: PatchMap, topology: TexelTopology, beyond: NDArray[n
 
 @kernel
 def _draw_rims(
-    seamless: SeamlessMap,
-    V: Floats,
-    sides: Ints,
-    corner: Ints,
-    homes: Ints,
-    places: Complex,
-    beyond: Floats,
+    seamless: SeamlessMap, V: Floats, sides: Ints, corner: Ints, homes: Ints, places: Complex, beyond: Floats
 ) -> None:
     """Put the points of sides at a rim beyond the texels opposite to them; see `places_seen_from`."""
     n = beyond.shape[1] - 2

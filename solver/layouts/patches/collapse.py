@@ -135,12 +135,7 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
     F = F.reshape(-1, 3)
     start, star = stars(F, len(used))
     seamless = seamless._replace(
-        F=F,
-        chart=seamless.chart[used],
-        z=seamless.z[used],
-        freedom=seamless.freedom[used],
-        star_start=start,
-        star=star,
+        F=F, chart=seamless.chart[used], z=seamless.z[used], freedom=seamless.freedom[used], star_start=start, star=star
     )
     return TriangleSurface(surface.V[used], F, parents[0], parents[1]), seamless
 

@@ -103,14 +103,7 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
 
 
 @kernel
-def _moved(
-    seamless: SeamlessMap,
-    reference: Reference,
-    vertices: Ints,
-    triangles: Ints,
-    fan: Ints,
-    star: Star,
-) -> bool:
+def _moved(seamless: SeamlessMap, reference: Reference, vertices: Ints, triangles: Ints, fan: Ints, star: Star) -> bool:
     """Try to move a tip; whether it stays there."""
     before = energy_of(seamless, reference, triangles)
     z, chart, freedom = seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices]
