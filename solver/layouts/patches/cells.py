@@ -78,14 +78,18 @@ def distance_graph(surface: TriangleSurface) -> csr_array:
     crossing = xp + (xq - xp) * yp / np.maximum(yp + yq, np.finfo(np.float64).tiny)
     straight = (crossing > 0) & (crossing < length) & (p != q)
     ends = np.concatenate([edges.ends, np.stack([p, q], axis=1)[straight]])
-    weights = np.concatenate([surface.edge_lengths, np.hypot(xp - xq, yp + yq)[straight]])
-    weights = np.maximum(weights, _LEAST * weights.max())
+    lengths = np.concatenate([surface.edge_lengths, np.hypot(xp - xq, yp + yq)[straight]])
+    return _linked(ends, np.maximum(lengths, _LEAST * lengths.max()), len(V))
+
+
+def _linked(ends: NDArray[np.int64], lengths: NDArray[np.float64], count: int) -> csr_array:
+    """Graph of `count` nodes with the shortest of the links between each two, whose ends are [k, 2]."""
     low, high = ends.min(axis=1), ends.max(axis=1)
-    order = np.lexsort((weights, low * len(V) + high))
-    key = (low * len(V) + high)[order]
-    kept = order[np.concatenate([[True], key[1:] != key[:-1]])]
+    key = low * count + high
+    order = np.lexsort((lengths, key))
+    kept = order[np.diff(key[order], prepend=-1) != 0]
     pairs = np.concatenate([low[kept], high[kept]]), np.concatenate([high[kept], low[kept]])
-    return csr_array(coo_array((np.tile(weights[kept], 2), pairs), shape=(len(V), len(V))))
+    return csr_array(coo_array((np.tile(lengths[kept], 2), pairs), shape=(count, count)))
 
 
 def _along_and_across(
@@ -222,29 +226,19 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     # each triangle has a vertex of the surface before, and all of those are of its cell
     of_vertex = np.concatenate([cells.label, np.full(len(cut.V) - len(cells.label), -1)])
     cell = of_vertex[cut.F].max(axis=1)
-    corner, rim_side = _corners(cut, cell), _rim_sides(cut)
-    arcs = []
-    for loop in _border_loops(cut, cell, len(cells.seeds)):
-        on_rim = rim_side[loop] == np.roll(loop, -1)
-        arcs.append(_arcs(cut.V, loop, corner[loop], on_rim))
+    count = len(cells.seeds)
+    meeting = np.bincount(np.unique(cut.F * count + cell[:, None]) // count, minlength=len(cut.V))
+    angle = np.bincount(cut.F.ravel(), cut.angles.ravel(), len(cut.V))
+    corner = np.where(cut.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
+    # the vertex that follows each along the rim, counter-clockwise about the surface
+    following = np.full(len(cut.V), -1)
+    triangle, side = np.divmod(cut.edges.sides[cut.edges.rim, 0], 3)
+    following[cut.F[triangle, side]] = cut.F[triangle, (side + 1) % 3]
+    arcs = [
+        _arcs(cut.V, loop, corner[loop], following[loop] == np.roll(loop, -1))
+        for loop in _border_loops(cut, cell, count)
+    ]
     return BorderedCells(cut, cell, arcs, len(surface.V))
-
-
-def _corners(surface: TriangleSurface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Vertices in which three cells meet, two at a rim, or one at a sharp corner of the rim."""
-    count = int(cell.max()) + 1
-    pairs = np.unique(surface.F * count + cell[:, None])
-    meeting = np.bincount(pairs // count, minlength=len(surface.V))
-    angle = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
-    return np.where(surface.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
-
-
-def _rim_sides(surface: TriangleSurface) -> NDArray[np.int64]:
-    """The vertex that follows each along the rim, counter-clockwise about the surface; -1 elsewhere."""
-    following = np.full(len(surface.V), -1)
-    triangle, side = np.divmod(surface.edges.sides[surface.edges.rim, 0], 3)
-    following[surface.F[triangle, side]] = surface.F[triangle, (side + 1) % 3]
-    return following
 
 
 def _border_loops(surface: TriangleSurface, cell: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
@@ -307,7 +301,11 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> ND
     count = min(_SAMPLES, len(total))
     seeds = np.unique(np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1]))
     cells = voronoi_cells(metric, np.minimum(seeds, len(total) - 1))
-    distance = dijkstra(_coarse_graph(metric.surface, cells), directed=False)
+    # from seed to seed, by the shortest way along an edge between neighbouring cells
+    ends = metric.surface.edges.ends
+    apart = cells.label[ends[:, 0]] != cells.label[ends[:, 1]]
+    length = cells.distance[ends[apart]].sum(axis=1) + metric.surface.edge_lengths[apart]
+    distance = dijkstra(_linked(cells.label[ends[apart]], length, len(seeds)))
     order = np.argsort(distance, axis=1, kind="stable")
     radius = np.take_along_axis(distance, order, axis=1)
     area = np.cumsum(np.bincount(cells.label, metric.masses, len(seeds))[order], axis=1)
@@ -316,15 +314,3 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> ND
     wrapped = np.where(full.all(axis=1), np.inf, radius[np.arange(len(seeds)), full.argmin(axis=1)])
     size = np.clip(reach * wrapped, *between)
     return (size + _GROWTH * distance).min(axis=1)[cells.label]
-
-
-def _coarse_graph(surface: TriangleSurface, cells: VoronoiCells) -> csr_array:
-    """Cells linked to their neighbours, by the shortest way from seed to seed along an edge between them [m]."""
-    count, ends = len(cells.seeds), surface.edges.ends
-    between = cells.label[ends[:, 0]] != cells.label[ends[:, 1]]
-    pairs = np.sort(cells.label[ends[between]], axis=1)
-    length = cells.distance[ends[between]].sum(axis=1) + surface.edge_lengths[between]
-    order = np.lexsort((length, pairs[:, 1], pairs[:, 0]))
-    key = (pairs @ [count, 1])[order]
-    kept = order[np.concatenate([[True], key[1:] != key[:-1]])]
-    return csr_array(coo_array((length[kept], tuple(pairs[kept].T)), shape=(count, count)))

@@ -8,6 +8,8 @@ that corner.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,7 @@ from ...errors import AtlasError
 from ...mesh.topology import labels
 from .cells import BorderedCells
 from .disks import Border, along, flattened
-from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved, halved_chords
+from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved_chords
 
 Path = NDArray[np.int64]
 Halves = list[tuple[Path, Path]]  # of each arc of a part's border
@@ -28,15 +30,13 @@ def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int6
     size = len(surface.V)
     low_high = surface.edges.ends @ [size, 1]
     chosen = np.isin(low_high, np.sort(single, axis=1) @ [size, 1])
-    finer, middles, origin, _ = halved(surface, chosen)
+    finer, middles, origin, _ = surface.subdivided(np.where(chosen, 0.5, np.nan))
     middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), middles[chosen].tolist(), strict=True))
     arcs = [
         [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each] for each in cells.arcs
     ]
-    on_border = np.zeros(len(finer.V), bool)
-    on_border[np.concatenate([arc for each in arcs for arc in each])] = True
     cell = cells.cell[origin]
-    split, origin = halved_chords(finer, cell, on_border)
+    split, origin = halved_chords(finer, cell, on_paths(finer, arcs))
     halves = [[halves_of(split.V, arc) for arc in each] for each in arcs]
     return split, cell[origin], halves
 
@@ -56,8 +56,7 @@ def cut_polygons(
 
     Parts beyond those that have a border are left alone.
     """
-    on_border = np.zeros(len(surface.V), bool)
-    on_border[np.concatenate([half for each in halves for arc in each for half in arc])] = True
+    on_border = on_paths(surface, [arc for each in halves for arc in each])
     chosen = part < len(halves)
     places = np.full((len(part), 3, 2), np.nan)
     some = TriangleSurface(surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen])
@@ -112,7 +111,7 @@ def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
     return sides
 
 
-def charts_of(surface: TriangleSurface, sides: list[Sides]) -> tuple[TriangleSurface, NDArray[np.int64]]:
+def charts_of(surface: TriangleSurface, sides: list[Sides]) -> NDArray[np.int64]:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
     size = len(surface.V)
     walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
@@ -130,7 +129,7 @@ def charts_of(surface: TriangleSurface, sides: list[Sides]) -> tuple[TriangleSur
     owner = triangle[order[np.searchsorted(key[order], wanted)]]
     chart = np.full(number, -1)
     chart[part[owner]] = np.arange(len(sides))
-    return surface, chart[part]
+    return chart[part]
 
 
 def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
@@ -142,8 +141,8 @@ def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
     return side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None]
 
 
-def on_paths(surface: TriangleSurface, sides: list[Sides]) -> NDArray[np.bool_]:
-    """Vertices that lie on a side of a chart, [n]."""
+def on_paths(surface: TriangleSurface, sides: Sequence[Sequence[Path]]) -> NDArray[np.bool_]:
+    """Vertices that lie on a path, such as a side of a chart, [n]."""
     on_path = np.zeros(len(surface.V), bool)
     on_path[np.concatenate([path for each in sides for path in each])] = True
     return on_path
@@ -203,10 +202,8 @@ def with_even_corners(
                 for (first, second), both in zip(whole, shared, strict=True)
             ]
         )
-    on_border = on_paths(surface, sides)
-    split, origin = halved_chords(surface, part[chart], on_border)
+    split, origin = halved_chords(surface, part[chart], on_paths(surface, sides))
     old = chart[origin]
     flat, paths = cut_polygons(split, part[old], halves)
     new_sides = [*chart_sides(halves, paths), *(sides[each] for each in rest)]
-    surface, chart = charts_of(flat.surface, new_sides)
-    return surface, chart, new_sides
+    return flat.surface, charts_of(flat.surface, new_sides), new_sides

@@ -60,23 +60,18 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: NDArray[np.int64], t
     """Give cells with too few corners a neighbour each, or take away their seeds where that was `tried` before."""
     new: list[int] = []
     gone: list[int] = []
+    ends = metric.surface.edges.ends
     for cell in few.tolist():
         seed = int(cells.seeds[cell])
         if seed not in tried or len(cells.seeds) - len(gone) <= _FEWEST:
             tried.add(seed)
-            farthest = np.where(_beside(metric.surface, cells, cell), cells.distance, -1.0)
-            new.append(int(np.argmax(farthest)))
+            # farthest of the vertices of other cells that have a neighbour in this one
+            own, beside = cells.label == cell, np.zeros(len(cells.label), bool)
+            beside[ends[own[ends].any(axis=1)]] = True
+            new.append(int(np.argmax(np.where(beside & ~own, cells.distance, -1.0))))
         else:
             gone.append(cell)
     return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
-
-
-def _beside(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> NDArray[np.bool_]:
-    """Vertices of other cells that have a neighbour in this one, [n]."""
-    ends = surface.edges.ends[(cells.label[surface.edges.ends] == cell).any(axis=1)]
-    beside = np.zeros(len(surface.V), bool)
-    beside[ends] = True
-    return beside & (cells.label != cell)
 
 
 def _euler(surface: TriangleSurface, cells: VoronoiCells) -> NDArray[np.int64]:
@@ -103,13 +98,11 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     distance, before = dijkstra(graph, directed=False, indices=cells.seeds[cell], return_predecessors=True)
     tree = (before[ends[:, 0]] == ends[:, 1]) | (before[ends[:, 1]] == ends[:, 0])
     loop = distance[ends].sum(axis=1) + lengths
-    number = np.full(len(surface.F) + 1, 0)  # 0: outside
-    inner = np.flatnonzero(own[surface.F].all(axis=1))
-    number[inner] = 1 + np.arange(len(inner))
-    sides = edges.sides[links]
-    beside = np.where(sides < 0, 0, number[sides // 3])
+    inner = own[surface.F].all(axis=1)
+    number = np.append(np.where(inner, np.cumsum(inner), 0), 0)  # 0: outside
+    beside = number[edges.sides[links] // 3]  # -1 at a rim: the last
     order = np.argsort(-loop, kind="stable")
-    closing = order[_closing(beside[order], tree[order], len(inner) + 1)]
+    closing = order[_closing(beside[order], tree[order], int(inner.sum()) + 1)]
     if not len(closing):
         return int(np.argmax(np.where(own, cells.distance, -1.0)))
     best = ends[closing[-1]]
@@ -134,7 +127,6 @@ def _closing(beside: NDArray[np.int64], tree: NDArray[np.bool_], triangles: int)
 
 # half-angle tangents; beyond them triangles are so bad that round-off would fold them
 _LEAST, _MOST = 1e-3, 1e3
-
 
 # of the vertices on the borders of parts: part and vertex, each [b], and place [b, 2]
 Border = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]

@@ -144,7 +144,10 @@ def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: in
             z, left = p, q
         elif seamless.F[f, (k + 2) % 3] == v:
             z, right = q, p
-    inward = _inward(left - z, right - z)
+    # between the directions to left and right, as long as the shorter: the sum of both sides' normals, inwards
+    a, b = left - z, right - z
+    inward = 1j * (a / abs(a) - b / abs(b))
+    inward = inward * (min(abs(a), abs(b)) / abs(inward)) if abs(inward) > 1e-9 else a
     least, best = np.inf, z
     for way in range(2):
         goal, share, trials = (middle, 0.65, 16) if way == 0 else (z + inward, 0.4, 40)
@@ -160,17 +163,6 @@ def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: in
         if least < np.inf:
             break
     seamless.z[u] = best
-
-
-@kernel
-def _inward(a: complex, b: complex) -> complex:
-    """Direction between those to two neighbours, as long as the shorter."""
-    shorter = min(abs(a), abs(b))
-    # the normals of the two sides, inwards
-    inward = 1j * (a / abs(a) - b / abs(b))
-    if not abs(inward) > 1e-9:
-        return a
-    return inward * (shorter / abs(inward))
 
 
 @kernel
@@ -325,15 +317,13 @@ def _joined(parts: list[Quads]) -> Quads:
         np.concatenate([each.surface.parent for each in parts]),
         np.concatenate([each.surface.inside for each in parts]),
     )
-    glued = []
-    for each, first in zip(parts, charts, strict=False):
-        table = each.glued.copy()
-        table[..., 0] += np.where(table[..., 0] >= 0, first, 0)
-        glued.append(table)
+    first_chart = np.repeat(charts[:-1], np.diff(charts))  # of the part of each
+    glued = np.concatenate([each.glued for each in parts])
+    glued[..., 0] += np.where(glued[..., 0] >= 0, first_chart[:, None], 0)
     return Quads(
         surface,
         np.concatenate([each.chart + first for each, first in zip(parts, charts, strict=False)]),
         np.concatenate([each.places for each in parts]),
-        np.concatenate(glued),
+        glued,
         np.concatenate([each.cut for each in parts]),
     )

@@ -240,26 +240,28 @@ def joined(
     if not at_rim[rest].any(axis=1).all():
         return None
     triangles, middles, shape, first = _joints(surface.V, sides, glued, fans)
-    wanted = 4 - _curvature(surface, cell[chart]) + np.bincount(cell, at_rim.all(axis=1))
+    # curvature of each cell, and of the rim in it, in right angles
+    total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
+    missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
+    share = (missing / total)[surface.F] * surface.angles
+    curvature = np.bincount(cell[chart], share.sum(axis=1)) / (np.pi / 2)
+    wanted = 4 - curvature + np.bincount(cell, at_rim.all(axis=1))
     chosen = chosen_joints(triangles, cell[middles], shape, len(fans), np.bincount(cell), wanted)
     if chosen is None:
         return None
     alone = triangles[chosen, 1] < 0
-    new = [_quad(sides, glued, a) for a in first[chosen[~alone]]]
-    new += [_lone_triangle(sides, glued, a) for a in first[chosen[alone]]]
+    new: list[Sides] = []
+    for a in first[chosen[~alone]]:  # two triangles, joined over the side a
+        b, beyond = glued[a, 1, 0], glued[a, 0, 0]
+        p, q, r, s = (_whole(sides, glued, each) for each in (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0]))
+        new.append((p, q, r, s))
+    for a in first[chosen[alone]]:  # a fourth corner in the middle of side a; the charts at the rim beyond stay apart
+        b = glued[a, 1, 0]
+        new.append((sides[a][0], sides[b][3], _whole(sides, glued, b), _whole(sides, glued, glued[b, 1, 0])))
     new += _at_rim(sides, glued, rest, glued[first[chosen[alone]], 0, 0])
     if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any():
         return None
-    surface, chart = charts_of(surface, new)
-    return surface, chart, new
-
-
-def _curvature(surface: TriangleSurface, cell: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Curvature of each cell, and of the rim in it, in right angles."""
-    total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
-    missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
-    share = (missing / total)[surface.F] * surface.angles
-    return np.bincount(cell, share.sum(axis=1)) / (np.pi / 2)
+    return surface, charts_of(surface, new), new
 
 
 def _joints(
@@ -267,8 +269,7 @@ def _joints(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Joints as `chosen_joints` takes them, with charts for their cells, and what they are called."""
     fan = np.full(len(sides), -1)
-    for number, each in enumerate(fans):
-        fan[each] = number
+    fan[np.array(fans, np.int64).reshape(-1, 3)] = np.arange(len(fans))[:, None]
     found = []
     for a in np.flatnonzero(fan >= 0).tolist():
         b, beyond = int(glued[a, 1, 0]), int(glued[a, 0, 0])
@@ -285,20 +286,6 @@ def _joints(
 def _whole(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Path:
     """The side of a triangle, from middle to middle."""
     return np.concatenate([sides[a][0], sides[glued[a, 1, 0]][3][1:]])
-
-
-def _quad(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Sides:
-    """Two triangles, joined over the side a."""
-    b, beyond = glued[a, 1, 0], glued[a, 0, 0]
-    around = (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0])
-    p, q, r, s = (_whole(sides, glued, each) for each in around)
-    return p, q, r, s
-
-
-def _lone_triangle(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Sides:
-    """A triangle with a fourth corner in the middle of its side a; the charts at the rim beyond stay apart."""
-    b = glued[a, 1, 0]
-    return sides[a][0], sides[b][3], _whole(sides, glued, b), _whole(sides, glued, glued[b, 1, 0])
 
 
 def _at_rim(sides: list[Sides], glued: NDArray[np.int64], rest: list[int], apart: NDArray[np.int64]) -> list[Sides]:
@@ -364,7 +351,7 @@ def _cut(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list
     surface, cell, halves = with_middles(cells)
     flat, paths = cut_polygons(surface, cell, halves)
     sides = chart_sides(halves, paths)
-    return *charts_of(flat.surface, sides), sides
+    return flat.surface, charts_of(flat.surface, sides), sides
 
 
 def _laid_out(cells: BorderedCells, surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]) -> Quads:

@@ -90,10 +90,12 @@ def seamless_map(quads: Quads) -> SeamlessMap:
     """The map that the quads begin with."""
     surface = quads.surface
     F, count = surface.F, len(surface.V)
-    twin = np.full(3 * len(F), -1)
-    sides = surface.edges.sides
-    joined = sides[:, 1] >= 0
-    twin[sides[joined, 0]], twin[sides[joined, 1]] = sides[joined, 1], sides[joined, 0]
+    twin, joined = np.full(3 * len(F), -1), surface.edges.sides[~surface.edges.rim]
+    twin[joined] = joined[:, ::-1]
+    # across glued sides: side s of one chart runs against side t of the other
+    here, there, corners = np.arange(4), quads.glued[..., 1], CORNERS @ (1, 1j)
+    side_turn = (there + 2 - here) % 4
+    side_shift = corners[(there + 1) % 4] - _TURNS[side_turn] * corners[here]
     star_start, star = stars(F, count)
     seamless = SeamlessMap(
         F,
@@ -104,7 +106,8 @@ def seamless_map(quads: Quads) -> SeamlessMap:
         np.zeros((len(F), 3), np.int64),
         np.zeros((len(F), 3), np.complex128),
         quads.glued,
-        *_transitions(quads.glued),
+        side_turn,
+        side_shift,
         star_start,
         star,
     )
@@ -115,13 +118,6 @@ def seamless_map(quads: Quads) -> SeamlessMap:
 def stars(F: Ints, count: int) -> tuple[Ints, Ints]:
     """Corners 3 triangle + k of the triangles F [m, 3] by vertex: where those of each begin [n + 1], and all [3 m]."""
     return counting_sort(F.ravel(), np.arange(F.size), count)
-
-
-def _transitions(glued: Ints) -> tuple[Ints, Complex]:
-    """Frame changes across glued sides, a turn and a shift; side s of one chart runs against side t of the other."""
-    here, there, corners = np.arange(4), glued[..., 1], CORNERS @ (1, 1j)
-    turn = (there + 2 - here) % 4
-    return turn, corners[(there + 1) % 4] - _TURNS[turn] * corners[here]
 
 
 @kernel
@@ -172,17 +168,13 @@ def _side_of(a: complex, b: complex, glued: Ints, other: int) -> int:
 def _connect(seamless: SeamlessMap, twin: Ints, places: Complex) -> None:
     """Go round each vertex and fill in its place, its freedom, and the frames of its corners."""
     for v in range(len(seamless.z)):
-        first = seamless.star[seamless.star_start[v]]
-        h, at_rim = first, False
-        while True:  # clockwise to the rim, if there is one
-            if twin[h] < 0:
-                at_rim = True
-                break
+        first = h = seamless.star[seamless.star_start[v]]
+        while twin[h] >= 0:  # clockwise to the rim, if there is one
             t = twin[h]
             h = t + 1 if t % 3 < 2 else t - 2
             if h == first:
                 break
-        _go_round(seamless, twin, places, v, h, at_rim)
+        _go_round(seamless, twin, places, v, h, twin[h] < 0)
 
 
 @kernel

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +19,6 @@ from ...mesh.topology import SPLITS, Edges, corner_angles, edges_of, triangle_ar
 A, B, C, AB, BC, CA, MIDDLE = range(7)
 
 Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
-
-# in the order in which the triangles are put
-_SPLITS: Patterns = {number: SPLITS[number] for number in (1, 2, 4, 3, 6, 5, 7)}
-
-# see `TriangleSurface.subdivided`
-Cut: TypeAlias = "tuple[TriangleSurface, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -81,7 +74,9 @@ class TriangleSurface:
         at_rim[self.edges.ends[self.edges.rim]] = True
         return at_rim
 
-    def subdivided(self, places: NDArray[np.float64], patterns: Patterns = _SPLITS) -> Cut:
+    def subdivided(
+        self, places: NDArray[np.float64], patterns: Patterns = SPLITS
+    ) -> tuple[TriangleSurface, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         """Cut edges, and the triangles beside them.
 
         Parameters
@@ -90,7 +85,7 @@ class TriangleSurface:
             Where each edge is cut, between 0 at its first end and 1; NaN where it is not.
         patterns : dict, optional
             For each set of cut sides of a triangle (1 for ab, 2 for bc, 4 for ca, added up) the triangles to put in
-            its place, by the seven points named in this module.
+            its place, by the seven points named in this module; they are put in the order of these sets.
 
         Returns
         -------
@@ -202,16 +197,14 @@ def cut_ray(
     crossed = (p * q < 0) & (sides[:, 1] >= 0)
     crossed &= flat.part[triangle] == flat.part[np.where(crossed, sides[:, 1], sides[:, 0]) // 3]
     t = np.where(crossed, p / np.where(crossed, p - q, 1.0), np.nan)
-    crossed &= (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3] > 0
+    distance = (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3]
+    crossed &= distance > 0
     forward = surface.edges.ends[:, 0] == surface.F[triangle, k]
     finer, middles, source, weights = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan))
-    touched = np.flatnonzero(on_ray.any(axis=1))
-    inner = np.stack([flat.part[touched].repeat(3), surface.F[touched].ravel(), reach[touched].ravel()])[
-        :, on_ray[touched].ravel()
-    ]
-    cut = np.flatnonzero(crossed)
-    distance = ((1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3])[cut]
-    points = np.concatenate([inner, np.stack([flat.part[triangle[cut]], middles[cut], distance])], axis=1)
+    touched, corner = np.nonzero(on_ray)
+    at_vertices = np.stack([flat.part[touched], surface.F[touched, corner], reach[touched, corner]])
+    on_edges = np.stack([flat.part[triangle[crossed]], middles[crossed], distance[crossed]])
+    points = np.concatenate([at_vertices, on_edges], axis=1)
     return Flat(finer, flat.part[source], weights @ flat.places[source]), _paths(points, len(start))
 
 
@@ -227,18 +220,12 @@ def _paths(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
     """Vertices of each part in order, from rows part, vertex, and distance along the line."""
     order = np.lexsort((points[2], points[0]))
     part, vertex = points[:2, order].astype(np.int64)
-    first = np.concatenate([[True], (np.diff(part) != 0) | (np.diff(vertex) != 0)]) if len(part) else np.zeros(0, bool)
-    part, vertex = part[first], vertex[first]
-    return np.split(vertex, np.searchsorted(part, np.arange(1, parts)))
+    first = (np.diff(part, prepend=-1) != 0) | (np.diff(vertex, prepend=-1) != 0)
+    return np.split(vertex[first], np.searchsorted(part[first], np.arange(1, parts)))
 
 
 _MOST_ROUNDS = 100
 _MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
-
-
-def halved(surface: TriangleSurface, chosen: NDArray[np.bool_]) -> Cut:
-    """Split chosen edges [e] in their middle; see `TriangleSurface.subdivided`."""
-    return surface.subdivided(np.where(chosen, 0.5, np.nan))
 
 
 def halved_chords(
@@ -250,7 +237,8 @@ def halved_chords(
     """
     sides = surface.edges.sides
     inner = (sides >= 0).all(axis=1) & (part[sides[:, 0] // 3] == part[sides[:, 1] // 3])
-    finer, _, origin, _ = halved(surface, inner & on_border[surface.edges.ends].all(axis=1))
+    chords = inner & on_border[surface.edges.ends].all(axis=1)
+    finer, _, origin, _ = surface.subdivided(np.where(chords, 0.5, np.nan))
     return finer, origin
 
 
@@ -268,5 +256,5 @@ def refined(surface: TriangleSurface, longest: float) -> TriangleSurface:
         chosen &= lengths > longest
         if not chosen.any() or len(surface.F) > most:
             break
-        surface = halved(surface, chosen)[0]
+        surface = surface.subdivided(np.where(chosen, 0.5, np.nan))[0]
     return surface
