@@ -143,16 +143,9 @@ def add_triangle(
 
 @kernel
 def _add_vertex(
-    v: int,
-    grad_d: Vector,
-    grad_j: Vector,
-    half: float,
-    x: Vector,
-    y: Vector,
-    bend: float,
-    shares: Shares,
+    v: int, grad_d: Vector, grad_j: Vector, half: float, x: Vector, y: Vector, bend: float, shares: Shares,
     system: System,
-) -> Corner:
+) -> Corner:  # fmt: skip
     """Add what a triangle says about its vertex v, given the gradients of D and of J / `half` there."""
     dx, dy, jx, jy = dot(grad_d, x), dot(grad_d, y), half * dot(grad_j, x), half * dot(grad_j, y)
     dd, dj, jj = shares[4], shares[5], shares[6]

@@ -142,12 +142,12 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
         return None
     beyond = topology.with_halo(positions)
     beyond[(topology.halo < 0) | topology.rim] = np.nan
-    sides = patches.surface.edges.sides[patches.surface.edges.rim, 0]
-    seamless = patches.seamless
+    seamless, surface = patches.seamless, patches.surface
+    sides = surface.edges.sides[surface.edges.rim, 0]
     f, k = np.divmod(sides, 3)
     corner = np.where(seamless.freedom[seamless.F[f, k]] != FIXED, k, (k + 1) % 3)
     homes, places = places_seen_from(seamless, f, corner)
-    _draw_rims(seamless, patches.surface.V, sides, corner, homes, places, beyond)
+    _draw_rims(seamless, surface.V, sides, corner, homes, places, beyond)
     n = topology.shape[1]
     for chart, corner in np.argwhere(topology.valence == 0):
         row, column = ((0, 0), (0, n + 1), (n + 1, n + 1), (n + 1, 0))[corner]
@@ -158,21 +158,13 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
             out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
             along_rows = topology.rim[other, out_r, c + 1]
             beyond[chart, row, column] = beyond[other, out_r, c + 1] if along_rows else beyond[other, r + 1, out_c]
-    _place_corners(patches, topology, beyond)
+    # points in which a single chart ends at a rim lie in the corner of its halo
+    f, k = np.nonzero((surface.at_rim & (seamless.freedom == FIXED))[surface.F])
+    place = seamless.shift[f, k] * (n + 1)
+    at = seamless.frame[f], place.imag.astype(np.int64), place.real.astype(np.int64)
+    alone = topology.rim[at]
+    beyond[tuple(each[alone] for each in at)] = surface.V[surface.F[f, k]][alone]
     return beyond
-
-
-def _place_corners(patches: PatchMap, topology: TexelTopology, beyond: NDArray[np.float64]) -> None:
-    """Put the points in which a single chart ends at a rim into the corners of its halo."""
-    seamless, surface = patches.seamless, patches.surface
-    held = np.zeros(len(surface.V), bool)
-    held[surface.edges.ends[surface.edges.rim]] = True
-    held &= seamless.freedom == FIXED
-    triangle, k = np.nonzero(held[surface.F])
-    place = seamless.shift[triangle, k] * (beyond.shape[1] - 1)
-    chart, row, column = seamless.frame[triangle], place.imag.astype(np.int64), place.real.astype(np.int64)
-    alone = topology.rim[chart, row, column]
-    beyond[chart[alone], row[alone], column[alone]] = surface.V[surface.F[triangle, k]][alone]
 
 
 @kernel
@@ -244,7 +236,6 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
         pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
     lines, corners = np.linspace(0.0, 1.0, n + 1), np.pad(pieces.places, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
     parts = pieces.triangle, pieces.barycentrics, pieces.chart
-    covered = texel_areas(mesh, parts, corners, lines, len(glued))
     return Atlas(
         mesh=mesh,
         texels=TexelMesh.of(
@@ -252,7 +243,7 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
             samples.positions,
             normals=samples.normals,
             beyond=beyond,
-            covered=covered,
+            covered=texel_areas(mesh, parts, corners, lines, len(glued)),
             detours=link_detours(mesh, topology, samples.triangles, samples.barycentrics),
         ),
         chart_map=PatchChartMap(pieces),

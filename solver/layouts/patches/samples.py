@@ -21,6 +21,7 @@ from .layout import PatchMap
 from .seamless import Complex, SeamlessMap, follow, places_on_charts, wedge
 
 _MARGIN = 0.1  # sine of a corner that is wide enough
+_BESIDE = ((0, 1), (1, 0), (0, -1), (-1, 0))  # row and column of a texel's neighbours, counter-clockwise
 
 
 class Texels(NamedTuple):
@@ -48,8 +49,7 @@ def _fault(texels: Texels, flat: int) -> float:
     chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
     o, normal = texels.positions[flat], texels.normals[flat]
     fault = 0.0
-    for k in range(4):
-        i, j = (0, 1) if k == 0 else ((1, 0) if k == 1 else ((0, -1) if k == 2 else (-1, 0)))
+    for i, j in _BESIDE:
         p, q = _place(texels, chart, row + i, column + j), _place(texels, chart, row + j, column - i)
         ax, ay, az, bx, by, bz = p[0] - o[0], p[1] - o[1], p[2] - o[2], q[0] - o[0], q[1] - o[1], q[2] - o[2]
         facing = (ay * bz - az * by) * normal[0] + (az * bx - ax * bz) * normal[1] + (ax * by - ay * bx) * normal[2]
@@ -66,8 +66,7 @@ def faults(texels: Texels, flat: int) -> float:
     n = texels.halo.shape[1] - 2
     chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
     total = _fault(texels, flat)
-    for k in range(4):
-        i, j = (0, 1) if k == 0 else ((1, 0) if k == 1 else ((0, -1) if k == 2 else (-1, 0)))
+    for i, j in _BESIDE:
         other = texels.halo[chart, row + i, column + j]
         if other >= 0 and not texels.rim[chart, row + i, column + j]:
             total += _fault(texels, other)
@@ -106,29 +105,23 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
     near, beside = number >= 0, seamless.glued[..., 0]
     for _ in range(_REACH):
         near |= (near[beside] & (beside >= 0)).any(axis=1)
-    triangles, barycentrics = np.full((len(charts), n, n), -1), np.zeros((len(charts), n, n, 3))
-    best = np.full((len(charts), n, n), -np.inf)
     corner, homes, places = places_on_charts(seamless)
     chosen = np.flatnonzero(near[homes])
-    _draw(seamless, chosen, corner, homes, places, number, triangles, barycentrics, best)
+    triangles, barycentrics, best = _draw(seamless, chosen, corner, homes, places, number, n)
     triangles[best < -_ROUND_OFF] = -1
     return triangles, barycentrics
 
 
 @kernel
 def _draw(
-    seamless: SeamlessMap,
-    chosen: Ints,
-    corner: Ints,
-    homes: Ints,
-    places: Complex,
-    number: Ints,
-    triangles: Ints,
-    barycentrics: Floats,
-    best: Floats,
-) -> None:
-    """Fill in the texels of the charts that have a number, from chosen triangles; see `places_on_charts`."""
-    n, slack = best.shape[1], 1e-9
+    seamless: SeamlessMap, chosen: Ints, corner: Ints, homes: Ints, places: Complex, number: Ints, n: int
+) -> tuple[Ints, Floats, Floats]:
+    """Find the texels of the charts that have a number in chosen triangles; see `places_on_charts`.
+
+    Returns the triangle of each, -1 where there is none, and its barycentric coordinates, and the least of these.
+    """
+    shape, slack = (number.max() + 1, n, n), 1e-9
+    triangles, barycentrics, best = np.full(shape, -1), np.zeros((*shape, 3)), np.full(shape, -np.inf)
     for f in chosen:
         home, k, p = homes[f], corner[f], places[f]
         u, v = p[1] - p[0], p[2] - p[0]
@@ -148,11 +141,10 @@ def _draw(
                 chart, row, column = number[found], int(np.floor(place.imag * n)), int(np.floor(place.real * n))
                 if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
                     continue
-                best[chart, row, column] = least
-                triangles[chart, row, column] = f
-                barycentrics[chart, row, column, 0] = 1 - s - t
-                barycentrics[chart, row, column, 1] = s
-                barycentrics[chart, row, column, 2] = t
+                best[chart, row, column], triangles[chart, row, column] = least, f
+                inside = barycentrics[chart, row, column]
+                inside[0], inside[1], inside[2] = 1 - s - t, s, t
+    return triangles, barycentrics, best
 
 
 class Samples(NamedTuple):
@@ -221,7 +213,11 @@ def untangled(
     positions, normals = samples.positions.reshape(-1, 3).copy(), samples.normals.reshape(-1, 3).copy()
     texels = Texels(topology.halo, topology.rim, outside, positions, normals, offsets)
     for _ in range(_ROUNDS):
-        active = _around(topology, folded(texels))
+        near = folded(texels).reshape(topology.shape)
+        for _ in range(_AROUND):
+            halo = topology.with_halo(near)
+            near = np.any([halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0)
+        active = np.flatnonzero(near)
         if not len(active):
             break
         chosen, index = np.unique(active // (n * n), return_inverse=True)
@@ -240,15 +236,6 @@ def untangled(
         small[chart[changed], row[changed], column[changed]] = places.small[at][changed]
         weights[chart[changed], row[changed], column[changed]] = places.weights[at][changed]
     return sampled(mesh, patches, small, weights), offsets[:, 1:-1, 1:-1] / _LATTICE
-
-
-def _around(topology: TexelTopology, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Flat indices of chosen texels [T] and of those round them."""
-    n = topology.shape[1]
-    for _ in range(_AROUND):
-        halo = topology.with_halo(chosen.reshape(topology.shape))
-        chosen = np.any([halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0)
-    return np.flatnonzero(chosen)
 
 
 @kernel
