@@ -79,9 +79,7 @@ def texels_towards(directions: Floats, n: int) -> Ints:
     return texels
 
 
-def cast_rays(
-    sphere: NDArray[np.float64], mesh: Mesh, directions: NDArray[np.float64], stride: int = 1
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def cast_rays(sphere: Floats, mesh: Mesh, directions: Floats, stride: int = 1) -> tuple[Ints, Floats]:
     """Intersect rays from the origin with the sphere-mapped mesh.
 
     Embree finds triangles in float32; the barycentrics are computed again in float64, which also moves a hit to the
@@ -168,21 +166,19 @@ class CubeChartMap:
     `sphere` [vertex_count, 3] is the sphere map: one unit vector a vertex.
     """
 
-    sphere: NDArray[np.float64]
+    sphere: Floats
 
     @property
     def layout(self) -> str:
         """Name of the layout."""
         return "cube"
 
-    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, mesh: Mesh, triangles: Ints, points: Floats) -> Floats:
         """Directions [k, 3] of points [k, 3] [m] that lie on triangles [k], unit vectors."""
         corners = mesh.F[triangles]
         return sphere_directions(mesh.V[corners], self.sphere[corners], points)
 
-    def chart_points(
-        self, coordinates: NDArray[np.float64], resolution: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def chart_points(self, coordinates: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
         """Chart, row and column of directions, each [k]."""
         return cube_chart_points(coordinates, resolution)
 
@@ -194,11 +190,11 @@ class CubeChartMap:
         """The triangles, with the directions of their corners."""
         return uncut(self.sphere[mesh.F])
 
-    def split(self, corners: NDArray[np.float64]) -> Parts:
+    def split(self, corners: Floats) -> Parts:
         """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
         return split_at_edges(corners)
 
-    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    def uv(self, coordinates: Floats, chart: Ints) -> Floats:
         """Place [k, ..., 2] in charts [k], 0 to 1, of directions [k, ..., 3] that belong to them."""
         return chart_uv(coordinates, chart)
 
@@ -216,7 +212,7 @@ class CubeChartMap:
 STRIDE = 16  # texels from one that is found by a ray to the next
 
 
-def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> Atlas:
+def atlas_from_sphere_map(mesh: Mesh, sphere: Floats, resolution: int) -> Atlas:
     """Atlas of a mesh for a given fold-free sphere map [vertex_count, 3] (unit vectors)."""
     directions = texel_directions(check_resolution(resolution))
     # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
@@ -256,7 +252,7 @@ class SphereAtlas(Atlas):
         """Radius of the sphere [m]."""
         return float(np.linalg.norm(self.mesh.V[0]))
 
-    def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Closest points on the sphere itself [m] (not on its triangles) and their directions, each [k, 3]."""
         points = check_points(points)
         length = np.linalg.norm(points, axis=1, keepdims=True)
@@ -264,7 +260,7 @@ class SphereAtlas(Atlas):
             raise AtlasError("the sphere's centre has no nearest surface point; give a point off the centre")
         return self.radius * (points / length), points / length
 
-    def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def nearest(self, points: ArrayLike) -> tuple[Floats, Ints]:
         """Closest points on the sphere [m], [k, 3], and the flat index of the texel in which each lies, [k]."""
         closest, directions = self.project(points)
         return closest, texels_towards(directions, self.resolution)
@@ -308,9 +304,7 @@ def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
     )
 
 
-def _texel_triangulation(
-    halo: NDArray[np.int64], n: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _texel_triangulation(halo: Ints, n: int) -> tuple[Ints, Ints, Floats]:
     """Triangles of the texel mesh; for each texel, one triangle [6, N, N] and the corner of it [6, N, N, 3] it is."""
     sw, se, nw, ne = halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, :-1], halo[:, 1:, 1:]
     # a cell across a cube edge appears on two charts, one at a cube corner on three: it belongs to its lowest texel

@@ -37,11 +37,11 @@ class PatchChartMap:
         return "patches"
 
     @functools.cached_property
-    def _first(self) -> NDArray[np.int64]:
+    def _first(self) -> Ints:
         """Number of the first piece of each triangle, and one behind the last."""
         return np.searchsorted(self.pieces.triangle, np.arange(self.pieces.triangle[-1] + 2))
 
-    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, mesh: Mesh, triangles: Ints, points: Floats) -> Floats:
         """Chart, column and row, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
         weights = barycentrics_in(mesh.V[mesh.F[triangles]], points)
         piece, inside = np.empty(len(weights), np.int64), np.empty((len(weights), 3))
@@ -49,9 +49,7 @@ class PatchChartMap:
         places = np.einsum("kc,kcj->kj", inside, self.pieces.places[piece])
         return np.concatenate([self.pieces.chart[piece, None], places], axis=1)
 
-    def chart_points(
-        self, coordinates: NDArray[np.float64], resolution: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def chart_points(self, coordinates: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
         """Chart, row and column, each [k]."""
         chart, column, row = coordinates.T
         return chart.astype(np.int64), row * resolution - 0.5, column * resolution - 0.5
@@ -66,11 +64,11 @@ class PatchChartMap:
         coordinates = np.concatenate([chart, self.pieces.places], axis=2)
         return self.pieces.triangle, self.pieces.barycentrics, coordinates
 
-    def split(self, corners: NDArray[np.float64]) -> Parts:
+    def split(self, corners: Floats) -> Parts:
         """Parts of pieces as they are: each lies in one chart."""
         return uncut(corners[:, 0, 0].astype(np.int64))
 
-    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    def uv(self, coordinates: Floats, chart: Ints) -> Floats:
         """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
         return np.clip(coordinates[..., 1:], 0.0, 1.0)
 
@@ -133,7 +131,7 @@ def _texels_on_pieces(corners: Floats, first: Ints, pieces: Pieces, n: int, tria
     return texels
 
 
-def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> NDArray[np.float64] | None:
+def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> Floats | None:
     """Positions with halo [C, n + 2, n + 2, 3] [m]; beyond a rim lies its point opposite to each texel.
 
     None if there is no rim. At the end of a rim, where that turns, lies its corner.

@@ -10,10 +10,10 @@ import dataclasses
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import SPLITS
 from .surface import AB, BC, CA, MIDDLE, A, B, C, Patterns, TriangleSurface
 
@@ -35,14 +35,14 @@ class Metric:
 
     surface: TriangleSurface
     graph: csr_array
-    unit: NDArray[np.float64]
+    unit: Floats
 
     @classmethod
     def of(cls, surface: TriangleSurface) -> Metric:
         """Distances in metres."""
         return cls(surface, distance_graph(surface), np.ones(len(surface.V)))
 
-    def in_units(self, unit: NDArray[np.float64]) -> Metric:
+    def in_units(self, unit: Floats) -> Metric:
         """The same distances in other units [n] [m]; a link takes the mean of both ends."""
         row = np.repeat(np.arange(len(unit)), np.diff(self.graph.indptr))
         column = self.graph.indices
@@ -50,13 +50,13 @@ class Metric:
         return Metric(self.surface, csr_array((lengths, column, self.graph.indptr), self.graph.shape), unit)
 
     @functools.cached_property
-    def edge_lengths(self) -> NDArray[np.float64]:
+    def edge_lengths(self) -> Floats:
         """Lengths of the surface's edges, none of them 0, [e]."""
         lengths = self.surface.edge_lengths / self.unit[self.surface.edges.ends].mean(axis=1)
         return np.maximum(lengths, np.finfo(np.float64).tiny)
 
     @functools.cached_property
-    def masses(self) -> NDArray[np.float64]:
+    def masses(self) -> Floats:
         """Area that belongs to each vertex, [n]."""
         surface = self.surface
         lumped = np.bincount(surface.F.ravel(), np.repeat(surface.areas / 3, 3), len(surface.V))
@@ -82,7 +82,7 @@ def distance_graph(surface: TriangleSurface) -> csr_array:
     return _linked(ends, np.maximum(lengths, _LEAST * lengths.max()), len(V))
 
 
-def _linked(ends: NDArray[np.int64], lengths: NDArray[np.float64], count: int) -> csr_array:
+def _linked(ends: Ints, lengths: Floats, count: int) -> csr_array:
     """Graph of `count` nodes with the shortest of the links between each two, whose ends are [k, 2]."""
     low, high = ends.min(axis=1), ends.max(axis=1)
     key = low * count + high
@@ -92,9 +92,7 @@ def _linked(ends: NDArray[np.int64], lengths: NDArray[np.float64], count: int) -
     return csr_array(coo_array((np.tile(lengths[kept], 2), pairs), shape=(count, count)))
 
 
-def _along_and_across(
-    offset: NDArray[np.float64], along: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _along_and_across(offset: Floats, along: Floats) -> tuple[Floats, Floats]:
     """Parts of offsets [k, 3] along a direction and across it."""
     x = np.einsum("ij,ij->i", offset, along)
     square = np.einsum("ij,ij->i", offset, offset)
@@ -119,12 +117,12 @@ class VoronoiCells:
         From that seed, in the units of the metric.
     """
 
-    seeds: NDArray[np.int64]
-    label: NDArray[np.int64]
-    distance: NDArray[np.float64]
+    seeds: Ints
+    label: Ints
+    distance: Floats
 
 
-def spread_seeds(metric: Metric, reach: float) -> NDArray[np.int64]:
+def spread_seeds(metric: Metric, reach: float) -> Ints:
     """Vertices of which one lies within reach of every vertex, on one connected component.
 
     Each is the farthest from those before.
@@ -138,7 +136,7 @@ def spread_seeds(metric: Metric, reach: float) -> NDArray[np.int64]:
     return np.array(seeds)
 
 
-def voronoi_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
+def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     """The vertices nearest to each seed."""
     distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
     number = np.full(len(metric.unit), -1)
@@ -147,7 +145,7 @@ def voronoi_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
     return VoronoiCells(seeds, label, distance)
 
 
-def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
+def centred_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     """Cells whose seeds moved to their middles a few times (Lloyd 1982)."""
     V, mass = metric.surface.V, metric.masses
     for _ in range(_LLOYD_STEPS):
@@ -163,7 +161,7 @@ def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
     return voronoi_cells(metric, seeds)
 
 
-def _gathered(surface: TriangleSurface, label: NDArray[np.int64], seeds: NDArray[np.int64]) -> NDArray[np.int64]:
+def _gathered(surface: TriangleSurface, label: Ints, seeds: Ints) -> Ints:
     """Give vertices that hang on their cell by no edge to a neighbour's."""
     ends, size = surface.edges.ends, len(surface.V)
     for _ in range(_MOST_PASSES):
@@ -206,8 +204,8 @@ class BorderedCells:
     """
 
     surface: TriangleSurface
-    cell: NDArray[np.int64]
-    arcs: list[list[NDArray[np.int64]]]
+    cell: Ints
+    arcs: list[list[Ints]]
     uncut: int
 
 
@@ -241,7 +239,7 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     return BorderedCells(cut, cell, arcs, len(surface.V))
 
 
-def _border_loops(surface: TriangleSurface, cell: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
+def _border_loops(surface: TriangleSurface, cell: Ints, count: int) -> list[Ints]:
     """The vertices round each cell, counter-clockwise."""
     sides = surface.edges.sides
     beside = np.where(sides < 0, -1, cell[sides // 3])
@@ -260,9 +258,7 @@ def _border_loops(surface: TriangleSurface, cell: NDArray[np.int64], count: int)
     return loops
 
 
-def _arcs(
-    V: NDArray[np.float64], loop: NDArray[np.int64], corner: NDArray[np.bool_], on_rim: NDArray[np.bool_]
-) -> list[NDArray[np.int64]]:
+def _arcs(V: Floats, loop: Ints, corner: Bools, on_rim: Bools) -> list[Ints]:
     """Cut a loop at its corners; more are put on its rim, far from the others, where it has too few."""
     corner = corner.copy()
     length = np.linalg.norm(np.roll(V[loop], -1, axis=0) - V[loop], axis=1)
@@ -290,7 +286,7 @@ _FEWEST = 12  # samples in a disk before it is judged
 _GROWTH = 0.5  # of the size of cells along the surface
 
 
-def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> NDArray[np.float64]:
+def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> Floats:
     """Radius of the cells round each vertex [m], [n], between a least and a largest one.
 
     A cell has at most the share `reach` of the radius at which a geodesic disk round its middle has much less area than

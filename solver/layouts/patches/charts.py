@@ -11,19 +11,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import AtlasError
+from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import labels
 from .cells import BorderedCells
 from .disks import Border, along, flattened
 from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved_chords
 
-Path = NDArray[np.int64]
+Path = Ints
 Halves = list[tuple[Path, Path]]  # of each arc of a part's border
 
 
-def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list[Halves]]:
+def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Halves]]:
     """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
     surface = cells.surface
     single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
@@ -41,7 +41,7 @@ def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int6
     return split, cell[origin], halves
 
 
-def halves_of(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
+def halves_of(V: Floats, arc: Path) -> tuple[Path, Path]:
     """Cut an arc in two at the vertex nearest to its middle; the same from either side."""
     flipped = arc[0] > arc[-1] or (arc[0] == arc[-1] and arc[1] > arc[-2])
     way = arc[::-1] if flipped else arc
@@ -49,9 +49,7 @@ def halves_of(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
     return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
 
 
-def cut_polygons(
-    surface: TriangleSurface, part: NDArray[np.int64], halves: list[Halves]
-) -> tuple[Flat, list[list[Path]]]:
+def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> tuple[Flat, list[list[Path]]]:
     """Lay out the first parts as regular polygons and cut them from their middles; return the paths of the cuts.
 
     Parts beyond those that have a border are left alone.
@@ -111,7 +109,7 @@ def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
     return sides
 
 
-def charts_of(surface: TriangleSurface, sides: list[Sides]) -> NDArray[np.int64]:
+def charts_of(surface: TriangleSurface, sides: list[Sides]) -> Ints:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
     size = len(surface.V)
     walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
@@ -141,14 +139,14 @@ def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
     return side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None]
 
 
-def on_paths(surface: TriangleSurface, sides: Sequence[Sequence[Path]]) -> NDArray[np.bool_]:
+def on_paths(surface: TriangleSurface, sides: Sequence[Sequence[Path]]) -> Bools:
     """Vertices that lie on a path, such as a side of a chart, [n]."""
     on_path = np.zeros(len(surface.V), bool)
     on_path[np.concatenate([path for each in sides for path in each])] = True
     return on_path
 
 
-def glued_sides(sides: list[Sides]) -> NDArray[np.int64]:
+def glued_sides(sides: list[Sides]) -> Ints:
     """Charts that share a side have its first edge the other way round."""
     table = np.full((len(sides), 4, 2), -1)
     seen = {(int(path[0]), int(path[1])): (chart, s) for chart, each in enumerate(sides) for s, path in enumerate(each)}
@@ -160,7 +158,7 @@ def glued_sides(sides: list[Sides]) -> NDArray[np.int64]:
     return table
 
 
-def fans_of(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[Fans, list[int]]:
+def fans_of(sides: list[Sides], glued: Ints) -> tuple[Fans, list[int]]:
     """The three charts round each corner where three cells meet, counter-clockwise, and all other charts."""
     fans: Fans = []
     used = np.zeros(len(sides), bool)
@@ -174,8 +172,8 @@ def fans_of(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[Fans, list[in
 
 
 def with_even_corners(
-    surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]
-) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]]:
+    surface: TriangleSurface, chart: Ints, sides: list[Sides]
+) -> tuple[TriangleSurface, Ints, list[Sides]]:
     """Move the corners in which three cells meet to the middle between the cells' middles.
 
     Voronoi cells often have very short sides, along which texels would be tiny. So the three charts round a corner,

@@ -8,12 +8,12 @@ weights follow the shape of the triangles.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
 from ...errors import AtlasError
+from ...kernel import Bools, Floats, Ints
 from .cells import BorderedCells, Metric, VoronoiCells, centred_cells, cut_borders, voronoi_cells
 from .surface import TriangleSurface
 
@@ -56,7 +56,7 @@ def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, Bordered
     raise AtlasError("no cells found that are disks with three corners")
 
 
-def _with_corners(metric: Metric, cells: VoronoiCells, few: NDArray[np.int64], tried: set[int]) -> VoronoiCells:
+def _with_corners(metric: Metric, cells: VoronoiCells, few: Ints, tried: set[int]) -> VoronoiCells:
     """Give cells with too few corners a neighbour each, or take away their seeds where that was `tried` before."""
     new: list[int] = []
     gone: list[int] = []
@@ -74,7 +74,7 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: NDArray[np.int64], t
     return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
 
 
-def _euler(surface: TriangleSurface, cells: VoronoiCells) -> NDArray[np.int64]:
+def _euler(surface: TriangleSurface, cells: VoronoiCells) -> Ints:
     """Euler characteristic of the vertices of each cell with the edges and triangles between them."""
     count, label = len(cells.seeds), cells.label
     ends, corners = label[surface.edges.ends], label[surface.F]
@@ -109,7 +109,7 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     return int(best[np.argmax(distance[best])])
 
 
-def _closing(beside: NDArray[np.int64], tree: NDArray[np.bool_], triangles: int) -> list[int]:
+def _closing(beside: Ints, tree: Bools, triangles: int) -> list[int]:
     """Edges, in this order and but for those of the `tree`, whose two triangles are joined already."""
     root, closing = list(range(triangles)), []
     for e, (a, b) in enumerate(beside.tolist()):
@@ -129,10 +129,10 @@ def _closing(beside: NDArray[np.int64], tree: NDArray[np.bool_], triangles: int)
 _LEAST, _MOST = 1e-3, 1e3
 
 # of the vertices on the borders of parts: part and vertex, each [b], and place [b, 2]
-Border = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
+Border = tuple[Ints, Ints, Floats]
 
 
-def flattened(surface: TriangleSurface, part: NDArray[np.int64], border: Border) -> NDArray[np.float64]:
+def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     """Places [m, 3, 2] of the triangles' corners, each part [m] laid out inside its border.
 
     A part that round-off folds with mean-value weights is laid out with equal ones.
@@ -153,13 +153,13 @@ def flattened(surface: TriangleSurface, part: NDArray[np.int64], border: Border)
     return places
 
 
-def signed_areas(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def signed_areas(places: Floats) -> Floats:
     """Areas [m] of flat triangles [m, 3, 2], positive where they are counter-clockwise."""
     u, v = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
     return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
 
 
-def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.float64]:
+def along(V: Floats, paths: list[Ints]) -> Floats:
     """How far along its path each vertex lies, from 0 to 1; the paths' one behind the other."""
     sizes = np.array([len(each) for each in paths])
     inside = np.arange(sizes.max()) < sizes[:, None]
@@ -174,7 +174,7 @@ def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.
     return shares[inside]
 
 
-def _mean_value_weights(surface: TriangleSurface) -> NDArray[np.float64]:
+def _mean_value_weights(surface: TriangleSurface) -> Floats:
     """Weights [m, 3, 2], in corner k of a triangle, of its next vertex and of the one before."""
     weights = np.empty((len(surface.F), 3, 2))
     tiny = np.finfo(np.float64).tiny
@@ -188,9 +188,7 @@ def _mean_value_weights(surface: TriangleSurface) -> NDArray[np.float64]:
     return weights
 
 
-def _solved(
-    corners: NDArray[np.int64], weights: NDArray[np.float64], start: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _solved(corners: Ints, weights: Floats, start: Floats) -> Floats:
     """Places [n, 2] of all vertices; NaN in `start` is what is looked for."""
     free = np.isnan(start[:, 0])
     row = np.repeat(corners, 2, axis=1).ravel()

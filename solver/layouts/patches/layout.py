@@ -12,9 +12,8 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...kernel import Ints, kernel
+from ...kernel import Floats, Ints, kernel
 from ...mesh.topology import labels
 from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
@@ -237,7 +236,7 @@ class PatchMap:
     seamless: SeamlessMap
 
 
-def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) -> PatchMap:
+def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
     """Lay a manifold, oriented mesh out on charts, without a fold; on about so many cells of four to six charts.
 
     Where the largest part allows it charts are large, one for each of some more cells. Raises `AtlasError` if its
@@ -259,7 +258,7 @@ def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) 
     return PatchMap(surface, seamless)
 
 
-def relax(V: NDArray[np.float64], seamless: SeamlessMap) -> None:
+def relax(V: Floats, seamless: SeamlessMap) -> None:
     """Even out areas and take away shear, in place, as far as the map's cones allow; V [n, 3] are its vertices [m].
 
     Cells are small and flat enough for that from where the quads lie; no step folds a triangle.
@@ -291,9 +290,7 @@ def _recut(part: TriangleSurface, quads: Quads, count: int, wanted: float, large
     return best
 
 
-def _components(
-    V: NDArray[np.float64], F: NDArray[np.int64], cells: int
-) -> tuple[list[TriangleSurface], list[int], NDArray[np.float64]]:
+def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], list[int], Floats]:
     """Each connected component, how many cells it gets, and its share of the area."""
     part = labels(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), len(V))
     number, of = np.unique(part[F[:, 0]], return_inverse=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...kernel import Bools, Floats, Ints, kernel
 from ...texels.chart_map import MOST_CORNERS, clip
@@ -33,10 +32,10 @@ class Pieces(NamedTuple):
         Column and row of the corners, 0 to 1 across the chart.
     """
 
-    triangle: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    chart: NDArray[np.int64]
-    places: NDArray[np.float64]
+    triangle: Ints
+    barycentrics: Floats
+    chart: Ints
+    places: Floats
 
 
 def chart_pieces(patches: PatchMap) -> Pieces:
@@ -121,7 +120,7 @@ def _area(corners: Floats, count: int) -> float:
     return total
 
 
-def warped(pieces: Pieces, offsets: NDArray[np.float64]) -> Pieces:
+def warped(pieces: Pieces, offsets: Floats) -> Pieces:
     """Pieces of a map whose texels have moved by `offsets` [C, n, n, 2] (column, row, in texels)."""
     n, moved = offsets.shape[1], np.pad(offsets, ((0, 0), (1, 1), (1, 1), (0, 0)))
     # squares of the lattice of which a corner moves, [C, n + 1, n + 1]

@@ -17,7 +17,6 @@ import dataclasses
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import AtlasError
 from ...kernel import Bools, Floats, Ints, kernel
@@ -63,13 +62,13 @@ class Pairing(NamedTuple):
 
 
 def chosen_joints(
-    triangles: NDArray[np.int64],
-    middles: NDArray[np.int64],
-    shape: NDArray[np.float64],
+    triangles: Ints,
+    middles: Ints,
+    shape: Floats,
     triangle_count: int,
-    corners: NDArray[np.int64],
-    wanted: NDArray[np.float64],
-) -> NDArray[np.int64] | None:
+    corners: Ints,
+    wanted: Floats,
+) -> Ints | None:
     """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
 
     A joint is a side between triangles, over which these may be joined.
@@ -230,8 +229,8 @@ def _change(pairing: Pairing, e: int, quads: int) -> float:
 
 
 def joined(
-    surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]
-) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]] | None:
+    surface: TriangleSurface, chart: Ints, sides: list[Sides]
+) -> tuple[TriangleSurface, Ints, list[Sides]] | None:
     """Join the charts of cells [m] to larger ones; None where that is not possible."""
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
@@ -264,9 +263,7 @@ def joined(
     return surface, charts_of(surface, new), new
 
 
-def _joints(
-    V: NDArray[np.float64], sides: list[Sides], glued: NDArray[np.int64], fans: Fans
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+def _joints(V: Floats, sides: list[Sides], glued: Ints, fans: Fans) -> tuple[Ints, Ints, Floats, Ints]:
     """Joints as `chosen_joints` takes them, with charts for their cells, and what they are called."""
     fan = np.full(len(sides), -1)
     fan[np.array(fans, np.int64).reshape(-1, 3)] = np.arange(len(fans))[:, None]
@@ -283,12 +280,12 @@ def _joints(
     return np.stack([fan[first], fan[other]], axis=1), np.stack([first, second], axis=1), shape, first
 
 
-def _whole(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Path:
+def _whole(sides: list[Sides], glued: Ints, a: int) -> Path:
     """The side of a triangle, from middle to middle."""
     return np.concatenate([sides[a][0], sides[glued[a, 1, 0]][3][1:]])
 
 
-def _at_rim(sides: list[Sides], glued: NDArray[np.int64], rest: list[int], apart: NDArray[np.int64]) -> list[Sides]:
+def _at_rim(sides: list[Sides], glued: Ints, rest: list[int], apart: Ints) -> list[Sides]:
     """Charts at the rim: those round a corner are joined, but for some that stay apart, called by the second one."""
     new = []
     for b in rest:
@@ -323,10 +320,10 @@ class Quads:
     """
 
     surface: TriangleSurface
-    chart: NDArray[np.int64]
-    places: NDArray[np.float64]
-    glued: NDArray[np.int64]
-    cut: NDArray[np.bool_]
+    chart: Ints
+    places: Floats
+    glued: Ints
+    cut: Bools
 
 
 def cut_into_quads(cells: BorderedCells) -> Quads:
@@ -346,7 +343,7 @@ def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
     return None if large is None else _laid_out(cells, *large)
 
 
-def _cut(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]]:
+def _cut(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sides]]:
     """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
     surface, cell, halves = with_middles(cells)
     flat, paths = cut_polygons(surface, cell, halves)
@@ -354,7 +351,7 @@ def _cut(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list
     return flat.surface, charts_of(flat.surface, sides), sides
 
 
-def _laid_out(cells: BorderedCells, surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]) -> Quads:
+def _laid_out(cells: BorderedCells, surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> Quads:
     surface, origin = halved_chords(surface, chart, on_paths(surface, sides))
     chart = chart[origin]
     places = flattened(surface, chart, square_border(surface, sides))
@@ -374,7 +371,7 @@ _FARTHEST = 100**2  # length of a surface over its width, times the number of it
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
-def part_of(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64]) -> TriangleSurface:
+def part_of(V: Floats, F: Ints, faces: Ints) -> TriangleSurface:
     """A connected component, the triangles `faces` [m] of V, F."""
     used, corners = np.unique(F[faces], return_inverse=True)
     return dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces)

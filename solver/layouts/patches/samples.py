@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import AtlasError
 from ...kernel import Bools, Floats, Ints, kernel
@@ -164,15 +163,15 @@ class Samples(NamedTuple):
         [m], and unit.
     """
 
-    small: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    small: Ints
+    weights: Floats
+    triangles: Ints
+    barycentrics: Floats
+    positions: Floats
+    normals: Floats
 
 
-def sampled(mesh: Mesh, patches: PatchMap, small: NDArray[np.int64], weights: NDArray[np.float64]) -> Samples:
+def sampled(mesh: Mesh, patches: PatchMap, small: Ints, weights: Floats) -> Samples:
     """Points at barycentric coordinates in triangles of the surface."""
     surface = patches.surface
     positions = np.einsum("...k,...kj->...j", weights, surface.V[surface.F[small]])
@@ -198,8 +197,8 @@ _AROUND = 2  # texels round a folded one that may move
 
 
 def untangled(
-    mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: NDArray[np.float64] | None
-) -> tuple[Samples, NDArray[np.float64]]:
+    mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: Floats | None
+) -> tuple[Samples, Floats]:
     """Move texels at the centres of their squares to where fewer are folded; `beyond` as in `TexelMesh`.
 
     Returns them, and the column and row by which each has moved, in texels, below 0.5, [C, n, n, 2].

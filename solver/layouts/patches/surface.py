@@ -11,8 +11,8 @@ import functools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import SPLITS, Edges, corner_angles, edges_of, triangle_areas
 
 # Of a triangle abc: its corners, a point on each of its sides, and one inside.
@@ -36,13 +36,13 @@ class TriangleSurface:
         Barycentric coordinates in it, of the three corners.
     """
 
-    V: NDArray[np.float64]
-    F: NDArray[np.int64]
-    parent: NDArray[np.int64]
-    inside: NDArray[np.float64]
+    V: Floats
+    F: Ints
+    parent: Ints
+    inside: Floats
 
     @classmethod
-    def of(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> TriangleSurface:
+    def of(cls, V: Floats, F: Ints) -> TriangleSurface:
         """The triangles of a mesh as they are."""
         return cls(V, F, np.arange(len(F)), np.broadcast_to(np.eye(3), (len(F), 3, 3)))
 
@@ -52,31 +52,29 @@ class TriangleSurface:
         return edges_of(self.F)
 
     @functools.cached_property
-    def edge_lengths(self) -> NDArray[np.float64]:
+    def edge_lengths(self) -> Floats:
         """Lengths of the edges [m], [e]."""
         ends = self.V[self.edges.ends]
         return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
     @functools.cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """Areas of the triangles [m^2], [m]."""
         return triangle_areas(self.V, self.F)
 
     @functools.cached_property
-    def angles(self) -> NDArray[np.float64]:
+    def angles(self) -> Floats:
         """Angles in the corners of the triangles, [m, 3]."""
         return corner_angles(self.V, self.F)
 
     @functools.cached_property
-    def at_rim(self) -> NDArray[np.bool_]:
+    def at_rim(self) -> Bools:
         """Vertices at a rim, [n]."""
         at_rim = np.zeros(len(self.V), bool)
         at_rim[self.edges.ends[self.edges.rim]] = True
         return at_rim
 
-    def subdivided(
-        self, places: NDArray[np.float64], patterns: Patterns = SPLITS
-    ) -> tuple[TriangleSurface, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    def subdivided(self, places: Floats, patterns: Patterns = SPLITS) -> tuple[TriangleSurface, Ints, Ints, Floats]:
         """Cut edges, and the triangles beside them.
 
         Parameters
@@ -126,9 +124,7 @@ class TriangleSurface:
         )
         return finer, middles, source, share
 
-    def _nodes(
-        self, triangles: NDArray[np.int64], middles: NDArray[np.int64], places: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _nodes(self, triangles: Ints, middles: Ints, places: Floats) -> tuple[Ints, Floats]:
         """Vertices [k, 7] of the named points of triangles [k], and their barycentrics [k, 7, 3]."""
         nodes, local = np.full((len(triangles), 7), -1), np.zeros((len(triangles), 7, 3))
         nodes[:, :3], local[:, :3] = self.F[triangles], np.eye(3)
@@ -151,11 +147,11 @@ class Flat:
     """Parts of a surface [m] laid out in the plane; `places` [m, 3, 2] are those of the triangles' corners."""
 
     surface: TriangleSurface
-    part: NDArray[np.int64]
-    places: NDArray[np.float64]
+    part: Ints
+    places: Floats
 
 
-def central_vertices(flat: Flat, on_border: NDArray[np.bool_]) -> NDArray[np.int64]:
+def central_vertices(flat: Flat, on_border: Bools) -> Ints:
     """The inner vertex nearest to the origin, one for each part."""
     distance = np.where(on_border[flat.surface.F], np.inf, (flat.places**2).sum(axis=2)).ravel()
     part = np.repeat(flat.part, 3)
@@ -164,9 +160,7 @@ def central_vertices(flat: Flat, on_border: NDArray[np.bool_]) -> NDArray[np.int
     return flat.surface.F.ravel()[first]
 
 
-def cut_ray(
-    flat: Flat, start: NDArray[np.int64], end: NDArray[np.int64], on_border: NDArray[np.bool_]
-) -> tuple[Flat, list[NDArray[np.int64]]]:
+def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat, list[Ints]]:
     """Cut parts along a straight line each, from one of their vertices to one on their border.
 
     Parameters
@@ -208,7 +202,7 @@ def cut_ray(
     return Flat(finer, flat.part[source], weights @ flat.places[source]), _paths(points, len(start))
 
 
-def _place_of(flat: Flat, vertex: NDArray[np.int64]) -> NDArray[np.float64]:
+def _place_of(flat: Flat, vertex: Ints) -> Floats:
     """Places [parts, 2] of one vertex of each part; NaN where that is -1."""
     places = np.full((len(vertex), 2), np.nan)
     triangle, k = np.nonzero(vertex[flat.part][:, None] == flat.surface.F)
@@ -216,7 +210,7 @@ def _place_of(flat: Flat, vertex: NDArray[np.int64]) -> NDArray[np.float64]:
     return places
 
 
-def _paths(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
+def _paths(points: Floats, parts: int) -> list[Ints]:
     """Vertices of each part in order, from rows part, vertex, and distance along the line."""
     order = np.lexsort((points[2], points[0]))
     part, vertex = points[:2, order].astype(np.int64)
@@ -228,9 +222,7 @@ _MOST_ROUNDS = 100
 _MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
 
 
-def halved_chords(
-    surface: TriangleSurface, part: NDArray[np.int64], on_border: NDArray[np.bool_]
-) -> tuple[TriangleSurface, NDArray[np.int64]]:
+def halved_chords(surface: TriangleSurface, part: Ints, on_border: Bools) -> tuple[TriangleSurface, Ints]:
     """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side.
 
     Returns the finer surface, and the triangle from before in which each of its triangles lies.

@@ -36,7 +36,7 @@ class Certificate:
     valid: bool
 
 
-def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
+def certify(F: NDArray[np.integer], S: Floats) -> Certificate:
     """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3]."""
     a, b, c = (S[F[:, j]].T for j in range(3))
     ab, ac = subtract(b, a), subtract(c, a)
@@ -48,14 +48,14 @@ def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
     return Certificate(int(flipped), float(solid_angle), bool(valid))
 
 
-def solid_angles(F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
+def solid_angles(F: NDArray[np.integer], S: Floats) -> Floats:
     """Signed solid angle of each spherical triangle [sr], shape [m] (van Oosterom and Strackee 1983)."""
     a, b, c = (S[F[:, j]].T for j in range(3))
     triple = dot(a, cross(subtract(b, a), subtract(c, a)))
     return 2 * np.arctan2(triple, 1 + dot(a, b) + dot(b, c) + dot(c, a))
 
 
-def stretch(V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
+def stretch(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     """Per triangle sqrt(real area / sphere area), real area scaled to 4 pi, shape [m].
 
     How many times wider than in an ideal even grid the texels are there.
@@ -84,7 +84,7 @@ def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     return S @ widest.T
 
 
-def spread_rotations(count: int) -> NDArray[np.float64]:
+def spread_rotations(count: int) -> Floats:
     """Rotation matrices spread evenly over all, [count, 3, 3]: super-Fibonacci spirals (Alexa 2022)."""
     s = np.arange(count) + 0.5
     inner, outer = np.sqrt(s / count), np.sqrt(1 - s / count)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SphereMapError
-from ...kernel import Floats, Ints32, kernel
+from ...kernel import Floats, Ints, Ints32, kernel
 from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
 from ..energy import FOLDED, FREE, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
@@ -231,7 +231,7 @@ CAREFUL_UNTIL = 30
 TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)  # in the real triangles, each tried when the one before gave no certified map
 
 
-def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
+def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
     """Map a closed triangle mesh of genus 0 one-to-one onto the unit sphere, its area spread evenly.
 
     Parameters
@@ -323,7 +323,7 @@ def _level_sizes(n: int) -> list[int]:
     return sizes
 
 
-def _morton_order(V: NDArray[np.float64]) -> NDArray[np.int64]:
+def _morton_order(V: Floats) -> Ints:
     """Vertices along a Morton curve: neighbours in space come close together in memory."""
     cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(np.int64)
     code = np.zeros(len(V), dtype=np.int64)
