@@ -141,8 +141,7 @@ def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
     number = np.full(len(metric.unit), -1)
     number[seeds] = np.arange(len(seeds))
-    label = _gathered(metric.surface, number[source], seeds)
-    return VoronoiCells(seeds, label, distance)
+    return VoronoiCells(seeds, _gathered(metric.surface, number[source], seeds), distance)
 
 
 def centred_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
@@ -222,8 +221,7 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     place = np.clip(0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths), _LEAST_SHARE, 1 - _LEAST_SHARE)
     cut = surface.subdivided(np.where(between, place, np.nan), _CUTS)[0]
     # each triangle has a vertex of the surface before, and all of those are of its cell
-    of_vertex = np.concatenate([cells.label, np.full(len(cut.V) - len(cells.label), -1)])
-    cell = of_vertex[cut.F].max(axis=1)
+    cell = np.pad(cells.label, (0, len(cut.V) - len(surface.V)), constant_values=-1)[cut.F].max(axis=1)
     count = len(cells.seeds)
     meeting = np.bincount(np.unique(cut.F * count + cell[:, None]) // count, minlength=len(cut.V))
     angle = np.bincount(cut.F.ravel(), cut.angles.ravel(), len(cut.V))

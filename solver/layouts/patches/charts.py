@@ -63,13 +63,12 @@ def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> 
     count = int(part.max()) + 1
     flat = Flat(surface, part, places)
     paths: list[list[Path]] = [[] for _ in halves]
-    for i in range(max(map(len, halves), default=0)):
+    for i in range(max(map(len, halves))):
         start, end = np.full(count, -1), np.full(count, -1)
         for number, each in enumerate(halves):
             if len(each) > i:
                 start[number], end[number] = centre[number], each[i][0][-1]
-        border = np.zeros(len(flat.surface.V), bool)
-        border[: len(on_border)] = on_border
+        border = np.pad(on_border, (0, len(flat.surface.V) - len(on_border)))
         flat, lines = cut_ray(flat, start, end, border)
         for path, line in zip(paths, lines, strict=False):
             if len(line):
@@ -119,12 +118,10 @@ def charts_of(surface: TriangleSurface, sides: list[Sides]) -> Ints:
     if number != len(sides):
         raise AtlasError(f"{len(sides)} charts came out as {number}: triangles of the surface are too thin")
     # the triangle on the inner side of the first edge of a chart's second side
-    triangle, k = np.divmod(surface.edges.sides.ravel(), 3)
-    tail, head = surface.F[triangle, k], surface.F[triangle, (k + 1) % 3]
-    key = np.where(surface.edges.sides.ravel() >= 0, tail * size + head, -1)
+    key = (surface.F * size + np.roll(surface.F, -1, axis=1)).ravel()
     order = np.argsort(key)
     wanted = np.array([each[1][0] * size + each[1][1] for each in sides])
-    owner = triangle[order[np.searchsorted(key[order], wanted)]]
+    owner = order[np.searchsorted(key, wanted, sorter=order)] // 3
     chart = np.full(number, -1)
     chart[part[owner]] = np.arange(len(sides))
     return chart[part]
@@ -186,20 +183,15 @@ def with_even_corners(
     part = np.empty(len(sides), np.int64)
     for number, fan in enumerate([*fans, *([each] for each in rest)]):
         part[fan] = number
-    inner = np.zeros(len(sides), bool)
-    inner[[each for fan in fans for each in fan]] = True
-    halves = []
+    inner = part < len(fans)
+    halves: list[Halves] = []
     for fan in fans:
-        following = [*fan[1:], fan[0]]
-        whole = [(sides[a][0], sides[b][3]) for a, b in zip(fan, following, strict=True)]
-        # the middle stays where the charts beyond do
-        shared = [inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]] for a, b in zip(fan, following, strict=True)]
-        halves.append(
-            [
-                halves_of(surface.V, np.concatenate([first, second[1:]])) if both else (first, second)
-                for (first, second), both in zip(whole, shared, strict=True)
-            ]
-        )
+        halves.append([])
+        for a, b in zip(fan, [*fan[1:], fan[0]], strict=True):
+            first, second = sides[a][0], sides[b][3]
+            if inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]]:  # else the middle stays, as the charts beyond do
+                first, second = halves_of(surface.V, np.concatenate([first, second[1:]]))
+            halves[-1].append((first, second))
     split, origin = halved_chords(surface, part[chart], on_paths(surface, sides))
     old = chart[origin]
     flat, paths = cut_polygons(split, part[old], halves)

@@ -28,10 +28,9 @@ def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     corners gets a further neighbour on its border or, if that was tried before, loses its seed. Cells with new
     neighbours are centred anew, and mended once more. Raises `AtlasError` if none are found.
     """
-    count = len(cells.seeds)
-    cells, bordered = _mended(metric, cells)
-    if len(cells.seeds) > count:
-        _, bordered = _mended(metric, centred_cells(metric, cells.seeds))
+    mended, bordered = _mended(metric, cells)
+    if len(mended.seeds) > len(cells.seeds):
+        _, bordered = _mended(metric, centred_cells(metric, mended.seeds))
     return bordered
 
 
@@ -144,7 +143,11 @@ def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     on_border, vertex, place = border
     fixed[np.searchsorted(key, on_border * size + vertex)] = np.arange(len(vertex))
     start = np.where(fixed[:, None] >= 0, place[fixed], np.nan)
-    weights = _mean_value_weights(surface)
+    # mean-value weights: in corner k of a triangle, of its next vertex and of the one before
+    triangles = surface.V[surface.F]
+    sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    lengths = np.maximum(np.stack([sides, np.roll(sides, 1, axis=1)], axis=2), np.finfo(np.float64).tiny)
+    weights = np.clip(np.tan(surface.angles / 2), _LEAST, _MOST)[:, :, None] / lengths
     places = _solved(corners, weights, start)[corners]
     folded = np.isin(part, part[signed_areas(places) <= 0])
     if folded.any():
@@ -172,20 +175,6 @@ def along(V: Floats, paths: list[Ints]) -> Floats:
     lengths = np.cumsum(np.where(inside[:, 1:], np.maximum(steps, least[:, None]), 0.0), axis=1)
     shares = np.concatenate([np.zeros((len(paths), 1)), lengths / lengths[:, -1:]], axis=1)
     return shares[inside]
-
-
-def _mean_value_weights(surface: TriangleSurface) -> Floats:
-    """Weights [m, 3, 2], in corner k of a triangle, of its next vertex and of the one before."""
-    weights = np.empty((len(surface.F), 3, 2))
-    tiny = np.finfo(np.float64).tiny
-    for k in range(3):
-        x, y, z = (surface.V[surface.F[:, (k + j) % 3]] for j in range(3))
-        u, v = y - x, z - x
-        lu, lv = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
-        sine, cosine = np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)
-        tangent = np.clip(np.tan(np.arctan2(sine, cosine) / 2), _LEAST, _MOST)
-        weights[:, k, 0], weights[:, k, 1] = tangent / np.maximum(lu, tiny), tangent / np.maximum(lv, tiny)
-    return weights
 
 
 def _solved(corners: Ints, weights: Floats, start: Floats) -> Floats:

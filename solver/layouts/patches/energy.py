@@ -161,9 +161,7 @@ _CG_RANGE = 40, 200
 
 def sweep_all(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float:
     """Move every vertex once, and follow them into their charts; return by how much the energy fell."""
-    before, vertices = seamless.z.copy(), np.arange(len(seamless.z))
-    if backwards:
-        vertices = vertices[::-1].copy()
+    before, vertices = seamless.z.copy(), np.arange(len(seamless.z))[:: -1 if backwards else 1].copy()
     fall = sweep(seamless, reference, vertices, scratch(seamless), False)
     rehome(seamless, before)
     return fall

@@ -18,7 +18,7 @@ from ...mesh.topology import labels
 from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
 from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
-from .quads import CELLS, Quads, large_quads_of, part_of, quads_of
+from .quads import CELLS, Quads, large_quads_of, quads_of
 from .seamless import Frame, SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned, wedge
 from .surface import TriangleSurface
 
@@ -299,7 +299,12 @@ def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], 
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
     small = share[share >= min(_NEGLIGIBLE, share.max())].min()
     count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
-    return [part_of(V, F, np.flatnonzero(of == each)) for each in range(len(number))], count.tolist(), share
+    parts = []
+    for each in range(len(number)):
+        faces = np.flatnonzero(of == each)
+        used, corners = np.unique(F[faces], return_inverse=True)
+        parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces))
+    return parts, count.tolist(), share
 
 
 def _joined(parts: list[Quads]) -> Quads:

@@ -62,12 +62,7 @@ class Pairing(NamedTuple):
 
 
 def chosen_joints(
-    triangles: Ints,
-    middles: Ints,
-    shape: Floats,
-    triangle_count: int,
-    corners: Ints,
-    wanted: Floats,
+    triangles: Ints, middles: Ints, shape: Floats, triangle_count: int, corners: Ints, wanted: Floats
 ) -> Ints | None:
     """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
 
@@ -369,12 +364,6 @@ _REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
 _SMALLEST = 0.85  # of the radius of cells elsewhere
 _FARTHEST = 100**2  # length of a surface over its width, times the number of its cells: at 88**2 charts take a minute
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
-
-
-def part_of(V: Floats, F: Ints, faces: Ints) -> TriangleSurface:
-    """A connected component, the triangles `faces` [m] of V, F."""
-    used, corners = np.unique(F[faces], return_inverse=True)
-    return dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces)
 
 
 def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:

@@ -221,10 +221,8 @@ def untangled(
             break
         chosen, index = np.unique(active // (n * n), return_inverse=True)
         places = sampled(mesh, patches, *locate_in_charts(patches.seamless, n * _LATTICE, chosen))
-        known = (places.small >= 0)[..., None]
-        number = np.full(charts, -1)
-        number[chosen] = np.arange(len(chosen))
-        candidates = np.where(known, places.positions, np.nan), places.normals
+        number = np.searchsorted(chosen, np.arange(charts))
+        candidates = np.where((places.small >= 0)[..., None], places.positions, np.nan), places.normals
         for i in range(_SWEEPS):
             if not _improve(texels, number, *candidates, active[:: 1 if i % 2 == 0 else -1].copy()):
                 break

@@ -106,7 +106,7 @@ class TriangleSurface:
         sets = ((middles[edges.of] >= 0) * (1, 2, 4)).sum(axis=1)
         touched = np.flatnonzero(sets)
         nodes, local = self._nodes(touched, middles, places)
-        central = np.flatnonzero([any(MIDDLE in each for each in patterns.get(int(s), ())) for s in range(8)])
+        central = [number for number, triangles in patterns.items() if any(MIDDLE in each for each in triangles)]
         inner = np.flatnonzero(np.isin(sets[touched], central))
         nodes[inner, MIDDLE] = count + len(cut) + np.arange(len(inner))
         points.append(np.einsum("ij,ijk->ik", local[inner, MIDDLE], self.V[self.F[touched[inner]]]))
@@ -119,10 +119,8 @@ class TriangleSurface:
                 weights.append(local[chosen][:, triangle])
                 origin.append(touched[chosen])
         source, share = np.concatenate(origin), np.concatenate(weights)
-        finer = TriangleSurface(
-            np.concatenate(points), np.concatenate(F), self.parent[source], share @ self.inside[source]
-        )
-        return finer, middles, source, share
+        parent, inside = self.parent[source], share @ self.inside[source]
+        return TriangleSurface(np.concatenate(points), np.concatenate(F), parent, inside), middles, source, share
 
     def _nodes(self, triangles: Ints, middles: Ints, places: Floats) -> tuple[Ints, Floats]:
         """Vertices [k, 7] of the named points of triangles [k], and their barycentrics [k, 7, 3]."""

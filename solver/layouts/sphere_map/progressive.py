@@ -290,8 +290,7 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     h = table.leaving[np.argmax(vertex_since == 4)]
     S[table.tail[[h, following(h), preceding(h), preceding(table.twin[h])]]] = TETRAHEDRON
     reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)), SPHERE)
-    load = np.ones(n)
-    count = 4
+    load, count = np.ones(n), 4
     for size in _level_sizes(n):
         shape_trust = trust * min(max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0)
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
@@ -304,9 +303,8 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
 
         vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
         update_level(vertices, triangles, table, surface, reference)
-        corners = (3 * triangles[:, None] + np.arange(3)).ravel()
         level_S = S[vertices]
-        shown = Reference(reference.area[triangles], reference.cotangent[corners], SPHERE)
+        shown = Reference(reference.area[triangles], reference.cotangent.reshape(-1, 3)[triangles].ravel(), SPHERE)
         relax_level(build_level(table, vertices, triangles), level_S, shown)
         S[vertices] = level_S
     return S
