@@ -23,6 +23,12 @@ Path = Ints
 Halves = list[tuple[Path, Path]]  # of each arc of a part's border
 
 
+def corner_charts(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sides]]:
+    """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
+    surface, sides = cut_polygons(*with_middles(cells))
+    return surface, charts_of(surface, sides), sides
+
+
 def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Halves]]:
     """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
     surface = cells.surface
@@ -49,8 +55,8 @@ def halves_of(V: Floats, arc: Path) -> tuple[Path, Path]:
     return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
 
 
-def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> tuple[Flat, list[list[Path]]]:
-    """Lay out the first parts as regular polygons and cut them from their middles; return the paths of the cuts.
+def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> tuple[TriangleSurface, list[Sides]]:
+    """Lay out the first parts as regular polygons and cut them from their middles; return the sides of the charts.
 
     Parts beyond those that have a border are left alone.
     """
@@ -73,7 +79,12 @@ def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> 
         for path, line in zip(paths, lines, strict=False):
             if len(line):
                 path.append(line)
-    return flat, paths
+    # a chart lies at each corner of each part, its sides counter-clockwise
+    sides: list[Sides] = []
+    for arcs, rays in zip(halves, paths, strict=True):
+        for i in range(len(arcs)):
+            sides.append((rays[i - 1], arcs[i - 1][1], arcs[i][0], rays[i][::-1]))
+    return flat.surface, sides
 
 
 def _polygon_border(surface: TriangleSurface, halves: list[Halves]) -> Border:
@@ -97,15 +108,6 @@ CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 Sides = tuple[Path, Path, Path, Path]
 Fans = list[list[int]]  # charts round a corner
-
-
-def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
-    """The four sides of each chart, counter-clockwise; a chart lies at each corner of each part."""
-    sides = []
-    for arcs, rays in zip(halves, paths, strict=True):
-        for i in range(len(arcs)):
-            sides.append((rays[i - 1], arcs[i - 1][1], arcs[i][0], rays[i][::-1]))
-    return sides
 
 
 def charts_of(surface: TriangleSurface, sides: list[Sides]) -> Ints:
@@ -168,9 +170,7 @@ def fans_of(sides: list[Sides], glued: Ints) -> tuple[Fans, list[int]]:
     return fans, np.flatnonzero(~used).tolist()
 
 
-def with_even_corners(
-    surface: TriangleSurface, chart: Ints, sides: list[Sides]
-) -> tuple[TriangleSurface, Ints, list[Sides]]:
+def with_even_corners(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> tuple[TriangleSurface, list[Sides]]:
     """Move the corners in which three cells meet to the middle between the cells' middles.
 
     Voronoi cells often have very short sides, along which texels would be tiny. So the three charts round a corner,
@@ -179,7 +179,7 @@ def with_even_corners(
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
     if not fans:
-        return surface, chart, sides
+        return surface, sides
     part = np.empty(len(sides), np.int64)
     for number, fan in enumerate([*fans, *([each] for each in rest)]):
         part[fan] = number
@@ -193,7 +193,5 @@ def with_even_corners(
                 first, second = halves_of(surface.V, np.concatenate([first, second[1:]]))
             halves[-1].append((first, second))
     split, origin = halved_chords(surface, part[chart], on_paths(surface, sides))
-    old = chart[origin]
-    flat, paths = cut_polygons(split, part[old], halves)
-    new_sides = [*chart_sides(halves, paths), *(sides[each] for each in rest)]
-    return flat.surface, charts_of(flat.surface, new_sides), new_sides
+    finer, new = cut_polygons(split, part[chart[origin]], halves)
+    return finer, [*new, *(sides[each] for each in rest)]

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
 from ...errors import AtlasError
-from ...kernel import Bools, Floats, Ints
+from ...kernel import Floats, Ints
 from .cells import BorderedCells, Metric, VoronoiCells, centred_cells, cut_borders, voronoi_cells
 from .surface import TriangleSurface
 
@@ -101,19 +101,18 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     number = np.append(np.where(inner, np.cumsum(inner), 0), 0)  # 0: outside
     beside = number[edges.sides[links] // 3]  # -1 at a rim: the last
     order = np.argsort(-loop, kind="stable")
-    closing = order[_closing(beside[order], tree[order], int(inner.sum()) + 1)]
+    order = order[~tree[order]]
+    closing = order[_closing(beside[order], int(inner.sum()) + 1)]
     if not len(closing):
         return int(np.argmax(np.where(own, cells.distance, -1.0)))
     best = ends[closing[-1]]
     return int(best[np.argmax(distance[best])])
 
 
-def _closing(beside: Ints, tree: Bools, triangles: int) -> list[int]:
-    """Edges, in this order and but for those of the `tree`, whose two triangles are joined already."""
+def _closing(beside: Ints, triangles: int) -> list[int]:
+    """Edges, in this order, whose two triangles are joined already."""
     root, closing = list(range(triangles)), []
     for e, (a, b) in enumerate(beside.tolist()):
-        if tree[e]:
-            continue
         while root[a] != a:
             root[a] = a = root[root[a]]
         while root[b] != b:

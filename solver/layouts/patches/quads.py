@@ -20,20 +20,19 @@ import numpy as np
 
 from ...errors import AtlasError
 from ...kernel import Bools, Floats, Ints, kernel
+from ...mesh.topology import counting_sort
 from .cells import BorderedCells, Metric, cell_sizes, centred_cells, spread_seeds
 from .charts import (
     Fans,
     Path,
     Sides,
-    chart_sides,
     charts_of,
-    cut_polygons,
+    corner_charts,
     fans_of,
     glued_sides,
     on_paths,
     square_border,
     with_even_corners,
-    with_middles,
 )
 from .disks import disk_cells, flattened, signed_areas
 from .surface import TriangleSurface, halved_chords, refined
@@ -90,21 +89,13 @@ def chosen_joints(
     ends = triangles[kept]
     inner = ends[:, 1] >= 0
     nodes = triangle_count + triangle_count % 2
-    ends = np.where(ends < 0, triangle_count, ends)
-    order = np.argsort(ends.T.ravel(), kind="stable")
-    pairing = Pairing(
-        np.searchsorted(ends.T.ravel()[order], np.arange(nodes + 1)),
-        order % max(len(kept), 1),
-        ends,
-        np.where(inner[:, None], middles[kept], -1),
-        np.where(inner, _SHAPE * shape[kept] ** 2, 0.0),
-        np.full(nodes, -1),
-        corners.copy(),
-        wanted,
-        np.zeros(nodes, bool),
-    )
     if not nodes:
         return kept[:0]
+    ends = np.where(ends < 0, triangle_count, ends)
+    start, order = counting_sort(ends.T.ravel(), np.arange(ends.size), nodes)
+    taken, cost = np.where(inner[:, None], middles[kept], -1), np.where(inner, _SHAPE * shape[kept] ** 2, 0.0)
+    closed, passed = np.full(nodes, -1), np.zeros(nodes, bool)
+    pairing = Pairing(start, order % len(kept), ends, taken, cost, closed, corners.copy(), wanted, passed)
     if not _paired(pairing) or pairing.quads.min() < FEWEST:
         return None
     return kept[np.unique(pairing.closed)]
@@ -223,10 +214,8 @@ def _change(pairing: Pairing, e: int, quads: int) -> float:
     return cost
 
 
-def joined(
-    surface: TriangleSurface, chart: Ints, sides: list[Sides]
-) -> tuple[TriangleSurface, Ints, list[Sides]] | None:
-    """Join the charts of cells [m] to larger ones; None where that is not possible."""
+def joined(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> list[Sides] | None:
+    """Join the charts of cells [m] to larger ones: their sides, or None where that is not possible."""
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
     cell = np.unique([each[0][0] for each in sides], return_inverse=True)[1]
@@ -253,9 +242,7 @@ def joined(
         b = glued[a, 1, 0]
         new.append((sides[a][0], sides[b][3], _whole(sides, glued, b), _whole(sides, glued, glued[b, 1, 0])))
     new += _at_rim(sides, glued, rest, glued[first[chosen[alone]], 0, 0])
-    if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any():
-        return None
-    return surface, charts_of(surface, new), new
+    return None if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any() else new
 
 
 def _joints(V: Floats, sides: list[Sides], glued: Ints, fans: Fans) -> tuple[Ints, Ints, Floats, Ints]:
@@ -326,7 +313,7 @@ def cut_into_quads(cells: BorderedCells) -> Quads:
 
     Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
-    return _laid_out(cells, *with_even_corners(*_cut(cells)))
+    return _laid_out(cells, *with_even_corners(*corner_charts(cells)))
 
 
 def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
@@ -334,19 +321,13 @@ def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
 
     Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
-    large = joined(*_cut(cells))
-    return None if large is None else _laid_out(cells, *large)
+    surface, chart, sides = corner_charts(cells)
+    large = joined(surface, chart, sides)
+    return None if large is None else _laid_out(cells, surface, large)
 
 
-def _cut(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sides]]:
-    """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
-    surface, cell, halves = with_middles(cells)
-    flat, paths = cut_polygons(surface, cell, halves)
-    sides = chart_sides(halves, paths)
-    return flat.surface, charts_of(flat.surface, sides), sides
-
-
-def _laid_out(cells: BorderedCells, surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> Quads:
+def _laid_out(cells: BorderedCells, surface: TriangleSurface, sides: list[Sides]) -> Quads:
+    chart = charts_of(surface, sides)
     surface, origin = halved_chords(surface, chart, on_paths(surface, sides))
     chart = chart[origin]
     places = flattened(surface, chart, square_border(surface, sides))
@@ -369,9 +350,8 @@ _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longes
 def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
     """The quads of a count of cells; large ones where they are wanted and possible, else about as many."""
     quads = large_quads_of(part, count) if large else None
-    if quads is not None:
-        return quads
-    return cut_into_quads(_cells_of(part, max(1, round(count * _LARGE / _CORNERS)) if large else count))
+    few = max(1, round(count * _LARGE / _CORNERS)) if large else count
+    return cut_into_quads(_cells_of(part, few)) if quads is None else quads
 
 
 def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:

@@ -15,6 +15,7 @@ import numpy as np
 from ...errors import AtlasError
 from ...kernel import Bools, Floats, Ints, kernel
 from ...mesh.mesh import Mesh
+from ...mesh.vectors import cross, dot, subtract
 from ...texels.topology import TexelTopology
 from .layout import PatchMap
 from .seamless import Complex, SeamlessMap, follow, places_on_charts, wedge
@@ -50,9 +51,8 @@ def _fault(texels: Texels, flat: int) -> float:
     fault = 0.0
     for i, j in _BESIDE:
         p, q = _place(texels, chart, row + i, column + j), _place(texels, chart, row + j, column - i)
-        ax, ay, az, bx, by, bz = p[0] - o[0], p[1] - o[1], p[2] - o[2], q[0] - o[0], q[1] - o[1], q[2] - o[2]
-        facing = (ay * bz - az * by) * normal[0] + (az * bx - ax * bz) * normal[1] + (ax * by - ay * bx) * normal[2]
-        size = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
+        a, b = subtract(p, o), subtract(q, o)
+        facing, size = dot(cross(a, b), normal), np.sqrt(dot(a, a) * dot(b, b))
         # NaN, where there is no neighbour, is not below the margin
         if facing < _MARGIN * size:
             fault += (1.0 if facing < 0.0 else 0.0) + (_MARGIN - facing / max(size, 1e-300)) ** 2
@@ -105,8 +105,7 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
     for _ in range(_REACH):
         near |= (near[beside] & (beside >= 0)).any(axis=1)
     corner, homes, places = places_on_charts(seamless)
-    chosen = np.flatnonzero(near[homes])
-    triangles, barycentrics, best = _draw(seamless, chosen, corner, homes, places, number, n)
+    triangles, barycentrics, best = _draw(seamless, np.flatnonzero(near[homes]), corner, homes, places, number, n)
     triangles[best < -_ROUND_OFF] = -1
     return triangles, barycentrics
 
