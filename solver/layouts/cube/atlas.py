@@ -252,7 +252,7 @@ class SphereAtlas(Atlas):
         """Radius of the sphere [m]."""
         return float(np.linalg.norm(self.mesh.V[0]))
 
-    def project(self, points: ArrayLike) -> tuple[Floats, Floats]:
+    def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Closest points on the sphere itself [m] (not on its triangles) and their directions, each [k, 3]."""
         points = check_points(points)
         length = np.linalg.norm(points, axis=1, keepdims=True)
@@ -260,7 +260,7 @@ class SphereAtlas(Atlas):
             raise AtlasError("the sphere's centre has no nearest surface point; give a point off the centre")
         return self.radius * (points / length), points / length
 
-    def nearest(self, points: ArrayLike) -> tuple[Floats, Ints]:
+    def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest points on the sphere [m], [k, 3], and the flat index of the texel in which each lies, [k]."""
         closest, directions = self.project(points)
         return closest, texels_towards(directions, self.resolution)

@@ -33,9 +33,8 @@ def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Halv
     """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
     surface = cells.surface
     single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
-    size = len(surface.V)
-    low_high = surface.edges.ends @ [size, 1]
-    chosen = np.isin(low_high, np.sort(single, axis=1) @ [size, 1])
+    key = [len(surface.V), 1]
+    chosen = np.isin(surface.edges.ends @ key, np.sort(single, axis=1) @ key)
     finer, middles, origin, _ = surface.subdivided(np.where(chosen, 0.5, np.nan))
     middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), middles[chosen].tolist(), strict=True))
     arcs = [

@@ -246,9 +246,7 @@ def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
     widest = int(shares.argmax())
     first = large_quads_of(parts[widest], counts[widest])
     large = first is not None
-    quads = [
-        first if first is not None and i == widest else quads_of(part, counts[i], large) for i, part in enumerate(parts)
-    ]
+    quads = [first if first and i == widest else quads_of(part, counts[i], large) for i, part in enumerate(parts)]
     wanted = shares * sum(len(each.glued) for each in quads)
     for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
         quads[i] = _recut(parts[i], quads[i], counts[i], wanted[i], large)
@@ -319,9 +317,9 @@ def _joined(parts: list[Quads]) -> Quads:
         np.concatenate([each.surface.parent for each in parts]),
         np.concatenate([each.surface.inside for each in parts]),
     )
-    first_chart = np.repeat(charts[:-1], np.diff(charts))  # of the part of each
     glued = np.concatenate([each.glued for each in parts])
-    glued[..., 0] += np.where(glued[..., 0] >= 0, first_chart[:, None], 0)
+    first_of_part = np.repeat(charts[:-1], np.diff(charts))
+    glued[..., 0] += np.where(glued[..., 0] >= 0, first_of_part[:, None], 0)
     return Quads(
         surface,
         np.concatenate([each.chart + first for each, first in zip(parts, charts, strict=False)]),

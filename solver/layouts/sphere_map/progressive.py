@@ -15,6 +15,8 @@ smooth is the work of `newton`.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,10 +48,7 @@ def relax_level(level: Level, S: Floats, reference: Reference) -> None:
     """Lower the energy of a level in place."""
     shapes = star_shapes(level.star, reference)
     least_gain = TIRED_NEWTON if len(S) < LARGE else TIRED_LARGE
-
-    def energy() -> float:
-        return total_energy(level.tail, S, reference)
-
+    energy = functools.partial(total_energy, level.tail, S, reference)
     for _ in range(MOST_ROUNDS):
         for i in range(MOST_SWEEPS):
             if sweep(level, S, shapes, reference.density, i % 2 == 0) < TIRED_SWEEP * energy():
@@ -284,24 +283,21 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     vertex_since, triangle_since = np.full(n, 4), np.full(len(F), 4)
     arrival = n - np.arange(len(log))
     vertex_since[removed] = triangle_since[log // 3] = triangle_since[table.twin[log] // 3] = arrival
+    vertices, triangles = np.flatnonzero(vertex_since == 4), np.flatnonzero(triangle_since == 4)
 
     S = np.zeros((n, 3))
     # the four that are left, in the order in which no triangle is inside out
-    h = table.leaving[np.argmax(vertex_since == 4)]
+    h = table.leaving[vertices[0]]
     S[table.tail[[h, following(h), preceding(h), preceding(table.twin[h])]]] = TETRAHEDRON
     reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)), SPHERE)
-    load, count = np.ones(n), 4
+    load = np.ones(n)
     for size in _level_sizes(n):
         shape_trust = trust * min(max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0)
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
         surface = RealSurface(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
-
-        vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
         update_level(vertices, triangles, table, surface, reference)
-        insert_vertices(log[n - size : n - count], table, surface, S, reference)
-        count = size
-
-        vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
+        insert_vertices(log[n - size : n - len(vertices)], table, surface, S, reference)
+        vertices, triangles = np.flatnonzero(vertex_since <= size), np.flatnonzero(triangle_since <= size)
         update_level(vertices, triangles, table, surface, reference)
         level_S = S[vertices]
         shown = Reference(reference.area[triangles], reference.cotangent.reshape(-1, 3)[triangles].ravel(), SPHERE)
