@@ -27,7 +27,6 @@ from .sphere_map import certify, conformal_sphere_map, progressive_sphere_map
 # "auto" takes the first of the others that fits a mesh.
 LAYOUTS = ("auto", "cube", "patches")
 
-
 Arrays = dict[str, NDArray]
 
 _CHART_MAPS: dict[str, Callable[[Arrays], ChartMap]] = {
@@ -116,9 +115,14 @@ def build_atlas(
         if name not in valid:
             raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
     check_memory(resolution)
-    if layout == "cube":
-        check_genus_zero(mesh)
-    cube = layout == "cube" or (layout == "auto" and _fits_cube(mesh))
+    cube = layout != "patches"
+    if cube:
+        try:
+            check_genus_zero(mesh)
+        except MeshError:
+            if layout == "cube":
+                raise
+            cube = False
     start = time.perf_counter()
     path = None
     if cache:  # a file for each mesh and sphere map: that does not depend on the resolution, and rays are quick
@@ -131,8 +135,7 @@ def build_atlas(
         stored.timings["cache"] = time.perf_counter() - start
         return stored
     if cube:
-        known = sphere if stored is None else stored.sphere
-        atlas = _cube(mesh, resolution, method, known)
+        atlas = _cube(mesh, resolution, method, sphere if stored is None else stored.sphere)
     else:
         atlas = patch_atlas(mesh, resolution)
     if path is not None:
@@ -145,32 +148,22 @@ def build_atlas(
     return atlas
 
 
-def _fits_cube(mesh: Mesh) -> bool:
-    try:
-        check_genus_zero(mesh)
-    except MeshError:
-        return False
-    return True
-
-
 def _cube(mesh: Mesh, resolution: int, method: str, known: NDArray[np.float64] | None) -> Atlas:
     """Atlas of the cube layout, by way of a sphere map that is known already, or by a method."""
     start = time.perf_counter()
-    sphere = SPHERE_MAPS[method](mesh.V, mesh.F) if known is None else _certified(mesh, known)
+    if known is None:
+        sphere = SPHERE_MAPS[method](mesh.V, mesh.F)
+    else:
+        sphere = np.ascontiguousarray(known, dtype=np.float64)
+        if sphere.shape != mesh.V.shape or not np.isfinite(sphere).all() or not certify(mesh.F, sphere).valid:
+            raise SphereMapError(
+                f"sphere has the shape {sphere.shape} and is no fold-free sphere map of the mesh, which has "
+                f"{len(mesh.V)} vertices; leave it out to have one computed"
+            )
     mapped = time.perf_counter()
     atlas = atlas_from_sphere_map(mesh, sphere, resolution)
     atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
     return atlas
-
-
-def _certified(mesh: Mesh, sphere: NDArray[np.float64]) -> NDArray[np.float64]:
-    sphere = np.ascontiguousarray(sphere, dtype=np.float64)
-    if sphere.shape != mesh.V.shape or not np.isfinite(sphere).all() or not certify(mesh.F, sphere).valid:
-        raise SphereMapError(
-            f"sphere has the shape {sphere.shape} and is no fold-free sphere map of the mesh, which has "
-            f"{len(mesh.V)} vertices; leave it out to have one computed"
-        )
-    return sphere
 
 
 def _read_cache(path: Path, mesh: Mesh, cube: bool) -> Atlas | None:

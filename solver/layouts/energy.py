@@ -20,7 +20,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..kernel import Floats, kernel
-from ..mesh.vectors import Vector, dot, row, subtract
+from ..mesh.vectors import Vector, combine, cross, dot, row, subtract
 
 
 class Density(NamedTuple):
@@ -137,23 +137,14 @@ def expand_star(
     """
     for i in range(degree):
         e, g = subtract(row(first, i), p), subtract(row(second, i), p)
-        ax, ay, az, bx, by, bz = dot(e, x), dot(e, y), dot(e, p), dot(g, x), dot(g, y), dot(g, p)
+        a, b = (dot(e, x), dot(e, y), dot(e, p)), (dot(g, x), dot(g, y), dot(g, p))
+        c, normal = subtract(b, a), cross(a, b)
         area, opposite, left, right = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
-        half = 0.5 / area
-        cx, cy, cz = bx - ax, by - ay, bz - az
-        terms[i, J] = half * (ax * by - ay * bx)
-        terms[i, JX] = half * (ay * bz - az * by - cy)
-        terms[i, JY] = half * (az * bx - ax * bz + cx)
-        terms[i, D] = (
-            opposite * (cx * cx + cy * cy + cz * cz)
-            + left * (bx * bx + by * by + bz * bz)
-            + right * (ax * ax + ay * ay + az * az)
-        )
-        terms[i, DX] = -2.0 * (left * bx + right * ax)
-        terms[i, DY] = -2.0 * (left * by + right * ay)
-        terms[i, DZ] = -2.0 * (left * bz + right * az)
-        terms[i, BEND] = left + right
-        terms[i, AREA] = area
+        half, pull = 0.5 / area, combine(left, b, right, a)
+        terms[i, J], terms[i, JX], terms[i, JY] = half * normal[2], half * (normal[0] - c[1]), half * (normal[1] + c[0])
+        terms[i, D] = opposite * dot(c, c) + left * dot(b, b) + right * dot(a, a)
+        terms[i, DX], terms[i, DY], terms[i, DZ] = -2.0 * pull[0], -2.0 * pull[1], -2.0 * pull[2]
+        terms[i, BEND], terms[i, AREA] = left + right, area
 
 
 @kernel

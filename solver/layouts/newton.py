@@ -94,7 +94,6 @@ class System(NamedTuple):
         return cls(np.zeros((vertices, 2)), np.zeros((vertices, 3)), np.zeros((edges, 4)))
 
 
-Triple: TypeAlias = tuple[int, int, int]
 # of D and J along the two directions of a vertex, D_x, D_y, J_x, J_y; or what these are multiplied with
 Slopes: TypeAlias = tuple[float, float, float, float]
 # a corner of a triangle: the directions of its vertex, its slopes, and these combined as in the outer products
@@ -105,7 +104,7 @@ Corner: TypeAlias = tuple[Vector, Vector, Slopes, Slopes]
 @kernel(inline="always")
 def add_triangle(
     f: int,
-    vertices: Triple,
+    vertices: tuple[int, int, int],
     edges: tuple[tuple[int, bool], tuple[int, bool], tuple[int, bool]],
     points: tuple[Vector, Vector, Vector],
     x: tuple[Vector, Vector, Vector],
@@ -143,16 +142,9 @@ def add_triangle(
 
 @kernel
 def _add_vertex(
-    v: int,
-    grad_d: Vector,
-    grad_j: Vector,
-    half: float,
-    x: Vector,
-    y: Vector,
-    bend: float,
-    shares: Shares,
+    v: int, grad_d: Vector, grad_j: Vector, half: float, x: Vector, y: Vector, bend: float, shares: Shares,
     system: System,
-) -> Corner:
+) -> Corner:  # fmt: skip
     """Add what a triangle says about its vertex v, given the gradients of D and of J / `half` there."""
     dx, dy, jx, jy = dot(grad_d, x), dot(grad_d, y), half * dot(grad_j, x), half * dot(grad_j, y)
     dd, dj, jj = shares[4], shares[5], shares[6]

@@ -79,9 +79,7 @@ def texels_towards(directions: Floats, n: int) -> Ints:
     return texels
 
 
-def cast_rays(
-    sphere: NDArray[np.float64], mesh: Mesh, directions: NDArray[np.float64], stride: int = 1
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def cast_rays(sphere: Floats, mesh: Mesh, directions: Floats, stride: int = 1) -> tuple[Ints, Floats]:
     """Intersect rays from the origin with the sphere-mapped mesh.
 
     Embree finds triangles in float32; the barycentrics are computed again in float64, which also moves a hit to the
@@ -168,21 +166,19 @@ class CubeChartMap:
     `sphere` [vertex_count, 3] is the sphere map: one unit vector a vertex.
     """
 
-    sphere: NDArray[np.float64]
+    sphere: Floats
 
     @property
     def layout(self) -> str:
         """Name of the layout."""
         return "cube"
 
-    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, mesh: Mesh, triangles: Ints, points: Floats) -> Floats:
         """Directions [k, 3] of points [k, 3] [m] that lie on triangles [k], unit vectors."""
         corners = mesh.F[triangles]
         return sphere_directions(mesh.V[corners], self.sphere[corners], points)
 
-    def chart_points(
-        self, coordinates: NDArray[np.float64], resolution: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def chart_points(self, coordinates: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
         """Chart, row and column of directions, each [k]."""
         return cube_chart_points(coordinates, resolution)
 
@@ -194,11 +190,11 @@ class CubeChartMap:
         """The triangles, with the directions of their corners."""
         return uncut(self.sphere[mesh.F])
 
-    def split(self, corners: NDArray[np.float64]) -> Parts:
+    def split(self, corners: Floats) -> Parts:
         """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
         return split_at_edges(corners)
 
-    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    def uv(self, coordinates: Floats, chart: Ints) -> Floats:
         """Place [k, ..., 2] in charts [k], 0 to 1, of directions [k, ..., 3] that belong to them."""
         return chart_uv(coordinates, chart)
 
@@ -216,13 +212,20 @@ class CubeChartMap:
 STRIDE = 16  # texels from one that is found by a ray to the next
 
 
-def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> Atlas:
+def atlas_from_sphere_map(mesh: Mesh, sphere: Floats, resolution: int) -> Atlas:
     """Atlas of a mesh for a given fold-free sphere map [vertex_count, 3] (unit vectors)."""
     directions = texel_directions(check_resolution(resolution))
     # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
     stride = math.gcd(resolution, STRIDE) if directions.size > 3 * len(mesh.F) else 1
     triangles, barycentrics = cast_rays(sphere, mesh, directions.reshape(-1, 3), stride)
-    positions, normals = _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics)
+    corners = mesh.F[triangles]
+    begins = np.arange(0, corners.size + 1, 3)
+    weights = csr_array((barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(mesh.V)))
+    normals = weights @ mesh.vertex_normals
+    lengths = np.linalg.norm(normals, axis=1)
+    cancelled = lengths <= 1e-9  # opposite normals: any corner's will do
+    normals[cancelled], lengths[cancelled] = mesh.vertex_normals[corners[cancelled, 0]], 1.0
+    normals /= lengths[:, None]
     shape = directions.shape[:3]
     triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)
     topology = cube_topology(resolution)
@@ -230,7 +233,7 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
         mesh=mesh,
         texels=TexelMesh.of(
             topology,
-            positions.reshape(*shape, 3),
+            (weights @ mesh.V).reshape(*shape, 3),
             normals=normals.reshape(*shape, 3),
             covered=covered_areas(mesh, sphere, resolution),
             detours=link_detours(mesh, topology, triangles, barycentrics),
@@ -239,21 +242,6 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
         triangles=triangles,
         barycentrics=barycentrics,
     )
-
-
-def _interpolate(
-    at_vertices: tuple[Floats, Floats], F: Ints, triangles: Ints, barycentrics: Floats
-) -> tuple[Floats, Floats]:
-    """Positions and unit normals, [n, 3] at the vertices, at barycentric coordinates in triangles, [k, 3]."""
-    (V, vertex_normals), corners = at_vertices, F[triangles]
-    begins = np.arange(0, corners.size + 1, 3)
-    weights = csr_array((barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(V)))
-    normals = weights @ vertex_normals
-    lengths = np.linalg.norm(normals, axis=1)
-    cancelled = lengths <= 1e-9  # opposite normals: any corner's will do
-    normals[cancelled], lengths[cancelled] = vertex_normals[corners[cancelled, 0]], 1.0
-    normals /= lengths[:, None]
-    return weights @ V, normals
 
 
 class SphereAtlas(Atlas):
@@ -316,9 +304,7 @@ def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
     )
 
 
-def _texel_triangulation(
-    halo: NDArray[np.int64], n: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _texel_triangulation(halo: Ints, n: int) -> tuple[Ints, Ints, Floats]:
     """Triangles of the texel mesh; for each texel, one triangle [6, N, N] and the corner of it [6, N, N, 3] it is."""
     sw, se, nw, ne = halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, :-1], halo[:, 1:, 1:]
     # a cell across a cube edge appears on two charts, one at a cube corner on three: it belongs to its lowest texel

@@ -18,12 +18,12 @@ import functools
 import numbers
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import AtlasError
 from ...files import require_memory
-from ...kernel import log
+from ...kernel import Floats, Ints, log
 from ...mesh.mesh import Mesh
+from ...mesh.vectors import cross, dot
 from ...texels.chart_map import Parts, texel_areas
 from ...texels.topology import TexelTopology, glue
 
@@ -60,22 +60,18 @@ def check_memory(resolution: int) -> None:
         log.warning("%s has about %d million texels, which take %.0f s or more", what, texels / 1e6, _SECONDS * texels)
 
 
-def texel_directions(resolution: int) -> NDArray[np.float64]:
+def texel_directions(resolution: int) -> Floats:
     """Unit vectors through the texel centres, shape [6, N, N, 3]."""
-    half_width = resolution
-    offset = 2 * np.arange(resolution) + 1 - half_width
+    offset = 2 * np.arange(resolution) + 1 - resolution
     # tan is evaluated once per distance from the chart's middle, so that mirrored texels are mirrored to the last bit
-    tangent = np.sign(offset) * np.tan(np.pi / 4 * np.abs(offset) / half_width)
-    a = tangent[None, None, :, None]
-    b = tangent[None, :, None, None]
+    tangent = np.sign(offset) * np.tan(np.pi / 4 * np.abs(offset) / resolution)
+    a, b = tangent[None, None, :, None], tangent[None, :, None, None]
     directions = CHART_NORMALS[:, None, None, :] + a * CHART_U[:, None, None, :] + b * CHART_V[:, None, None, :]
     # the sum of squares in one order for all charts, for the same reason
     return directions / np.sqrt(1.0 + np.minimum(a * a, b * b) + np.maximum(a * a, b * b))
 
 
-def cube_chart_points(
-    directions: NDArray[np.float64], resolution: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def cube_chart_points(directions: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
     """Chart, row and column of directions from the cube's centre (they need not be unit vectors).
 
     Row and column are float64 in texel units; 0.0 is the centre of the first texel. Each result has shape [k].
@@ -109,21 +105,21 @@ _SIDES = np.stack(
 ).astype(np.float64)
 
 
-def split_at_edges(corners: NDArray[np.float64]) -> Parts:
+def split_at_edges(corners: Floats) -> Parts:
     """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
     middles = corners.sum(axis=1)
     axis = np.argmax(np.abs(middles), axis=1)
     chart = 2 * axis + (np.take_along_axis(middles, axis[:, None], axis=1)[:, 0] < 0)
     inside = (np.einsum("mki,msi->mks", corners, _SIDES[chart]) >= -_ROUND_OFF).all(axis=(1, 2))
     whole, crossing = np.flatnonzero(inside), np.flatnonzero(~inside)
-    owner, piece_chart, pieces = _cut(corners[crossing], _SIDES)
+    owner, piece_chart, pieces = _cut(corners[crossing])
     triangle = np.concatenate([whole, crossing[owner]])
     order = np.argsort(triangle, kind="stable")
     barycentrics = np.concatenate([np.tile(np.eye(3), (len(whole), 1, 1)), pieces])[order]
     return triangle[order], barycentrics, np.concatenate([chart[whole], piece_chart])[order]
 
 
-def covered_areas(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> NDArray[np.float64]:
+def covered_areas(mesh: Mesh, sphere: Floats, resolution: int) -> Floats:
     """Area of a mesh that each texel covers [m^2], [6, N, N], by its sphere map; see `texel_areas`."""
     directions = sphere[mesh.F]
     triangle, barycentrics, chart = split_at_edges(directions)
@@ -133,36 +129,31 @@ def covered_areas(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> N
     return texel_areas(mesh, (triangle, barycentrics, chart), corners, lines, 6)
 
 
-def chart_uv(directions: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+def chart_uv(directions: Floats, chart: Ints) -> Floats:
     """Equiangular place in charts [k], 0 to 1, of directions [k, ..., 3] that belong to them, [k, ..., 2]."""
     depth = np.einsum("p...i,pi->p...", directions, CHART_NORMALS[chart])
     sides = np.einsum("p...i,pij->p...j", directions, np.stack([CHART_U, CHART_V], axis=-1)[chart])
     return np.clip(0.5 + np.arctan(sides / depth[..., None]) * (2 / np.pi), 0.0, 1.0)
 
 
-def _cut(
-    corners: NDArray[np.float64], sides: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _cut(corners: Floats) -> tuple[Ints, Ints, Floats]:
     """Cut triangles [k, 3, 3] into their parts in each chart: owner, chart, and barycentrics [pieces, 3, 3]."""
     owner, chart = np.divmod(np.arange(6 * len(corners)), 6)
     # a triangle that is cut by four planes has seven corners at most
     polygons, sizes = np.zeros((len(owner), _MOST, 3)), np.full(len(owner), 3)
     polygons[:, :3] = np.eye(3)
     for s in range(4):
-        polygons, sizes = _clip(polygons, sizes, corners[owner], sides[chart, s])
+        polygons, sizes = _clip(polygons, sizes, corners[owner], _SIDES[chart, s])
         left = sizes > 0
         owner, chart, polygons, sizes = owner[left], chart[left], polygons[left], sizes[left]
     fan, k = np.nonzero(np.arange(2, _MOST) < sizes[:, None])
     pieces = np.stack([polygons[fan, 0], polygons[fan, k + 1], polygons[fan, k + 2]], axis=1)
     a, b, c = pieces.transpose(1, 2, 0)
-    area = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-    real = area > _ROUND_OFF
+    real = dot(a, cross(b, c)) > _ROUND_OFF  # their areas
     return owner[fan[real]], chart[fan[real]], pieces[real]
 
 
-def _clip(
-    polygons: NDArray[np.float64], sizes: NDArray[np.int64], corners: NDArray[np.float64], planes: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _clip(polygons: Floats, sizes: Ints, corners: Floats, planes: Floats) -> tuple[Floats, Ints]:
     """Keep the parts of convex polygons, [p, 8, 3], on the inner sides of planes (Sutherland and Hodgman 1974)."""
     clipped, count, every = np.zeros_like(polygons), np.zeros_like(sizes), np.arange(len(sizes))
     previous = polygons[every, sizes - 1]
@@ -183,10 +174,6 @@ def _clip(
     return clipped, count
 
 
-def _distance(
-    weights: NDArray[np.float64], corners: NDArray[np.float64], planes: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _distance(weights: Floats, corners: Floats, planes: Floats) -> Floats:
     """Distance [p] of points in triangles, by barycentrics [p, 3] and corners [p, 3, 3], from planes [p, 3]."""
-    x, y, z = planes.T
-    a, b, c = (corners[:, i, 0] * x + corners[:, i, 1] * y + corners[:, i, 2] * z for i in range(3))
-    return weights[:, 0] * a + weights[:, 1] * b + weights[:, 2] * c
+    return dot(weights.T, [dot(corners[:, i].T, planes.T) for i in range(3)])

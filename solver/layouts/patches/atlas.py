@@ -37,11 +37,11 @@ class PatchChartMap:
         return "patches"
 
     @functools.cached_property
-    def _first(self) -> NDArray[np.int64]:
+    def _first(self) -> Ints:
         """Number of the first piece of each triangle, and one behind the last."""
         return np.searchsorted(self.pieces.triangle, np.arange(self.pieces.triangle[-1] + 2))
 
-    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def coordinates(self, mesh: Mesh, triangles: Ints, points: Floats) -> Floats:
         """Chart, column and row, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
         weights = barycentrics_in(mesh.V[mesh.F[triangles]], points)
         piece, inside = np.empty(len(weights), np.int64), np.empty((len(weights), 3))
@@ -49,9 +49,7 @@ class PatchChartMap:
         places = np.einsum("kc,kcj->kj", inside, self.pieces.places[piece])
         return np.concatenate([self.pieces.chart[piece, None], places], axis=1)
 
-    def chart_points(
-        self, coordinates: NDArray[np.float64], resolution: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def chart_points(self, coordinates: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
         """Chart, row and column, each [k]."""
         chart, column, row = coordinates.T
         return chart.astype(np.int64), row * resolution - 0.5, column * resolution - 0.5
@@ -66,11 +64,11 @@ class PatchChartMap:
         coordinates = np.concatenate([chart, self.pieces.places], axis=2)
         return self.pieces.triangle, self.pieces.barycentrics, coordinates
 
-    def split(self, corners: NDArray[np.float64]) -> Parts:
+    def split(self, corners: Floats) -> Parts:
         """Parts of pieces as they are: each lies in one chart."""
         return uncut(corners[:, 0, 0].astype(np.int64))
 
-    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    def uv(self, coordinates: Floats, chart: Ints) -> Floats:
         """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
         return np.clip(coordinates[..., 1:], 0.0, 1.0)
 
@@ -133,7 +131,7 @@ def _texels_on_pieces(corners: Floats, first: Ints, pieces: Pieces, n: int, tria
     return texels
 
 
-def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> NDArray[np.float64] | None:
+def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> Floats | None:
     """Positions with halo [C, n + 2, n + 2, 3] [m]; beyond a rim lies its point opposite to each texel.
 
     None if there is no rim. At the end of a rim, where that turns, lies its corner.
@@ -142,12 +140,12 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
         return None
     beyond = topology.with_halo(positions)
     beyond[(topology.halo < 0) | topology.rim] = np.nan
-    sides = patches.surface.edges.sides[patches.surface.edges.rim, 0]
-    seamless = patches.seamless
+    seamless, surface = patches.seamless, patches.surface
+    sides = surface.edges.sides[surface.edges.rim, 0]
     f, k = np.divmod(sides, 3)
     corner = np.where(seamless.freedom[seamless.F[f, k]] != FIXED, k, (k + 1) % 3)
     homes, places = places_seen_from(seamless, f, corner)
-    _draw_rims(seamless, patches.surface.V, sides, corner, homes, places, beyond)
+    _draw_rims(seamless, surface.V, sides, corner, homes, places, beyond)
     n = topology.shape[1]
     for chart, corner in np.argwhere(topology.valence == 0):
         row, column = ((0, 0), (0, n + 1), (n + 1, n + 1), (n + 1, 0))[corner]
@@ -158,32 +156,18 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
             out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
             along_rows = topology.rim[other, out_r, c + 1]
             beyond[chart, row, column] = beyond[other, out_r, c + 1] if along_rows else beyond[other, r + 1, out_c]
-    _place_corners(patches, topology, beyond)
+    # points in which a single chart ends at a rim lie in the corner of its halo
+    f, k = np.nonzero((surface.at_rim & (seamless.freedom == FIXED))[surface.F])
+    place = seamless.shift[f, k] * (n + 1)
+    at = seamless.frame[f], place.imag.astype(np.int64), place.real.astype(np.int64)
+    alone = topology.rim[at]
+    beyond[tuple(each[alone] for each in at)] = surface.V[surface.F[f, k]][alone]
     return beyond
-
-
-def _place_corners(patches: PatchMap, topology: TexelTopology, beyond: NDArray[np.float64]) -> None:
-    """Put the points in which a single chart ends at a rim into the corners of its halo."""
-    seamless, surface = patches.seamless, patches.surface
-    held = np.zeros(len(surface.V), bool)
-    held[surface.edges.ends[surface.edges.rim]] = True
-    held &= seamless.freedom == FIXED
-    triangle, k = np.nonzero(held[surface.F])
-    place = seamless.shift[triangle, k] * (beyond.shape[1] - 1)
-    chart, row, column = seamless.frame[triangle], place.imag.astype(np.int64), place.real.astype(np.int64)
-    alone = topology.rim[chart, row, column]
-    beyond[chart[alone], row[alone], column[alone]] = surface.V[surface.F[triangle, k]][alone]
 
 
 @kernel
 def _draw_rims(
-    seamless: SeamlessMap,
-    V: Floats,
-    sides: Ints,
-    corner: Ints,
-    homes: Ints,
-    places: Complex,
-    beyond: Floats,
+    seamless: SeamlessMap, V: Floats, sides: Ints, corner: Ints, homes: Ints, places: Complex, beyond: Floats
 ) -> None:
     """Put the points of sides at a rim beyond the texels opposite to them; see `places_seen_from`."""
     n = beyond.shape[1] - 2
@@ -250,7 +234,6 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
         pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
     lines, corners = np.linspace(0.0, 1.0, n + 1), np.pad(pieces.places, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
     parts = pieces.triangle, pieces.barycentrics, pieces.chart
-    covered = texel_areas(mesh, parts, corners, lines, len(glued))
     return Atlas(
         mesh=mesh,
         texels=TexelMesh.of(
@@ -258,7 +241,7 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
             samples.positions,
             normals=samples.normals,
             beyond=beyond,
-            covered=covered,
+            covered=texel_areas(mesh, parts, corners, lines, len(glued)),
             detours=link_detours(mesh, topology, samples.triangles, samples.barycentrics),
         ),
         chart_map=PatchChartMap(pieces),

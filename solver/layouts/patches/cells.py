@@ -10,10 +10,10 @@ import dataclasses
 import functools
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import SPLITS
 from .surface import AB, BC, CA, MIDDLE, A, B, C, Patterns, TriangleSurface
 
@@ -35,14 +35,14 @@ class Metric:
 
     surface: TriangleSurface
     graph: csr_array
-    unit: NDArray[np.float64]
+    unit: Floats
 
     @classmethod
     def of(cls, surface: TriangleSurface) -> Metric:
         """Distances in metres."""
         return cls(surface, distance_graph(surface), np.ones(len(surface.V)))
 
-    def in_units(self, unit: NDArray[np.float64]) -> Metric:
+    def in_units(self, unit: Floats) -> Metric:
         """The same distances in other units [n] [m]; a link takes the mean of both ends."""
         row = np.repeat(np.arange(len(unit)), np.diff(self.graph.indptr))
         column = self.graph.indices
@@ -50,13 +50,13 @@ class Metric:
         return Metric(self.surface, csr_array((lengths, column, self.graph.indptr), self.graph.shape), unit)
 
     @functools.cached_property
-    def edge_lengths(self) -> NDArray[np.float64]:
+    def edge_lengths(self) -> Floats:
         """Lengths of the surface's edges, none of them 0, [e]."""
         lengths = self.surface.edge_lengths / self.unit[self.surface.edges.ends].mean(axis=1)
         return np.maximum(lengths, np.finfo(np.float64).tiny)
 
     @functools.cached_property
-    def masses(self) -> NDArray[np.float64]:
+    def masses(self) -> Floats:
         """Area that belongs to each vertex, [n]."""
         surface = self.surface
         lumped = np.bincount(surface.F.ravel(), np.repeat(surface.areas / 3, 3), len(surface.V))
@@ -78,19 +78,21 @@ def distance_graph(surface: TriangleSurface) -> csr_array:
     crossing = xp + (xq - xp) * yp / np.maximum(yp + yq, np.finfo(np.float64).tiny)
     straight = (crossing > 0) & (crossing < length) & (p != q)
     ends = np.concatenate([edges.ends, np.stack([p, q], axis=1)[straight]])
-    weights = np.concatenate([surface.edge_lengths, np.hypot(xp - xq, yp + yq)[straight]])
-    weights = np.maximum(weights, _LEAST * weights.max())
+    lengths = np.concatenate([surface.edge_lengths, np.hypot(xp - xq, yp + yq)[straight]])
+    return _linked(ends, np.maximum(lengths, _LEAST * lengths.max()), len(V))
+
+
+def _linked(ends: Ints, lengths: Floats, count: int) -> csr_array:
+    """Graph of `count` nodes with the shortest of the links between each two, whose ends are [k, 2]."""
     low, high = ends.min(axis=1), ends.max(axis=1)
-    order = np.lexsort((weights, low * len(V) + high))
-    key = (low * len(V) + high)[order]
-    kept = order[np.concatenate([[True], key[1:] != key[:-1]])]
+    key = low * count + high
+    order = np.lexsort((lengths, key))
+    kept = order[np.diff(key[order], prepend=-1) != 0]
     pairs = np.concatenate([low[kept], high[kept]]), np.concatenate([high[kept], low[kept]])
-    return csr_array(coo_array((np.tile(weights[kept], 2), pairs), shape=(len(V), len(V))))
+    return csr_array(coo_array((np.tile(lengths[kept], 2), pairs), shape=(count, count)))
 
 
-def _along_and_across(
-    offset: NDArray[np.float64], along: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _along_and_across(offset: Floats, along: Floats) -> tuple[Floats, Floats]:
     """Parts of offsets [k, 3] along a direction and across it."""
     x = np.einsum("ij,ij->i", offset, along)
     square = np.einsum("ij,ij->i", offset, offset)
@@ -115,12 +117,12 @@ class VoronoiCells:
         From that seed, in the units of the metric.
     """
 
-    seeds: NDArray[np.int64]
-    label: NDArray[np.int64]
-    distance: NDArray[np.float64]
+    seeds: Ints
+    label: Ints
+    distance: Floats
 
 
-def spread_seeds(metric: Metric, reach: float) -> NDArray[np.int64]:
+def spread_seeds(metric: Metric, reach: float) -> Ints:
     """Vertices of which one lies within reach of every vertex, on one connected component.
 
     Each is the farthest from those before.
@@ -134,16 +136,15 @@ def spread_seeds(metric: Metric, reach: float) -> NDArray[np.int64]:
     return np.array(seeds)
 
 
-def voronoi_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
+def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     """The vertices nearest to each seed."""
     distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
     number = np.full(len(metric.unit), -1)
     number[seeds] = np.arange(len(seeds))
-    label = _gathered(metric.surface, number[source], seeds)
-    return VoronoiCells(seeds, label, distance)
+    return VoronoiCells(seeds, _gathered(metric.surface, number[source], seeds), distance)
 
 
-def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
+def centred_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     """Cells whose seeds moved to their middles a few times (Lloyd 1982)."""
     V, mass = metric.surface.V, metric.masses
     for _ in range(_LLOYD_STEPS):
@@ -159,7 +160,7 @@ def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
     return voronoi_cells(metric, seeds)
 
 
-def _gathered(surface: TriangleSurface, label: NDArray[np.int64], seeds: NDArray[np.int64]) -> NDArray[np.int64]:
+def _gathered(surface: TriangleSurface, label: Ints, seeds: Ints) -> Ints:
     """Give vertices that hang on their cell by no edge to a neighbour's."""
     ends, size = surface.edges.ends, len(surface.V)
     for _ in range(_MOST_PASSES):
@@ -202,8 +203,8 @@ class BorderedCells:
     """
 
     surface: TriangleSurface
-    cell: NDArray[np.int64]
-    arcs: list[list[NDArray[np.int64]]]
+    cell: Ints
+    arcs: list[list[Ints]]
     uncut: int
 
 
@@ -220,34 +221,23 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     place = np.clip(0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths), _LEAST_SHARE, 1 - _LEAST_SHARE)
     cut = surface.subdivided(np.where(between, place, np.nan), _CUTS)[0]
     # each triangle has a vertex of the surface before, and all of those are of its cell
-    of_vertex = np.concatenate([cells.label, np.full(len(cut.V) - len(cells.label), -1)])
-    cell = of_vertex[cut.F].max(axis=1)
-    corner, rim_side = _corners(cut, cell), _rim_sides(cut)
-    arcs = []
-    for loop in _border_loops(cut, cell, len(cells.seeds)):
-        on_rim = rim_side[loop] == np.roll(loop, -1)
-        arcs.append(_arcs(cut.V, loop, corner[loop], on_rim))
+    cell = np.pad(cells.label, (0, len(cut.V) - len(surface.V)), constant_values=-1)[cut.F].max(axis=1)
+    count = len(cells.seeds)
+    meeting = np.bincount(np.unique(cut.F * count + cell[:, None]) // count, minlength=len(cut.V))
+    angle = np.bincount(cut.F.ravel(), cut.angles.ravel(), len(cut.V))
+    corner = np.where(cut.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
+    # the vertex that follows each along the rim, counter-clockwise about the surface
+    following = np.full(len(cut.V), -1)
+    triangle, side = np.divmod(cut.edges.sides[cut.edges.rim, 0], 3)
+    following[cut.F[triangle, side]] = cut.F[triangle, (side + 1) % 3]
+    arcs = [
+        _arcs(cut.V, loop, corner[loop], following[loop] == np.roll(loop, -1))
+        for loop in _border_loops(cut, cell, count)
+    ]
     return BorderedCells(cut, cell, arcs, len(surface.V))
 
 
-def _corners(surface: TriangleSurface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Vertices in which three cells meet, two at a rim, or one at a sharp corner of the rim."""
-    count = int(cell.max()) + 1
-    pairs = np.unique(surface.F * count + cell[:, None])
-    meeting = np.bincount(pairs // count, minlength=len(surface.V))
-    angle = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
-    return np.where(surface.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
-
-
-def _rim_sides(surface: TriangleSurface) -> NDArray[np.int64]:
-    """The vertex that follows each along the rim, counter-clockwise about the surface; -1 elsewhere."""
-    following = np.full(len(surface.V), -1)
-    triangle, side = np.divmod(surface.edges.sides[surface.edges.rim, 0], 3)
-    following[surface.F[triangle, side]] = surface.F[triangle, (side + 1) % 3]
-    return following
-
-
-def _border_loops(surface: TriangleSurface, cell: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
+def _border_loops(surface: TriangleSurface, cell: Ints, count: int) -> list[Ints]:
     """The vertices round each cell, counter-clockwise."""
     sides = surface.edges.sides
     beside = np.where(sides < 0, -1, cell[sides // 3])
@@ -266,9 +256,7 @@ def _border_loops(surface: TriangleSurface, cell: NDArray[np.int64], count: int)
     return loops
 
 
-def _arcs(
-    V: NDArray[np.float64], loop: NDArray[np.int64], corner: NDArray[np.bool_], on_rim: NDArray[np.bool_]
-) -> list[NDArray[np.int64]]:
+def _arcs(V: Floats, loop: Ints, corner: Bools, on_rim: Bools) -> list[Ints]:
     """Cut a loop at its corners; more are put on its rim, far from the others, where it has too few."""
     corner = corner.copy()
     length = np.linalg.norm(np.roll(V[loop], -1, axis=0) - V[loop], axis=1)
@@ -296,7 +284,7 @@ _FEWEST = 12  # samples in a disk before it is judged
 _GROWTH = 0.5  # of the size of cells along the surface
 
 
-def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> NDArray[np.float64]:
+def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> Floats:
     """Radius of the cells round each vertex [m], [n], between a least and a largest one.
 
     A cell has at most the share `reach` of the radius at which a geodesic disk round its middle has much less area than
@@ -307,7 +295,11 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> ND
     count = min(_SAMPLES, len(total))
     seeds = np.unique(np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1]))
     cells = voronoi_cells(metric, np.minimum(seeds, len(total) - 1))
-    distance = dijkstra(_coarse_graph(metric.surface, cells), directed=False)
+    # from seed to seed, by the shortest way along an edge between neighbouring cells
+    ends = metric.surface.edges.ends
+    apart = cells.label[ends[:, 0]] != cells.label[ends[:, 1]]
+    length = cells.distance[ends[apart]].sum(axis=1) + metric.surface.edge_lengths[apart]
+    distance = dijkstra(_linked(cells.label[ends[apart]], length, len(seeds)))
     order = np.argsort(distance, axis=1, kind="stable")
     radius = np.take_along_axis(distance, order, axis=1)
     area = np.cumsum(np.bincount(cells.label, metric.masses, len(seeds))[order], axis=1)
@@ -316,15 +308,3 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> ND
     wrapped = np.where(full.all(axis=1), np.inf, radius[np.arange(len(seeds)), full.argmin(axis=1)])
     size = np.clip(reach * wrapped, *between)
     return (size + _GROWTH * distance).min(axis=1)[cells.label]
-
-
-def _coarse_graph(surface: TriangleSurface, cells: VoronoiCells) -> csr_array:
-    """Cells linked to their neighbours, by the shortest way from seed to seed along an edge between them [m]."""
-    count, ends = len(cells.seeds), surface.edges.ends
-    between = cells.label[ends[:, 0]] != cells.label[ends[:, 1]]
-    pairs = np.sort(cells.label[ends[between]], axis=1)
-    length = cells.distance[ends[between]].sum(axis=1) + surface.edge_lengths[between]
-    order = np.lexsort((length, pairs[:, 1], pairs[:, 0]))
-    key = (pairs @ [count, 1])[order]
-    kept = order[np.concatenate([[True], key[1:] != key[:-1]])]
-    return csr_array(coo_array((length[kept], tuple(pairs[kept].T)), shape=(count, count)))

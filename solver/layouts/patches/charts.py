@@ -8,40 +8,45 @@ that corner.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import AtlasError
+from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import labels
 from .cells import BorderedCells
 from .disks import Border, along, flattened
-from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved, halved_chords
+from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved_chords
 
-Path = NDArray[np.int64]
+Path = Ints
 Halves = list[tuple[Path, Path]]  # of each arc of a part's border
 
 
-def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list[Halves]]:
+def corner_charts(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sides]]:
+    """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
+    surface, sides = cut_polygons(*with_middles(cells))
+    return surface, charts_of(surface, sides), sides
+
+
+def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Halves]]:
     """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
     surface = cells.surface
     single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
-    size = len(surface.V)
-    low_high = surface.edges.ends @ [size, 1]
-    chosen = np.isin(low_high, np.sort(single, axis=1) @ [size, 1])
-    finer, middles, origin, _ = halved(surface, chosen)
+    key = [len(surface.V), 1]
+    chosen = np.isin(surface.edges.ends @ key, np.sort(single, axis=1) @ key)
+    finer, middles, origin, _ = surface.subdivided(np.where(chosen, 0.5, np.nan))
     middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), middles[chosen].tolist(), strict=True))
     arcs = [
         [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each] for each in cells.arcs
     ]
-    on_border = np.zeros(len(finer.V), bool)
-    on_border[np.concatenate([arc for each in arcs for arc in each])] = True
     cell = cells.cell[origin]
-    split, origin = halved_chords(finer, cell, on_border)
+    split, origin = halved_chords(finer, cell, on_paths(finer, arcs))
     halves = [[halves_of(split.V, arc) for arc in each] for each in arcs]
     return split, cell[origin], halves
 
 
-def halves_of(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
+def halves_of(V: Floats, arc: Path) -> tuple[Path, Path]:
     """Cut an arc in two at the vertex nearest to its middle; the same from either side."""
     flipped = arc[0] > arc[-1] or (arc[0] == arc[-1] and arc[1] > arc[-2])
     way = arc[::-1] if flipped else arc
@@ -49,15 +54,12 @@ def halves_of(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
     return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
 
 
-def cut_polygons(
-    surface: TriangleSurface, part: NDArray[np.int64], halves: list[Halves]
-) -> tuple[Flat, list[list[Path]]]:
-    """Lay out the first parts as regular polygons and cut them from their middles; return the paths of the cuts.
+def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> tuple[TriangleSurface, list[Sides]]:
+    """Lay out the first parts as regular polygons and cut them from their middles; return the sides of the charts.
 
     Parts beyond those that have a border are left alone.
     """
-    on_border = np.zeros(len(surface.V), bool)
-    on_border[np.concatenate([half for each in halves for arc in each for half in arc])] = True
+    on_border = on_paths(surface, [arc for each in halves for arc in each])
     chosen = part < len(halves)
     places = np.full((len(part), 3, 2), np.nan)
     some = TriangleSurface(surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen])
@@ -66,18 +68,22 @@ def cut_polygons(
     count = int(part.max()) + 1
     flat = Flat(surface, part, places)
     paths: list[list[Path]] = [[] for _ in halves]
-    for i in range(max(map(len, halves), default=0)):
+    for i in range(max(map(len, halves))):
         start, end = np.full(count, -1), np.full(count, -1)
         for number, each in enumerate(halves):
             if len(each) > i:
                 start[number], end[number] = centre[number], each[i][0][-1]
-        border = np.zeros(len(flat.surface.V), bool)
-        border[: len(on_border)] = on_border
+        border = np.pad(on_border, (0, len(flat.surface.V) - len(on_border)))
         flat, lines = cut_ray(flat, start, end, border)
         for path, line in zip(paths, lines, strict=False):
             if len(line):
                 path.append(line)
-    return flat, paths
+    # a chart lies at each corner of each part, its sides counter-clockwise
+    sides: list[Sides] = []
+    for arcs, rays in zip(halves, paths, strict=True):
+        for i in range(len(arcs)):
+            sides.append((rays[i - 1], arcs[i - 1][1], arcs[i][0], rays[i][::-1]))
+    return flat.surface, sides
 
 
 def _polygon_border(surface: TriangleSurface, halves: list[Halves]) -> Border:
@@ -103,16 +109,7 @@ Sides = tuple[Path, Path, Path, Path]
 Fans = list[list[int]]  # charts round a corner
 
 
-def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
-    """The four sides of each chart, counter-clockwise; a chart lies at each corner of each part."""
-    sides = []
-    for arcs, rays in zip(halves, paths, strict=True):
-        for i in range(len(arcs)):
-            sides.append((rays[i - 1], arcs[i - 1][1], arcs[i][0], rays[i][::-1]))
-    return sides
-
-
-def charts_of(surface: TriangleSurface, sides: list[Sides]) -> tuple[TriangleSurface, NDArray[np.int64]]:
+def charts_of(surface: TriangleSurface, sides: list[Sides]) -> Ints:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
     size = len(surface.V)
     walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
@@ -122,15 +119,13 @@ def charts_of(surface: TriangleSurface, sides: list[Sides]) -> tuple[TriangleSur
     if number != len(sides):
         raise AtlasError(f"{len(sides)} charts came out as {number}: triangles of the surface are too thin")
     # the triangle on the inner side of the first edge of a chart's second side
-    triangle, k = np.divmod(surface.edges.sides.ravel(), 3)
-    tail, head = surface.F[triangle, k], surface.F[triangle, (k + 1) % 3]
-    key = np.where(surface.edges.sides.ravel() >= 0, tail * size + head, -1)
+    key = (surface.F * size + np.roll(surface.F, -1, axis=1)).ravel()
     order = np.argsort(key)
     wanted = np.array([each[1][0] * size + each[1][1] for each in sides])
-    owner = triangle[order[np.searchsorted(key[order], wanted)]]
+    owner = order[np.searchsorted(key, wanted, sorter=order)] // 3
     chart = np.full(number, -1)
     chart[part[owner]] = np.arange(len(sides))
-    return surface, chart[part]
+    return chart[part]
 
 
 def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
@@ -142,14 +137,14 @@ def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
     return side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None]
 
 
-def on_paths(surface: TriangleSurface, sides: list[Sides]) -> NDArray[np.bool_]:
-    """Vertices that lie on a side of a chart, [n]."""
+def on_paths(surface: TriangleSurface, sides: Sequence[Sequence[Path]]) -> Bools:
+    """Vertices that lie on a path, such as a side of a chart, [n]."""
     on_path = np.zeros(len(surface.V), bool)
     on_path[np.concatenate([path for each in sides for path in each])] = True
     return on_path
 
 
-def glued_sides(sides: list[Sides]) -> NDArray[np.int64]:
+def glued_sides(sides: list[Sides]) -> Ints:
     """Charts that share a side have its first edge the other way round."""
     table = np.full((len(sides), 4, 2), -1)
     seen = {(int(path[0]), int(path[1])): (chart, s) for chart, each in enumerate(sides) for s, path in enumerate(each)}
@@ -161,7 +156,7 @@ def glued_sides(sides: list[Sides]) -> NDArray[np.int64]:
     return table
 
 
-def fans_of(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[Fans, list[int]]:
+def fans_of(sides: list[Sides], glued: Ints) -> tuple[Fans, list[int]]:
     """The three charts round each corner where three cells meet, counter-clockwise, and all other charts."""
     fans: Fans = []
     used = np.zeros(len(sides), bool)
@@ -174,9 +169,7 @@ def fans_of(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[Fans, list[in
     return fans, np.flatnonzero(~used).tolist()
 
 
-def with_even_corners(
-    surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]
-) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]]:
+def with_even_corners(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> tuple[TriangleSurface, list[Sides]]:
     """Move the corners in which three cells meet to the middle between the cells' middles.
 
     Voronoi cells often have very short sides, along which texels would be tiny. So the three charts round a corner,
@@ -185,28 +178,19 @@ def with_even_corners(
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
     if not fans:
-        return surface, chart, sides
+        return surface, sides
     part = np.empty(len(sides), np.int64)
     for number, fan in enumerate([*fans, *([each] for each in rest)]):
         part[fan] = number
-    inner = np.zeros(len(sides), bool)
-    inner[[each for fan in fans for each in fan]] = True
-    halves = []
+    inner = part < len(fans)
+    halves: list[Halves] = []
     for fan in fans:
-        following = [*fan[1:], fan[0]]
-        whole = [(sides[a][0], sides[b][3]) for a, b in zip(fan, following, strict=True)]
-        # the middle stays where the charts beyond do
-        shared = [inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]] for a, b in zip(fan, following, strict=True)]
-        halves.append(
-            [
-                halves_of(surface.V, np.concatenate([first, second[1:]])) if both else (first, second)
-                for (first, second), both in zip(whole, shared, strict=True)
-            ]
-        )
-    on_border = on_paths(surface, sides)
-    split, origin = halved_chords(surface, part[chart], on_border)
-    old = chart[origin]
-    flat, paths = cut_polygons(split, part[old], halves)
-    new_sides = [*chart_sides(halves, paths), *(sides[each] for each in rest)]
-    surface, chart = charts_of(flat.surface, new_sides)
-    return surface, chart, new_sides
+        halves.append([])
+        for a, b in zip(fan, [*fan[1:], fan[0]], strict=True):
+            first, second = sides[a][0], sides[b][3]
+            if inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]]:  # else the middle stays, as the charts beyond do
+                first, second = halves_of(surface.V, np.concatenate([first, second[1:]]))
+            halves[-1].append((first, second))
+    split, origin = halved_chords(surface, part[chart], on_paths(surface, sides))
+    finer, new = cut_polygons(split, part[chart[origin]], halves)
+    return finer, [*new, *(sides[each] for each in rest)]

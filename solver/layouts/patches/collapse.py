@@ -20,7 +20,6 @@ from .surface import TriangleSurface
 _FLATTEST = 0.05  # double area over squared length of a triangle on the charts after a collapse
 _LEAST_INSIDE = 1e-9  # double area of a triangle in its parent, in barycentric coordinates
 
-
 # Where the triangles lie on the mesh: parent [m], and barycentrics in it of their corners [m, 3, 3]
 Parents = tuple[Ints, Floats]
 
@@ -125,8 +124,7 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
         chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
         if chosen.sum() <= _LEAST_SHARE * cut.sum():
             break
-        F, turn, shift, inside = seamless.F.copy(), seamless.turn.copy(), seamless.shift.copy(), parents[1].copy()
-        left = _collapse(seamless, parents, chosen, target, F, turn, shift, inside)
+        left, F, turn, shift, inside = _collapse(seamless, parents, chosen, target)
         F, frame, turn, shift = F[left], seamless.frame[left], turn[left], shift[left]
         start, star = stars(F, len(seamless.z))
         seamless = seamless._replace(F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star)
@@ -135,12 +133,7 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
     F = F.reshape(-1, 3)
     start, star = stars(F, len(used))
     seamless = seamless._replace(
-        F=F,
-        chart=seamless.chart[used],
-        z=seamless.z[used],
-        freedom=seamless.freedom[used],
-        star_start=start,
-        star=star,
+        F=F, chart=seamless.chart[used], z=seamless.z[used], freedom=seamless.freedom[used], star_start=start, star=star
     )
     return TriangleSurface(surface.V[used], F, parents[0], parents[1]), seamless
 
@@ -177,13 +170,10 @@ def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> 
 
 @kernel
 def _collapse(
-    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints, F: Ints, turn: Ints, shift: Complex,
-    inside: Floats,
-) -> Bools:  # fmt: skip
-    """Change copies of the triangles' vertices, of the changes to their frames, and of where in their parents they lie.
-
-    Returns which triangles are left.
-    """
+    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints
+) -> tuple[Bools, Ints, Ints, Complex, Floats]:
+    """Which triangles are left; of all, vertices, the changes to their frames, and where in their parents these lie."""
+    F, turn, shift, inside = seamless.F.copy(), seamless.turn.copy(), seamless.shift.copy(), parents[1].copy()
     left = np.ones(len(F), np.bool_)
     for f in range(len(F)):
         k = 0
@@ -206,4 +196,4 @@ def _collapse(
             if parents[0][h] == parents[0][f]:
                 for j in range(3):
                     inside[f, k, j] = parents[1][h, c, j]
-    return left
+    return left, F, turn, shift, inside

@@ -8,12 +8,12 @@ weights follow the shape of the triangles.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
 from ...errors import AtlasError
+from ...kernel import Floats, Ints
 from .cells import BorderedCells, Metric, VoronoiCells, centred_cells, cut_borders, voronoi_cells
 from .surface import TriangleSurface
 
@@ -28,10 +28,9 @@ def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     corners gets a further neighbour on its border or, if that was tried before, loses its seed. Cells with new
     neighbours are centred anew, and mended once more. Raises `AtlasError` if none are found.
     """
-    count = len(cells.seeds)
-    cells, bordered = _mended(metric, cells)
-    if len(cells.seeds) > count:
-        _, bordered = _mended(metric, centred_cells(metric, cells.seeds))
+    mended, bordered = _mended(metric, cells)
+    if len(mended.seeds) > len(cells.seeds):
+        _, bordered = _mended(metric, centred_cells(metric, mended.seeds))
     return bordered
 
 
@@ -56,30 +55,25 @@ def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, Bordered
     raise AtlasError("no cells found that are disks with three corners")
 
 
-def _with_corners(metric: Metric, cells: VoronoiCells, few: NDArray[np.int64], tried: set[int]) -> VoronoiCells:
+def _with_corners(metric: Metric, cells: VoronoiCells, few: Ints, tried: set[int]) -> VoronoiCells:
     """Give cells with too few corners a neighbour each, or take away their seeds where that was `tried` before."""
     new: list[int] = []
     gone: list[int] = []
+    ends = metric.surface.edges.ends
     for cell in few.tolist():
         seed = int(cells.seeds[cell])
         if seed not in tried or len(cells.seeds) - len(gone) <= _FEWEST:
             tried.add(seed)
-            farthest = np.where(_beside(metric.surface, cells, cell), cells.distance, -1.0)
-            new.append(int(np.argmax(farthest)))
+            # farthest of the vertices of other cells that have a neighbour in this one
+            own, beside = cells.label == cell, np.zeros(len(cells.label), bool)
+            beside[ends[own[ends].any(axis=1)]] = True
+            new.append(int(np.argmax(np.where(beside & ~own, cells.distance, -1.0))))
         else:
             gone.append(cell)
     return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
 
 
-def _beside(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> NDArray[np.bool_]:
-    """Vertices of other cells that have a neighbour in this one, [n]."""
-    ends = surface.edges.ends[(cells.label[surface.edges.ends] == cell).any(axis=1)]
-    beside = np.zeros(len(surface.V), bool)
-    beside[ends] = True
-    return beside & (cells.label != cell)
-
-
-def _euler(surface: TriangleSurface, cells: VoronoiCells) -> NDArray[np.int64]:
+def _euler(surface: TriangleSurface, cells: VoronoiCells) -> Ints:
     """Euler characteristic of the vertices of each cell with the edges and triangles between them."""
     count, label = len(cells.seeds), cells.label
     ends, corners = label[surface.edges.ends], label[surface.F]
@@ -103,25 +97,22 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     distance, before = dijkstra(graph, directed=False, indices=cells.seeds[cell], return_predecessors=True)
     tree = (before[ends[:, 0]] == ends[:, 1]) | (before[ends[:, 1]] == ends[:, 0])
     loop = distance[ends].sum(axis=1) + lengths
-    number = np.full(len(surface.F) + 1, 0)  # 0: outside
-    inner = np.flatnonzero(own[surface.F].all(axis=1))
-    number[inner] = 1 + np.arange(len(inner))
-    sides = edges.sides[links]
-    beside = np.where(sides < 0, 0, number[sides // 3])
+    inner = own[surface.F].all(axis=1)
+    number = np.append(np.where(inner, np.cumsum(inner), 0), 0)  # 0: outside
+    beside = number[edges.sides[links] // 3]  # -1 at a rim: the last
     order = np.argsort(-loop, kind="stable")
-    closing = order[_closing(beside[order], tree[order], len(inner) + 1)]
+    order = order[~tree[order]]
+    closing = order[_closing(beside[order], int(inner.sum()) + 1)]
     if not len(closing):
         return int(np.argmax(np.where(own, cells.distance, -1.0)))
     best = ends[closing[-1]]
     return int(best[np.argmax(distance[best])])
 
 
-def _closing(beside: NDArray[np.int64], tree: NDArray[np.bool_], triangles: int) -> list[int]:
-    """Edges, in this order and but for those of the `tree`, whose two triangles are joined already."""
+def _closing(beside: Ints, triangles: int) -> list[int]:
+    """Edges, in this order, whose two triangles are joined already."""
     root, closing = list(range(triangles)), []
     for e, (a, b) in enumerate(beside.tolist()):
-        if tree[e]:
-            continue
         while root[a] != a:
             root[a] = a = root[root[a]]
         while root[b] != b:
@@ -135,12 +126,11 @@ def _closing(beside: NDArray[np.int64], tree: NDArray[np.bool_], triangles: int)
 # half-angle tangents; beyond them triangles are so bad that round-off would fold them
 _LEAST, _MOST = 1e-3, 1e3
 
-
 # of the vertices on the borders of parts: part and vertex, each [b], and place [b, 2]
-Border = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
+Border = tuple[Ints, Ints, Floats]
 
 
-def flattened(surface: TriangleSurface, part: NDArray[np.int64], border: Border) -> NDArray[np.float64]:
+def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     """Places [m, 3, 2] of the triangles' corners, each part [m] laid out inside its border.
 
     A part that round-off folds with mean-value weights is laid out with equal ones.
@@ -152,7 +142,11 @@ def flattened(surface: TriangleSurface, part: NDArray[np.int64], border: Border)
     on_border, vertex, place = border
     fixed[np.searchsorted(key, on_border * size + vertex)] = np.arange(len(vertex))
     start = np.where(fixed[:, None] >= 0, place[fixed], np.nan)
-    weights = _mean_value_weights(surface)
+    # mean-value weights: in corner k of a triangle, of its next vertex and of the one before
+    triangles = surface.V[surface.F]
+    sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    lengths = np.maximum(np.stack([sides, np.roll(sides, 1, axis=1)], axis=2), np.finfo(np.float64).tiny)
+    weights = np.clip(np.tan(surface.angles / 2), _LEAST, _MOST)[:, :, None] / lengths
     places = _solved(corners, weights, start)[corners]
     folded = np.isin(part, part[signed_areas(places) <= 0])
     if folded.any():
@@ -161,13 +155,13 @@ def flattened(surface: TriangleSurface, part: NDArray[np.int64], border: Border)
     return places
 
 
-def signed_areas(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def signed_areas(places: Floats) -> Floats:
     """Areas [m] of flat triangles [m, 3, 2], positive where they are counter-clockwise."""
     u, v = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
     return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
 
 
-def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.float64]:
+def along(V: Floats, paths: list[Ints]) -> Floats:
     """How far along its path each vertex lies, from 0 to 1; the paths' one behind the other."""
     sizes = np.array([len(each) for each in paths])
     inside = np.arange(sizes.max()) < sizes[:, None]
@@ -182,23 +176,7 @@ def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.
     return shares[inside]
 
 
-def _mean_value_weights(surface: TriangleSurface) -> NDArray[np.float64]:
-    """Weights [m, 3, 2], in corner k of a triangle, of its next vertex and of the one before."""
-    weights = np.empty((len(surface.F), 3, 2))
-    tiny = np.finfo(np.float64).tiny
-    for k in range(3):
-        x, y, z = (surface.V[surface.F[:, (k + j) % 3]] for j in range(3))
-        u, v = y - x, z - x
-        lu, lv = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
-        sine, cosine = np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)
-        tangent = np.clip(np.tan(np.arctan2(sine, cosine) / 2), _LEAST, _MOST)
-        weights[:, k, 0], weights[:, k, 1] = tangent / np.maximum(lu, tiny), tangent / np.maximum(lv, tiny)
-    return weights
-
-
-def _solved(
-    corners: NDArray[np.int64], weights: NDArray[np.float64], start: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _solved(corners: Ints, weights: Floats, start: Floats) -> Floats:
     """Places [n, 2] of all vertices; NaN in `start` is what is looked for."""
     free = np.isnan(start[:, 0])
     row = np.repeat(corners, 2, axis=1).ravel()

@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...kernel import Floats, Ints, Ints32, kernel
 from ...mesh.topology import edges_of
@@ -31,7 +30,7 @@ _LEAST_AREA = 1e-6  # of a triangle, in units of their mean
 UP, COLUMNS, ROWS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
 
-def reference_of(V: NDArray[np.float64], F: NDArray[np.int64], charts: int) -> Reference:
+def reference_of(V: Floats, F: Ints, charts: int) -> Reference:
     """The triangles F [m, 3] that a map is to resemble, their areas scaled to add up to the number of charts."""
     a, b, c = (V[F[:, k]].T for k in range(3))
     ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
@@ -162,9 +161,7 @@ _CG_RANGE = 40, 200
 
 def sweep_all(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float:
     """Move every vertex once, and follow them into their charts; return by how much the energy fell."""
-    before, vertices = seamless.z.copy(), np.arange(len(seamless.z))
-    if backwards:
-        vertices = vertices[::-1].copy()
+    before, vertices = seamless.z.copy(), np.arange(len(seamless.z))[:: -1 if backwards else 1].copy()
     fall = sweep(seamless, reference, vertices, scratch(seamless), False)
     rehome(seamless, before)
     return fall

@@ -12,14 +12,13 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...kernel import Ints, kernel
+from ...kernel import Floats, Ints, kernel
 from ...mesh.topology import labels
 from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
 from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
-from .quads import CELLS, Quads, large_quads_of, part_of, quads_of
+from .quads import CELLS, Quads, large_quads_of, quads_of
 from .seamless import Frame, SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned, wedge
 from .surface import TriangleSurface
 
@@ -103,14 +102,7 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
 
 
 @kernel
-def _moved(
-    seamless: SeamlessMap,
-    reference: Reference,
-    vertices: Ints,
-    triangles: Ints,
-    fan: Ints,
-    star: Star,
-) -> bool:
+def _moved(seamless: SeamlessMap, reference: Reference, vertices: Ints, triangles: Ints, fan: Ints, star: Star) -> bool:
     """Try to move a tip; whether it stays there."""
     before = energy_of(seamless, reference, triangles)
     z, chart, freedom = seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices]
@@ -151,7 +143,10 @@ def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: in
             z, left = p, q
         elif seamless.F[f, (k + 2) % 3] == v:
             z, right = q, p
-    inward = _inward(left - z, right - z)
+    # between the directions to left and right, as long as the shorter: the sum of both sides' normals, inwards
+    a, b = left - z, right - z
+    inward = 1j * (a / abs(a) - b / abs(b))
+    inward = inward * (min(abs(a), abs(b)) / abs(inward)) if abs(inward) > 1e-9 else a
     least, best = np.inf, z
     for way in range(2):
         goal, share, trials = (middle, 0.65, 16) if way == 0 else (z + inward, 0.4, 40)
@@ -167,17 +162,6 @@ def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: in
         if least < np.inf:
             break
     seamless.z[u] = best
-
-
-@kernel
-def _inward(a: complex, b: complex) -> complex:
-    """Direction between those to two neighbours, as long as the shorter."""
-    shorter = min(abs(a), abs(b))
-    # the normals of the two sides, inwards
-    inward = 1j * (a / abs(a) - b / abs(b))
-    if not abs(inward) > 1e-9:
-        return a
-    return inward * (shorter / abs(inward))
 
 
 @kernel
@@ -252,7 +236,7 @@ class PatchMap:
     seamless: SeamlessMap
 
 
-def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) -> PatchMap:
+def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
     """Lay a manifold, oriented mesh out on charts, without a fold; on about so many cells of four to six charts.
 
     Where the largest part allows it charts are large, one for each of some more cells. Raises `AtlasError` if its
@@ -262,9 +246,7 @@ def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) 
     widest = int(shares.argmax())
     first = large_quads_of(parts[widest], counts[widest])
     large = first is not None
-    quads = [
-        first if first is not None and i == widest else quads_of(part, counts[i], large) for i, part in enumerate(parts)
-    ]
+    quads = [first if first and i == widest else quads_of(part, counts[i], large) for i, part in enumerate(parts)]
     wanted = shares * sum(len(each.glued) for each in quads)
     for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
         quads[i] = _recut(parts[i], quads[i], counts[i], wanted[i], large)
@@ -274,7 +256,7 @@ def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) 
     return PatchMap(surface, seamless)
 
 
-def relax(V: NDArray[np.float64], seamless: SeamlessMap) -> None:
+def relax(V: Floats, seamless: SeamlessMap) -> None:
     """Even out areas and take away shear, in place, as far as the map's cones allow; V [n, 3] are its vertices [m].
 
     Cells are small and flat enough for that from where the quads lie; no step folds a triangle.
@@ -306,9 +288,7 @@ def _recut(part: TriangleSurface, quads: Quads, count: int, wanted: float, large
     return best
 
 
-def _components(
-    V: NDArray[np.float64], F: NDArray[np.int64], cells: int
-) -> tuple[list[TriangleSurface], list[int], NDArray[np.float64]]:
+def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], list[int], Floats]:
     """Each connected component, how many cells it gets, and its share of the area."""
     part = labels(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), len(V))
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
@@ -317,7 +297,12 @@ def _components(
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
     small = share[share >= min(_NEGLIGIBLE, share.max())].min()
     count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
-    return [part_of(V, F, np.flatnonzero(of == each)) for each in range(len(number))], count.tolist(), share
+    parts = []
+    for each in range(len(number)):
+        faces = np.flatnonzero(of == each)
+        used, corners = np.unique(F[faces], return_inverse=True)
+        parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces))
+    return parts, count.tolist(), share
 
 
 def _joined(parts: list[Quads]) -> Quads:
@@ -332,15 +317,13 @@ def _joined(parts: list[Quads]) -> Quads:
         np.concatenate([each.surface.parent for each in parts]),
         np.concatenate([each.surface.inside for each in parts]),
     )
-    glued = []
-    for each, first in zip(parts, charts, strict=False):
-        table = each.glued.copy()
-        table[..., 0] += np.where(table[..., 0] >= 0, first, 0)
-        glued.append(table)
+    glued = np.concatenate([each.glued for each in parts])
+    first_of_part = np.repeat(charts[:-1], np.diff(charts))
+    glued[..., 0] += np.where(glued[..., 0] >= 0, first_of_part[:, None], 0)
     return Quads(
         surface,
         np.concatenate([each.chart + first for each, first in zip(parts, charts, strict=False)]),
         np.concatenate([each.places for each in parts]),
-        np.concatenate(glued),
+        glued,
         np.concatenate([each.cut for each in parts]),
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...kernel import Bools, Floats, Ints, kernel
 from ...texels.chart_map import MOST_CORNERS, clip
@@ -33,10 +32,10 @@ class Pieces(NamedTuple):
         Column and row of the corners, 0 to 1 across the chart.
     """
 
-    triangle: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    chart: NDArray[np.int64]
-    places: NDArray[np.float64]
+    triangle: Ints
+    barycentrics: Floats
+    chart: Ints
+    places: Floats
 
 
 def chart_pieces(patches: PatchMap) -> Pieces:
@@ -47,20 +46,20 @@ def chart_pieces(patches: PatchMap) -> Pieces:
     # squares of the plane that each reaches into, from one to that before another; whole numbers lie on borders
     first = np.floor(places.min(axis=1) + 1e-12).astype(np.int64)
     last = np.maximum(np.ceil(places.max(axis=1) - 1e-12).astype(np.int64), first + 1)
-    given = seamless, corner, homes, places, first, last
-    origin, chart, weights, cut = _filled(_cut_at_borders, *given)
-    triangle = patches.surface.parent[origin]
+    cut = _filled(_cut_at_borders, seamless, corner, homes, places, first, last)
+    triangle = patches.surface.parent[cut.triangle]
     order = np.argsort(triangle, kind="stable")
-    barycentrics = weights @ patches.surface.inside[origin]
-    return Pieces(triangle[order], barycentrics[order], chart[order], np.clip(cut[order], 0.0, 1.0))
+    barycentrics = cut.barycentrics @ patches.surface.inside[cut.triangle]
+    return Pieces(triangle[order], barycentrics[order], cut.chart[order], np.clip(cut.places[order], 0.0, 1.0))
 
 
-def _filled(cut: Any, *given: Any) -> tuple[Ints, Ints, Floats, Floats]:
-    """Triangle and chart of each piece that a cut makes, barycentrics in that triangle and places of its corners."""
+def _filled(cut: Any, *given: Any) -> Pieces:
+    """Pieces that a cut makes of some triangles, in any order."""
     size = 0
     while True:  # once to count them, once to fill them in
-        room = np.empty(size, np.int64), np.empty(size, np.int64), np.empty((size, 3, 3)), np.empty((size, 3, 2))
-        count = cut(*given, *room)
+        triangle, chart = np.empty((2, size), np.int64)
+        room = Pieces(triangle, np.empty((size, 3, 3)), chart, np.empty((size, 3, 2)))
+        count = cut(*given, room)
         if count == size:
             return room
         size = count
@@ -68,19 +67,10 @@ def _filled(cut: Any, *given: Any) -> tuple[Ints, Ints, Floats, Floats]:
 
 @kernel
 def _cut_at_borders(
-    seamless: SeamlessMap,
-    corner: Ints,
-    homes: Ints,
-    seen: Floats,
-    first: Ints,
-    last: Ints,
-    origin: Ints,
-    chart: Ints,
-    weights: Floats,
-    places: Floats,
+    seamless: SeamlessMap, corner: Ints, homes: Ints, seen: Floats, first: Ints, last: Ints, room: Pieces
 ) -> int:
     """Fill in the pieces as far as there is room, and return how many there are."""
-    count, room = 0, len(origin)
+    count = 0
     whole, spare = np.empty((3, 5)), np.empty((MOST_CORNERS, 5))
     column, square = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
     for f in range(len(seen)):
@@ -99,14 +89,14 @@ def _cut_at_borders(
                     middle += complex(square[c, 0], square[c, 1])
                 target, (turn, shift), _ = follow(seamless, homes[f], complex(p[k, 0], p[k, 1]), middle / corners)
                 for c in range(1, corners - 1):
-                    if count < room:
-                        origin[count], chart[count] = f, target
+                    if count < len(room.chart):
+                        room.triangle[count], room.chart[count] = f, target
                         for to in range(3):
                             of = c + to - 1 if to > 0 else 0
                             for m in range(3):
-                                weights[count, to, m] = square[of, 2 + m]
+                                room.barycentrics[count, to, m] = square[of, 2 + m]
                             place = turned(complex(square[of, 0], square[of, 1]), turn) + shift
-                            places[count, to, 0], places[count, to, 1] = place.real, place.imag
+                            room.places[count, to, 0], room.places[count, to, 1] = place.real, place.imag
                     count += 1
     return count
 
@@ -130,7 +120,7 @@ def _area(corners: Floats, count: int) -> float:
     return total
 
 
-def warped(pieces: Pieces, offsets: NDArray[np.float64]) -> Pieces:
+def warped(pieces: Pieces, offsets: Floats) -> Pieces:
     """Pieces of a map whose texels have moved by `offsets` [C, n, n, 2] (column, row, in texels)."""
     n, moved = offsets.shape[1], np.pad(offsets, ((0, 0), (1, 1), (1, 1), (0, 0)))
     # squares of the lattice of which a corner moves, [C, n + 1, n + 1]
@@ -143,26 +133,15 @@ def warped(pieces: Pieces, offsets: NDArray[np.float64]) -> Pieces:
     # squares that a piece may reach into: their corners move by less than half a texel
     first = np.maximum(np.floor(pieces.places.min(axis=1) * n).astype(np.int64) - 1, 0)
     last = np.minimum(np.floor(pieces.places.max(axis=1) * n).astype(np.int64) + 3, n + 1)
-    given = pieces, nodes, bent, first, last
-    origin, chart, inside, places = _filled(_cut_at_lattice, *given)
-    barycentrics = inside @ pieces.barycentrics[origin]
-    return Pieces(pieces.triangle[origin], barycentrics, chart, np.clip(places, 0.0, 1.0))
+    cut = _filled(_cut_at_lattice, pieces, nodes, bent, first, last)
+    barycentrics = cut.barycentrics @ pieces.barycentrics[cut.triangle]
+    return Pieces(pieces.triangle[cut.triangle], barycentrics, cut.chart, np.clip(cut.places, 0.0, 1.0))
 
 
 @kernel
-def _cut_at_lattice(
-    pieces: Pieces,
-    nodes: Floats,
-    bent: Bools,
-    first: Ints,
-    last: Ints,
-    origin: Ints,
-    chart: Ints,
-    inside: Floats,
-    places: Floats,
-) -> int:
+def _cut_at_lattice(pieces: Pieces, nodes: Floats, bent: Bools, first: Ints, last: Ints, room: Pieces) -> int:
     """Fill in the parts of pieces as far as there is room, and return how many there are."""
-    count, room = 0, len(origin)
+    count = 0
     whole, corner, node = np.empty((3, 5)), np.empty((3, 5)), np.empty((4, 4))
     part, spare = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
     for p in range(len(pieces.triangle)):
@@ -170,8 +149,9 @@ def _cut_at_lattice(
         left, right, low, high = first[p, 0], last[p, 0], first[p, 1], last[p, 1]
         _fill_in(place, whole)
         if not bent[home, low:high, left:right].any():
-            if count < room:
-                origin[count], chart[count], inside[count], places[count] = p, home, whole[:, 2:], place
+            if count < len(room.chart):
+                room.triangle[count], room.chart[count] = p, home
+                room.barycentrics[count], room.places[count] = whole[:, 2:], place
             count += 1
             continue
         for i in range(low, high):
@@ -195,8 +175,8 @@ def _cut_at_lattice(
                             corner[k, 1] = (1.0 - s - r) * a[3] + s * b[3] + r * c[3]
                         if _area(corner, 3) < LEAST:
                             continue
-                        if count < room:
-                            origin[count], chart[count] = p, home
-                            inside[count], places[count] = corner[:, 2:], corner[:, :2]
+                        if count < len(room.chart):
+                            room.triangle[count], room.chart[count] = p, home
+                            room.barycentrics[count], room.places[count] = corner[:, 2:], corner[:, :2]
                         count += 1
     return count

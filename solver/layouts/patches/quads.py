@@ -17,24 +17,22 @@ import dataclasses
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import AtlasError
 from ...kernel import Bools, Floats, Ints, kernel
+from ...mesh.topology import counting_sort
 from .cells import BorderedCells, Metric, cell_sizes, centred_cells, spread_seeds
 from .charts import (
     Fans,
     Path,
     Sides,
-    chart_sides,
     charts_of,
-    cut_polygons,
+    corner_charts,
     fans_of,
     glued_sides,
     on_paths,
     square_border,
     with_even_corners,
-    with_middles,
 )
 from .disks import disk_cells, flattened, signed_areas
 from .surface import TriangleSurface, halved_chords, refined
@@ -63,13 +61,8 @@ class Pairing(NamedTuple):
 
 
 def chosen_joints(
-    triangles: NDArray[np.int64],
-    middles: NDArray[np.int64],
-    shape: NDArray[np.float64],
-    triangle_count: int,
-    corners: NDArray[np.int64],
-    wanted: NDArray[np.float64],
-) -> NDArray[np.int64] | None:
+    triangles: Ints, middles: Ints, shape: Floats, triangle_count: int, corners: Ints, wanted: Floats
+) -> Ints | None:
     """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
 
     A joint is a side between triangles, over which these may be joined.
@@ -96,21 +89,13 @@ def chosen_joints(
     ends = triangles[kept]
     inner = ends[:, 1] >= 0
     nodes = triangle_count + triangle_count % 2
-    ends = np.where(ends < 0, triangle_count, ends)
-    order = np.argsort(ends.T.ravel(), kind="stable")
-    pairing = Pairing(
-        np.searchsorted(ends.T.ravel()[order], np.arange(nodes + 1)),
-        order % max(len(kept), 1),
-        ends,
-        np.where(inner[:, None], middles[kept], -1),
-        np.where(inner, _SHAPE * shape[kept] ** 2, 0.0),
-        np.full(nodes, -1),
-        corners.copy(),
-        wanted,
-        np.zeros(nodes, bool),
-    )
     if not nodes:
         return kept[:0]
+    ends = np.where(ends < 0, triangle_count, ends)
+    start, order = counting_sort(ends.T.ravel(), np.arange(ends.size), nodes)
+    taken, cost = np.where(inner[:, None], middles[kept], -1), np.where(inner, _SHAPE * shape[kept] ** 2, 0.0)
+    closed, passed = np.full(nodes, -1), np.zeros(nodes, bool)
+    pairing = Pairing(start, order % len(kept), ends, taken, cost, closed, corners.copy(), wanted, passed)
     if not _paired(pairing) or pairing.quads.min() < FEWEST:
         return None
     return kept[np.unique(pairing.closed)]
@@ -229,10 +214,8 @@ def _change(pairing: Pairing, e: int, quads: int) -> float:
     return cost
 
 
-def joined(
-    surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]
-) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]] | None:
-    """Join the charts of cells [m] to larger ones; None where that is not possible."""
+def joined(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> list[Sides] | None:
+    """Join the charts of cells [m] to larger ones: their sides, or None where that is not possible."""
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
     cell = np.unique([each[0][0] for each in sides], return_inverse=True)[1]
@@ -240,35 +223,32 @@ def joined(
     if not at_rim[rest].any(axis=1).all():
         return None
     triangles, middles, shape, first = _joints(surface.V, sides, glued, fans)
-    wanted = 4 - _curvature(surface, cell[chart]) + np.bincount(cell, at_rim.all(axis=1))
+    # curvature of each cell, and of the rim in it, in right angles
+    total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
+    missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
+    share = (missing / total)[surface.F] * surface.angles
+    curvature = np.bincount(cell[chart], share.sum(axis=1)) / (np.pi / 2)
+    wanted = 4 - curvature + np.bincount(cell, at_rim.all(axis=1))
     chosen = chosen_joints(triangles, cell[middles], shape, len(fans), np.bincount(cell), wanted)
     if chosen is None:
         return None
     alone = triangles[chosen, 1] < 0
-    new = [_quad(sides, glued, a) for a in first[chosen[~alone]]]
-    new += [_lone_triangle(sides, glued, a) for a in first[chosen[alone]]]
+    new: list[Sides] = []
+    for a in first[chosen[~alone]]:  # two triangles, joined over the side a
+        b, beyond = glued[a, 1, 0], glued[a, 0, 0]
+        p, q, r, s = (_whole(sides, glued, each) for each in (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0]))
+        new.append((p, q, r, s))
+    for a in first[chosen[alone]]:  # a fourth corner in the middle of side a; the charts at the rim beyond stay apart
+        b = glued[a, 1, 0]
+        new.append((sides[a][0], sides[b][3], _whole(sides, glued, b), _whole(sides, glued, glued[b, 1, 0])))
     new += _at_rim(sides, glued, rest, glued[first[chosen[alone]], 0, 0])
-    if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any():
-        return None
-    surface, chart = charts_of(surface, new)
-    return surface, chart, new
+    return None if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any() else new
 
 
-def _curvature(surface: TriangleSurface, cell: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Curvature of each cell, and of the rim in it, in right angles."""
-    total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
-    missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
-    share = (missing / total)[surface.F] * surface.angles
-    return np.bincount(cell, share.sum(axis=1)) / (np.pi / 2)
-
-
-def _joints(
-    V: NDArray[np.float64], sides: list[Sides], glued: NDArray[np.int64], fans: Fans
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+def _joints(V: Floats, sides: list[Sides], glued: Ints, fans: Fans) -> tuple[Ints, Ints, Floats, Ints]:
     """Joints as `chosen_joints` takes them, with charts for their cells, and what they are called."""
     fan = np.full(len(sides), -1)
-    for number, each in enumerate(fans):
-        fan[each] = number
+    fan[np.array(fans, np.int64).reshape(-1, 3)] = np.arange(len(fans))[:, None]
     found = []
     for a in np.flatnonzero(fan >= 0).tolist():
         b, beyond = int(glued[a, 1, 0]), int(glued[a, 0, 0])
@@ -282,26 +262,12 @@ def _joints(
     return np.stack([fan[first], fan[other]], axis=1), np.stack([first, second], axis=1), shape, first
 
 
-def _whole(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Path:
+def _whole(sides: list[Sides], glued: Ints, a: int) -> Path:
     """The side of a triangle, from middle to middle."""
     return np.concatenate([sides[a][0], sides[glued[a, 1, 0]][3][1:]])
 
 
-def _quad(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Sides:
-    """Two triangles, joined over the side a."""
-    b, beyond = glued[a, 1, 0], glued[a, 0, 0]
-    around = (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0])
-    p, q, r, s = (_whole(sides, glued, each) for each in around)
-    return p, q, r, s
-
-
-def _lone_triangle(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Sides:
-    """A triangle with a fourth corner in the middle of its side a; the charts at the rim beyond stay apart."""
-    b = glued[a, 1, 0]
-    return sides[a][0], sides[b][3], _whole(sides, glued, b), _whole(sides, glued, glued[b, 1, 0])
-
-
-def _at_rim(sides: list[Sides], glued: NDArray[np.int64], rest: list[int], apart: NDArray[np.int64]) -> list[Sides]:
+def _at_rim(sides: list[Sides], glued: Ints, rest: list[int], apart: Ints) -> list[Sides]:
     """Charts at the rim: those round a corner are joined, but for some that stay apart, called by the second one."""
     new = []
     for b in rest:
@@ -336,10 +302,10 @@ class Quads:
     """
 
     surface: TriangleSurface
-    chart: NDArray[np.int64]
-    places: NDArray[np.float64]
-    glued: NDArray[np.int64]
-    cut: NDArray[np.bool_]
+    chart: Ints
+    places: Floats
+    glued: Ints
+    cut: Bools
 
 
 def cut_into_quads(cells: BorderedCells) -> Quads:
@@ -347,7 +313,7 @@ def cut_into_quads(cells: BorderedCells) -> Quads:
 
     Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
-    return _laid_out(cells, *with_even_corners(*_cut(cells)))
+    return _laid_out(cells, *with_even_corners(*corner_charts(cells)))
 
 
 def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
@@ -355,19 +321,13 @@ def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
 
     Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
-    large = joined(*_cut(cells))
-    return None if large is None else _laid_out(cells, *large)
+    surface, chart, sides = corner_charts(cells)
+    large = joined(surface, chart, sides)
+    return None if large is None else _laid_out(cells, surface, large)
 
 
-def _cut(cells: BorderedCells) -> tuple[TriangleSurface, NDArray[np.int64], list[Sides]]:
-    """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
-    surface, cell, halves = with_middles(cells)
-    flat, paths = cut_polygons(surface, cell, halves)
-    sides = chart_sides(halves, paths)
-    return *charts_of(flat.surface, sides), sides
-
-
-def _laid_out(cells: BorderedCells, surface: TriangleSurface, chart: NDArray[np.int64], sides: list[Sides]) -> Quads:
+def _laid_out(cells: BorderedCells, surface: TriangleSurface, sides: list[Sides]) -> Quads:
+    chart = charts_of(surface, sides)
     surface, origin = halved_chords(surface, chart, on_paths(surface, sides))
     chart = chart[origin]
     places = flattened(surface, chart, square_border(surface, sides))
@@ -387,18 +347,11 @@ _FARTHEST = 100**2  # length of a surface over its width, times the number of it
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
-def part_of(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64]) -> TriangleSurface:
-    """A connected component, the triangles `faces` [m] of V, F."""
-    used, corners = np.unique(F[faces], return_inverse=True)
-    return dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces)
-
-
 def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
     """The quads of a count of cells; large ones where they are wanted and possible, else about as many."""
     quads = large_quads_of(part, count) if large else None
-    if quads is not None:
-        return quads
-    return cut_into_quads(_cells_of(part, max(1, round(count * _LARGE / _CORNERS)) if large else count))
+    few = max(1, round(count * _LARGE / _CORNERS)) if large else count
+    return cut_into_quads(_cells_of(part, few)) if quads is None else quads
 
 
 def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:

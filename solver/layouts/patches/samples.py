@@ -11,16 +11,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import AtlasError
 from ...kernel import Bools, Floats, Ints, kernel
 from ...mesh.mesh import Mesh
+from ...mesh.vectors import cross, dot, subtract
 from ...texels.topology import TexelTopology
 from .layout import PatchMap
 from .seamless import Complex, SeamlessMap, follow, places_on_charts, wedge
 
 _MARGIN = 0.1  # sine of a corner that is wide enough
+_BESIDE = ((0, 1), (1, 0), (0, -1), (-1, 0))  # row and column of a texel's neighbours, counter-clockwise
 
 
 class Texels(NamedTuple):
@@ -48,12 +49,10 @@ def _fault(texels: Texels, flat: int) -> float:
     chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
     o, normal = texels.positions[flat], texels.normals[flat]
     fault = 0.0
-    for k in range(4):
-        i, j = (0, 1) if k == 0 else ((1, 0) if k == 1 else ((0, -1) if k == 2 else (-1, 0)))
+    for i, j in _BESIDE:
         p, q = _place(texels, chart, row + i, column + j), _place(texels, chart, row + j, column - i)
-        ax, ay, az, bx, by, bz = p[0] - o[0], p[1] - o[1], p[2] - o[2], q[0] - o[0], q[1] - o[1], q[2] - o[2]
-        facing = (ay * bz - az * by) * normal[0] + (az * bx - ax * bz) * normal[1] + (ax * by - ay * bx) * normal[2]
-        size = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
+        a, b = subtract(p, o), subtract(q, o)
+        facing, size = dot(cross(a, b), normal), np.sqrt(dot(a, a) * dot(b, b))
         # NaN, where there is no neighbour, is not below the margin
         if facing < _MARGIN * size:
             fault += (1.0 if facing < 0.0 else 0.0) + (_MARGIN - facing / max(size, 1e-300)) ** 2
@@ -66,8 +65,7 @@ def faults(texels: Texels, flat: int) -> float:
     n = texels.halo.shape[1] - 2
     chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
     total = _fault(texels, flat)
-    for k in range(4):
-        i, j = (0, 1) if k == 0 else ((1, 0) if k == 1 else ((0, -1) if k == 2 else (-1, 0)))
+    for i, j in _BESIDE:
         other = texels.halo[chart, row + i, column + j]
         if other >= 0 and not texels.rim[chart, row + i, column + j]:
             total += _fault(texels, other)
@@ -106,29 +104,22 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
     near, beside = number >= 0, seamless.glued[..., 0]
     for _ in range(_REACH):
         near |= (near[beside] & (beside >= 0)).any(axis=1)
-    triangles, barycentrics = np.full((len(charts), n, n), -1), np.zeros((len(charts), n, n, 3))
-    best = np.full((len(charts), n, n), -np.inf)
     corner, homes, places = places_on_charts(seamless)
-    chosen = np.flatnonzero(near[homes])
-    _draw(seamless, chosen, corner, homes, places, number, triangles, barycentrics, best)
+    triangles, barycentrics, best = _draw(seamless, np.flatnonzero(near[homes]), corner, homes, places, number, n)
     triangles[best < -_ROUND_OFF] = -1
     return triangles, barycentrics
 
 
 @kernel
 def _draw(
-    seamless: SeamlessMap,
-    chosen: Ints,
-    corner: Ints,
-    homes: Ints,
-    places: Complex,
-    number: Ints,
-    triangles: Ints,
-    barycentrics: Floats,
-    best: Floats,
-) -> None:
-    """Fill in the texels of the charts that have a number, from chosen triangles; see `places_on_charts`."""
-    n, slack = best.shape[1], 1e-9
+    seamless: SeamlessMap, chosen: Ints, corner: Ints, homes: Ints, places: Complex, number: Ints, n: int
+) -> tuple[Ints, Floats, Floats]:
+    """Find the texels of the charts that have a number in chosen triangles; see `places_on_charts`.
+
+    Returns the triangle of each, -1 where there is none, and its barycentric coordinates, and the least of these.
+    """
+    shape, slack = (number.max() + 1, n, n), 1e-9
+    triangles, barycentrics, best = np.full(shape, -1), np.zeros((*shape, 3)), np.full(shape, -np.inf)
     for f in chosen:
         home, k, p = homes[f], corner[f], places[f]
         u, v = p[1] - p[0], p[2] - p[0]
@@ -148,11 +139,10 @@ def _draw(
                 chart, row, column = number[found], int(np.floor(place.imag * n)), int(np.floor(place.real * n))
                 if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
                     continue
-                best[chart, row, column] = least
-                triangles[chart, row, column] = f
-                barycentrics[chart, row, column, 0] = 1 - s - t
-                barycentrics[chart, row, column, 1] = s
-                barycentrics[chart, row, column, 2] = t
+                best[chart, row, column], triangles[chart, row, column] = least, f
+                inside = barycentrics[chart, row, column]
+                inside[0], inside[1], inside[2] = 1 - s - t, s, t
+    return triangles, barycentrics, best
 
 
 class Samples(NamedTuple):
@@ -172,15 +162,15 @@ class Samples(NamedTuple):
         [m], and unit.
     """
 
-    small: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    small: Ints
+    weights: Floats
+    triangles: Ints
+    barycentrics: Floats
+    positions: Floats
+    normals: Floats
 
 
-def sampled(mesh: Mesh, patches: PatchMap, small: NDArray[np.int64], weights: NDArray[np.float64]) -> Samples:
+def sampled(mesh: Mesh, patches: PatchMap, small: Ints, weights: Floats) -> Samples:
     """Points at barycentric coordinates in triangles of the surface."""
     surface = patches.surface
     positions = np.einsum("...k,...kj->...j", weights, surface.V[surface.F[small]])
@@ -206,8 +196,8 @@ _AROUND = 2  # texels round a folded one that may move
 
 
 def untangled(
-    mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: NDArray[np.float64] | None
-) -> tuple[Samples, NDArray[np.float64]]:
+    mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: Floats | None
+) -> tuple[Samples, Floats]:
     """Move texels at the centres of their squares to where fewer are folded; `beyond` as in `TexelMesh`.
 
     Returns them, and the column and row by which each has moved, in texels, below 0.5, [C, n, n, 2].
@@ -221,15 +211,17 @@ def untangled(
     positions, normals = samples.positions.reshape(-1, 3).copy(), samples.normals.reshape(-1, 3).copy()
     texels = Texels(topology.halo, topology.rim, outside, positions, normals, offsets)
     for _ in range(_ROUNDS):
-        active = _around(topology, folded(texels))
+        near = folded(texels).reshape(topology.shape)
+        for _ in range(_AROUND):
+            halo = topology.with_halo(near)
+            near = np.any([halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0)
+        active = np.flatnonzero(near)
         if not len(active):
             break
         chosen, index = np.unique(active // (n * n), return_inverse=True)
         places = sampled(mesh, patches, *locate_in_charts(patches.seamless, n * _LATTICE, chosen))
-        known = (places.small >= 0)[..., None]
-        number = np.full(charts, -1)
-        number[chosen] = np.arange(len(chosen))
-        candidates = np.where(known, places.positions, np.nan), places.normals
+        number = np.searchsorted(chosen, np.arange(charts))
+        candidates = np.where((places.small >= 0)[..., None], places.positions, np.nan), places.normals
         for i in range(_SWEEPS):
             if not _improve(texels, number, *candidates, active[:: 1 if i % 2 == 0 else -1].copy()):
                 break
@@ -240,15 +232,6 @@ def untangled(
         small[chart[changed], row[changed], column[changed]] = places.small[at][changed]
         weights[chart[changed], row[changed], column[changed]] = places.weights[at][changed]
     return sampled(mesh, patches, small, weights), offsets[:, 1:-1, 1:-1] / _LATTICE
-
-
-def _around(topology: TexelTopology, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Flat indices of chosen texels [T] and of those round them."""
-    n = topology.shape[1]
-    for _ in range(_AROUND):
-        halo = topology.with_halo(chosen.reshape(topology.shape))
-        chosen = np.any([halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0)
-    return np.flatnonzero(chosen)
 
 
 @kernel

@@ -90,23 +90,16 @@ def seamless_map(quads: Quads) -> SeamlessMap:
     """The map that the quads begin with."""
     surface = quads.surface
     F, count = surface.F, len(surface.V)
-    twin = np.full(3 * len(F), -1)
-    sides = surface.edges.sides
-    joined = sides[:, 1] >= 0
-    twin[sides[joined, 0]], twin[sides[joined, 1]] = sides[joined, 1], sides[joined, 0]
-    star_start, star = stars(F, count)
+    twin, joined = np.full(3 * len(F), -1), surface.edges.sides[~surface.edges.rim]
+    twin[joined] = joined[:, ::-1]
+    # across glued sides: side s of one chart runs against side t of the other
+    here, there, corners = np.arange(4), quads.glued[..., 1], CORNERS @ (1, 1j)
+    side_turn = (there + 2 - here) % 4
+    side_shift = corners[(there + 1) % 4] - _TURNS[side_turn] * corners[here]
+    chart, z, freedom = np.zeros(count, np.int64), np.zeros(count, np.complex128), np.full(count, FREE)
+    turn, shift = np.zeros(F.shape, np.int64), np.zeros(F.shape, np.complex128)
     seamless = SeamlessMap(
-        F,
-        quads.chart,
-        np.zeros(count, np.int64),
-        np.zeros(count, np.complex128),
-        np.full(count, FREE),
-        np.zeros((len(F), 3), np.int64),
-        np.zeros((len(F), 3), np.complex128),
-        quads.glued,
-        *_transitions(quads.glued),
-        star_start,
-        star,
+        F, quads.chart, chart, z, freedom, turn, shift, quads.glued, side_turn, side_shift, *stars(F, count)
     )
     _connect(seamless, twin, quads.places[..., 0] + 1j * quads.places[..., 1])
     return seamless
@@ -115,13 +108,6 @@ def seamless_map(quads: Quads) -> SeamlessMap:
 def stars(F: Ints, count: int) -> tuple[Ints, Ints]:
     """Corners 3 triangle + k of the triangles F [m, 3] by vertex: where those of each begin [n + 1], and all [3 m]."""
     return counting_sort(F.ravel(), np.arange(F.size), count)
-
-
-def _transitions(glued: Ints) -> tuple[Ints, Complex]:
-    """Frame changes across glued sides, a turn and a shift; side s of one chart runs against side t of the other."""
-    here, there, corners = np.arange(4), glued[..., 1], CORNERS @ (1, 1j)
-    turn = (there + 2 - here) % 4
-    return turn, corners[(there + 1) % 4] - _TURNS[turn] * corners[here]
 
 
 @kernel
@@ -171,53 +157,42 @@ def _side_of(a: complex, b: complex, glued: Ints, other: int) -> int:
 @kernel
 def _connect(seamless: SeamlessMap, twin: Ints, places: Complex) -> None:
     """Go round each vertex and fill in its place, its freedom, and the frames of its corners."""
+    chart = seamless.frame
     for v in range(len(seamless.z)):
-        first = seamless.star[seamless.star_start[v]]
-        h, at_rim = first, False
-        while True:  # clockwise to the rim, if there is one
-            if twin[h] < 0:
-                at_rim = True
-                break
+        first = h = seamless.star[seamless.star_start[v]]
+        while twin[h] >= 0:  # clockwise to the rim, if there is one
             t = twin[h]
             h = t + 1 if t % 3 < 2 else t - 2
             if h == first:
                 break
-        _go_round(seamless, twin, places, v, h, at_rim)
-
-
-@kernel
-def _go_round(seamless: SeamlessMap, twin: Ints, places: Complex, v: int, h: int, at_rim: bool) -> None:
-    """Fill in a vertex and its corners, counter-clockwise from corner h, the first one at a rim."""
-    first, chart, frame, crossed = h, seamless.frame, _OWN, 0
-    seamless.chart[v], place = chart[h // 3], places[h // 3, h % 3]
-    seamless.z[v] = place
-    while True:
-        f, k = h // 3, h % 3
-        seamless.turn[f, k], seamless.shift[f, k] = frame
-        before = h + 2 if k == 0 else h - 1
-        t = twin[before]
-        if t < 0:
-            break
-        if chart[t // 3] != chart[f]:
-            c = chart[f]
-            side = _side_of(places[f, k], places[f, before % 3], seamless.glued[c], chart[t // 3])
-            frame = after(frame, (seamless.side_turn[c, side], seamless.side_shift[c, side]))
-            crossed += 1
-        h = t
-        if h == first:
-            break
-    corner = (place.real == 0 or place.real == 1) and (place.imag == 0 or place.imag == 1)
-    cone = corner and crossed != (1 if at_rim else 4)
-    if at_rim:
-        f, k = first // 3, first % 3
-        side = _side_of(places[f, k], places[f, (k + 1) % 3], seamless.glued[chart[f]], -1)
-        seamless.freedom[v] = COLUMN if side % 2 == 0 else ROW
-    if not cone:
-        return
-    seamless.freedom[v], seamless.z[v] = FIXED, 0.0
-    for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
-        f, k = seamless.star[i] // 3, seamless.star[i] % 3
-        seamless.turn[f, k], seamless.shift[f, k] = 0, places[f, k]
+        first, at_rim, frame, crossed = h, twin[h] < 0, _OWN, 0
+        place = places[h // 3, h % 3]
+        seamless.chart[v], seamless.z[v] = chart[h // 3], place
+        while True:  # counter-clockwise, from one chart to the next
+            f, k = h // 3, h % 3
+            seamless.turn[f, k], seamless.shift[f, k] = frame
+            before = h + 2 if k == 0 else h - 1
+            t = twin[before]
+            if t < 0:
+                break
+            if chart[t // 3] != chart[f]:
+                c = chart[f]
+                side = _side_of(places[f, k], places[f, before % 3], seamless.glued[c], chart[t // 3])
+                frame = after(frame, (seamless.side_turn[c, side], seamless.side_shift[c, side]))
+                crossed += 1
+            h = t
+            if h == first:
+                break
+        if at_rim:
+            f, k = first // 3, first % 3
+            side = _side_of(places[f, k], places[f, (k + 1) % 3], seamless.glued[chart[f]], -1)
+            seamless.freedom[v] = COLUMN if side % 2 == 0 else ROW
+        corner = (place.real == 0 or place.real == 1) and (place.imag == 0 or place.imag == 1)
+        if corner and crossed != (1 if at_rim else 4):  # the tip of a cone
+            seamless.freedom[v], seamless.z[v] = FIXED, 0.0
+            for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
+                f, k = seamless.star[i] // 3, seamless.star[i] % 3
+                seamless.turn[f, k], seamless.shift[f, k] = 0, places[f, k]
 
 
 _MOST_CHARTS = 64

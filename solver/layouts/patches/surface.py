@@ -9,23 +9,16 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import SPLITS, Edges, corner_angles, edges_of, triangle_areas
 
 # Of a triangle abc: its corners, a point on each of its sides, and one inside.
 A, B, C, AB, BC, CA, MIDDLE = range(7)
 
 Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
-
-# in the order in which the triangles are put
-_SPLITS: Patterns = {number: SPLITS[number] for number in (1, 2, 4, 3, 6, 5, 7)}
-
-# see `TriangleSurface.subdivided`
-Cut: TypeAlias = "tuple[TriangleSurface, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,13 +36,13 @@ class TriangleSurface:
         Barycentric coordinates in it, of the three corners.
     """
 
-    V: NDArray[np.float64]
-    F: NDArray[np.int64]
-    parent: NDArray[np.int64]
-    inside: NDArray[np.float64]
+    V: Floats
+    F: Ints
+    parent: Ints
+    inside: Floats
 
     @classmethod
-    def of(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> TriangleSurface:
+    def of(cls, V: Floats, F: Ints) -> TriangleSurface:
         """The triangles of a mesh as they are."""
         return cls(V, F, np.arange(len(F)), np.broadcast_to(np.eye(3), (len(F), 3, 3)))
 
@@ -59,29 +52,29 @@ class TriangleSurface:
         return edges_of(self.F)
 
     @functools.cached_property
-    def edge_lengths(self) -> NDArray[np.float64]:
+    def edge_lengths(self) -> Floats:
         """Lengths of the edges [m], [e]."""
         ends = self.V[self.edges.ends]
         return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
     @functools.cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """Areas of the triangles [m^2], [m]."""
         return triangle_areas(self.V, self.F)
 
     @functools.cached_property
-    def angles(self) -> NDArray[np.float64]:
+    def angles(self) -> Floats:
         """Angles in the corners of the triangles, [m, 3]."""
         return corner_angles(self.V, self.F)
 
     @functools.cached_property
-    def at_rim(self) -> NDArray[np.bool_]:
+    def at_rim(self) -> Bools:
         """Vertices at a rim, [n]."""
         at_rim = np.zeros(len(self.V), bool)
         at_rim[self.edges.ends[self.edges.rim]] = True
         return at_rim
 
-    def subdivided(self, places: NDArray[np.float64], patterns: Patterns = _SPLITS) -> Cut:
+    def subdivided(self, places: Floats, patterns: Patterns = SPLITS) -> tuple[TriangleSurface, Ints, Ints, Floats]:
         """Cut edges, and the triangles beside them.
 
         Parameters
@@ -90,7 +83,7 @@ class TriangleSurface:
             Where each edge is cut, between 0 at its first end and 1; NaN where it is not.
         patterns : dict, optional
             For each set of cut sides of a triangle (1 for ab, 2 for bc, 4 for ca, added up) the triangles to put in
-            its place, by the seven points named in this module.
+            its place, by the seven points named in this module; they are put in the order of these sets.
 
         Returns
         -------
@@ -113,7 +106,7 @@ class TriangleSurface:
         sets = ((middles[edges.of] >= 0) * (1, 2, 4)).sum(axis=1)
         touched = np.flatnonzero(sets)
         nodes, local = self._nodes(touched, middles, places)
-        central = np.flatnonzero([any(MIDDLE in each for each in patterns.get(int(s), ())) for s in range(8)])
+        central = [number for number, triangles in patterns.items() if any(MIDDLE in each for each in triangles)]
         inner = np.flatnonzero(np.isin(sets[touched], central))
         nodes[inner, MIDDLE] = count + len(cut) + np.arange(len(inner))
         points.append(np.einsum("ij,ijk->ik", local[inner, MIDDLE], self.V[self.F[touched[inner]]]))
@@ -126,14 +119,10 @@ class TriangleSurface:
                 weights.append(local[chosen][:, triangle])
                 origin.append(touched[chosen])
         source, share = np.concatenate(origin), np.concatenate(weights)
-        finer = TriangleSurface(
-            np.concatenate(points), np.concatenate(F), self.parent[source], share @ self.inside[source]
-        )
-        return finer, middles, source, share
+        parent, inside = self.parent[source], share @ self.inside[source]
+        return TriangleSurface(np.concatenate(points), np.concatenate(F), parent, inside), middles, source, share
 
-    def _nodes(
-        self, triangles: NDArray[np.int64], middles: NDArray[np.int64], places: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _nodes(self, triangles: Ints, middles: Ints, places: Floats) -> tuple[Ints, Floats]:
         """Vertices [k, 7] of the named points of triangles [k], and their barycentrics [k, 7, 3]."""
         nodes, local = np.full((len(triangles), 7), -1), np.zeros((len(triangles), 7, 3))
         nodes[:, :3], local[:, :3] = self.F[triangles], np.eye(3)
@@ -156,11 +145,11 @@ class Flat:
     """Parts of a surface [m] laid out in the plane; `places` [m, 3, 2] are those of the triangles' corners."""
 
     surface: TriangleSurface
-    part: NDArray[np.int64]
-    places: NDArray[np.float64]
+    part: Ints
+    places: Floats
 
 
-def central_vertices(flat: Flat, on_border: NDArray[np.bool_]) -> NDArray[np.int64]:
+def central_vertices(flat: Flat, on_border: Bools) -> Ints:
     """The inner vertex nearest to the origin, one for each part."""
     distance = np.where(on_border[flat.surface.F], np.inf, (flat.places**2).sum(axis=2)).ravel()
     part = np.repeat(flat.part, 3)
@@ -169,9 +158,7 @@ def central_vertices(flat: Flat, on_border: NDArray[np.bool_]) -> NDArray[np.int
     return flat.surface.F.ravel()[first]
 
 
-def cut_ray(
-    flat: Flat, start: NDArray[np.int64], end: NDArray[np.int64], on_border: NDArray[np.bool_]
-) -> tuple[Flat, list[NDArray[np.int64]]]:
+def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat, list[Ints]]:
     """Cut parts along a straight line each, from one of their vertices to one on their border.
 
     Parameters
@@ -202,20 +189,18 @@ def cut_ray(
     crossed = (p * q < 0) & (sides[:, 1] >= 0)
     crossed &= flat.part[triangle] == flat.part[np.where(crossed, sides[:, 1], sides[:, 0]) // 3]
     t = np.where(crossed, p / np.where(crossed, p - q, 1.0), np.nan)
-    crossed &= (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3] > 0
+    distance = (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3]
+    crossed &= distance > 0
     forward = surface.edges.ends[:, 0] == surface.F[triangle, k]
     finer, middles, source, weights = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan))
-    touched = np.flatnonzero(on_ray.any(axis=1))
-    inner = np.stack([flat.part[touched].repeat(3), surface.F[touched].ravel(), reach[touched].ravel()])[
-        :, on_ray[touched].ravel()
-    ]
-    cut = np.flatnonzero(crossed)
-    distance = ((1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3])[cut]
-    points = np.concatenate([inner, np.stack([flat.part[triangle[cut]], middles[cut], distance])], axis=1)
+    touched, corner = np.nonzero(on_ray)
+    at_vertices = np.stack([flat.part[touched], surface.F[touched, corner], reach[touched, corner]])
+    on_edges = np.stack([flat.part[triangle[crossed]], middles[crossed], distance[crossed]])
+    points = np.concatenate([at_vertices, on_edges], axis=1)
     return Flat(finer, flat.part[source], weights @ flat.places[source]), _paths(points, len(start))
 
 
-def _place_of(flat: Flat, vertex: NDArray[np.int64]) -> NDArray[np.float64]:
+def _place_of(flat: Flat, vertex: Ints) -> Floats:
     """Places [parts, 2] of one vertex of each part; NaN where that is -1."""
     places = np.full((len(vertex), 2), np.nan)
     triangle, k = np.nonzero(vertex[flat.part][:, None] == flat.surface.F)
@@ -223,34 +208,27 @@ def _place_of(flat: Flat, vertex: NDArray[np.int64]) -> NDArray[np.float64]:
     return places
 
 
-def _paths(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
+def _paths(points: Floats, parts: int) -> list[Ints]:
     """Vertices of each part in order, from rows part, vertex, and distance along the line."""
     order = np.lexsort((points[2], points[0]))
     part, vertex = points[:2, order].astype(np.int64)
-    first = np.concatenate([[True], (np.diff(part) != 0) | (np.diff(vertex) != 0)]) if len(part) else np.zeros(0, bool)
-    part, vertex = part[first], vertex[first]
-    return np.split(vertex, np.searchsorted(part, np.arange(1, parts)))
+    first = (np.diff(part, prepend=-1) != 0) | (np.diff(vertex, prepend=-1) != 0)
+    return np.split(vertex[first], np.searchsorted(part[first], np.arange(1, parts)))
 
 
 _MOST_ROUNDS = 100
 _MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
 
 
-def halved(surface: TriangleSurface, chosen: NDArray[np.bool_]) -> Cut:
-    """Split chosen edges [e] in their middle; see `TriangleSurface.subdivided`."""
-    return surface.subdivided(np.where(chosen, 0.5, np.nan))
-
-
-def halved_chords(
-    surface: TriangleSurface, part: NDArray[np.int64], on_border: NDArray[np.bool_]
-) -> tuple[TriangleSurface, NDArray[np.int64]]:
+def halved_chords(surface: TriangleSurface, part: Ints, on_border: Bools) -> tuple[TriangleSurface, Ints]:
     """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side.
 
     Returns the finer surface, and the triangle from before in which each of its triangles lies.
     """
     sides = surface.edges.sides
     inner = (sides >= 0).all(axis=1) & (part[sides[:, 0] // 3] == part[sides[:, 1] // 3])
-    finer, _, origin, _ = halved(surface, inner & on_border[surface.edges.ends].all(axis=1))
+    chords = inner & on_border[surface.edges.ends].all(axis=1)
+    finer, _, origin, _ = surface.subdivided(np.where(chords, 0.5, np.nan))
     return finer, origin
 
 
@@ -268,5 +246,5 @@ def refined(surface: TriangleSurface, longest: float) -> TriangleSurface:
         chosen &= lengths > longest
         if not chosen.any() or len(surface.F) > most:
             break
-        surface = halved(surface, chosen)[0]
+        surface = surface.subdivided(np.where(chosen, 0.5, np.nan))[0]
     return surface

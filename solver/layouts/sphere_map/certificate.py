@@ -36,26 +36,26 @@ class Certificate:
     valid: bool
 
 
-def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
+def certify(F: NDArray[np.integer], S: Floats) -> Certificate:
     """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3]."""
     a, b, c = (S[F[:, j]].T for j in range(3))
     ab, ac = subtract(b, a), subtract(c, a)
     triple = dot(a, cross(ab, ac))
     flipped = np.count_nonzero(~(triple > 4.0 * EPSILON * np.sqrt(dot(ab, ab) * dot(ac, ac))))
-    solid_angle = np.sum(2.0 * np.arctan2(triple, 1.0 + dot(a, b) + dot(b, c) + dot(c, a)))
+    solid_angle = np.sum(solid_angles(F, S))
     on_sphere = bool(np.all(np.abs(dot(S.T, S.T) - 1) < 1e-9))
     valid = flipped == 0 and on_sphere and abs(solid_angle - 4 * np.pi) < 1e-6
     return Certificate(int(flipped), float(solid_angle), bool(valid))
 
 
-def solid_angles(F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
+def solid_angles(F: NDArray[np.integer], S: Floats) -> Floats:
     """Signed solid angle of each spherical triangle [sr], shape [m] (van Oosterom and Strackee 1983)."""
     a, b, c = (S[F[:, j]].T for j in range(3))
     triple = dot(a, cross(subtract(b, a), subtract(c, a)))
     return 2 * np.arctan2(triple, 1 + dot(a, b) + dot(b, c) + dot(c, a))
 
 
-def stretch(V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
+def stretch(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     """Per triangle sqrt(real area / sphere area), real area scaled to 4 pi, shape [m].
 
     How many times wider than in an ideal even grid the texels are there.
@@ -69,7 +69,10 @@ def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     metric, area = _vertex_metrics(F, V, S)
     trace = metric[:, 0] + metric[:, 1] + metric[:, 2]
     squares = np.sum(metric[:, :3] ** 2, axis=1) + 2 * np.sum(metric[:, 3:] ** 2, axis=1)
-    narrowest = area * _inverse_square(trace, (trace * trace - squares) / 2) ** SHARPNESS
+    determinant = (trace * trace - squares) / 2
+    # the larger eigenvalue of the 2 x 2 matrices; over the determinant, it is one over the smaller
+    upper = 0.5 * (trace + np.sqrt(np.maximum(trace * trace - 4 * determinant, 0)))
+    narrowest = area * (upper / np.maximum(determinant, LEAST_SQUARE * upper)) ** SHARPNESS
     order = np.argsort(-narrowest, kind="stable")
     count = int(np.searchsorted(np.cumsum(narrowest[order]), (1 - NEGLIGIBLE) * np.sum(narrowest))) + 1
     narrow = S[order[:count]], metric[order[:count]], area[order[:count]]
@@ -81,7 +84,7 @@ def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     return S @ widest.T
 
 
-def spread_rotations(count: int) -> NDArray[np.float64]:
+def spread_rotations(count: int) -> Floats:
     """Rotation matrices spread evenly over all, [count, 3, 3]: super-Fibonacci spirals (Alexa 2022)."""
     s = np.arange(count) + 0.5
     inner, outer = np.sqrt(s / count), np.sqrt(1 - s / count)
@@ -93,12 +96,6 @@ def spread_rotations(count: int) -> NDArray[np.float64]:
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
     return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
-
-
-def _inverse_square(trace: Floats, determinant: Floats) -> Floats:
-    """One over the smaller eigenvalue of symmetric 2 x 2 matrices."""
-    root = np.sqrt(np.maximum(trace * trace - 4 * determinant, 0))
-    return 0.5 * (trace + root) / np.maximum(determinant, 0.5 * LEAST_SQUARE * (trace + root))
 
 
 def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Floats, Floats]:
@@ -160,11 +157,9 @@ def _narrowness(rotation: Floats, S: Floats, metric: Floats, area: Floats, limit
         s, t = local[along], local[across]
         first = (du * (e[0] - s * p[0]), du * (e[1] - s * p[1]), du * (e[2] - s * p[2]))
         second = (dv * (g[0] - t * p[0]), dv * (g[1] - t * p[1]), dv * (g[2] - t * p[2]))
-        ee, eg, gg = (
-            _aligned_product(metric[v], first, first),
-            _aligned_product(metric[v], first, second),
-            _aligned_product(metric[v], second, second),
-        )
+        m = metric[v]
+        ee, gg = _aligned_product(m, first, first), _aligned_product(m, second, second)
+        eg = _aligned_product(m, first, second)
         trace, determinant = ee + gg, ee * gg - eg * eg
         upper = 0.5 * (trace + np.sqrt(max(trace * trace - 4.0 * determinant, 0.0)))
         total += area[v] * (upper / max(determinant, LEAST_SQUARE * upper)) ** SHARPNESS

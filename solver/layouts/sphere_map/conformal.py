@@ -66,8 +66,11 @@ def _harmonic_map(V: Real, F: Triangles) -> Real:
     a, b, c = V[F[cut]]
     across = (c - a) @ (b - a) / np.linalg.norm(b - a)
     corners = np.array([0, np.linalg.norm(b - a), across + 1j * np.sqrt((c - a) @ (c - a) - across**2)])
-    unit = np.ones(len(F))
-    plane = _solve_dirichlet(_stiffness(*_flatten(V, F), unit, 0 * unit, unit, F, len(V)), F[cut], corners)
+    # each triangle in a plane of its own: the sides from its first corner to the second and third
+    u, v = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
+    length, unit = np.linalg.norm(u, axis=1), np.ones(len(F))
+    e, f = length + 0j, (np.einsum("ij,ij->i", u, v) + 1j * np.linalg.norm(np.cross(u, v), axis=1)) / length
+    plane = _solve_dirichlet(_stiffness(e, f, unit, 0 * unit, unit, F, len(V)), F[cut], corners)
     plane -= plane.mean()
 
     # scale the plane so that the triangles at the two poles come out alike
@@ -83,8 +86,8 @@ def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
     e, f = plane[F[:, 1]] - plane[F[:, 0]], plane[F[:, 2]] - plane[F[:, 0]]
     u, v = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
     det = e.real * f.imag - e.imag * f.real
-    dx, dy = (u * f.imag[:, None] - v * e.imag[:, None]), (v * e.real[:, None] - u * f.real[:, None])
-    dx, dy = dx / det[:, None], dy / det[:, None]
+    dx = (u * f.imag[:, None] - v * e.imag[:, None]) / det[:, None]
+    dy = (v * e.real[:, None] - u * f.real[:, None]) / det[:, None]
     xx, xy, yy = (np.einsum("ij,ij->i", p, q) for p, q in ((dx, dx), (dx, dy), (dy, dy)))
     # Beltrami coefficient of the map from the plane to the mesh
     beltrami = (xx - yy + 2j * xy) / (xx + yy + 2 * np.sqrt(np.maximum(xx * yy - xy * xy, 0)))
@@ -96,13 +99,6 @@ def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
     southern = np.argsort(S[:, 2], kind="stable")[: max(round(SOUTHERN_SHARE * len(V)), 3)]
     repaired = _to_sphere(_solve_dirichlet(stiffness, southern, plane[southern]))
     return repaired * [1, 1, -1]
-
-
-def _flatten(V: Real, F: Triangles) -> tuple[Complex, Complex]:
-    """Each triangle in a plane of its own: the sides from its first corner to the second and third."""
-    u, v = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
-    length = np.linalg.norm(u, axis=1)
-    return length + 0j, (np.einsum("ij,ij->i", u, v) + 1j * np.linalg.norm(np.cross(u, v), axis=1)) / length
 
 
 def _stiffness(

@@ -151,29 +151,21 @@ def decimate(table: CornerTable, V: Floats) -> Ints32:
     edges = V[table.tail] - V[table.tail[table.twin]]
     blur = 1e-4 * float(np.mean(np.sum(edges * edges, axis=1)))
     n = len(V)
-    log = np.empty(n - 4, dtype=np.int32)
-    front = _Front(
-        table,
-        V,
-        vertex_quadrics(table.tail, V),
-        merged=np.ones(n),
-        degree=np.bincount(table.tail, minlength=n).astype(np.int32),
-        stale=np.ones(n, dtype=np.bool_),
-        cost=np.full(n, np.inf),
-        target=np.full(n, -1, dtype=np.int32),
-    )
-    alive = np.arange(n, dtype=np.int32)
+    log, alive = np.empty(n - 4, np.int32), np.arange(n, dtype=np.int32)
+    degree = np.bincount(table.tail, minlength=n).astype(np.int32)
+    stale, cost, target = np.ones(n, np.bool_), np.full(n, np.inf), np.full(n, -1, np.int32)
+    front = _Front(table, V, vertex_quadrics(table.tail, V), np.ones(n), degree, stale, cost, target)
     done, limit = 0, DEGREE_LIMIT
     while done < len(log):
         _price(alive, front, blur, limit)
-        order = alive[np.argsort(front.cost[alive], kind="stable")]
+        order = alive[np.argsort(cost[alive], kind="stable")]
         quota = min(len(log) - done, max(1, int(ROUND_SHARE * len(alive))))
         removed = _collapse_round(order, quota, front, limit, log[done:])
         if removed == 0:
             limit *= 2
-            front.stale[alive] = True
+            stale[alive] = True
         done += removed
-        alive = alive[front.cost[alive] >= 0.0]
+        alive = alive[cost[alive] >= 0.0]
     return log
 
 

@@ -41,20 +41,14 @@ def build_level(table: CornerTable, vertices: NDArray[np.integer], triangles: ND
     edge[lower] = edge[twin[lower]] = np.arange(len(lower))
     ends = np.stack([tail[lower], tail[twin[lower]]], axis=1)
     star_start = np.concatenate([[0], np.cumsum(np.bincount(tail))]).astype(np.int32)
-    star = _stars(vertices, table, star_start)
-    ring = vertex_number[table.tail[table.twin[star]]]
-    return Level(tail, edge, ends, star_start, ring, corner_number[star])
-
-
-def _stars(vertices: NDArray[np.integer], table: CornerTable, star_start: Ints32) -> Ints32:
-    """Half-edges that leave each vertex, counterclockwise, one vertex after the other, [3 m]."""
     star = np.empty(star_start[-1], dtype=np.int32)
     h, place, end = table.leaving[vertices], star_start[:-1], star_start[1:]
-    while len(h):
+    while len(h):  # one half-edge further counterclockwise round every vertex that has more
         star[place] = h
         left = np.flatnonzero(place + 1 < end)
         h, place, end = table.twin[preceding(h[left])], place[left] + 1, end[left]
-    return star
+    ring = vertex_number[table.tail[table.twin[star]]]
+    return Level(tail, edge, ends, star_start, ring, corner_number[star])
 
 
 def star_shapes(star: Ints32, reference: Reference) -> Floats:

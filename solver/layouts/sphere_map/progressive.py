@@ -15,11 +15,13 @@ smooth is the work of `newton`.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SphereMapError
-from ...kernel import Floats, Ints32, kernel
+from ...kernel import Floats, Ints, Ints32, kernel
 from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
 from ..energy import FOLDED, FREE, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
@@ -46,10 +48,7 @@ def relax_level(level: Level, S: Floats, reference: Reference) -> None:
     """Lower the energy of a level in place."""
     shapes = star_shapes(level.star, reference)
     least_gain = TIRED_NEWTON if len(S) < LARGE else TIRED_LARGE
-
-    def energy() -> float:
-        return total_energy(level.tail, S, reference)
-
+    energy = functools.partial(total_energy, level.tail, S, reference)
     for _ in range(MOST_ROUNDS):
         for i in range(MOST_SWEEPS):
             if sweep(level, S, shapes, reference.density, i % 2 == 0) < TIRED_SWEEP * energy():
@@ -68,18 +67,15 @@ def relax_level(level: Level, S: Floats, reference: Reference) -> None:
 @kernel
 def total_energy(tail: Ints32, S: Floats, reference: Reference) -> float:
     """Energy of the whole map S; infinite if a triangle is folded."""
-    cotangent = reference.cotangent
-    total = 0.0
+    total, cotangent = 0.0, reference.cotangent
     for f in range(len(tail) // 3):
-        a, b, c = row(S, tail[3 * f]), row(S, tail[3 * f + 1]), row(S, tail[3 * f + 2])
+        h, area = 3 * f, reference.area[f]
+        a, b, c = row(S, tail[h]), row(S, tail[h + 1]), row(S, tail[h + 2])
         ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
         triple = dot(a, cross(ab, ac))
         if not triple > FOLDED:
             return np.inf
-        area = reference.area[f]
-        dirichlet = (
-            cotangent[3 * f] * dot(bc, bc) + cotangent[3 * f + 1] * dot(ac, ac) + cotangent[3 * f + 2] * dot(ab, ab)
-        )
+        dirichlet = cotangent[h] * dot(bc, bc) + cotangent[h + 1] * dot(ac, ac) + cotangent[h + 2] * dot(ab, ab)
         total += area * energy_density(dirichlet, 2.0 * area / triple, reference.density)
     return total
 
@@ -234,7 +230,7 @@ CAREFUL_UNTIL = 30
 TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)  # in the real triangles, each tried when the one before gave no certified map
 
 
-def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
+def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
     """Map a closed triangle mesh of genus 0 one-to-one onto the unit sphere, its area spread evenly.
 
     Parameters
@@ -254,31 +250,25 @@ def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> ND
     SphereMapError
         No such map was found.
     """
-    normal_V = _normalise(np.asarray(V, dtype=np.float64), F)
-    order = _morton_order(normal_V)
+    # centred, scaled to an area of 4 pi, and rounded, so that place and size of the mesh do not change the map: without
+    # rounding, the last bits would decide between the many equivalent ways out of a symmetric coarse level
+    V = V - np.mean(V, axis=0, dtype=np.float64)
+    V = np.rint(V * np.sqrt(4 * np.pi / np.sum(triangle_areas(V, F))) * GRID) / GRID
+    order = _morton_order(V)
     number = np.empty(len(V), dtype=np.int64)
     number[order] = np.arange(len(V))
     triangles = number[F]
     triangles = triangles[np.argsort(triangles.min(axis=1), kind="stable")]
     for trust in TRUST_LADDER:
-        S = _map_by_levels(normal_V[order], triangles, trust)[number]
+        S = _map_by_levels(V[order], triangles, trust)[number]
         certificate = certify(F, S)
         if certificate.valid:
-            turned = align(normal_V, F, S)
+            turned = align(V, F, S)
             return turned if certify(F, turned).valid else S  # round-off can fold the tiniest triangles
     raise SphereMapError(
         f"no fold-free sphere map was found: {certificate.flipped} of {len(F)} triangles are folded, the solid angle "
         f"is {certificate.solid_angle:.6g} instead of 4 pi; simplify or remesh the mesh, and remove its slivers"
     )
-
-
-def _normalise(V: Floats, F: NDArray[np.integer]) -> Floats:
-    """Centre the mesh, scale its area to 4 pi, and round it, so that its place and size do not change the map.
-
-    Without rounding, the last bits would decide between the many equivalent ways out of a symmetric coarse level.
-    """
-    V = V - V.mean(axis=0)
-    return np.rint(V * np.sqrt(4 * np.pi / np.sum(triangle_areas(V, F))) * GRID) / GRID
 
 
 def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
@@ -293,45 +283,32 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     vertex_since, triangle_since = np.full(n, 4), np.full(len(F), 4)
     arrival = n - np.arange(len(log))
     vertex_since[removed] = triangle_since[log // 3] = triangle_since[table.twin[log] // 3] = arrival
+    vertices, triangles = np.flatnonzero(vertex_since == 4), np.flatnonzero(triangle_since == 4)
 
     S = np.zeros((n, 3))
-    S[_tetrahedron(table, np.flatnonzero(vertex_since == 4))] = TETRAHEDRON
+    # the four that are left, in the order in which no triangle is inside out
+    h = table.leaving[vertices[0]]
+    S[table.tail[[h, following(h), preceding(h), preceding(table.twin[h])]]] = TETRAHEDRON
     reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)), SPHERE)
     load = np.ones(n)
-    count = 4
     for size in _level_sizes(n):
         shape_trust = trust * min(max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0)
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
         surface = RealSurface(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
-
-        vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
         update_level(vertices, triangles, table, surface, reference)
-        insert_vertices(log[n - size : n - count], table, surface, S, reference)
-        count = size
-
-        vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
+        insert_vertices(log[n - size : n - len(vertices)], table, surface, S, reference)
+        vertices, triangles = np.flatnonzero(vertex_since <= size), np.flatnonzero(triangle_since <= size)
         update_level(vertices, triangles, table, surface, reference)
-        corners = (3 * triangles[:, None] + np.arange(3)).ravel()
         level_S = S[vertices]
-        shown = Reference(reference.area[triangles], reference.cotangent[corners], SPHERE)
+        shown = Reference(reference.area[triangles], reference.cotangent.reshape(-1, 3)[triangles].ravel(), SPHERE)
         relax_level(build_level(table, vertices, triangles), level_S, shown)
         S[vertices] = level_S
     return S
 
 
-def _tetrahedron(table: CornerTable, vertices: NDArray[np.integer]) -> list[int]:
-    """Order the last four vertices so that placing them at TETRAHEDRON leaves no triangle inside out."""
-    a = int(vertices[0])
-    h = int(table.leaving[a])
-    b, c = int(table.tail[following(h)]), int(table.tail[preceding(h)])
-    (d,) = {int(v) for v in vertices} - {a, b, c}
-    return [a, b, c, d]
-
-
 def _level_sizes(n: int) -> list[int]:
     """Vertex counts of the levels, from just above four to n."""
-    sizes = []
-    size = 4.0
+    sizes, size = [], 4.0
     while size < n:
         size = size * (SLOW_GROWTH if size < CAREFUL_UNTIL else FAST_GROWTH) + 1
         sizes.append(min(int(size), n))
@@ -340,7 +317,7 @@ def _level_sizes(n: int) -> list[int]:
     return sizes
 
 
-def _morton_order(V: NDArray[np.float64]) -> NDArray[np.int64]:
+def _morton_order(V: Floats) -> Ints:
     """Vertices along a Morton curve: neighbours in space come close together in memory."""
     cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(np.int64)
     code = np.zeros(len(V), dtype=np.int64)
@@ -369,18 +346,9 @@ def _gather(
 
 @kernel
 def _place(
-    u: int,
-    v: int,
-    left: int,
-    right: int,
-    S: Floats,
-    ring: Floats,
-    shapes: Floats,
-    degree: int,
-    density: Density,
-    terms: Floats,
-) -> None:
-    """Put u where its star's energy is least among trial points on the ways from v."""
+    v: int, left: int, right: int, S: Floats, ring: Floats, shapes: Floats, degree: int, density: Density, terms: Floats
+) -> Vector:
+    """Where the energy of a new vertex's star is least among trial points on the ways from v."""
     start = row(S, v)
     x, y = tangent_frame(start)
     expand_star(start, x, y, ring, ring[1:], shapes, degree, terms)
@@ -388,8 +356,7 @@ def _place(
     for i in range(degree):
         middle = combine(1.0, middle, 1.0, row(ring, i))
     inward = combine(1.0, unit(cross(start, row(S, left))), 1.0, unit(cross(row(S, right), start)))
-    least = np.inf
-    best = start
+    least, best = np.inf, start
     for goal, share, trials in ((unit(middle), 0.65, 16), (unit(combine(1.0, start, 1.0, unit(inward))), 0.4, 40)):
         t = 1.0
         for _ in range(trials):
@@ -397,14 +364,13 @@ def _place(
             move = subtract(p, start)
             energy = star_energy(terms, degree, density, (dot(move, x), dot(move, y), dot(move, start)))
             if energy < least:
-                least = energy
-                best = p
+                least, best = energy, p
             elif least < np.inf:
                 break
             t *= share
         if least < np.inf:
             break
-    S[u, 0], S[u, 1], S[u, 2] = best
+    return best
 
 
 @kernel
@@ -428,7 +394,8 @@ def insert_vertices(log: Ints32, table: CornerTable, surface: RealSurface, S: Fl
             for i in range(degree):
                 update_triangle(neighbours[i] // 3, tail, surface, reference)
         _gather(neighbours, degree, tail, S, reference, ring, shapes)
-        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, ring, shapes, degree, density, terms)
+        left, right = tail[preceding(h)], tail[preceding(table.twin[h])]
+        S[u, 0], S[u, 1], S[u, 2] = _place(v, left, right, S, ring, shapes, degree, density, terms)
         relax_vertex(u, S, ring, shapes, degree, density, terms)
         for i in range(degree):
             w = tail[following(neighbours[i])]
