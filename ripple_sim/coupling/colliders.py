@@ -148,19 +148,16 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
         stored = read_arrays(path)
         mark_used(path)
         return [stored[str(i)] for i in range(len(stored))]
-    parts = _decompose(mesh)
+    import coacd
+
+    coacd.set_log_level("error")
+    found = coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)
+    parts = [np.array(V, dtype=np.float64) for V, _ in found]
     # a folder that cannot be written costs the next call its time, nothing else
     with contextlib.suppress(OSError), atomic_write(path) as unfinished, unfinished.open("wb") as file:
         write_arrays(file, {str(i): part for i, part in enumerate(parts)})
     make_room(path)
     return parts
-
-
-def _decompose(mesh: Mesh) -> list[NDArray[np.float64]]:
-    import coacd
-
-    coacd.set_log_level("error")
-    return [np.array(V, dtype=np.float64) for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)]
 
 
 # What a geom's stand-ins collide like.

@@ -256,7 +256,7 @@ class FlexContacts:
         ----------
         data : mujoco.MjData
         contacts, sides, targets, others : int64 [k]
-            Contacts on these targets, pair by pair; see `PairRows`.
+            Contacts on these targets, pair by pair; see `pair_rows`.
         starts : int64 [p]
             The first of each pair.
         along : float64 [k, 3]
@@ -271,7 +271,10 @@ class FlexContacts:
         each, counts = data.contact, np.diff(np.append(starts, len(contacts)))
         frames, sign = each.frame[contacts].reshape(-1, 3, 3), np.where(sides == 1, 1.0, -1.0)[:, None]
         outward = -sign * frames[:, 0]
-        normals = self._surface_normals(data, each.elem[contacts, sides], targets, outward)
+        rotations, elements = data.geom_xmat[targets].reshape(-1, 3, 3), each.elem[contacts, sides]
+        normals = np.einsum("kij,kj->ki", rotations, self._normals[self._first[targets] + elements])
+        # a plane touches vertices, which are no element, and its own normal is right
+        normals = np.where(elements[:, None] >= 0, normals, outward)
         straight = np.einsum("ij,ij->i", outward, normals)
         behind = self._is_sheet[targets] & (straight < 0)
         normals[behind], straight[behind] = -normals[behind], -straight[behind]
@@ -292,15 +295,6 @@ class FlexContacts:
         outside = depth + np.minimum(depth, self._extents[others])
         met = each.pos[contacts] - sign * each.dist[contacts, None] / 2 * frames[:, 0]
         return kept, (met + outside[:, None] * normals)[kept], forces[kept], normals[kept]
-
-    def _surface_normals(self, data: mujoco.MjData, elements: Ints, targets: Ints, outward: Floats) -> Floats:
-        """Normals of the surface at contacts with elements, [k, 3].
-
-        A plane touches vertices, which are no element, and its own normal is right.
-        """
-        rotations = data.geom_xmat[targets].reshape(-1, 3, 3)
-        normals = np.einsum("kij,kj->ki", rotations, self._normals[self._first[targets] + elements])
-        return np.where(elements[:, None] >= 0, normals, outward)
 
     def _judge(self, targets: Ints, force: Floats, amount: Floats, friction: Floats) -> None:
         """Warn, once for each, of targets whose forces are not those of a contact.

@@ -32,10 +32,7 @@ def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[NDArray[n
     number = np.arange(rows * columns).reshape(rows, columns)
     south_west, south_east = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
     north_west, north_east = number[1:, :-1].ravel(), number[1:, 1:].ravel()
-    F = [
-        np.stack([south_west, south_east, north_east], axis=1),
-        np.stack([south_west, north_east, north_west], axis=1),
-    ]
+    F = [np.stack([south_west, south_east, north_east], axis=1), np.stack([south_west, north_east, north_west], axis=1)]
     return np.stack([x.ravel(), y.ravel(), z], axis=1), np.concatenate(F)
 
 

@@ -19,16 +19,7 @@ from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
 
-from .geoms import (
-    ByGeom,
-    GeomKey,
-    checked_materials,
-    find_any,
-    find_target,
-    for_each,
-    rotation_in_body,
-    target_name,
-)
+from .geoms import ByGeom, GeomKey, checked_materials, find_any, find_target, for_each, rotation_in_body, target_name
 from .soft import is_soft, target_pose
 from .suited import suited_targets
 from .target_mesh import target_atlas

@@ -255,9 +255,10 @@ class TwoWay:
         found: dict[Key, list[tuple[int, NDArray, NDArray]]] = {}
         if not data.ncon:
             return found
-        rows = pair_rows(self._colliders(data), data.contact.efc_address >= 0, self._is_read)
-        points, normals = points_outside(data, rows, self._coupled.extents)
-        ids = zip(rows.contacts.tolist(), rows.targets.tolist(), rows.others.tolist(), strict=True)
+        bears = data.contact.efc_address >= 0
+        rows = contacts, _, geoms, others = pair_rows(self._colliders(data), bears, self._is_read)
+        points, normals = points_outside(data, *rows, self._coupled.extents)
+        ids = zip(contacts.tolist(), geoms.tolist(), others.tolist(), strict=True)
         for (i, geom, other), at, normal in zip(ids, points, normals, strict=True):
             choices = []
             for target in self._targets_of[geom]:
