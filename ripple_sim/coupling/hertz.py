@@ -273,7 +273,15 @@ class Hits:
             return 0.0
         radius = self._radius(data, atlas, pair, texels, other)
         if isinstance(radius, str):
-            self._refuse(other, radius)
+            if radius not in self._told:
+                self._told.add(radius)
+                names, owners = self._coupled.names, self._coupled.owners
+                hit, hits = names[owners[self._target]], names[owners[other]]
+                warnings.warn(
+                    f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {radius}",
+                    RippleWarning,
+                    stacklevel=7,
+                )
             return 0.0
         duration = hertz_time(meet.mass, radius, self._modulus, meet.speed)
         impulses = meet.impulse(model.opt.timestep) * shares
@@ -311,15 +319,3 @@ class Hits:
         if total <= 0 or product < _ROUND * total**2:
             return "they touch along a line, or over an area, not at a point"
         return product**-0.5
-
-    def _refuse(self, other: int, reason: str) -> None:
-        """Say once why hits keep MuJoCo's pulse."""
-        if reason not in self._told:
-            self._told.add(reason)
-            names, owners = self._coupled.names, self._coupled.owners
-            hit, hits = names[owners[self._target]], names[owners[other]]
-            warnings.warn(
-                f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {reason}",
-                RippleWarning,
-                stacklevel=8,
-            )

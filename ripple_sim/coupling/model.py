@@ -67,13 +67,9 @@ def flex_thickness(model: mujoco.MjModel, flex: int) -> float:
     return float(model.flex_margin[flex] + model.flex_radius[flex])
 
 
-def vertex_flexes(model: mujoco.MjModel) -> NDArray[np.int64]:
-    """Id of the flex of each vertex, [nflexvert]."""
-    return np.repeat(np.arange(model.nflex), model.flex_vertnum)
+_NOT_CONVEX = (int(mujoco.mjtGeom.mjGEOM_SDF), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
-
-_GEOM = mujoco.mjtGeom
-_NOT_CONVEX = (int(_GEOM.mjGEOM_SDF), int(_GEOM.mjGEOM_HFIELD))
+_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 
 # Footprint radius of a contact over the touching geom's smallest half-extent: about the patch of a ball that is sunk in
 # by an eighth of its radius.
@@ -86,7 +82,7 @@ class CoupledModel:
     A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are the geom's. It may
     collide through its convex parts, which then touch as that geom. Of any other flex each vertex is a collider.
     Collider ids are those of the geoms, and after them one for each vertex, each flex and each skin; there are c of
-    them. A flex or a skin that ripples touches as a whole, with the last ones, see `soft_ids`. A target may have
+    them. A flex or a skin that ripples touches as a whole, with the last ones, see `find_soft`. A target may have
     collision geoms, whose contacts load it; see `find_collision_geoms`.
 
     Parameters
@@ -132,8 +128,9 @@ class CoupledModel:
         self.model = model
         geoms, softs = range(model.ngeom), model.nflex + model.nskin
         self.names = [geom_name(model, geom) for geom in geoms] + soft_names(model)
+        vertex_flexes = np.repeat(np.arange(model.nflex), model.flex_vertnum)
         whole = model.ngeom + np.arange(softs)
-        self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes(model), whole]).astype(np.int64)
+        self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes, whole]).astype(np.int64)
         self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid, np.full(softs, -1)]).astype(np.int64)
         self.flex_colliders = find_flex_colliders(model)
         self.convex_colliders = find_convex_colliders(model)
@@ -155,7 +152,7 @@ class CoupledModel:
         self._soft_flexes = np.setdiff1d(np.arange(model.nflex), list(self.flex_colliders.values()))
         edges = zip(model.flex_edgeadr, model.flex_edgenum, strict=True)
         lengths = [model.flexedge_length0[i : i + count].mean() if count else 0.0 for i, count in edges]
-        spacing = np.array(lengths)[vertex_flexes(model)]
+        spacing = np.array(lengths)[vertex_flexes]
         endless = np.full(softs, np.inf)
         self.extents = np.concatenate([extents, spacing, endless])
         self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing, endless])
@@ -182,6 +179,11 @@ class CoupledModel:
             for one, two in (pairs, pairs[::-1]):
                 found[two[one == each]] = True
         return found
+
+    def are_still(self, data: mujoco.MjData, colliders: Sequence[int]) -> bool:
+        """Whether all sleep or are static, so that they press as before; vertices between bodies never sleep."""
+        bodies = self.bodies[list(colliders)]
+        return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
 
     def can_collide(self, geom: int) -> NDArray[np.bool_]:
         """The same on bodies that are not welded to that of this geom."""

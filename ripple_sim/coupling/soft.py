@@ -71,7 +71,7 @@ class SoftSurface:
     ----------
     model : mujoco.MjModel
     target : int
-        See `soft_ids`.
+        See `find_soft`.
 
     Attributes
     ----------
@@ -86,8 +86,17 @@ class SoftSurface:
     def __init__(self, model: mujoco.MjModel, target: int) -> None:
         self._model, self.flex, self._skin = model, -1, -1
         if target < first_skin(model):
-            self.flex = target - first_flex(model)
-            F = _flex_triangles(model, self.flex)
+            flex = self.flex = target - first_flex(model)
+            if model.flex_dim[flex] == 1:
+                raise SceneError(
+                    f"flex {soft_name(model, target)!r} is a cable, which cannot ripple; valid are surfaces and solids "
+                    "(dim 2 and 3)"
+                )
+            # the triangles themselves, or those of the outside of tetrahedra
+            F, first, count = model.flex_elem, model.flex_elemdataadr[flex], model.flex_elemnum[flex]
+            if model.flex_dim[flex] == 3:
+                F, first, count = model.flex_shell, model.flex_shelldataadr[flex], model.flex_shellnum[flex]
+            F = F[first : first + 3 * count].reshape(-1, 3)
         else:
             self._skin = target - first_skin(model)
             first = model.skin_faceadr[self._skin]
@@ -161,18 +170,6 @@ class SoftSurface:
             placed = (V[vertices] - model.skin_bonebindpos[bone]) @ rotation.reshape(3, 3).T + data.xpos[body]
             np.add.at(moved, vertices, weights * placed)
         return moved
-
-
-def _flex_triangles(model: mujoco.MjModel, flex: int) -> NDArray[np.int64]:
-    """Triangles of a flex of triangles, or of the outside of one of tetrahedra, [m, 3]."""
-    if model.flex_dim[flex] == 1:
-        name = soft_name(model, first_flex(model) + flex)
-        raise SceneError(f"flex {name!r} is a cable, which cannot ripple; valid are surfaces and solids (dim 2 and 3)")
-    if model.flex_dim[flex] == 2:
-        first, count = model.flex_elemdataadr[flex], model.flex_elemnum[flex]
-        return model.flex_elem[first : first + 3 * count].reshape(-1, 3).astype(np.int64)
-    first, count = model.flex_shelldataadr[flex], model.flex_shellnum[flex]
-    return model.flex_shell[first : first + 3 * count].reshape(-1, 3).astype(np.int64)
 
 
 # Share of a mass that is added to each coarse motion's own: some are next to the same.

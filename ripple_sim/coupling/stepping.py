@@ -302,7 +302,10 @@ class SolvedForces:
         mujoco.mj_fwdConstraint(model, self._completed)
         if lost:
             return self._completed, LOST_WARNING
-        return self._completed, None if _solved(model, data) else UNSOLVED_WARNING
+        # whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f; the sums may be in another order
+        force = np.zeros(model.nv)
+        mujoco.mj_mulJacTVec(model, data, force, data.efc_force)
+        return self._completed, None if _agree(force, data.qfrc_constraint, 1e-9) else UNSOLVED_WARNING
 
     def _moved_on(self, data: mujoco.MjData) -> bool:
         """Whether the poses are already those that follow from the positions."""
@@ -334,14 +337,6 @@ def _restore_forces(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     mujoco.mj_mulJacVec(model, data, excess, data.qacc)
     mujoco.mj_constraintUpdate(model, data, excess - data.efc_aref, None, 0)
     return _agree(data.qfrc_constraint, expected, _RESTORED)
-
-
-def _solved(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f."""
-    force = np.zeros(model.nv)
-    mujoco.mj_mulJacTVec(model, data, force, data.efc_force)
-    # the sums may be made in another order
-    return _agree(force, data.qfrc_constraint, 1e-9)
 
 
 def _agree(force: NDArray[np.float64], expected: NDArray[np.float64], tolerance: float) -> bool:

@@ -129,16 +129,6 @@ def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: 
     return min(_density_under(coupled, geom, extent, speed, stiffness, limit), 1e12)
 
 
-def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, material: Material) -> Material:
-    """The same for a flex or a skin, by its size and the mass of its bodies [kg]: what may hit it is not looked at."""
-    if not material.unset:
-        return material
-    speed = _speed(model, extent)
-    return _filled_in(
-        material, speed, min(narrow_stiffness(extent.size, speed), _stiffest(model)), _density(mass, extent)
-    )
-
-
 def _filled_in(material: Material, speed: float, stiffness: float, density: float) -> Material:
     """A material with these where it has no parameters of its own."""
     suited = {
@@ -211,8 +201,7 @@ def _resting(coupled: CoupledModel, geom: int) -> float:
 
 def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
     """Geoms that are not fixed to the world."""
-    moves: NDArray[np.bool_] = model.body_weldid[model.geom_bodyid] != 0
-    return moves
+    return np.asarray(model.body_weldid[model.geom_bodyid] != 0)
 
 
 def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
@@ -340,7 +329,12 @@ def suited_targets(
     for name, target in list(geoms.items()):
         if is_soft(model, target):
             surface = SoftSurface(model, geoms.pop(name))
-            suited[name] = suited_soft_material(model, Extent.of(surface.mesh), surface.mass, materials[name])
+            extent = Extent.of(surface.mesh)
+            if materials[name].unset:
+                # by its size and the mass of its bodies: what may hit it is not looked at
+                speed = _speed(model, extent)
+                stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(model))
+                suited[name] = _filled_in(materials[name], speed, stiffness, _density(surface.mass, extent))
             texels.setdefault(name, _SOFT)
     left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:

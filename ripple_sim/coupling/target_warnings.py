@@ -66,22 +66,17 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
         return 0.0
     outside = np.full(len(points), np.inf)
     for geom in solids:
-        V, F = _solid(coupled, geom)
+        kind = TARGET_TYPES[int(model.geom_type[geom])]
+        if kind in ("mesh", "sdf"):
+            V, F, _ = mesh_arrays(model, int(model.geom_dataid[geom]))
+        else:
+            V, F = primitive_triangles(kind, model.geom_size[geom])
+        if kind == "mesh" and not coupled.has_flex[geom]:
+            hull = trimesh.convex.convex_hull(V)
+            V, F = np.array(hull.vertices), np.array(hull.faces)
         local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
         outside = np.minimum(outside, igl.signed_distance(local, V, F)[0])
     return float(max(outside.max(), -np.median(outside)))
-
-
-def _solid(coupled: CoupledModel, geom: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices [m], [n, 3], and triangles of a geom as it collides, in its own frame."""
-    model, kind = coupled.model, TARGET_TYPES[int(coupled.model.geom_type[geom])]
-    if kind not in ("mesh", "sdf"):
-        return primitive_triangles(kind, model.geom_size[geom])
-    V, F, _ = mesh_arrays(model, int(model.geom_dataid[geom]))
-    if kind == "mesh" and not coupled.has_flex[geom]:
-        hull = trimesh.convex.convex_hull(V)
-        V, F = np.array(hull.vertices), np.array(hull.faces)
-    return V, F
 
 
 # A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air. The coarse

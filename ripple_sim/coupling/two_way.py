@@ -11,7 +11,7 @@ they are given the force after which both move alike.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -73,13 +73,6 @@ _SOLID = tuple(
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
     for name in ("SPHERE", "ELLIPSOID", "CAPSULE", "CYLINDER", "BOX", "MESH", "SDF")
 )
-
-
-def reachable(coupled: CoupledModel, targets: Iterable[int]) -> dict[int, list[int]]:
-    """Geoms that may come within reach of each target, by its geom id; see `within_reach`."""
-    model = coupled.model
-    moving = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _SOLID)
-    return {target: np.flatnonzero(moving & coupled.can_collide(target)).tolist() for target in targets}
 
 
 def within_reach(
@@ -170,9 +163,13 @@ class TwoWay:
 
     def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
         self._coupled, self._waves = coupled, waves
-        self._colliders, self._reachable = ColliderIds(coupled), reachable(coupled, waves)
+        self._colliders, model = ColliderIds(coupled), coupled.model
+        # geoms that may come within reach of each target, and the targets that each geom collides for
+        self._reachable: dict[int, list[int]] = {}
         self._targets_of: dict[int, list[int]] = {}
+        moving = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _SOLID)
         for target in waves:
+            self._reachable[target] = np.flatnonzero(moving & coupled.can_collide(target)).tolist()
             for geom in coupled.collision_geoms(target):
                 self._targets_of.setdefault(geom, []).append(target)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
@@ -214,7 +211,8 @@ class TwoWay:
             atlas = self._waves[target].atlas
             load = load.merged(atlas.areas.size)
             self._places[target, other] = _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(target, load))
-        asleep = [key for key in known if key not in self._places and self._force_stays(solved, key)]
+        asleep = [key for key in known if key not in self._places and key in self._forces]
+        asleep = [key for key in asleep if self._coupled.are_still(solved, key)]
         self._places |= {key: known[key] for key in asleep}
         self._heights = {target: self._waves[target].height for target, _ in self._places}
         pairs = self._surfaces(dt)
@@ -308,11 +306,6 @@ class TwoWay:
 
     def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
-
-    def _force_stays(self, data: mujoco.MjData, key: Key) -> bool:
-        """Whether both of a pair sleep or are static, so that they press as before."""
-        bodies = self._coupled.bodies[list(key)]
-        return key in self._forces and bool((bodies >= 0).all() and (data.body_awake[bodies] <= 0).all())
 
     # How the surfaces move
 
