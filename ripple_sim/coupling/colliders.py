@@ -88,7 +88,7 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         route = "sdf" if target_mesh(model, model.geom(found.name).id).closed else "flex"
     # what can fail comes first: then nothing has been changed
     core = flex_core(spec, found) if found.meshname and route == "flex" else None
-    parts = convex_parts_of(spec, found) if found.meshname and route == "convex" else None
+    parts = convex_parts(mesh_on_body(spec, found)) if found.meshname and route == "convex" else None
     if not found.meshname or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
     if found.meshname:
@@ -134,8 +134,13 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     """Vertices of the convex parts of a mesh [m], each [n, 3]; the same for the same mesh.
 
     Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity and tree search".
-    Raises `SceneError` if the package coacd is missing.
+    Raises `SceneError` if the mesh is open, or the package coacd is missing.
     """
+    if not mesh.closed:
+        raise SceneError(
+            f"the {mesh.name} is open and encloses no volume that has convex parts; valid routes for it are 'flex' "
+            "and 'hull'"
+        )
     try:
         version = importlib.metadata.version("coacd")
     except importlib.metadata.PackageNotFoundError as error:
@@ -211,7 +216,7 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
     geom : mujoco.MjsGeom
         Of type mesh.
     parts : sequence of float64 [k, 3]
-        Vertices of each [m]; see `convex_parts_of`.
+        Vertices of each in the frame of its body [m]; see `convex_parts`.
     """
     for i, V in enumerate(parts):
         name = part_name(geom.name, i)
@@ -228,21 +233,6 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
             **{each: np.array(getattr(geom, each)) for each in _LISTS},
         )
     geom.contype = geom.conaffinity = 0
-
-
-def convex_parts_of(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> list[NDArray[np.float64]]:
-    """Vertices of the convex parts of a geom's mesh in the frame of its body [m].
-
-    Raises `SceneError` if the mesh is open, the package coacd is missing, or the specification does not compile or
-    discards geoms that do not collide.
-    """
-    mesh = mesh_on_body(spec, geom)
-    if not mesh.closed:
-        raise SceneError(
-            f"the mesh of geom {geom.name!r} is open and encloses no volume that has convex parts; valid routes for it "
-            "are 'flex' and 'hull'"
-        )
-    return convex_parts(mesh)
 
 
 # Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.

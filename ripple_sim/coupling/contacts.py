@@ -331,8 +331,8 @@ class ContactReader:
         Triangles of a flex that touches push sideways in pairs: the contacts of such a pair add up to the sum of their
         vectors, as for the flex; see `FlexContacts`.
         """
-        model, each, pulls = self._coupled.model, data.contact, adhesion(self._coupled.model, data)
-        bears = each.efc_address >= 0
+        model, pulls = self._coupled.model, adhesion(self._coupled.model, data)
+        bears = data.contact.efc_address >= 0
         if pulls is not None:
             bears |= pulls > 0  # those within the gap pull without a row in the constraint solver
         rows = pair_rows(colliders, bears, self._is_read)
@@ -342,7 +342,8 @@ class ContactReader:
         if pulls is not None:
             forces += pulls[rows[0]]
         pushing = forces > 0
-        contacts, sides, targets, others, forces = (of_row[pushing] for of_row in (*rows, forces))
+        contacts, sides, targets, others = (each[pushing] for each in rows)
+        forces = forces[pushing]
         points, normals = points_outside(data, contacts, sides, targets, others, self._coupled.extents)
         found = Contacts(others, points, forces, normals)
         if pulls is not None or self._has_flex[others].any():

@@ -331,11 +331,8 @@ class ContactProblem:
                 works += aside  # friction that drives must be paid for too
             linear[mine[0].purse] += float(works[0])
             square[mine[0].purse] += float(works[1])
-        return {
-            purse: share
-            for purse in linear
-            if (share := affordable_share(linear[purse], square[purse], paid.get(purse, 0.0))) < 1
-        }
+        shares = {each: affordable_share(linear[each], square[each], paid.get(each, 0.0)) for each in linear}
+        return {purse: share for purse, share in shares.items() if share < 1}
 
 
 def affordable_share(linear: float, square: float, paid: float) -> float:

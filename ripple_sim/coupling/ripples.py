@@ -16,15 +16,7 @@ from ripple_sim.solver.errors import checked, whole
 from ripple_sim.solver.operator.plate_rim import Rim
 
 from .energy import Energy, body_energy
-from .geoms import (
-    ByGeom,
-    GeomKey,
-    for_each,
-    named_collision_geoms,
-    own_data,
-    own_model,
-    target_name,
-)
+from .geoms import ByGeom, GeomKey, for_each, named_collision_geoms, own_data, own_model, target_name
 from .hertz import Hits, hertz_moduli
 from .load import ContactLoads, Impulse
 from .model import CoupledModel

@@ -20,8 +20,6 @@ from ripple_sim.solver.kernel import Floats, Ints
 
 from .model import SPECULATIVE, CoupledModel
 
-_SDF = int(mujoco.mjtGeom.mjGEOM_SDF)
-_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 _SAFE = 0.85
 # Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
 # at 1.4, not yet at 1.2.
@@ -123,7 +121,7 @@ def too_fast(pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, step
 def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
     """Pairs of a geom that collides for a target and another geom, which may tunnel, `PAIR` [p]."""
     model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex
-    sdf, cylinder = model.geom_type == _SDF, model.geom_type == _CYLINDER
+    sdf, cylinder = (model.geom_type == kind for kind in (mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_CYLINDER))
     unchecked = sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
     pairs = [
         (target, other)

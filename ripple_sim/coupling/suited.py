@@ -211,7 +211,7 @@ def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
     moves, the mass is 0.
     """
     reduced = _reduced_masses(coupled, geom)
-    return _hitting(coupled, geom, reduced, int(reduced.argmax()))
+    return float(reduced.max()), float(coupled.footprint_radii[[geom, int(reduced.argmax())]].min())
 
 
 def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
@@ -221,11 +221,6 @@ def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
     inverse = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)[model.geom_bodyid]
     total = np.where(coupled.can_collide(geom), inverse + inverse[geom], 0.0)
     return np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)
-
-
-def _hitting(coupled: CoupledModel, geom: int, reduced: NDArray[np.float64], other: int) -> tuple[float, float]:
-    radii = coupled.footprint_radii
-    return float(reduced[other]), float(min(radii[geom], radii[other]))
 
 
 def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
@@ -246,7 +241,7 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
     if not len(touching):
         raise SceneError(f"{needs}: nothing that moves can touch it in the model")
     middle = int(touching[np.argsort(reduced[touching])[len(touching) // 2]])
-    mass, footprint = _hitting(coupled, geom, reduced, middle)
+    mass, footprint = float(reduced[middle]), float(coupled.footprint_radii[[geom, middle]].min())
     fall = _fall(model, min(max(extent.size, _height(coupled, geom)), 2 * extent.size))
     return {
         "size": extent.size,

@@ -159,25 +159,15 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> str | None:
     model, name = coupled.model, coupled.names[geom]
     meets, body = coupled.can_collide(geom), int(model.geom_bodyid[geom])
     thickness = flex_thickness(model, coupled.flex_colliders[geom])
+    boxes, distances = model.geom_type == _GEOM.mjGEOM_BOX, model.geom_type == _GEOM.mjGEOM_SDF
+    apart = np.isin(model.geom_bodyid, _kept_apart(model, body))
     reasons = (
-        (
-            model.geom_type == _GEOM.mjGEOM_BOX,
-            "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped meshes",
-        ),
-        (
-            model.geom_type == _GEOM.mjGEOM_SDF,
-            f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out",
-        ),
-        (
-            np.isin(model.geom_bodyid, _kept_apart(model, body)),
-            "MuJoCo finds no contacts of a flex with bodies that are joined to its own or excluded ({})",
-        ),
+        (boxes, "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped meshes"),
+        (distances, f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out"),
+        (apart, "MuJoCo finds no contacts of a flex with bodies that are joined to its own or excluded ({})"),
     )
-    found = [
-        why.format(", ".join(repr(coupled.names[other]) for other in np.flatnonzero(which & meets).tolist()))
-        for which, why in reasons
-        if (which & meets).any()
-    ]
+    named = [([repr(coupled.names[i]) for i in np.flatnonzero(which & meets)], why) for which, why in reasons]
+    found = [why.format(", ".join(names)) for names, why in named if names]
     if not found:
         return None
     return (

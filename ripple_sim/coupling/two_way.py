@@ -24,6 +24,7 @@ from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
 from .contacts import ColliderIds, pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
+from .geoms import ENDLESS, TARGET_TYPES
 from .model import CoupledModel
 
 _GEOM = mujoco.mjtGeom
@@ -69,10 +70,6 @@ def _side(along: float) -> float:
 
 
 _ROUNDS = 3  # of the search for the points of surface and geom that are nearest to each other
-_SOLID = tuple(
-    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
-    for name in ("SPHERE", "ELLIPSOID", "CAPSULE", "CYLINDER", "BOX", "MESH", "SDF")
-)
 
 
 def within_reach(
@@ -167,7 +164,8 @@ class TwoWay:
         # geoms that may come within reach of each target, and the targets that each geom collides for
         self._reachable: dict[int, list[int]] = {}
         self._targets_of: dict[int, list[int]] = {}
-        moving = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _SOLID)
+        solid = np.isin(model.geom_type, list(TARGET_TYPES)) & ~np.isin(model.geom_type, ENDLESS)
+        moving = (model.body_weldid[model.geom_bodyid] > 0) & solid
         for target in waves:
             self._reachable[target] = np.flatnonzero(moving & coupled.can_collide(target)).tolist()
             for geom in coupled.collision_geoms(target):
