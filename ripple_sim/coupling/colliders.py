@@ -10,7 +10,6 @@ import contextlib
 import dataclasses
 import importlib.metadata
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import mujoco
 import numpy as np
@@ -87,7 +86,7 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         model = _compiled(spec, found)
         route = "sdf" if target_mesh(model, model.geom(found.name).id).closed else "flex"
     # what can fail comes first: then nothing has been changed
-    core = flex_core(spec, found) if found.meshname and route == "flex" else None
+    core = flex_core(mesh_on_body(spec, found)) if found.meshname and route == "flex" else None
     parts = convex_parts(mesh_on_body(spec, found)) if found.meshname and route == "convex" else None
     if not found.meshname or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
@@ -123,7 +122,7 @@ def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
 
 
 # Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the surface [m].
-FlexCore: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64], float]
+FlexCore = tuple[NDArray[np.float64], NDArray[np.int64], float]
 
 # CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface. With a third of its
 # usual iterations it finds as good cuts in half the time.
@@ -156,8 +155,7 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     import coacd
 
     coacd.set_log_level("error")
-    found = coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)
-    parts = [np.array(V, dtype=np.float64) for V, _ in found]
+    parts = [np.array(V, dtype=np.float64) for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)]
     # a folder that cannot be written costs the next call its time, nothing else
     with contextlib.suppress(OSError), atomic_write(path) as unfinished, unfinished.open("wb") as file:
         write_arrays(file, {str(i): part for i, part in enumerate(parts)})
@@ -173,7 +171,8 @@ _LISTS = ("friction", "solref", "solimp")
 def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
     """A geom's mesh in the frame of its body, as MuJoCo compiles it.
 
-    Raises `SceneError` if the specification does not compile as it is, or would lose geoms that do not collide.
+    Raises `SceneError` if the specification does not compile as it is, or would lose geoms that do not collide, and
+    `MeshError` if the mesh has no triangle with an area.
     """
     if spec.compiler.discardvisual:
         raise SceneError(
@@ -298,17 +297,8 @@ def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
         i += 1
 
 
-def flex_core(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> FlexCore:
-    """What a geom's flex collider is made of.
-
-    Raises
-    ------
-    SceneError
-        If the specification does not compile as it is, or discards geoms that do not collide.
-    MeshError
-        If the mesh has no triangle with an area.
-    """
-    mesh = mesh_on_body(spec, geom)
+def flex_core(mesh: Mesh) -> FlexCore:
+    """What the flex collider of a mesh in the frame of its body is made of."""
     size = float(np.ptp(mesh.V, axis=0).max())
     if not mesh.closed:
         return mesh.V, mesh.F, _SHEET * size

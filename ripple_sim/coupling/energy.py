@@ -322,8 +322,7 @@ class ContactProblem:
             given, added = total[pair.key], pair.mean_mobility * dt
             linear[pair.purse] += -given * dt * (pair.mean + added * pair.held)
             square[pair.purse] += given * dt * added * given
-        gained = self._along(data.qacc) - self._smooth
-        motions = data.efc_vel + dt / 2 * self._smooth, dt / 2 * gained
+        motions = data.efc_vel + dt / 2 * self._smooth, dt / 2 * (self._along(data.qacc) - self._smooth)
         for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
             works = np.array([normal * dt * float(motion[rows].mean()) for motion in motions])
             aside = np.array([dt * float(force[whole] @ motion[whole]) for motion in motions]) - works

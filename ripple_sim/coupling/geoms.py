@@ -286,7 +286,18 @@ def named_collision_geoms(
             raise SceneError(f"contacts of geom {name!r} is {keys!r}; valid is a list of geoms")
         found[target] = tuple(dict.fromkeys(find_geom(model, key) for key in keys))
         for geom in found[target]:
-            _check_collision_geom(model, target, geom, rippling)
+            other, weld = geom_name(model, geom), model.body_weldid[model.geom_bodyid]
+            if weld[geom] != weld[target]:
+                theirs, own = (model.body(model.geom_bodyid[each]).name for each in (geom, target))
+                raise SceneError(
+                    f"contacts of geom {name!r} names geom {other!r} on body {theirs!r}, which moves by itself; valid "
+                    f"are geoms of body {own!r} and of those welded to it"
+                )
+            if geom != target and geom in rippling:
+                raise SceneError(
+                    f"contacts of geom {name!r} names geom {other!r}, which ripples itself and keeps its contacts; "
+                    "take it out of one of the two"
+                )
     return found
 
 
@@ -340,18 +351,3 @@ def _kin(model: mujoco.MjModel, target: int, free: NDArray[np.bool_]) -> NDArray
     middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
     away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
     return np.asarray(kin & (np.abs(away) <= box[target, 3:]).all(axis=1))
-
-
-def _check_collision_geom(model: mujoco.MjModel, target: int, geom: int, rippling: Mapping[int, str]) -> None:
-    weld, name, other = model.body_weldid[model.geom_bodyid], geom_name(model, target), geom_name(model, geom)
-    if weld[geom] != weld[target]:
-        raise SceneError(
-            f"contacts of geom {name!r} names geom {other!r} on body {model.body(model.geom_bodyid[geom]).name!r}, "
-            f"which moves by itself; valid are geoms of body {model.body(model.geom_bodyid[target]).name!r} and of "
-            "those welded to it"
-        )
-    if geom != target and geom in rippling:
-        raise SceneError(
-            f"contacts of geom {name!r} names geom {other!r}, which ripples itself and keeps its contacts; take it out "
-            "of one of the two"
-        )

@@ -162,7 +162,9 @@ class CoupledModel:
         targets = list(targets)
         self.soft = {each: SoftSurface(model, each) for each in targets if is_soft(model, each)}
         for target, surface in self.soft.items():
-            self.footprint_radii[target] = surface.spacing
+            # the mean distance between vertices side by side: no contact is known more closely
+            V, F = surface.mesh.V, surface.mesh.F
+            self.footprint_radii[target] = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean()
         geoms_alone = [each for each in targets if each not in self.soft]
         self._collision_geoms = find_collision_geoms(model, self._collides, geoms_alone, named or {})
 

@@ -19,6 +19,7 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.waves.footprint import weigh_each
 
+# Up to so many contacts of a pair, what is convex presses between them too.
 MAX_CORNERS = 8
 # Points on the rim of a patch stand for half a cell, those at its corners for a quarter: their centres lie farther in.
 _INSET = 0.75
@@ -125,9 +126,8 @@ def _spread(
     of = of[kept]
     # the points of a patch that is filled stand for the cells of a lattice
     inset = np.where(filled, _INSET, 1.0)[of, None]
-    points = inset * probes[kept] + (1 - inset) * middles[of]
     near, wide = np.where(filled, size / 8, 0.0), np.where(filled, np.maximum(radii, _OVERLAP * size), radii)
-    return of, points, shares[kept], near, wide
+    return of, inset * probes[kept] + (1 - inset) * middles[of], shares[kept], near, wide
 
 
 def corners(patches: Ints, points: Floats, forces: Floats, radii: Floats) -> tuple[Ints, Floats, Floats]:
@@ -197,7 +197,7 @@ def _join(
 
 
 # A footprint is reused while its point moves by less than this share of a texel.
-_SAME_PLACE = 0.3
+SAME_PLACE = 0.3
 
 
 class Footprints:
@@ -257,7 +257,7 @@ class Footprints:
             shares = weights * self._movable_area[texels]
             ends = itertools.pairwise(begins.tolist())
             under = [*under, *((texels[first:last], shares[first:last]) for first, last in ends)]
-            tolerances = _SAME_PLACE * np.sqrt(grid.areas[centres])
+            tolerances = SAME_PLACE * np.sqrt(grid.areas[centres])
         self._under = [under[row] for row in rows.tolist()]
         self._geoms = np.concatenate([self._geoms, geoms[new]])[rows]
         self._points = np.concatenate([self._points, points[new]])[rows]

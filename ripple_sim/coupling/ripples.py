@@ -23,12 +23,13 @@ from .model import CoupledModel
 from .soft import HighPass
 from .step_checks import TunnellingCheck
 from .stepping import (
+    NO_RESET,
     SolvedForces,
     StepClock,
     adopt_warnings,
+    divergence,
     divergence_warning,
     followed,
-    goes_on_broken,
     missed_warning,
     physics_errors,
 )
@@ -259,7 +260,8 @@ class Ripples(Targets):
 
     def _follow(self, data: mujoco.MjData) -> None:
         passed = self._clock.look(self.model, data)
-        broken = goes_on_broken(self.model, data)
+        # whether MuJoCo's automatic reset is disabled, and its state is broken since the last one
+        broken = bool(self.model.opt.disableflags & NO_RESET) and divergence(data) is not None
         if passed.reset or broken:
             self._flatten()
             self._warn_once("divergence", divergence_warning(self.model, data))

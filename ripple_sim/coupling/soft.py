@@ -135,17 +135,6 @@ class SoftSurface:
         """Degree of the polynomials that interpolate a flex between its nodes, 1 or 2; 0 where its vertices move."""
         return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
 
-    @property
-    def mass(self) -> float:
-        """Mass of its bodies [kg]."""
-        return float(self._model.body_mass[self.bodies].sum())
-
-    @property
-    def spacing(self) -> float:
-        """Mean distance between vertices side by side [m]: no contact is known more closely."""
-        side = self.mesh.V[self.mesh.F] - self.mesh.V[np.roll(self.mesh.F, 1, axis=1)]
-        return float(np.linalg.norm(side, axis=2).mean())
-
     @functools.cached_property
     def _bones(self) -> slice:
         first = int(self._model.skin_boneadr[self._skin])
@@ -193,8 +182,7 @@ class HighPass:
         self._mass = waves.operator.mass.reshape(-1)
         self._basis = coarse_motions(waves, surface)
         gram = csc_array(self._basis.T @ (self._basis * self._mass[:, None]))
-        diagonal = np.maximum(gram.diagonal(), _LEAST * gram.diagonal().max())
-        gram.setdiag(diagonal * (1 + _LEAST))
+        gram.setdiag(np.maximum(gram.diagonal(), _LEAST * gram.diagonal().max()) * (1 + _LEAST))
         self._solve = splu(gram).solve
 
     def __call__(self, load: Load) -> Load:

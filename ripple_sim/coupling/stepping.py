@@ -25,8 +25,6 @@ from ripple_sim.errors import RippleWarning, SimulationError
 _FWDINV = int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 # nothing that is computed depends on the marks, so they may differ from run to run
 _random = random.SystemRandom()
-
-
 _ROUND_OFF = 1e-6  # of times, in time steps
 
 
@@ -116,7 +114,7 @@ def missed_warning(missed: int) -> str | None:
 
 
 _BROKEN = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-_NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
 def divergence(data: mujoco.MjData) -> str | None:
@@ -127,11 +125,6 @@ def divergence(data: mujoco.MjData) -> str | None:
     return next((warning.name for warning in _BROKEN if data.warning[warning].number), None)
 
 
-def goes_on_broken(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Whether MuJoCo's automatic reset is disabled, and its state is broken since the last one."""
-    return bool(model.opt.disableflags & _NO_RESET) and divergence(data) is not None
-
-
 def divergence_warning(model: mujoco.MjModel, data: mujoco.MjData) -> str | None:
     """What to warn of where the simulation has diverged, else None."""
     broken = divergence(data)
@@ -139,7 +132,7 @@ def divergence_warning(model: mujoco.MjModel, data: mujoco.MjData) -> str | None
         return None
     then = (
         "its automatic reset is disabled, and the ripples stay flat until you reset it"
-        if model.opt.disableflags & _NO_RESET
+        if model.opt.disableflags & NO_RESET
         else "MuJoCo reset it to its initial state, and the ripples with it"
     )
     advice = "use a shorter time step in the MJCF's <option>, or softer contacts"

@@ -327,9 +327,9 @@ def suited_targets(
             extent = Extent.of(surface.mesh)
             if materials[name].unset:
                 # by its size and the mass of its bodies: what may hit it is not looked at
-                speed = _speed(model, extent)
+                speed, mass = _speed(model, extent), float(model.body_mass[surface.bodies].sum())
                 stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(model))
-                suited[name] = _filled_in(materials[name], speed, stiffness, _density(surface.mass, extent))
+                suited[name] = _filled_in(materials[name], speed, stiffness, _density(mass, extent))
             texels.setdefault(name, _SOFT)
     left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:

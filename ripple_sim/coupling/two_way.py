@@ -26,6 +26,7 @@ from .contacts import ColliderIds, pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
 from .geoms import ENDLESS, TARGET_TYPES
 from .model import CoupledModel
+from .patches import MAX_CORNERS, SAME_PLACE
 
 _GEOM = mujoco.mjtGeom
 
@@ -106,16 +107,9 @@ def within_reach(
     if (point - place) @ normal >= height[texel]:
         return None
     where = footprint(atlas, place, float(coupled.footprint_radii[[target, other]].min()))
-    movable = waves.operator.movable.reshape(-1)[where.texels]
-    movable_area = atlas.areas.reshape(-1)[where.texels] * movable
+    movable_area = atlas.areas.reshape(-1)[where.texels] * waves.operator.movable.reshape(-1)[where.texels]
     load = Load(where.texels, where.weights * movable_area)
     return load, data.geom_xpos[target] + rotation @ place, rotation @ normal
-
-
-# A footprint is reused while its points move by less than this share of a texel.
-_SAME_PLACE = 0.3
-# Up to so many contacts of a pair, what is convex presses between them too.
-_MOST_CORNERS = 8
 
 
 class _Place(NamedTuple):
@@ -282,7 +276,7 @@ class TwoWay:
     def _place(self, key: Key, touched: Sequence[tuple[int, NDArray, NDArray]], known: _Place | None) -> _Place:
         (target, other), atlas = key, self._waves[key[0]].atlas
         points = np.array([point for _, point, _ in touched])
-        if self._coupled.convex[other] and 1 < len(points) <= _MOST_CORNERS:
+        if self._coupled.convex[other] and 1 < len(points) <= MAX_CORNERS:
             one, two = np.triu_indices(len(points), 1)
             points = np.concatenate([points, (points[one] + points[two]) / 2])
         if (
@@ -300,7 +294,7 @@ class TwoWay:
         inside = not atlas.mesh.closed and touched[0][2] @ atlas.normals.reshape(-1, 3)[texels[0]] < 0
         load = Load.together(loads).merged(areas.size)
         load = Load(load.texels, -load.forces) if inside else load
-        return _Place(atlas, points, _SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
+        return _Place(atlas, points, SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
 
     def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
