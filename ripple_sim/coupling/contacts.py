@@ -298,10 +298,8 @@ class ContactReader:
         for geom in coupled.flex_colliders.keys() & self._targets_of.keys():
             meshes[geom] = target_mesh(coupled.model, geom)
         self._colliders = ColliderIds(coupled)
-        count = len(coupled.owners)
-        self._is_read, self._has_flex = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._targets_of, *coupled.soft]] = True
-        self._has_flex[list(coupled.flex_colliders)] = True
         self._check_solver, self._check_wraps = SolverBalance(coupled), WrapCheck(coupled)
         self._flexes = FlexContacts(coupled, meshes) if coupled.flex_colliders else None
         if self._flexes is not None:
@@ -346,7 +344,7 @@ class ContactReader:
         forces = forces[pushing]
         points, normals = points_outside(data, contacts, sides, targets, others, self._coupled.extents)
         found = Contacts(others, points, forces, normals)
-        if pulls is not None or self._has_flex[others].any():
+        if pulls is not None or self._coupled.has_flex[others].any():
             # the forces of a pair are to add up to what it bears: without pulls, and as vectors with a flex
             starts = first_rows(targets, others)
             whole = np.add.reduceat(forces, starts)
@@ -354,7 +352,7 @@ class ContactReader:
             if pulls is not None:
                 factors -= 2 * np.add.reduceat(pulls[contacts], starts) / whole
             sums = np.linalg.norm(np.add.reduceat(forces[:, None] * normals, starts), axis=1)
-            factors *= np.where(self._has_flex[others[starts]], sums / whole, 1.0)
+            factors *= np.where(self._coupled.has_flex[others[starts]], sums / whole, 1.0)
             factors = np.repeat(factors, np.diff(np.append(starts, len(forces))))
             found = found._replace(forces=factors * forces).rows(factors != 0)
             targets = targets[factors != 0]

@@ -106,7 +106,7 @@ class CoupledModel:
         Geom id to the id of its flex collider.
     convex_colliders : dict of int to list of int
         Geom id to the ids of its convex colliders.
-    has_flex : bool [ngeom]
+    has_flex : bool [c]
         Whether a geom collides through a flex.
     extents : float64 [c]
         Smallest half-extents [m]; infinite for planes and height fields, the spacing of a flex's vertices for them.
@@ -134,7 +134,7 @@ class CoupledModel:
         self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid, np.full(softs, -1)]).astype(np.int64)
         self.flex_colliders = find_flex_colliders(model)
         self.convex_colliders = find_convex_colliders(model)
-        self.has_flex = np.zeros(model.ngeom, dtype=np.bool_)
+        self.has_flex = np.zeros(len(self.owners), dtype=np.bool_)
         self.has_flex[list(self.flex_colliders)] = True
         extents = np.where(np.isin(model.geom_type, ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
         self.collider_extents, self.solref = extents.copy(), model.geom_solref.copy()
@@ -156,7 +156,7 @@ class CoupledModel:
         endless = np.full(softs, np.inf)
         self.extents = np.concatenate([extents, spacing, endless])
         self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing, endless])
-        convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex
+        convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex[: model.ngeom]
         convex[[geom for geom, parts in self.convex_colliders.items() if len(parts) > 1]] = False
         self.convex = np.concatenate([convex, np.zeros(model.nflexvert + softs, dtype=np.bool_)])
         targets = list(targets)

@@ -120,7 +120,7 @@ def too_fast(pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, step
 
 def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
     """Pairs of a geom that collides for a target and another geom, which may tunnel, `PAIR` [p]."""
-    model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex
+    model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex[: coupled.model.ngeom]
     sdf, cylinder = (model.geom_type == kind for kind in (mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_CYLINDER))
     unchecked = sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
     pairs = [

@@ -70,7 +70,6 @@ def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[n
         radius = np.linalg.norm(V[:, :2], axis=1)
         # the other vertices lie inside the flat ends
         on_side = radius > size[0] * (np.cos(np.pi / _CYLINDER_SIDES) - 1e-9)
-        V = V.copy()
         V[on_side, :2] *= (size[0] / radius[on_side])[:, None]
     return scale * V, F
 

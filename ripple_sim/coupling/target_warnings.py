@@ -86,7 +86,7 @@ GAP_TOLERANCE, COARSE_TOLERANCE = 0.02, 0.1
 
 def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
     """What to warn of where nothing touches a target, it collides off its surface, or contacts tell no forces."""
-    model = coupled.model
+    model, name = coupled.model, coupled.names[geom]
     if coupled.out_of_touch(geom):
         yield _touch_warning(coupled, geom)
     elif geom in coupled.convex_colliders or any(each != geom for each in coupled.collision_geoms(geom)):
@@ -94,16 +94,26 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
     elif coupled.has_flex[geom]:
         yield from _flex_warning(coupled, geom)
     elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
-        yield from _hull_warning(coupled.names[geom], atlas)
+        gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
+        if gap > GAP_TOLERANCE * size:
+            yield (
+                f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the "
+                f'surface that ripples; give it type="sdf" in the MJCF, or call make_collidable(spec, {name!r})'
+            )
     elif model.geom_type[geom] == _GEOM.mjGEOM_SDF:
-        yield from _distance_warning(coupled, geom)
+        hills = np.flatnonzero(coupled.can_collide(geom) & (model.geom_type == _GEOM.mjGEOM_HFIELD))
+        if len(hills):
+            names = ", ".join(repr(coupled.names[other]) for other in hills)
+            yield (
+                f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): call "
+                f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so that they do not meet'
+            )
     passive = getattr(model, "flex_passive", np.zeros(model.nflex))  # not in MuJoCo's older versions
     for flex in coupled.soft_flexes(geom).tolist():
         if passive[flex]:
-            name = coupled.names[model.ngeom + flex]
             yield (
-                f"MuJoCo tells no forces of the passive contacts of flex {name!r}, under which geom "
-                f'{coupled.names[geom]!r} will not ripple; set passive="false" in the flex\'s <contact>'
+                f"MuJoCo tells no forces of the passive contacts of flex {coupled.names[model.ngeom + flex]!r}, under "
+                f'which geom {name!r} will not ripple; set passive="false" in the flex\'s <contact>'
             )
 
 
@@ -136,16 +146,6 @@ def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str
         )
 
 
-def _hull_warning(name: str, atlas: Atlas) -> Iterator[str]:
-    """Warning of a convex hull that is visibly off the surface."""
-    gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
-    if gap > GAP_TOLERANCE * size:
-        yield (
-            f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the "
-            f'surface that ripples; give it type="sdf" in the MJCF, or call make_collidable(spec, {name!r})'
-        )
-
-
 def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
     """Warning of geoms that a flex collider meets badly, or not at all."""
     model, name, meets = coupled.model, coupled.names[geom], coupled.can_collide(geom)
@@ -163,17 +163,6 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
         yield (
             f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), '
             "or choose contype and conaffinity so that they do not meet"
-        )
-
-
-def _distance_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
-    """Warning of geoms that an SDF geom does not meet."""
-    hills = np.flatnonzero(coupled.can_collide(geom) & (coupled.model.geom_type == _GEOM.mjGEOM_HFIELD))
-    if len(hills):
-        name, names = coupled.names[geom], ", ".join(repr(coupled.names[other]) for other in hills)
-        yield (
-            f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): call "
-            f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so that they do not meet'
         )
 
 

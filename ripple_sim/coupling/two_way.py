@@ -11,7 +11,7 @@ they are given the force after which both move alike.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -198,11 +198,7 @@ class TwoWay:
         known, self._places = self._places, {}
         for key, touched in contacts.items():
             self._places[key] = self._place(key, touched, known.get(key))
-        reached = list(self._reached(solved))
-        for (target, other), load, _, _ in reached:
-            atlas = self._waves[target].atlas
-            load = load.merged(atlas.areas.size)
-            self._places[target, other] = _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(target, load))
+        reached = self._reached(solved)
         asleep = [key for key in known if key not in self._places and key in self._forces]
         asleep = [key for key in asleep if self._coupled.are_still(solved, key)]
         self._places |= {key: known[key] for key in asleep}
@@ -219,7 +215,7 @@ class TwoWay:
             forces |= problem.solve(self._paid)
             self._move(data, self._velocity_change(solved, *old, pending=pending), dt, pending=pending)
             self._work = problem.works()
-        for key, _, point, normal in reached:
+        for key, point, normal in reached:
             forces[key] = self._push(data, solved, pairs[key], point, normal, dt, pending=pending)
         self._forces = forces
         self._velocity_change.note(data)
@@ -262,16 +258,20 @@ class TwoWay:
             found.setdefault((target, other), []).append((i, point, outward))
         return found
 
-    def _reached(self, data: mujoco.MjData) -> Iterator[tuple[Key, Load, NDArray[np.float64], NDArray[np.float64]]]:
-        """Pairs within reach that do not touch, and what `within_reach` says of them."""
+    def _reached(self, data: mujoco.MjData) -> list[tuple[Key, NDArray[np.float64], NDArray[np.float64]]]:
+        """Pairs within reach that do not touch, and where; see `within_reach`. They get a place."""
+        reached = []
         for target, others in self._reachable.items():
-            height = self._waves[target].height.reshape(-1)
+            waves, height = self._waves[target], self._waves[target].height.reshape(-1)
             highest = float(height.max())
-            for other in others if highest > 0 else ():
-                if (target, other) not in self._places:
-                    found = within_reach(self._coupled, data, (target, other), self._waves[target], height, highest)
-                    if found is not None:
-                        yield (target, other), *found
+            for key in ((target, other) for other in others if highest > 0):
+                found = None if key in self._places else within_reach(self._coupled, data, key, waves, height, highest)
+                if found is not None:
+                    load = found[0].merged(len(height))
+                    moving = self._moving(target, load)
+                    self._places[key] = _Place(waves.atlas, np.zeros((0, 3)), 0.0, load, moving)
+                    reached.append((key, *found[1:]))
+        return reached
 
     def _place(self, key: Key, touched: Sequence[tuple[int, NDArray, NDArray]], known: _Place | None) -> _Place:
         (target, other), atlas = key, self._waves[key[0]].atlas
