@@ -276,12 +276,11 @@ class TargetLoad:
         done = StepContacts(self._target, *pose, contacts, starts, places, at, forces, inner, on_texels)
         self._filter.set_timestep(timestep)
         if self._hits is not None and data is not None:
-            arrived, pairs = self._filter.arrived(geoms, elapsed), contacts.by_other()
-            for row in arrived:
+            for row in self._filter.arrived(geoms, elapsed):
                 mine = slice(begins[row], begins[row + 1])
                 # what a unit of the contact's impulse gives each texel
                 shares = on_texels.forces[mine] * (elapsed / (timestep * forces[row]))
-                prepaid = self._hits.begin(data, self._atlas, pairs[row], texels[mine], shares)
+                prepaid = self._hits.begin(data, self._atlas, contacts.by_other()[row], texels[mine], shares)
                 self._filter.prepay(int(geoms[row]), prepaid)
         return self._over(self._filter(on_texels, elapsed), elapsed), done
 

@@ -6,8 +6,6 @@ where it is. A `HighPass` leaves a flex its coarse motion: its waves get what it
 
 from __future__ import annotations
 
-import functools
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +97,8 @@ class SoftSurface:
             F = F[first : first + 3 * count].reshape(-1, 3)
         else:
             self._skin = target - first_skin(model)
+            first = int(model.skin_boneadr[self._skin])
+            self._bones = slice(first, first + int(model.skin_bonenum[self._skin]))
             first = model.skin_faceadr[self._skin]
             F = model.skin_face[first : first + model.skin_facenum[self._skin]]
         data = mujoco.MjData(model)
@@ -134,11 +134,6 @@ class SoftSurface:
     def degree(self) -> int:
         """Degree of the polynomials that interpolate a flex between its nodes, 1 or 2; 0 where its vertices move."""
         return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
-
-    @functools.cached_property
-    def _bones(self) -> slice:
-        first = int(self._model.skin_boneadr[self._skin])
-        return slice(first, first + int(self._model.skin_bonenum[self._skin]))
 
     def _all(self, data: mujoco.MjData) -> NDArray[np.float64]:
         model = self._model
