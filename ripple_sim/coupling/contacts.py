@@ -333,12 +333,12 @@ class ContactReader:
         bears = data.contact.efc_address >= 0
         if pulls is not None:
             bears |= pulls > 0  # those within the gap pull without a row in the constraint solver
-        rows = pair_rows(colliders, bears, self._is_read)
-        if not len(rows[0]):
+        rows = contacts, *_ = pair_rows(colliders, bears, self._is_read)
+        if not len(contacts):
             return {}
-        forces = normal_forces(model, data, rows[0])
+        forces = normal_forces(model, data, contacts)
         if pulls is not None:
-            forces += pulls[rows[0]]
+            forces += pulls[contacts]
         pushing = forces > 0
         contacts, sides, targets, others = (each[pushing] for each in rows)
         forces = forces[pushing]

@@ -266,7 +266,8 @@ class Hits:
                     stacklevel=7,
                 )
             return 0.0
-        # how long two elastic bodies touch: Johnson, equation 11.24, whose factor is 2.87
+        # how long two elastic bodies touch: Johnson, equation 11.24, whose factor is 2.87, with
+        # 1 / m = 1 / m1 + 1 / m2 and 1 / R = 1 / R1 + 1 / R2
         duration = 2.868 * (meet.mass**2 / (radius * self._modulus**2 * meet.speed)) ** 0.2
         impulses = meet.impulse(model.opt.timestep) * shares
         self._pulses.append(Pulse(texels, impulses, duration, 0.0))
