@@ -10,7 +10,6 @@ import contextlib
 import dataclasses
 import importlib.metadata
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import mujoco
 import numpy as np
@@ -87,8 +86,8 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         model = _compiled(spec, found)
         route = "sdf" if target_mesh(model, model.geom(found.name).id).closed else "flex"
     # what can fail comes first: then nothing has been changed
-    core = flex_core(spec, found) if found.meshname and route == "flex" else None
-    parts = convex_parts_of(spec, found) if found.meshname and route == "convex" else None
+    core = flex_core(mesh_on_body(spec, found)) if found.meshname and route == "flex" else None
+    parts = convex_parts(mesh_on_body(spec, found)) if found.meshname and route == "convex" else None
     if not found.meshname or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
     if found.meshname:
@@ -123,7 +122,7 @@ def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
 
 
 # Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the surface [m].
-FlexCore: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64], float]
+FlexCore = tuple[NDArray[np.float64], NDArray[np.int64], float]
 
 # CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface. With a third of its
 # usual iterations it finds as good cuts in half the time.
@@ -134,8 +133,13 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     """Vertices of the convex parts of a mesh [m], each [n, 3]; the same for the same mesh.
 
     Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity and tree search".
-    Raises `SceneError` if the package coacd is missing.
+    Raises `SceneError` if the mesh is open, or the package coacd is missing.
     """
+    if not mesh.closed:
+        raise SceneError(
+            f"the {mesh.name} is open and encloses no volume that has convex parts; valid routes for it are 'flex' "
+            "and 'hull'"
+        )
     try:
         version = importlib.metadata.version("coacd")
     except importlib.metadata.PackageNotFoundError as error:
@@ -148,19 +152,15 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
         stored = read_arrays(path)
         mark_used(path)
         return [stored[str(i)] for i in range(len(stored))]
-    parts = _decompose(mesh)
+    import coacd
+
+    coacd.set_log_level("error")
+    parts = [np.array(V, dtype=np.float64) for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)]
     # a folder that cannot be written costs the next call its time, nothing else
     with contextlib.suppress(OSError), atomic_write(path) as unfinished, unfinished.open("wb") as file:
         write_arrays(file, {str(i): part for i, part in enumerate(parts)})
     make_room(path)
     return parts
-
-
-def _decompose(mesh: Mesh) -> list[NDArray[np.float64]]:
-    import coacd
-
-    coacd.set_log_level("error")
-    return [np.array(V, dtype=np.float64) for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)]
 
 
 # What a geom's stand-ins collide like.
@@ -171,7 +171,8 @@ _LISTS = ("friction", "solref", "solimp")
 def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
     """A geom's mesh in the frame of its body, as MuJoCo compiles it.
 
-    Raises `SceneError` if the specification does not compile as it is, or would lose geoms that do not collide.
+    Raises `SceneError` if the specification does not compile as it is, or would lose geoms that do not collide, and
+    `MeshError` if the mesh has no triangle with an area.
     """
     if spec.compiler.discardvisual:
         raise SceneError(
@@ -214,7 +215,7 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
     geom : mujoco.MjsGeom
         Of type mesh.
     parts : sequence of float64 [k, 3]
-        Vertices of each [m]; see `convex_parts_of`.
+        Vertices of each in the frame of its body [m]; see `convex_parts`.
     """
     for i, V in enumerate(parts):
         name = part_name(geom.name, i)
@@ -231,21 +232,6 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
             **{each: np.array(getattr(geom, each)) for each in _LISTS},
         )
     geom.contype = geom.conaffinity = 0
-
-
-def convex_parts_of(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> list[NDArray[np.float64]]:
-    """Vertices of the convex parts of a geom's mesh in the frame of its body [m].
-
-    Raises `SceneError` if the mesh is open, the package coacd is missing, or the specification does not compile or
-    discards geoms that do not collide.
-    """
-    mesh = mesh_on_body(spec, geom)
-    if not mesh.closed:
-        raise SceneError(
-            f"the mesh of geom {geom.name!r} is open and encloses no volume that has convex parts; valid routes for it "
-            "are 'flex' and 'hull'"
-        )
-    return convex_parts(mesh)
 
 
 # Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
@@ -311,17 +297,8 @@ def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
         i += 1
 
 
-def flex_core(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> FlexCore:
-    """What a geom's flex collider is made of.
-
-    Raises
-    ------
-    SceneError
-        If the specification does not compile as it is, or discards geoms that do not collide.
-    MeshError
-        If the mesh has no triangle with an area.
-    """
-    mesh = mesh_on_body(spec, geom)
+def flex_core(mesh: Mesh) -> FlexCore:
+    """What the flex collider of a mesh in the frame of its body is made of."""
     size = float(np.ptp(mesh.V, axis=0).max())
     if not mesh.closed:
         return mesh.V, mesh.F, _SHEET * size

@@ -75,27 +75,8 @@ def by_target(targets: Ints, contacts: Contacts) -> dict[int, Contacts]:
     return {target: contacts.rows(slice(*bounds[i : i + 2])) for i, target in enumerate(targets[starts].tolist())}
 
 
-class PairRows(NamedTuple):
+def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) -> tuple[Ints, Ints, Ints, Ints]:
     """MuJoCo's contacts that bear on targets, sorted by target and other; where two targets touch, one for each.
-
-    Attributes
-    ----------
-    contacts : int64 [k]
-        Indices among MuJoCo's contacts.
-    sides : int64 [k]
-        0 where the target is the first geom of the contact, 1 where it is the second.
-    targets, others : int64 [k]
-        Collider ids.
-    """
-
-    contacts: Ints
-    sides: Ints
-    targets: Ints
-    others: Ints
-
-
-def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) -> PairRows:
-    """Find the contacts that bear on targets.
 
     Parameters
     ----------
@@ -105,6 +86,15 @@ def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) ->
         Whether a contact carries a force: one without a row in the constraint solver (excluded, or in the margin only)
         does not.
     is_target : bool [c]
+
+    Returns
+    -------
+    contacts : int64 [k]
+        Indices among MuJoCo's contacts.
+    sides : int64 [k]
+        0 where the target is the first geom of the contact, 1 where it is the second.
+    targets, others : int64 [k]
+        Collider ids.
     """
     # the two sides of a contact stand together: of row i the other is i ^ 1
     both = colliders.astype(np.int64).ravel()
@@ -113,7 +103,7 @@ def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) ->
     order = np.lexsort((others, targets))
     order = order[np.minimum(targets, others)[order] >= 0]
     rows = rows[order]
-    return PairRows(rows >> 1, rows & 1, targets[order], others[order])
+    return rows >> 1, rows & 1, targets[order], others[order]
 
 
 def normal_rows(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> tuple[Ints, Ints]:
@@ -156,30 +146,20 @@ def is_pyramidal(model: mujoco.MjModel) -> bool:
     return bool(model.opt.cone == _PYRAMIDAL)
 
 
-def points_outside(data: mujoco.MjData, rows: PairRows, extents: Floats) -> tuple[Floats, Floats]:
+def points_outside(
+    data: mujoco.MjData, contacts: Ints, sides: Ints, targets: Ints, others: Ints, extents: Floats
+) -> tuple[Floats, Floats]:
     """Points just outside the targets' surfaces [m], and unit normals from the targets to what touches, [k, 3] each.
 
-    Both are in the world; `extents` [c] are those of `CoupledModel`.
+    Both are in the world. The contacts are those of `pair_rows`; `extents` [c] are those of `CoupledModel`.
     """
-    each, (contacts, sides, targets, others) = data.contact, rows
+    each = data.contact
     normals = each.frame[contacts, :3] * (1.0 - 2.0 * sides)[:, None]
     # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard to stop
     depths = np.minimum(np.abs(each.dist[contacts]), np.minimum(extents[targets], extents[others]))
     # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is dist/2
     # away. A little outside it the nearest surface point is on this side, even of a thin part.
     return each.pos[contacts] + 1.5 * depths[:, None] * normals, normals
-
-
-def _pair_factors(rows: PairRows, forces: Floats, normals: Floats, pulls: Floats | None, has_flex: Bools) -> Floats:
-    """Factors [k] that make the forces of a pair add up to what it bears: without pulls, and as vectors with a flex."""
-    starts = first_rows(rows.targets, rows.others)
-    whole = np.add.reduceat(forces, starts)
-    factors = np.ones(len(starts))
-    if pulls is not None:
-        factors -= 2 * np.add.reduceat(pulls[rows.contacts], starts) / whole
-    sums = np.linalg.norm(np.add.reduceat(forces[:, None] * normals, starts), axis=1)
-    factors *= np.where(has_flex[rows.others[starts]], sums / whole, 1.0)
-    return np.repeat(factors, np.diff(np.append(starts, len(forces))))
 
 
 # MuJoCo's marks of contacts that pull though they do not push: all right, or within the gap.
@@ -318,10 +298,8 @@ class ContactReader:
         for geom in coupled.flex_colliders.keys() & self._targets_of.keys():
             meshes[geom] = target_mesh(coupled.model, geom)
         self._colliders = ColliderIds(coupled)
-        count = len(coupled.owners)
-        self._is_read, self._has_flex = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._targets_of, *coupled.soft]] = True
-        self._has_flex[list(coupled.flex_colliders)] = True
         self._check_solver, self._check_wraps = SolverBalance(coupled), WrapCheck(coupled)
         self._flexes = FlexContacts(coupled, meshes) if coupled.flex_colliders else None
         if self._flexes is not None:
@@ -351,24 +329,31 @@ class ContactReader:
         Triangles of a flex that touches push sideways in pairs: the contacts of such a pair add up to the sum of their
         vectors, as for the flex; see `FlexContacts`.
         """
-        model, each, pulls = self._coupled.model, data.contact, adhesion(self._coupled.model, data)
-        bears = each.efc_address >= 0
+        model, pulls = self._coupled.model, adhesion(self._coupled.model, data)
+        bears = data.contact.efc_address >= 0
         if pulls is not None:
             bears |= pulls > 0  # those within the gap pull without a row in the constraint solver
-        rows = pair_rows(colliders, bears, self._is_read)
-        if not len(rows.contacts):
+        rows = contacts, *_ = pair_rows(colliders, bears, self._is_read)
+        if not len(contacts):
             return {}
-        forces = normal_forces(model, data, rows.contacts)
+        forces = normal_forces(model, data, contacts)
         if pulls is not None:
-            forces += pulls[rows.contacts]
+            forces += pulls[contacts]
         pushing = forces > 0
-        if not pushing.all():
-            rows, forces = PairRows(*(each[pushing] for each in rows)), forces[pushing]
-        targets, others = rows.targets, rows.others
-        points, normals = points_outside(data, rows, self._coupled.extents)
+        contacts, sides, targets, others = (each[pushing] for each in rows)
+        forces = forces[pushing]
+        points, normals = points_outside(data, contacts, sides, targets, others, self._coupled.extents)
         found = Contacts(others, points, forces, normals)
-        if pulls is not None or self._has_flex[others].any():
-            factors = _pair_factors(rows, forces, normals, pulls, self._has_flex)
+        if pulls is not None or self._coupled.has_flex[others].any():
+            # the forces of a pair are to add up to what it bears: without pulls, and as vectors with a flex
+            starts = first_rows(targets, others)
+            whole = np.add.reduceat(forces, starts)
+            factors = np.ones(len(starts))
+            if pulls is not None:
+                factors -= 2 * np.add.reduceat(pulls[contacts], starts) / whole
+            sums = np.linalg.norm(np.add.reduceat(forces[:, None] * normals, starts), axis=1)
+            factors *= np.where(self._coupled.has_flex[others[starts]], sums / whole, 1.0)
+            factors = np.repeat(factors, np.diff(np.append(starts, len(forces))))
             found = found._replace(forces=factors * forces).rows(factors != 0)
             targets = targets[factors != 0]
         return by_target(targets, found)
@@ -378,29 +363,26 @@ class ContactReader:
     ) -> dict[int, Contacts]:
         """The same of targets with a flex collider, by theirs."""
         model = self._coupled.model
-        rows = pair_rows(colliders, data.contact.efc_address >= 0, flexes.is_target)
-        if not len(rows.contacts):
+        rows = contacts, _, targets, others = pair_rows(colliders, data.contact.efc_address >= 0, flexes.is_target)
+        if not len(contacts):
             return {}
-        normal, friction = (read(model, data, rows.contacts) for read in (normal_forces, friction_forces))
-        forces = np.column_stack([normal - data.contact.adhesion[rows.contacts], friction])
-        kept, *loads = flexes.loads(data, *rows, first_rows(rows.targets, rows.others), forces)
-        return by_target(rows.targets[kept], Contacts(rows.others[kept], *loads))
+        normal, friction = (read(model, data, contacts) for read in (normal_forces, friction_forces))
+        forces = np.column_stack([normal - data.contact.adhesion[contacts], friction])
+        kept, *loads = flexes.loads(data, *rows, first_rows(targets, others), forces)
+        return by_target(targets[kept], Contacts(others[kept], *loads))
 
     def _hand_over(self, data: mujoco.MjData, found: dict[int, Contacts]) -> None:
         """Hand every contact of a collision geom to one target: where several share the geom, to the nearest."""
         theirs = {geom: found.pop(geom) for geom in sorted(self._targets_of.keys() & found.keys())}
         for geom, contacts in theirs.items():
-            targets = self._targets_of[geom]
-            placed = np.array([self._places(data, target, contacts) for target in targets])
-            nearest = np.linalg.norm(placed - contacts.points, axis=2).argmin(axis=0)
-            for i, target in enumerate(targets):
+            placed = []
+            for target in self._targets_of[geom]:
+                position, rotation = data.geom_xpos[target], data.geom_xmat[target].reshape(3, 3)
+                points, normals = (contacts.points - position) @ rotation, contacts.normals @ rotation
+                placed.append(position + places_facing(self._atlases[target], points, normals) @ rotation.T)
+            nearest = np.linalg.norm(np.array(placed) - contacts.points, axis=2).argmin(axis=0)
+            for i, target in enumerate(self._targets_of[geom]):
                 if (nearest == i).any():
                     own = [found[target]] if target in found else []
                     mine = contacts._replace(points=placed[i]).rows(nearest == i)
                     found[target] = Contacts.together([*own, mine])
-
-    def _places(self, data: mujoco.MjData, target: int, contacts: Contacts) -> Floats:
-        """Places of contacts on a target in the world [m], [k, 3]."""
-        position, rotation = data.geom_xpos[target], data.geom_xmat[target].reshape(3, 3)
-        points, normals = (contacts.points - position) @ rotation, contacts.normals @ rotation
-        return position + places_facing(self._atlases[target], points, normals) @ rotation.T

@@ -298,8 +298,7 @@ class ContactProblem:
             data.efc_aref[:] = aref
             mujoco.mj_fwdConstraint(self._model, data)
             last, force = force, data.efc_force.copy()
-            found, least = self._total(force), 0.0
-            left = 0.0
+            found, least, left = self._total(force), 0.0, 0.0
             for _, rows, _, mine in self._contacts:
                 moved = self._mobility[rows] * (force[rows] - last[rows])
                 for pair in mine:
@@ -323,25 +322,16 @@ class ContactProblem:
             given, added = total[pair.key], pair.mean_mobility * dt
             linear[pair.purse] += -given * dt * (pair.mean + added * pair.held)
             square[pair.purse] += given * dt * added * given
-        gained = self._along(data.qacc) - self._smooth
+        motions = data.efc_vel + dt / 2 * self._smooth, dt / 2 * (self._along(data.qacc) - self._smooth)
         for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
-            purse = mine[0].purse
-            at_first, later = data.efc_vel + dt / 2 * self._smooth, dt / 2 * gained
-            works = [normal * dt * float(each[rows].mean()) for each in (at_first, later)]
-            aside = [
-                dt * float(force[whole] @ each[whole]) - work
-                for each, work in zip((at_first, later), works, strict=True)
-            ]
-            if sum(aside) > 0:
-                # friction that drives must be paid for too
-                works = [work + more for work, more in zip(works, aside, strict=True)]
-            linear[purse] += works[0]
-            square[purse] += works[1]
-        return {
-            purse: share
-            for purse in linear
-            if (share := affordable_share(linear[purse], square[purse], paid.get(purse, 0.0))) < 1
-        }
+            works = np.array([normal * dt * float(motion[rows].mean()) for motion in motions])
+            aside = np.array([dt * float(force[whole] @ motion[whole]) for motion in motions]) - works
+            if aside.sum() > 0:
+                works += aside  # friction that drives must be paid for too
+            linear[mine[0].purse] += float(works[0])
+            square[mine[0].purse] += float(works[1])
+        shares = {each: affordable_share(linear[each], square[each], paid.get(each, 0.0)) for each in linear}
+        return {purse: share for purse, share in shares.items() if share < 1}
 
 
 def affordable_share(linear: float, square: float, paid: float) -> float:

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Material
 from ripple_sim.solver.errors import shown
 
 from .soft import find_soft, is_soft, soft_name, soft_names
@@ -57,15 +56,20 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
         return int(key)
     if isinstance(key, str):
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, key)
-        geom = _by_place(model, key) if geom < 0 else geom
         if geom >= 0:
             return int(geom)
-    names = [repr(geom_name(model, geom)) for geom in range(model.ngeom)]
+        body_name, slash, index = key.rpartition("/")
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body_name) if slash else -1
+        if body >= 0 and index.isdecimal() and int(index) < model.body_geomnum[body]:
+            return int(model.body_geomadr[body]) + int(index)
+    names = [geom_name(model, geom) for geom in range(model.ngeom)]
+    if isinstance(key, str) and key in names:
+        return names.index(key)
     more = f" and {model.ngeom - _LISTED} more" if model.ngeom > _LISTED else ""
     soft = f"; its flexes and skins are {', '.join(map(repr, soft_names(model)))}" if soft_names(model) else ""
     raise SceneError(
-        f"the model has no geom {key!r}; its geoms are {', '.join(names[:_LISTED]) or 'none'}{more}{soft}: give a "
-        'name, "body/index", or an id'
+        f"the model has no geom {key!r}; its geoms are {', '.join(map(repr, names[:_LISTED])) or 'none'}{more}{soft}: "
+        'give a name, "body/index", or an id'
     )
 
 
@@ -75,7 +79,7 @@ def target_name(model: mujoco.MjModel, target: int) -> str:
 
 
 def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
-    """Id of what is to ripple: a geom, see `find_geom`, or else the flex or skin of a name, see `soft_ids`.
+    """Id of what is to ripple: a geom, see `find_geom`, or else the flex or skin of a name, see `find_soft`.
 
     Raises `SceneError` if there is nothing of that name, or a geom's type has no closed surface.
     """
@@ -113,15 +117,6 @@ def find_any(model: mujoco.MjModel, key: GeomKey) -> int:
     if soft >= 0 and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, str(key)) < 0:
         return soft
     return find_geom(model, key)
-
-
-def _by_place(model: mujoco.MjModel, key: str) -> int:
-    """Geom called "body/index" or "geom <id>", or -1."""
-    body_name, slash, index = key.rpartition("/")
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body_name) if slash else -1
-    if body >= 0 and index.isdecimal() and int(index) < model.body_geomnum[body]:
-        return int(model.body_geomadr[body]) + int(index)
-    return next((geom for geom in range(model.ngeom) if geom_name(model, geom) == key), -1)
 
 
 # Numbers that two models of one signature share.
@@ -231,20 +226,6 @@ def _sizes(model: mujoco.MjModel) -> str:
     return ", ".join([repr(name), *(f"{size} {getattr(model, size)}" for size in _SIZES)])
 
 
-def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dict[str, Material]:
-    """Materials by the names of their geoms.
-
-    Raises `SceneError` for arguments of a wrong type, a geom that cannot ripple, or one that has two materials.
-    """
-    if not isinstance(materials, Mapping):
-        raise SceneError(f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material")
-    for key, material in materials.items():
-        find_target(model, key)
-        if not isinstance(material, Material):
-            raise SceneError(f"material of geom {key!r} is {material!r}; valid is a Material")
-    return by_name(model, materials, "materials")
-
-
 def for_each(model: mujoco.MjModel, names: Iterable[str], what: str, value: Value | ByGeom[Value]) -> dict[str, Value]:
     """What an argument says for each target, by name: one value for all, or a mapping.
 
@@ -276,16 +257,6 @@ def rotation_in_body(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
     return rotation.reshape(3, 3)
 
 
-def integrator_warning(model: mujoco.MjModel) -> str | None:
-    """What to warn of where the integrator's forces are not those that MuJoCo reports, else None."""
-    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
-        return None
-    return (
-        "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: impulses "
-        'are off by some per cent; use integrator="implicitfast", or a short time step'
-    )
-
-
 ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 
@@ -315,7 +286,18 @@ def named_collision_geoms(
             raise SceneError(f"contacts of geom {name!r} is {keys!r}; valid is a list of geoms")
         found[target] = tuple(dict.fromkeys(find_geom(model, key) for key in keys))
         for geom in found[target]:
-            _check_collision_geom(model, target, geom, rippling)
+            other, weld = geom_name(model, geom), model.body_weldid[model.geom_bodyid]
+            if weld[geom] != weld[target]:
+                theirs, own = (model.body(model.geom_bodyid[each]).name for each in (geom, target))
+                raise SceneError(
+                    f"contacts of geom {name!r} names geom {other!r} on body {theirs!r}, which moves by itself; valid "
+                    f"are geoms of body {own!r} and of those welded to it"
+                )
+            if geom != target and geom in rippling:
+                raise SceneError(
+                    f"contacts of geom {name!r} names geom {other!r}, which ripples itself and keeps its contacts; "
+                    "take it out of one of the two"
+                )
     return found
 
 
@@ -360,29 +342,12 @@ def _kin(model: mujoco.MjModel, target: int, free: NDArray[np.bool_]) -> NDArray
         return same_body
     weld = model.body_weldid[model.geom_bodyid]
     kin = weld == weld[target]
-    return kin if weld[target] else kin & _inside(model, target)
-
-
-def _inside(model: mujoco.MjModel, target: int) -> NDArray[np.bool_]:
-    """Static geoms, [ngeom], whose middle lies in the box around a static target."""
+    if weld[target]:
+        return kin
+    # of static geoms those whose middle lies in the box around the target
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     rotation, box = data.geom_xmat.reshape(-1, 3, 3), model.geom_aabb
     middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
     away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
-    return np.asarray((np.abs(away) <= box[target, 3:]).all(axis=1))
-
-
-def _check_collision_geom(model: mujoco.MjModel, target: int, geom: int, rippling: Mapping[int, str]) -> None:
-    weld, name, other = model.body_weldid[model.geom_bodyid], geom_name(model, target), geom_name(model, geom)
-    if weld[geom] != weld[target]:
-        raise SceneError(
-            f"contacts of geom {name!r} names geom {other!r} on body {model.body(model.geom_bodyid[geom]).name!r}, "
-            f"which moves by itself; valid are geoms of body {model.body(model.geom_bodyid[target]).name!r} and of "
-            "those welded to it"
-        )
-    if geom != target and geom in rippling:
-        raise SceneError(
-            f"contacts of geom {name!r} names geom {other!r}, which ripples itself and keeps its contacts; take it out "
-            "of one of the two"
-        )
+    return np.asarray(kin & (np.abs(away) <= box[target, 3:]).all(axis=1))

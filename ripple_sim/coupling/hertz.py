@@ -70,23 +70,6 @@ def hertz_moduli(
     return found
 
 
-def hertz_time(mass: float, radius: float, modulus: float, speed: float) -> float:
-    """How long two elastic bodies touch [s]; Johnson, equation 11.24, whose factor is 2.87.
-
-    Parameters
-    ----------
-    mass : float
-        1 / m = 1 / m1 + 1 / m2 [kg].
-    radius : float
-        1 / R = 1 / R1 + 1 / R2 [m].
-    modulus : float
-        E* [Pa].
-    speed : float
-        At which they meet [m/s].
-    """
-    return 2.868 * (mass**2 / (radius * modulus**2 * speed)) ** 0.2
-
-
 def given_share(age: float) -> float:
     """Share of a Hertz pulse's impulse that is given when a share `age` of its time has passed.
 
@@ -273,9 +256,19 @@ class Hits:
             return 0.0
         radius = self._radius(data, atlas, pair, texels, other)
         if isinstance(radius, str):
-            self._refuse(other, radius)
+            if radius not in self._told:
+                self._told.add(radius)
+                names, owners = self._coupled.names, self._coupled.owners
+                hit, hits = names[owners[self._target]], names[owners[other]]
+                warnings.warn(
+                    f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {radius}",
+                    RippleWarning,
+                    stacklevel=7,
+                )
             return 0.0
-        duration = hertz_time(meet.mass, radius, self._modulus, meet.speed)
+        # how long two elastic bodies touch: Johnson, equation 11.24, whose factor is 2.87, with
+        # 1 / m = 1 / m1 + 1 / m2 and 1 / R = 1 / R1 + 1 / R2
+        duration = 2.868 * (meet.mass**2 / (radius * self._modulus**2 * meet.speed)) ** 0.2
         impulses = meet.impulse(model.opt.timestep) * shares
         self._pulses.append(Pulse(texels, impulses, duration, 0.0))
         return float(impulses.sum())
@@ -311,15 +304,3 @@ class Hits:
         if total <= 0 or product < _ROUND * total**2:
             return "they touch along a line, or over an area, not at a point"
         return product**-0.5
-
-    def _refuse(self, other: int, reason: str) -> None:
-        """Say once why hits keep MuJoCo's pulse."""
-        if reason not in self._told:
-            self._told.add(reason)
-            names, owners = self._coupled.names, self._coupled.owners
-            hit, hits = names[owners[self._target]], names[owners[other]]
-            warnings.warn(
-                f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {reason}",
-                RippleWarning,
-                stacklevel=8,
-            )

@@ -57,7 +57,6 @@ def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData | None:
     return resting
 
 
-_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 # A body falls asleep after it was slow for this many steps: `mjMINAWAKE` of MuJoCo.
 _SLOW_STEPS = 10
 
@@ -81,9 +80,7 @@ class SleepingContacts:
         for key, (pair, sums) in list(self._pairs.items()):
             if key in present:
                 continue
-            # neither is awake: each sleeps or is static; vertices between bodies never sleep
-            bodies = self._coupled.bodies[list(key)]
-            if (bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all():
+            if self._coupled.are_still(data, key):
                 mean = pair._replace(forces=pair.forces * (sum(sums) / len(sums) / pair.forces.sum()))
                 found[key[0]] = Contacts.together([*([found[key[0]]] if key[0] in found else []), mean])
             else:
@@ -239,13 +236,9 @@ class TargetLoad:
             self._footprints.follow(atlas)
 
     def touched(
-        self,
-        contacts: Contacts,
-        pose: tuple[Floats, Floats],
-        timestep: float,
-        elapsed: float,
+        self, contacts: Contacts, pose: tuple[Floats, Floats], timestep: float, elapsed: float,
         data: mujoco.MjData | None = None,
-    ) -> tuple[Load, StepContacts]:
+    ) -> tuple[Load, StepContacts]:  # fmt: skip
         """Load over a time in which geoms touch, and what they did.
 
         Parameters
@@ -283,12 +276,11 @@ class TargetLoad:
         done = StepContacts(self._target, *pose, contacts, starts, places, at, forces, inner, on_texels)
         self._filter.set_timestep(timestep)
         if self._hits is not None and data is not None:
-            arrived, pairs = self._filter.arrived(geoms, elapsed), contacts.by_other()
-            for row in arrived:
+            for row in self._filter.arrived(geoms, elapsed):
                 mine = slice(begins[row], begins[row + 1])
                 # what a unit of the contact's impulse gives each texel
                 shares = on_texels.forces[mine] * (elapsed / (timestep * forces[row]))
-                prepaid = self._hits.begin(data, self._atlas, pairs[row], texels[mine], shares)
+                prepaid = self._hits.begin(data, self._atlas, contacts.by_other()[row], texels[mine], shares)
                 self._filter.prepay(int(geoms[row]), prepaid)
         return self._over(self._filter(on_texels, elapsed), elapsed), done
 
@@ -339,21 +331,14 @@ class ContactLoads:
     def clear(self) -> None:
         """Forget all contacts."""
         self._sleeping: SleepingContacts | None = None
-        radii, convex, soft = self._coupled.footprint_radii, self._coupled.convex, self._coupled.soft
-        # a flex has a contact at each of its vertices: nothing touches between them
-        self._targets = {
-            geom: TargetLoad(
-                waves,
-                geom,
-                radii,
-                convex & (geom not in soft),
-                time_constant(self._coupled, geom),
-                self._hits.get(geom),
-            )
-            for geom, waves in self._waves.items()
-        }
-        for hits in self._hits.values():
-            hits.clear()
+        coupled, self._targets = self._coupled, dict[int, TargetLoad]()
+        for geom, waves in self._waves.items():
+            # a flex has a contact at each of its vertices: nothing touches between them
+            convex, constant = coupled.convex & (geom not in coupled.soft), time_constant(coupled, geom)
+            hits = self._hits.get(geom)
+            self._targets[geom] = TargetLoad(waves, geom, coupled.footprint_radii, convex, constant, hits)
+            if hits is not None:
+                hits.clear()
         self.skip()
 
     def skip(self) -> None:

@@ -67,13 +67,9 @@ def flex_thickness(model: mujoco.MjModel, flex: int) -> float:
     return float(model.flex_margin[flex] + model.flex_radius[flex])
 
 
-def vertex_flexes(model: mujoco.MjModel) -> NDArray[np.int64]:
-    """Id of the flex of each vertex, [nflexvert]."""
-    return np.repeat(np.arange(model.nflex), model.flex_vertnum)
+_NOT_CONVEX = (int(mujoco.mjtGeom.mjGEOM_SDF), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
-
-_GEOM = mujoco.mjtGeom
-_NOT_CONVEX = (int(_GEOM.mjGEOM_SDF), int(_GEOM.mjGEOM_HFIELD))
+_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 
 # Footprint radius of a contact over the touching geom's smallest half-extent: about the patch of a ball that is sunk in
 # by an eighth of its radius.
@@ -86,7 +82,7 @@ class CoupledModel:
     A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are the geom's. It may
     collide through its convex parts, which then touch as that geom. Of any other flex each vertex is a collider.
     Collider ids are those of the geoms, and after them one for each vertex, each flex and each skin; there are c of
-    them. A flex or a skin that ripples touches as a whole, with the last ones, see `soft_ids`. A target may have
+    them. A flex or a skin that ripples touches as a whole, with the last ones, see `find_soft`. A target may have
     collision geoms, whose contacts load it; see `find_collision_geoms`.
 
     Parameters
@@ -110,7 +106,7 @@ class CoupledModel:
         Geom id to the id of its flex collider.
     convex_colliders : dict of int to list of int
         Geom id to the ids of its convex colliders.
-    has_flex : bool [ngeom]
+    has_flex : bool [c]
         Whether a geom collides through a flex.
     extents : float64 [c]
         Smallest half-extents [m]; infinite for planes and height fields, the spacing of a flex's vertices for them.
@@ -132,12 +128,13 @@ class CoupledModel:
         self.model = model
         geoms, softs = range(model.ngeom), model.nflex + model.nskin
         self.names = [geom_name(model, geom) for geom in geoms] + soft_names(model)
+        vertex_flexes = np.repeat(np.arange(model.nflex), model.flex_vertnum)
         whole = model.ngeom + np.arange(softs)
-        self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes(model), whole]).astype(np.int64)
+        self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes, whole]).astype(np.int64)
         self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid, np.full(softs, -1)]).astype(np.int64)
         self.flex_colliders = find_flex_colliders(model)
         self.convex_colliders = find_convex_colliders(model)
-        self.has_flex = np.zeros(model.ngeom, dtype=np.bool_)
+        self.has_flex = np.zeros(len(self.owners), dtype=np.bool_)
         self.has_flex[list(self.flex_colliders)] = True
         extents = np.where(np.isin(model.geom_type, ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
         self.collider_extents, self.solref = extents.copy(), model.geom_solref.copy()
@@ -155,17 +152,19 @@ class CoupledModel:
         self._soft_flexes = np.setdiff1d(np.arange(model.nflex), list(self.flex_colliders.values()))
         edges = zip(model.flex_edgeadr, model.flex_edgenum, strict=True)
         lengths = [model.flexedge_length0[i : i + count].mean() if count else 0.0 for i, count in edges]
-        spacing = np.array(lengths)[vertex_flexes(model)]
+        spacing = np.array(lengths)[vertex_flexes]
         endless = np.full(softs, np.inf)
         self.extents = np.concatenate([extents, spacing, endless])
         self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing, endless])
-        convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex
+        convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex[: model.ngeom]
         convex[[geom for geom, parts in self.convex_colliders.items() if len(parts) > 1]] = False
         self.convex = np.concatenate([convex, np.zeros(model.nflexvert + softs, dtype=np.bool_)])
         targets = list(targets)
         self.soft = {each: SoftSurface(model, each) for each in targets if is_soft(model, each)}
         for target, surface in self.soft.items():
-            self.footprint_radii[target] = surface.spacing
+            # the mean distance between vertices side by side: no contact is known more closely
+            V, F = surface.mesh.V, surface.mesh.F
+            self.footprint_radii[target] = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean()
         geoms_alone = [each for each in targets if each not in self.soft]
         self._collision_geoms = find_collision_geoms(model, self._collides, geoms_alone, named or {})
 
@@ -182,6 +181,11 @@ class CoupledModel:
             for one, two in (pairs, pairs[::-1]):
                 found[two[one == each]] = True
         return found
+
+    def are_still(self, data: mujoco.MjData, colliders: Sequence[int]) -> bool:
+        """Whether all sleep or are static, so that they press as before; vertices between bodies never sleep."""
+        bodies = self.bodies[list(colliders)]
+        return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
 
     def can_collide(self, geom: int) -> NDArray[np.bool_]:
         """The same on bodies that are not welded to that of this geom."""
@@ -256,7 +260,7 @@ class FlexContacts:
         ----------
         data : mujoco.MjData
         contacts, sides, targets, others : int64 [k]
-            Contacts on these targets, pair by pair; see `PairRows`.
+            Contacts on these targets, pair by pair; see `pair_rows`.
         starts : int64 [p]
             The first of each pair.
         along : float64 [k, 3]
@@ -271,7 +275,10 @@ class FlexContacts:
         each, counts = data.contact, np.diff(np.append(starts, len(contacts)))
         frames, sign = each.frame[contacts].reshape(-1, 3, 3), np.where(sides == 1, 1.0, -1.0)[:, None]
         outward = -sign * frames[:, 0]
-        normals = self._surface_normals(data, each.elem[contacts, sides], targets, outward)
+        rotations, elements = data.geom_xmat[targets].reshape(-1, 3, 3), each.elem[contacts, sides]
+        normals = np.einsum("kij,kj->ki", rotations, self._normals[self._first[targets] + elements])
+        # a plane touches vertices, which are no element, and its own normal is right
+        normals = np.where(elements[:, None] >= 0, normals, outward)
         straight = np.einsum("ij,ij->i", outward, normals)
         behind = self._is_sheet[targets] & (straight < 0)
         normals[behind], straight[behind] = -normals[behind], -straight[behind]
@@ -292,15 +299,6 @@ class FlexContacts:
         outside = depth + np.minimum(depth, self._extents[others])
         met = each.pos[contacts] - sign * each.dist[contacts, None] / 2 * frames[:, 0]
         return kept, (met + outside[:, None] * normals)[kept], forces[kept], normals[kept]
-
-    def _surface_normals(self, data: mujoco.MjData, elements: Ints, targets: Ints, outward: Floats) -> Floats:
-        """Normals of the surface at contacts with elements, [k, 3].
-
-        A plane touches vertices, which are no element, and its own normal is right.
-        """
-        rotations = data.geom_xmat[targets].reshape(-1, 3, 3)
-        normals = np.einsum("kij,kj->ki", rotations, self._normals[self._first[targets] + elements])
-        return np.where(elements[:, None] >= 0, normals, outward)
 
     def _judge(self, targets: Ints, force: Floats, amount: Floats, friction: Floats) -> None:
         """Warn, once for each, of targets whose forces are not those of a contact.

@@ -19,6 +19,7 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.waves.footprint import weigh_each
 
+# Up to so many contacts of a pair, what is convex presses between them too.
 MAX_CORNERS = 8
 # Points on the rim of a patch stand for half a cell, those at its corners for a quarter: their centres lie farther in.
 _INSET = 0.75
@@ -27,12 +28,7 @@ _OVERLAP = 0.3
 
 
 def load_points(
-    points: Floats,
-    forces: Floats,
-    starts: Ints,
-    radii: Floats,
-    convex: Bools,
-    closest: Callable[[Floats], Floats],
+    points: Floats, forces: Floats, starts: Ints, radii: Floats, convex: Bools, closest: Callable[[Floats], Floats]
 ) -> tuple[Ints, Floats, Floats, Floats]:
     """Points that carry the forces of all patches on a target, patch by patch, 36 a patch at most.
 
@@ -67,23 +63,21 @@ def load_points(
     patches = np.zeros(len(forces), dtype=np.int64)
     patches[starts[1:]] = 1
     patches, points, forces = corners(patches.cumsum(), points, forces, radii)
-    pairs = _pairs(patches, convex)
+    # all pairs of corners of a convex patch, [m, 2] in ascending order
+    row = np.arange(len(patches))
+    later = np.where(convex[patches], np.searchsorted(patches, patches, "right") - row - 1, 0)
+    first = np.repeat(row, later)
+    second = first + 1 + np.arange(len(first)) - np.repeat(later.cumsum() - later, later)
+    pairs = np.column_stack([first, second])
     if not len(pairs):
         return patches, points, forces, radii[patches]
     probes = np.concatenate([points, points[pairs].sum(axis=1) / 2])
     # contact points lie a little outside the surface, by up to their depth: so may the midpoints
-    away = _length(closest(probes) - probes)
+    off = closest(probes) - probes
+    away = np.sqrt(np.einsum("ij,ij->i", off, off))
     patches, points, forces, near, radii = _spread(patches, forces, radii, pairs, probes, away)
     patches, points, forces = _joined(patches, points, forces, near, len(forces))
     return patches, points, forces, radii[patches]
-
-
-def _pairs(patches: Ints, convex: Bools) -> Ints:
-    """All pairs of corners of a convex patch, [m, 2] in ascending order; `patches` [k] are those of the corners."""
-    row = np.arange(len(patches))
-    later = np.where(convex[patches], np.searchsorted(patches, patches, "right") - row - 1, 0)
-    first = np.repeat(row, later)
-    return np.column_stack([first, first + 1 + np.arange(len(first)) - np.repeat(later.cumsum() - later, later)])
 
 
 def _spread(
@@ -132,9 +126,8 @@ def _spread(
     of = of[kept]
     # the points of a patch that is filled stand for the cells of a lattice
     inset = np.where(filled, _INSET, 1.0)[of, None]
-    points = inset * probes[kept] + (1 - inset) * middles[of]
     near, wide = np.where(filled, size / 8, 0.0), np.where(filled, np.maximum(radii, _OVERLAP * size), radii)
-    return of, points, shares[kept], near, wide
+    return of, inset * probes[kept] + (1 - inset) * middles[of], shares[kept], near, wide
 
 
 def corners(patches: Ints, points: Floats, forces: Floats, radii: Floats) -> tuple[Ints, Floats, Floats]:
@@ -203,12 +196,8 @@ def _join(
     return found
 
 
-def _length(vectors: Floats) -> Floats:
-    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-
-
 # A footprint is reused while its point moves by less than this share of a texel.
-_SAME_PLACE = 0.3
+SAME_PLACE = 0.3
 
 
 class Footprints:
@@ -260,23 +249,21 @@ class Footprints:
         rows = rows[: _serving(geoms, points, radii, *made, active, touching, rows)]
         new = (rows < 0).nonzero()[0]
         rows[new] = len(self._geoms) + np.arange(len(new))
-        under, tolerances = self._make(points[new], radii[new]) if len(new) else ([], np.zeros(0))
-        all_under = [*self._under, *under]
-        self._under = [all_under[row] for row in rows.tolist()]
+        under, tolerances = self._under, np.zeros(0)
+        if len(new):
+            grid = self._grid
+            places, centres = self._atlas.nearest_places(points[new])
+            begins, texels, weights, _ = weigh_each(grid, centres, places, radii[new])
+            shares = weights * self._movable_area[texels]
+            ends = itertools.pairwise(begins.tolist())
+            under = [*under, *((texels[first:last], shares[first:last]) for first, last in ends)]
+            tolerances = SAME_PLACE * np.sqrt(grid.areas[centres])
+        self._under = [under[row] for row in rows.tolist()]
         self._geoms = np.concatenate([self._geoms, geoms[new]])[rows]
         self._points = np.concatenate([self._points, points[new]])[rows]
         self._radii = np.concatenate([self._radii, radii[new]])[rows]
         self._tolerances = np.concatenate([self._tolerances, tolerances])[rows]
         return self._under[: len(geoms)]
-
-    def _make(self, points: Floats, radii: Floats) -> tuple[list[tuple[Ints, Floats]], Floats]:
-        """New footprints, and how far they may be from their points [m]."""
-        grid = self._grid
-        places, centres = self._atlas.nearest_places(points)
-        begins, texels, weights, _ = weigh_each(grid, centres, places, radii)
-        shares = weights * self._movable_area[texels]
-        under = [(texels[first:last], shares[first:last]) for first, last in itertools.pairwise(begins.tolist())]
-        return under, _SAME_PLACE * np.sqrt(grid.areas[centres])
 
 
 @kernel

@@ -282,7 +282,16 @@ def _touch(state: Any, force: float, middle: Floats, place_radius: float, dt: fl
     state.chatters = state.chatters and state.unbroken < _CALM
     hit = force - state.mean_force if state.chatters and force > _HIT * state.mean_force else 0.0
     state.level += dt / (dt + _AVERAGED) * (force - hit - state.level)
-    _follow_force(state, force, dt)
+    # the mean force follows; a hit ends the memory
+    if state.age < _ONSET:
+        unchanged = 0.0
+    elif state.springy or state.unbroken < _CALM:
+        unchanged = _HIT - force / max(state.mean_force, _TINY)
+    else:
+        unchanged = 2 - abs(force - state.mean_force) / max(_CHANGE * state.mean_force, _TINY)
+    state.memory = min(state.memory + _GROWTH * dt, _LONGEST_MEMORY) * min(max(unchanged, 0.0), 1.0)
+    now = state.level if state.chatters else force
+    state.mean_force += dt / (dt + state.memory) * (now - state.mean_force)
     _follow_place(state, middle, place_radius, dt)
     return _given(state, force, hit, dt)
 
@@ -322,20 +331,6 @@ def _given(state: Any, force: float, hit: float, dt: float) -> float:
         state.deficit -= paid
         given += paid / dt
     return given
-
-
-@kernel(no_cpython_wrapper=True)
-def _follow_force(state: Any, force: float, dt: float) -> None:
-    """Let the mean force follow; a hit ends the memory."""
-    if state.age < _ONSET:
-        unchanged = 0.0
-    elif state.springy or state.unbroken < _CALM:
-        unchanged = _HIT - force / max(state.mean_force, _TINY)
-    else:
-        unchanged = 2 - abs(force - state.mean_force) / max(_CHANGE * state.mean_force, _TINY)
-    state.memory = min(state.memory + _GROWTH * dt, _LONGEST_MEMORY) * min(max(unchanged, 0.0), 1.0)
-    now = state.level if state.chatters else force
-    state.mean_force += dt / (dt + state.memory) * (now - state.mean_force)
 
 
 @kernel(no_cpython_wrapper=True)

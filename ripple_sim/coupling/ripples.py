@@ -16,28 +16,20 @@ from ripple_sim.solver.errors import checked, whole
 from ripple_sim.solver.operator.plate_rim import Rim
 
 from .energy import Energy, body_energy
-from .geoms import (
-    ByGeom,
-    GeomKey,
-    for_each,
-    integrator_warning,
-    named_collision_geoms,
-    own_data,
-    own_model,
-    target_name,
-)
+from .geoms import ByGeom, GeomKey, for_each, named_collision_geoms, own_data, own_model, target_name
 from .hertz import Hits, hertz_moduli
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .soft import HighPass
 from .step_checks import TunnellingCheck
 from .stepping import (
+    NO_RESET,
     SolvedForces,
     StepClock,
     adopt_warnings,
+    divergence,
     divergence_warning,
     followed,
-    goes_on_broken,
     missed_warning,
     physics_errors,
 )
@@ -131,7 +123,7 @@ class Ripples(Targets):
         rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
         for geom, waves in rigid.items():
             for message in collision_warnings(coupled, geom, waves.atlas):
-                _warn(message)
+                warnings.warn(message, RippleWarning, stacklevel=2)
         moduli = hertz_moduli(self.model, self, pulse, modulus)
         if two_way and moduli:
             raise SceneError(
@@ -149,7 +141,13 @@ class Ripples(Targets):
             for target, surface in coupled.soft.items()
             if surface.flex >= 0 and fine[target_name(self.model, target)]
         }
-        _warn(integrator_warning(self.model))
+        if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            warnings.warn(
+                "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
+                'impulses are off by some per cent; use integrator="implicitfast", or a short time step',
+                RippleWarning,
+                stacklevel=2,
+            )
         hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in moduli.items()}
         self._loads = ContactLoads(coupled, self._waves, hits)
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
@@ -262,7 +260,8 @@ class Ripples(Targets):
 
     def _follow(self, data: mujoco.MjData) -> None:
         passed = self._clock.look(self.model, data)
-        broken = goes_on_broken(self.model, data)
+        # whether MuJoCo's automatic reset is disabled, and its state is broken since the last one
+        broken = bool(self.model.opt.disableflags & NO_RESET) and divergence(data) is not None
         if passed.reset or broken:
             self._flatten()
             self._warn_once("divergence", divergence_warning(self.model, data))
@@ -304,9 +303,4 @@ class Ripples(Targets):
     def _warn_once(self, kind: str, message: str | None) -> None:
         if message is not None and kind not in self._warned:
             self._warned.add(kind)
-            _warn(message, stacklevel=5)
-
-
-def _warn(message: str | None, stacklevel: int = 3) -> None:
-    if message is not None:
-        warnings.warn(message, RippleWarning, stacklevel=stacklevel)
+            warnings.warn(message, RippleWarning, stacklevel=4)

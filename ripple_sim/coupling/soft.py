@@ -6,8 +6,6 @@ where it is. A `HighPass` leaves a flex its coarse motion: its waves get what it
 
 from __future__ import annotations
 
-import functools
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +69,7 @@ class SoftSurface:
     ----------
     model : mujoco.MjModel
     target : int
-        See `soft_ids`.
+        See `find_soft`.
 
     Attributes
     ----------
@@ -86,10 +84,21 @@ class SoftSurface:
     def __init__(self, model: mujoco.MjModel, target: int) -> None:
         self._model, self.flex, self._skin = model, -1, -1
         if target < first_skin(model):
-            self.flex = target - first_flex(model)
-            F = _flex_triangles(model, self.flex)
+            flex = self.flex = target - first_flex(model)
+            if model.flex_dim[flex] == 1:
+                raise SceneError(
+                    f"flex {soft_name(model, target)!r} is a cable, which cannot ripple; valid are surfaces and solids "
+                    "(dim 2 and 3)"
+                )
+            # the triangles themselves, or those of the outside of tetrahedra
+            F, first, count = model.flex_elem, model.flex_elemdataadr[flex], model.flex_elemnum[flex]
+            if model.flex_dim[flex] == 3:
+                F, first, count = model.flex_shell, model.flex_shelldataadr[flex], model.flex_shellnum[flex]
+            F = F[first : first + 3 * count].reshape(-1, 3)
         else:
             self._skin = target - first_skin(model)
+            first = int(model.skin_boneadr[self._skin])
+            self._bones = slice(first, first + int(model.skin_bonenum[self._skin]))
             first = model.skin_faceadr[self._skin]
             F = model.skin_face[first : first + model.skin_facenum[self._skin]]
         data = mujoco.MjData(model)
@@ -126,22 +135,6 @@ class SoftSurface:
         """Degree of the polynomials that interpolate a flex between its nodes, 1 or 2; 0 where its vertices move."""
         return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
 
-    @property
-    def mass(self) -> float:
-        """Mass of its bodies [kg]."""
-        return float(self._model.body_mass[self.bodies].sum())
-
-    @property
-    def spacing(self) -> float:
-        """Mean distance between vertices side by side [m]: no contact is known more closely."""
-        side = self.mesh.V[self.mesh.F] - self.mesh.V[np.roll(self.mesh.F, 1, axis=1)]
-        return float(np.linalg.norm(side, axis=2).mean())
-
-    @functools.cached_property
-    def _bones(self) -> slice:
-        first = int(self._model.skin_boneadr[self._skin])
-        return slice(first, first + int(self._model.skin_bonenum[self._skin]))
-
     def _all(self, data: mujoco.MjData) -> NDArray[np.float64]:
         model = self._model
         if self._skin < 0:
@@ -161,18 +154,6 @@ class SoftSurface:
             placed = (V[vertices] - model.skin_bonebindpos[bone]) @ rotation.reshape(3, 3).T + data.xpos[body]
             np.add.at(moved, vertices, weights * placed)
         return moved
-
-
-def _flex_triangles(model: mujoco.MjModel, flex: int) -> NDArray[np.int64]:
-    """Triangles of a flex of triangles, or of the outside of one of tetrahedra, [m, 3]."""
-    if model.flex_dim[flex] == 1:
-        name = soft_name(model, first_flex(model) + flex)
-        raise SceneError(f"flex {name!r} is a cable, which cannot ripple; valid are surfaces and solids (dim 2 and 3)")
-    if model.flex_dim[flex] == 2:
-        first, count = model.flex_elemdataadr[flex], model.flex_elemnum[flex]
-        return model.flex_elem[first : first + 3 * count].reshape(-1, 3).astype(np.int64)
-    first, count = model.flex_shelldataadr[flex], model.flex_shellnum[flex]
-    return model.flex_shell[first : first + 3 * count].reshape(-1, 3).astype(np.int64)
 
 
 # Share of a mass that is added to each coarse motion's own: some are next to the same.
@@ -196,8 +177,7 @@ class HighPass:
         self._mass = waves.operator.mass.reshape(-1)
         self._basis = coarse_motions(waves, surface)
         gram = csc_array(self._basis.T @ (self._basis * self._mass[:, None]))
-        diagonal = np.maximum(gram.diagonal(), _LEAST * gram.diagonal().max())
-        gram.setdiag(diagonal * (1 + _LEAST))
+        gram.setdiag(np.maximum(gram.diagonal(), _LEAST * gram.diagonal().max()) * (1 + _LEAST))
         self._solve = splu(gram).solve
 
     def __call__(self, load: Load) -> Load:

@@ -20,8 +20,6 @@ from ripple_sim.solver.kernel import Floats, Ints
 
 from .model import SPECULATIVE, CoupledModel
 
-_SDF = int(mujoco.mjtGeom.mjGEOM_SDF)
-_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 _SAFE = 0.85
 # Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
 # at 1.4, not yet at 1.2.
@@ -122,8 +120,8 @@ def too_fast(pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, step
 
 def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
     """Pairs of a geom that collides for a target and another geom, which may tunnel, `PAIR` [p]."""
-    model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex
-    sdf, cylinder = model.geom_type == _SDF, model.geom_type == _CYLINDER
+    model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex[: coupled.model.ngeom]
+    sdf, cylinder = (model.geom_type == kind for kind in (mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_CYLINDER))
     unchecked = sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
     pairs = [
         (target, other)
@@ -139,19 +137,13 @@ def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void
         limit = np.minimum(limit, safe)
     reach = model.geom_rbound[target] + model.geom_rbound[other]
     solref = (coupled.solref[target] + coupled.solref[other]) / 2
-    stopping_times = _stopping_times(solref, model.opt.timestep)
-    return np.array(list(zip(target, other, limit, reach, stopping_times, strict=True)), PAIR)
-
-
-def _stopping_times(solref: NDArray[np.float64], timestep: float) -> NDArray[np.float64]:
-    """Depth over speed [s], [k], of contacts with these parameters, [k, 2]."""
     # negative pairs are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio = damping / (2 omega)
     direct = solref[:, 0] <= 0
     omega = np.sqrt(np.where(direct, np.maximum(-solref[:, 0], 1e-12), 1.0))
-    constant = np.maximum(solref[:, 0], 2 * timestep)
+    constant = np.maximum(solref[:, 0], 2 * model.opt.timestep)
     ratio = np.where(direct, -solref[:, 1] / (2 * omega), solref[:, 1])
-    period = np.where(direct, 1 / omega, constant * ratio)
-    return period * np.exp(-np.clip(ratio, 0, 1))
+    stopping_times = np.where(direct, 1 / omega, constant * ratio) * np.exp(-np.clip(ratio, 0, 1))
+    return np.array(list(zip(target, other, limit, reach, stopping_times, strict=True)), PAIR)
 
 
 # Share of the impulses on a target that may be missing from the bodies' motion, or be there without a contact force.

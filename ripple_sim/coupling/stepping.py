@@ -25,8 +25,6 @@ from ripple_sim.errors import RippleWarning, SimulationError
 _FWDINV = int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 # nothing that is computed depends on the marks, so they may differ from run to run
 _random = random.SystemRandom()
-
-
 _ROUND_OFF = 1e-6  # of times, in time steps
 
 
@@ -116,7 +114,7 @@ def missed_warning(missed: int) -> str | None:
 
 
 _BROKEN = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-_NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
 def divergence(data: mujoco.MjData) -> str | None:
@@ -127,11 +125,6 @@ def divergence(data: mujoco.MjData) -> str | None:
     return next((warning.name for warning in _BROKEN if data.warning[warning].number), None)
 
 
-def goes_on_broken(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Whether MuJoCo's automatic reset is disabled, and its state is broken since the last one."""
-    return bool(model.opt.disableflags & _NO_RESET) and divergence(data) is not None
-
-
 def divergence_warning(model: mujoco.MjModel, data: mujoco.MjData) -> str | None:
     """What to warn of where the simulation has diverged, else None."""
     broken = divergence(data)
@@ -139,7 +132,7 @@ def divergence_warning(model: mujoco.MjModel, data: mujoco.MjData) -> str | None
         return None
     then = (
         "its automatic reset is disabled, and the ripples stay flat until you reset it"
-        if model.opt.disableflags & _NO_RESET
+        if model.opt.disableflags & NO_RESET
         else "MuJoCo reset it to its initial state, and the ripples with it"
     )
     advice = "use a shorter time step in the MJCF's <option>, or softer contacts"
@@ -302,7 +295,10 @@ class SolvedForces:
         mujoco.mj_fwdConstraint(model, self._completed)
         if lost:
             return self._completed, LOST_WARNING
-        return self._completed, None if _solved(model, data) else UNSOLVED_WARNING
+        # whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f; the sums may be in another order
+        force = np.zeros(model.nv)
+        mujoco.mj_mulJacTVec(model, data, force, data.efc_force)
+        return self._completed, None if _agree(force, data.qfrc_constraint, 1e-9) else UNSOLVED_WARNING
 
     def _moved_on(self, data: mujoco.MjData) -> bool:
         """Whether the poses are already those that follow from the positions."""
@@ -334,14 +330,6 @@ def _restore_forces(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     mujoco.mj_mulJacVec(model, data, excess, data.qacc)
     mujoco.mj_constraintUpdate(model, data, excess - data.efc_aref, None, 0)
     return _agree(data.qfrc_constraint, expected, _RESTORED)
-
-
-def _solved(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f."""
-    force = np.zeros(model.nv)
-    mujoco.mj_mulJacTVec(model, data, force, data.efc_force)
-    # the sums may be made in another order
-    return _agree(force, data.qfrc_constraint, 1e-9)
 
 
 def _agree(force: NDArray[np.float64], expected: NDArray[np.float64], tolerance: float) -> bool:

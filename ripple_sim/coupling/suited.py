@@ -129,16 +129,6 @@ def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: 
     return min(_density_under(coupled, geom, extent, speed, stiffness, limit), 1e12)
 
 
-def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, material: Material) -> Material:
-    """The same for a flex or a skin, by its size and the mass of its bodies [kg]: what may hit it is not looked at."""
-    if not material.unset:
-        return material
-    speed = _speed(model, extent)
-    return _filled_in(
-        material, speed, min(narrow_stiffness(extent.size, speed), _stiffest(model)), _density(mass, extent)
-    )
-
-
 def _filled_in(material: Material, speed: float, stiffness: float, density: float) -> Material:
     """A material with these where it has no parameters of its own."""
     suited = {
@@ -211,8 +201,7 @@ def _resting(coupled: CoupledModel, geom: int) -> float:
 
 def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
     """Geoms that are not fixed to the world."""
-    moves: NDArray[np.bool_] = model.body_weldid[model.geom_bodyid] != 0
-    return moves
+    return np.asarray(model.body_weldid[model.geom_bodyid] != 0)
 
 
 def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
@@ -222,7 +211,7 @@ def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
     moves, the mass is 0.
     """
     reduced = _reduced_masses(coupled, geom)
-    return _hitting(coupled, geom, reduced, int(reduced.argmax()))
+    return float(reduced.max()), float(coupled.footprint_radii[[geom, int(reduced.argmax())]].min())
 
 
 def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
@@ -232,11 +221,6 @@ def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
     inverse = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)[model.geom_bodyid]
     total = np.where(coupled.can_collide(geom), inverse + inverse[geom], 0.0)
     return np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)
-
-
-def _hitting(coupled: CoupledModel, geom: int, reduced: NDArray[np.float64], other: int) -> tuple[float, float]:
-    radii = coupled.footprint_radii
-    return float(reduced[other]), float(min(radii[geom], radii[other]))
 
 
 def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
@@ -257,7 +241,7 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
     if not len(touching):
         raise SceneError(f"{needs}: nothing that moves can touch it in the model")
     middle = int(touching[np.argsort(reduced[touching])[len(touching) // 2]])
-    mass, footprint = _hitting(coupled, geom, reduced, middle)
+    mass, footprint = float(reduced[middle]), float(coupled.footprint_radii[[geom, middle]].min())
     fall = _fall(model, min(max(extent.size, _height(coupled, geom)), 2 * extent.size))
     return {
         "size": extent.size,
@@ -340,7 +324,12 @@ def suited_targets(
     for name, target in list(geoms.items()):
         if is_soft(model, target):
             surface = SoftSurface(model, geoms.pop(name))
-            suited[name] = suited_soft_material(model, Extent.of(surface.mesh), surface.mass, materials[name])
+            extent = Extent.of(surface.mesh)
+            if materials[name].unset:
+                # by its size and the mass of its bodies: what may hit it is not looked at
+                speed, mass = _speed(model, extent), float(model.body_mass[surface.bodies].sum())
+                stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(model))
+                suited[name] = _filled_in(materials[name], speed, stiffness, _density(mass, extent))
             texels.setdefault(name, _SOFT)
     left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:

@@ -32,10 +32,7 @@ def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[NDArray[n
     number = np.arange(rows * columns).reshape(rows, columns)
     south_west, south_east = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
     north_west, north_east = number[1:, :-1].ravel(), number[1:, 1:].ravel()
-    F = [
-        np.stack([south_west, south_east, north_east], axis=1),
-        np.stack([south_west, north_east, north_west], axis=1),
-    ]
+    F = [np.stack([south_west, south_east, north_east], axis=1), np.stack([south_west, north_east, north_west], axis=1)]
     return np.stack([x.ravel(), y.ravel(), z], axis=1), np.concatenate(F)
 
 
@@ -50,12 +47,7 @@ def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[n
         kind, size = "ellipsoid", np.full(3, size[0])
     # trimesh merges vertices within a fixed distance: triangles are made at a size of about 1
     scale = 2.0 ** np.floor(np.log2(size.max()))
-    V, F = _triangles(kind, size / scale)
-    return scale * V, F
-
-
-def _triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Triangles on a primitive whose largest size is from 1 to 2."""
+    size = size / scale
     if kind == "ellipsoid":
         solid = trimesh.creation.icosphere(subdivisions=4)
         solid.apply_scale(size)
@@ -68,23 +60,18 @@ def _triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64
         solid = trimesh.creation.box(extents=2 * size)
     longest = float(np.max(solid.extents)) * _LONGEST_EDGE
     V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, max_edge=longest)
-    return _on_round_surface(kind, size, V), F
-
-
-def _on_round_surface(kind: str, size: NDArray[np.float64], V: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vertices moved along the radius from the chords of a round solid onto its surface [m]."""
+    # vertices of a round solid move along the radius from its chords onto its surface
     if kind == "ellipsoid":
-        return V / np.linalg.norm(V / size, axis=1, keepdims=True)
-    if kind == "capsule":
+        V = V / np.linalg.norm(V / size, axis=1, keepdims=True)
+    elif kind == "capsule":
         axis = np.clip(V[:, 2:], -size[1], size[1]) * [0.0, 0.0, 1.0]
-        return axis + size[0] * (V - axis) / np.linalg.norm(V - axis, axis=1, keepdims=True)
-    if kind == "cylinder":
+        V = axis + size[0] * (V - axis) / np.linalg.norm(V - axis, axis=1, keepdims=True)
+    elif kind == "cylinder":
         radius = np.linalg.norm(V[:, :2], axis=1)
         # the other vertices lie inside the flat ends
         on_side = radius > size[0] * (np.cos(np.pi / _CYLINDER_SIDES) - 1e-9)
-        V = V.copy()
         V[on_side, :2] *= (size[0] / radius[on_side])[:, None]
-    return V
+    return scale * V, F
 
 
 _MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB

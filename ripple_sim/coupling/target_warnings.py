@@ -66,22 +66,17 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
         return 0.0
     outside = np.full(len(points), np.inf)
     for geom in solids:
-        V, F = _solid(coupled, geom)
+        kind = TARGET_TYPES[int(model.geom_type[geom])]
+        if kind in ("mesh", "sdf"):
+            V, F, _ = mesh_arrays(model, int(model.geom_dataid[geom]))
+        else:
+            V, F = primitive_triangles(kind, model.geom_size[geom])
+        if kind == "mesh" and not coupled.has_flex[geom]:
+            hull = trimesh.convex.convex_hull(V)
+            V, F = np.array(hull.vertices), np.array(hull.faces)
         local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
         outside = np.minimum(outside, igl.signed_distance(local, V, F)[0])
     return float(max(outside.max(), -np.median(outside)))
-
-
-def _solid(coupled: CoupledModel, geom: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices [m], [n, 3], and triangles of a geom as it collides, in its own frame."""
-    model, kind = coupled.model, TARGET_TYPES[int(coupled.model.geom_type[geom])]
-    if kind not in ("mesh", "sdf"):
-        return primitive_triangles(kind, model.geom_size[geom])
-    V, F, _ = mesh_arrays(model, int(model.geom_dataid[geom]))
-    if kind == "mesh" and not coupled.has_flex[geom]:
-        hull = trimesh.convex.convex_hull(V)
-        V, F = np.array(hull.vertices), np.array(hull.faces)
-    return V, F
 
 
 # A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air. The coarse
@@ -91,31 +86,35 @@ GAP_TOLERANCE, COARSE_TOLERANCE = 0.02, 0.1
 
 def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
     """What to warn of where nothing touches a target, it collides off its surface, or contacts tell no forces."""
-    message = _shape_warning(coupled, geom, atlas)
-    if message is not None:
-        yield message
-    passive = getattr(coupled.model, "flex_passive", np.zeros(coupled.model.nflex))  # not in MuJoCo's older versions
+    model, name = coupled.model, coupled.names[geom]
+    if coupled.out_of_touch(geom):
+        yield _touch_warning(coupled, geom)
+    elif geom in coupled.convex_colliders or any(each != geom for each in coupled.collision_geoms(geom)):
+        yield from _gap_warning(coupled, geom, atlas)
+    elif coupled.has_flex[geom]:
+        yield from _flex_warning(coupled, geom)
+    elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+        gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
+        if gap > GAP_TOLERANCE * size:
+            yield (
+                f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the "
+                f'surface that ripples; give it type="sdf" in the MJCF, or call make_collidable(spec, {name!r})'
+            )
+    elif model.geom_type[geom] == _GEOM.mjGEOM_SDF:
+        hills = np.flatnonzero(coupled.can_collide(geom) & (model.geom_type == _GEOM.mjGEOM_HFIELD))
+        if len(hills):
+            names = ", ".join(repr(coupled.names[other]) for other in hills)
+            yield (
+                f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): call "
+                f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so that they do not meet'
+            )
+    passive = getattr(model, "flex_passive", np.zeros(model.nflex))  # not in MuJoCo's older versions
     for flex in coupled.soft_flexes(geom).tolist():
         if passive[flex]:
-            name = coupled.names[coupled.model.ngeom + flex]
             yield (
-                f"MuJoCo tells no forces of the passive contacts of flex {name!r}, under which geom "
-                f'{coupled.names[geom]!r} will not ripple; set passive="false" in the flex\'s <contact>'
+                f"MuJoCo tells no forces of the passive contacts of flex {coupled.names[model.ngeom + flex]!r}, under "
+                f'which geom {name!r} will not ripple; set passive="false" in the flex\'s <contact>'
             )
-
-
-def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
-    colliders = coupled.collision_geoms(geom)
-    if coupled.out_of_touch(geom):
-        return _touch_warning(coupled, geom)
-    if any(each != geom for each in colliders) or geom in coupled.convex_colliders:
-        return _gap_warning(coupled, geom, atlas)
-    if coupled.has_flex[geom]:
-        return _flex_warning(coupled, geom)
-    model = coupled.model
-    if model.geom_type[geom] == _GEOM.mjGEOM_MESH and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
-        return _hull_warning(coupled.names[geom], atlas)
-    return _distance_warning(coupled, geom)
 
 
 def _touch_warning(coupled: CoupledModel, geom: int) -> str:
@@ -133,75 +132,38 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
     return f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not welded to its own"
 
 
-def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
+def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
     """Warning of collision geoms that are visibly off the surface."""
     name, solids = coupled.names[geom], coupled.collision_geoms(geom)
     colliders = [part for each in solids for part in coupled.convex_colliders.get(each, [each])]
     gap, size = collision_gap(coupled, geom, atlas, colliders), float(np.ptp(atlas.mesh.V, axis=0).max())
-    if gap <= COARSE_TOLERANCE * size:
-        return None
-    names = ", ".join(repr(coupled.names[each]) for each in colliders)
-    return (
-        f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface that "
-        f"ripples: contacts load it where it is nearest to them; name other geoms in contacts=, or call "
-        f"make_collidable(spec, {name!r})"
-    )
+    if gap > COARSE_TOLERANCE * size:
+        names = ", ".join(repr(coupled.names[each]) for each in colliders)
+        yield (
+            f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface that "
+            f"ripples: contacts load it where it is nearest to them; name other geoms in contacts=, or call "
+            f"make_collidable(spec, {name!r})"
+        )
 
 
-def _hull_warning(name: str, atlas: Atlas) -> str | None:
-    """Warning of a convex hull that is visibly off the surface."""
-    gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
-    if gap <= GAP_TOLERANCE * size:
-        return None
-    return (
-        f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface "
-        f'that ripples; give it type="sdf" in the MJCF, or call make_collidable(spec, {name!r})'
-    )
-
-
-def _flex_warning(coupled: CoupledModel, geom: int) -> str | None:
+def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
     """Warning of geoms that a flex collider meets badly, or not at all."""
-    model, name = coupled.model, coupled.names[geom]
-    meets, body = coupled.can_collide(geom), int(model.geom_bodyid[geom])
+    model, name, meets = coupled.model, coupled.names[geom], coupled.can_collide(geom)
     thickness = flex_thickness(model, coupled.flex_colliders[geom])
+    boxes, distances = model.geom_type == _GEOM.mjGEOM_BOX, model.geom_type == _GEOM.mjGEOM_SDF
+    apart = np.isin(model.geom_bodyid, _kept_apart(model, int(model.geom_bodyid[geom])))
     reasons = (
-        (
-            model.geom_type == _GEOM.mjGEOM_BOX,
-            "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped meshes",
-        ),
-        (
-            model.geom_type == _GEOM.mjGEOM_SDF,
-            f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out",
-        ),
-        (
-            np.isin(model.geom_bodyid, _kept_apart(model, body)),
-            "MuJoCo finds no contacts of a flex with bodies that are joined to its own or excluded ({})",
-        ),
+        (boxes, "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped meshes"),
+        (distances, f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out"),
+        (apart, "MuJoCo finds no contacts of a flex with bodies that are joined to its own or excluded ({})"),
     )
-    found = [
-        why.format(", ".join(repr(coupled.names[other]) for other in np.flatnonzero(which & meets).tolist()))
-        for which, why in reasons
-        if (which & meets).any()
-    ]
-    if not found:
-        return None
-    return (
-        f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), or '
-        "choose contype and conaffinity so that they do not meet"
-    )
-
-
-def _distance_warning(coupled: CoupledModel, geom: int) -> str | None:
-    """Warning of geoms that an SDF geom does not meet."""
-    model, name = coupled.model, coupled.names[geom]
-    hills = coupled.can_collide(geom) & (model.geom_type == int(_GEOM.mjGEOM_HFIELD))
-    if int(model.geom_type[geom]) != int(_GEOM.mjGEOM_SDF) or not hills.any():
-        return None
-    names = ", ".join(repr(coupled.names[other]) for other in np.flatnonzero(hills).tolist())
-    return (
-        f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): call "
-        f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so that they do not meet'
-    )
+    named = [([repr(coupled.names[i]) for i in np.flatnonzero(which & meets)], why) for which, why in reasons]
+    found = [why.format(", ".join(names)) for names, why in named if names]
+    if found:
+        yield (
+            f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), '
+            "or choose contype and conaffinity so that they do not meet"
+        )
 
 
 def _kept_apart(model: mujoco.MjModel, body: int) -> list[int]:

@@ -19,16 +19,7 @@ from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
 
-from .geoms import (
-    ByGeom,
-    GeomKey,
-    checked_materials,
-    find_any,
-    find_target,
-    for_each,
-    rotation_in_body,
-    target_name,
-)
+from .geoms import ByGeom, GeomKey, by_name, find_any, find_target, for_each, rotation_in_body, target_name
 from .soft import is_soft, target_pose
 from .suited import suited_targets
 from .target_mesh import target_atlas
@@ -121,7 +112,13 @@ class Targets:
         rim: Rim | ByGeom[Rim],
         options: Mapping[str, Any],
     ) -> None:
-        named = checked_materials(model, materials)
+        if not isinstance(materials, Mapping):
+            raise SceneError(f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material")
+        for key, material in materials.items():
+            find_target(model, key)
+            if not isinstance(material, Material):
+                raise SceneError(f"material of geom {key!r} is {material!r}; valid is a Material")
+        named = by_name(model, materials, "materials")
         given = for_each(model, named, "resolution", resolution)
         layouts, rims = for_each(model, named, "layout", layout), for_each(model, named, "rim", rim)
         named, texels = suited_targets(model, named, given)

@@ -11,7 +11,7 @@ they are given the force after which both move alike.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -24,7 +24,9 @@ from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
 from .contacts import ColliderIds, pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
+from .geoms import ENDLESS, TARGET_TYPES
 from .model import CoupledModel
+from .patches import MAX_CORNERS, SAME_PLACE
 
 _GEOM = mujoco.mjtGeom
 
@@ -69,17 +71,6 @@ def _side(along: float) -> float:
 
 
 _ROUNDS = 3  # of the search for the points of surface and geom that are nearest to each other
-_SOLID = tuple(
-    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
-    for name in ("SPHERE", "ELLIPSOID", "CAPSULE", "CYLINDER", "BOX", "MESH", "SDF")
-)
-
-
-def reachable(coupled: CoupledModel, targets: Iterable[int]) -> dict[int, list[int]]:
-    """Geoms that may come within reach of each target, by its geom id; see `within_reach`."""
-    model = coupled.model
-    moving = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _SOLID)
-    return {target: np.flatnonzero(moving & coupled.can_collide(target)).tolist() for target in targets}
 
 
 def within_reach(
@@ -116,16 +107,9 @@ def within_reach(
     if (point - place) @ normal >= height[texel]:
         return None
     where = footprint(atlas, place, float(coupled.footprint_radii[[target, other]].min()))
-    movable = waves.operator.movable.reshape(-1)[where.texels]
-    movable_area = atlas.areas.reshape(-1)[where.texels] * movable
+    movable_area = atlas.areas.reshape(-1)[where.texels] * waves.operator.movable.reshape(-1)[where.texels]
     load = Load(where.texels, where.weights * movable_area)
     return load, data.geom_xpos[target] + rotation @ place, rotation @ normal
-
-
-# A footprint is reused while its points move by less than this share of a texel.
-_SAME_PLACE = 0.3
-# Up to so many contacts of a pair, what is convex presses between them too.
-_MOST_CORNERS = 8
 
 
 class _Place(NamedTuple):
@@ -170,9 +154,14 @@ class TwoWay:
 
     def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
         self._coupled, self._waves = coupled, waves
-        self._colliders, self._reachable = ColliderIds(coupled), reachable(coupled, waves)
+        self._colliders, model = ColliderIds(coupled), coupled.model
+        # geoms that may come within reach of each target, and the targets that each geom collides for
+        self._reachable: dict[int, list[int]] = {}
         self._targets_of: dict[int, list[int]] = {}
+        solid = np.isin(model.geom_type, list(TARGET_TYPES)) & ~np.isin(model.geom_type, ENDLESS)
+        moving = (model.body_weldid[model.geom_bodyid] > 0) & solid
         for target in waves:
+            self._reachable[target] = np.flatnonzero(moving & coupled.can_collide(target)).tolist()
             for geom in coupled.collision_geoms(target):
                 self._targets_of.setdefault(geom, []).append(target)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
@@ -209,12 +198,9 @@ class TwoWay:
         known, self._places = self._places, {}
         for key, touched in contacts.items():
             self._places[key] = self._place(key, touched, known.get(key))
-        reached = list(self._reached(solved))
-        for (target, other), load, _, _ in reached:
-            atlas = self._waves[target].atlas
-            load = load.merged(atlas.areas.size)
-            self._places[target, other] = _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(target, load))
-        asleep = [key for key in known if key not in self._places and self._force_stays(solved, key)]
+        reached = self._reached(solved)
+        asleep = [key for key in known if key not in self._places and key in self._forces]
+        asleep = [key for key in asleep if self._coupled.are_still(solved, key)]
         self._places |= {key: known[key] for key in asleep}
         self._heights = {target: self._waves[target].height for target, _ in self._places}
         pairs = self._surfaces(dt)
@@ -229,7 +215,7 @@ class TwoWay:
             forces |= problem.solve(self._paid)
             self._move(data, self._velocity_change(solved, *old, pending=pending), dt, pending=pending)
             self._work = problem.works()
-        for key, _, point, normal in reached:
+        for key, point, normal in reached:
             forces[key] = self._push(data, solved, pairs[key], point, normal, dt, pending=pending)
         self._forces = forces
         self._velocity_change.note(data)
@@ -255,9 +241,10 @@ class TwoWay:
         found: dict[Key, list[tuple[int, NDArray, NDArray]]] = {}
         if not data.ncon:
             return found
-        rows = pair_rows(self._colliders(data), data.contact.efc_address >= 0, self._is_read)
-        points, normals = points_outside(data, rows, self._coupled.extents)
-        ids = zip(rows.contacts.tolist(), rows.targets.tolist(), rows.others.tolist(), strict=True)
+        bears = data.contact.efc_address >= 0
+        rows = contacts, _, geoms, others = pair_rows(self._colliders(data), bears, self._is_read)
+        points, normals = points_outside(data, *rows, self._coupled.extents)
+        ids = zip(contacts.tolist(), geoms.tolist(), others.tolist(), strict=True)
         for (i, geom, other), at, normal in zip(ids, points, normals, strict=True):
             choices = []
             for target in self._targets_of[geom]:
@@ -271,21 +258,25 @@ class TwoWay:
             found.setdefault((target, other), []).append((i, point, outward))
         return found
 
-    def _reached(self, data: mujoco.MjData) -> Iterator[tuple[Key, Load, NDArray[np.float64], NDArray[np.float64]]]:
-        """Pairs within reach that do not touch, and what `within_reach` says of them."""
+    def _reached(self, data: mujoco.MjData) -> list[tuple[Key, NDArray[np.float64], NDArray[np.float64]]]:
+        """Pairs within reach that do not touch, and where; see `within_reach`. They get a place."""
+        reached = []
         for target, others in self._reachable.items():
-            height = self._waves[target].height.reshape(-1)
+            waves, height = self._waves[target], self._waves[target].height.reshape(-1)
             highest = float(height.max())
-            for other in others if highest > 0 else ():
-                if (target, other) not in self._places:
-                    found = within_reach(self._coupled, data, (target, other), self._waves[target], height, highest)
-                    if found is not None:
-                        yield (target, other), *found
+            for key in ((target, other) for other in others if highest > 0):
+                found = None if key in self._places else within_reach(self._coupled, data, key, waves, height, highest)
+                if found is not None:
+                    load = found[0].merged(len(height))
+                    moving = self._moving(target, load)
+                    self._places[key] = _Place(waves.atlas, np.zeros((0, 3)), 0.0, load, moving)
+                    reached.append((key, *found[1:]))
+        return reached
 
     def _place(self, key: Key, touched: Sequence[tuple[int, NDArray, NDArray]], known: _Place | None) -> _Place:
         (target, other), atlas = key, self._waves[key[0]].atlas
         points = np.array([point for _, point, _ in touched])
-        if self._coupled.convex[other] and 1 < len(points) <= _MOST_CORNERS:
+        if self._coupled.convex[other] and 1 < len(points) <= MAX_CORNERS:
             one, two = np.triu_indices(len(points), 1)
             points = np.concatenate([points, (points[one] + points[two]) / 2])
         if (
@@ -303,15 +294,10 @@ class TwoWay:
         inside = not atlas.mesh.closed and touched[0][2] @ atlas.normals.reshape(-1, 3)[texels[0]] < 0
         load = Load.together(loads).merged(areas.size)
         load = Load(load.texels, -load.forces) if inside else load
-        return _Place(atlas, points, _SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
+        return _Place(atlas, points, SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
 
     def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
-
-    def _force_stays(self, data: mujoco.MjData, key: Key) -> bool:
-        """Whether both of a pair sleep or are static, so that they press as before."""
-        bodies = self._coupled.bodies[list(key)]
-        return key in self._forces and bool((bodies >= 0).all() and (data.body_awake[bodies] <= 0).all())
 
     # How the surfaces move
 
