@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Bools, Floats, Ints, kernel
-from ..mesh.vectors import dot, row, subtract
 from .texel_mesh import TexelMesh
 
 # Rows and columns in a halo table of the eight neighbours of a texel, in order round it
@@ -78,13 +77,15 @@ def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -
         q = around[(k + _TURNS[turn]) % 8]
         if q < 0 or distance[q] == np.inf:
             continue
-        pq, ps = subtract(row(positions, q), row(positions, t)), subtract(row(positions, s), row(positions, t))
-        length2 = dot(pq, pq)
-        if length2 == 0:
-            continue
+        length2 = ps2 = along = 0.0
+        for i in range(3):
+            pq, ps = positions[q, i] - positions[t, i], positions[s, i] - positions[t, i]
+            length2, ps2, along = length2 + pq * pq, ps2 + ps * ps, along + ps * pq
         length = np.sqrt(length2)
-        along = dot(ps, pq) / length
-        above = np.sqrt(max(dot(ps, ps) - along * along, 0.0))
+        if length == 0:
+            continue
+        along /= length
+        above = np.sqrt(max(ps2 - along * along, 0.0))
         source_along = (dp * dp - distance[q] * distance[q] + length2) / (2 * length)
         below2 = dp * dp - source_along * source_along
         if below2 < 0:
@@ -159,5 +160,5 @@ def clean(scratch: Scratch, count: int) -> None:
 @kernel(no_cpython_wrapper=True)
 def distance_to(positions: Floats, t: int, point: Floats) -> float:
     """Straight distance of texel t from a point [m]."""
-    way = subtract(row(positions, t), point)
-    return np.sqrt(dot(way, way))
+    x, y, z = positions[t, 0] - point[0], positions[t, 1] - point[1], positions[t, 2] - point[2]
+    return np.sqrt(x * x + y * y + z * z)
