@@ -23,6 +23,7 @@ import trimesh
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.scene import read_toml, shipped_scenes
+from ripple_sim.scene.scene_file import converted
 from ripple_sim.solver.errors import shown
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.settings import check_options
@@ -329,10 +330,7 @@ def read_plan(path: str | Path) -> Plan:
     for key in table:
         if key not in valid:
             raise SceneError(f"plan {str(path)!r}: unknown key {key!r}; valid are {', '.join(valid)}")
-    try:
-        content = msgspec.convert(table, PlanFile)
-    except msgspec.ValidationError as error:
-        raise SceneError(f"plan {str(path)!r}: {str(error).replace('`$.', '`')}") from error
+    content = converted(table, PlanFile, f"plan {str(path)!r}")
     plan = Plan(
         count=content.count,
         seed=content.seed,
@@ -399,8 +397,5 @@ def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Di
         if isinstance(value, dict) and not set(value) & {*KINDS, "apply"}:
             yield from _distributions(value, key)
             continue
-        try:
-            given = msgspec.convert(value if isinstance(value, dict) else {"constant": value}, Distribution)
-        except msgspec.ValidationError as error:
-            raise SceneError(f"plan: {key}: {str(error).replace('`$.', '`')}") from error
-        yield key, given
+        table_of_value = value if isinstance(value, dict) else {"constant": value}
+        yield key, converted(table_of_value, Distribution, f"plan: {key}")

@@ -30,6 +30,8 @@ from .target_maps import HeightEntry, InsideEntry, moved
 
 MAX_EXPOSURES = 1024
 
+Entry = typing.TypeVar("Entry")
+
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[camera]`: where the video is seen from."""
@@ -218,10 +220,15 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
     """Check a scene's table against the schema; raises `SceneError` naming the place, the value and what is valid."""
     _check_keys(table, SceneFile, "", origin)
     _check_values(table, "", origin)
+    return converted(table, SceneFile, f"scene file {origin!r}")
+
+
+def converted(table: Any, schema: type[Entry], what: str) -> Entry:
+    """A table read by a schema; raises `SceneError` with what it is, the key and the value if they do not fit."""
     try:
-        return msgspec.convert(table, SceneFile)
+        return msgspec.convert(table, schema)
     except msgspec.ValidationError as error:
-        raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
+        raise SceneError(f"{what}: {str(error).replace('`$.', '`')}") from error
 
 
 # Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not overflow.

@@ -34,7 +34,6 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{name: (getattr(np, name), 2) for name in ("hypot", "minimum", "maximum")},
     "where": (np.where, 3),
 }
-_CONSTANTS = {"pi": np.pi}
 _OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -64,7 +63,7 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
             raise SceneError(f"it has {len(text)} characters, valid are {_LONGEST} at most")
         tree = ast.parse(text.strip(), mode="eval")
         with np.errstate(all="ignore"):
-            value = _value(tree.body, {**_CONSTANTS, **variables})
+            value = _value(tree.body, {"pi": np.pi, **variables})
         result = np.zeros_like(next(iter(variables.values()))) + np.asarray(value, dtype=np.float64)
     except SceneError as wrong:
         raise SceneError(f"the expression {shown(text)} cannot be used: {wrong}") from None
