@@ -122,7 +122,7 @@ class LocalExecutor(Executor):
     def __init__(self, workers: int) -> None:
         self.places = workers
         self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
-        self._starts = [functools.partial(_pool, cores) for cores in shares(available_cores(), workers)]
+        self._cores = shares(available_cores(), workers)
         self._pools: dict[int, ProcessPoolExecutor] = {}
         self._processes: dict[int, Future[int]] = {}
         for place in range(workers):
@@ -150,20 +150,15 @@ class LocalExecutor(Executor):
 
     def _pool(self, place: int) -> ProcessPoolExecutor:
         if place not in self._pools:
-            self._pools[place] = pool = self._starts[place]()
-            self._processes[place] = pool.submit(os.getpid)
+            spawn = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
+            pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin, initargs=(self._cores[place],))
+            self._pools[place], self._processes[place] = pool, pool.submit(os.getpid)
         return self._pools[place]
 
     def _release(self, place: int, future: Future) -> None:
         if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
             self._pools.pop(place).shutdown(wait=False)
         self._free.put(place)
-
-
-def _pool(cores: list[int]) -> ProcessPoolExecutor:
-    """A process that keeps to some cores."""
-    context = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
-    return ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(cores,))
 
 
 def _begin(cores: list[int]) -> None:
