@@ -16,11 +16,10 @@ from ripple_sim.coupling.stepping import divergence, physics_errors
 from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.scene_file import SensorEntry, apply_maps, uniform_material
+from ripple_sim.scene.scene_file import apply_maps, uniform_material
 from ripple_sim.scene.target_maps import rim_of
 from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
 from ripple_sim.solver.kernel import work_clock
-from ripple_sim.solver.waves.sensor import Sensor
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
@@ -107,19 +106,19 @@ class Simulation:
         self._raise_surfaces()
         self._materials = {name: self.ripples[name].material for name in self.ripples}
         self._script = Script(self.model, scene.events, list(self.ripples))
-        self.sensors = {entry.name: _sensor(self.ripples, entry) for entry in scene.sensors}
+        self.sensors = {}
+        for sensor in scene.sensors:
+            points = [sensor.point] if sensor.point is not None else sensor.points
+            at = sensor.site if sensor.site is not None else self.ripples.to_geom(sensor.geom, points)
+            waves = self.ripples[sensor.geom]
+            self.sensors[sensor.name] = waves.sensor(at, sensor.kind, sensor.rate, thickness=sensor.thickness)
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
         self._steps = 0  # of the next frame, already taken
 
     @classmethod
     def of(
-        cls,
-        scene: Scene,
-        options: Any,
-        *,
-        operator: str = "fem",
-        on_step: Callable[[Simulation], None] | None = None,
+        cls, scene: Scene, options: Any, *, operator: str = "fem", on_step: Callable[[Simulation], None] | None = None
     ) -> Self:
         """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
         chosen = {name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")}
@@ -205,12 +204,6 @@ class Simulation:
             mujoco.mj_resetData(self.model, self.data)
         with physics_errors():
             mujoco.mj_forward(self.model, self.data)
-
-
-def _sensor(ripples: Ripples, entry: SensorEntry) -> Sensor:
-    points = [entry.point] if entry.point is not None else entry.points
-    at = entry.site if entry.site is not None else ripples.to_geom(entry.geom, points)
-    return ripples[entry.geom].sensor(at, entry.kind, entry.rate, thickness=entry.thickness)
 
 
 def _steps_per_frame(fps: float, timestep: float) -> int:

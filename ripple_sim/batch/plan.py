@@ -80,21 +80,18 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
         if self.integers is not None:
             whole = rng.integers(self.integers[0], self.integers[1], size=self.length, endpoint=True)
             return whole.tolist() if self.length else int(whole)
-        return _plain(self._number(rng))
-
-    def _number(self, rng: np.random.Generator) -> Any:
         if self.uniform is not None:
-            return rng.uniform(*self.uniform, size=self.length)
+            return _plain(rng.uniform(*self.uniform, size=self.length))
         if self.log_uniform is not None:
-            low, high = np.log(np.array(self.log_uniform[0])), np.log(np.array(self.log_uniform[1]))
-            return np.exp(rng.uniform(low, high, size=self.length))
+            low, high = (np.log(np.array(end)) for end in self.log_uniform)
+            return _plain(np.exp(rng.uniform(low, high, size=self.length)))
         mean, deviation = self.normal or (0.0, 0.0)
         least, greatest = self.limits or (-math.inf, math.inf)
         number = rng.normal(mean, deviation, size=self.length)
         for _ in range(_MOST_DRAWS):
             outside = (number < least) | (number > greatest)
             if not np.any(outside):
-                return number
+                return _plain(number)
             number = np.where(outside, rng.normal(mean, deviation, size=self.length), number)
         raise SceneError(f"normal {self.normal} hardly ever lies within the limits {self.limits}; widen them")
 
@@ -106,8 +103,8 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
                 f"plan: {key} is drawn from {' and '.join(given) or 'nothing'}; valid is one of {', '.join(KINDS)}"
             )
         kind = given[0]
-        for other, extra in (("weights", self.weights), ("limits", self.limits)):
-            if extra is not None and kind != {"weights": "choice", "limits": "normal"}[other]:
+        for other, extra, fitting in (("weights", self.weights, "choice"), ("limits", self.limits, "normal")):
+            if extra is not None and kind != fitting:
                 raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
         if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
             raise SceneError(f"plan: {key} has length {self.length}; valid is 1 or more, of numbers")

@@ -48,7 +48,6 @@ from .arguments import (
 
 if TYPE_CHECKING:
     from ripple_sim.scene.scene import Scene
-    from ripple_sim.video.render_video import Summary
     from ripple_sim.viewer.window import Window
 
 
@@ -221,7 +220,16 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         title = f"renderer {shared_context().renderer}, waves {options.backend}"
         with frame_progress(title, frame_count(options)) as progress:
             summary = render_video(scene, self.output, options, progress=progress)
-        print(_summary_text(summary))
+        resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
+        compiling = f"compiling (once) {summary.compile_seconds:.1f} s, " if summary.compile_seconds >= 0.05 else ""
+        print(
+            f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
+            f"renderer  {summary.renderer}\n"
+            f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
+            f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+            f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
+            f"encoding {summary.encode_seconds:.1f} s"
+        )
 
     def _run_cycles(self) -> None:
         from ripple_sim.cycles.render import check_cycles, render_cycles
@@ -303,19 +311,6 @@ class DropCommand(_VideoCommand):
         return scene
 
 
-def _summary_text(summary: Summary) -> str:
-    resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
-    compiling = f"compiling (once) {summary.compile_seconds:.1f} s, " if summary.compile_seconds >= 0.05 else ""
-    return (
-        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
-        f"renderer  {summary.renderer}\n"
-        f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
-        f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
-        f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
-        f"encoding {summary.encode_seconds:.1f} s"
-    )
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ViewCommand:
     """Open a scene or a mesh in an interactive window.
@@ -357,7 +352,7 @@ class ViewCommand:
         from ripple_sim.encode.output import check_size
         from ripple_sim.scene.drop import is_scene
         from ripple_sim.viewer.opening import display_problem
-        from ripple_sim.viewer.window import check_display
+        from ripple_sim.viewer.window import benchmark, check_display, run
 
         # refuse what cannot work before anything that takes time: first what is asked for, then what this machine lacks
         is_scene(self.scene)
@@ -365,8 +360,6 @@ class ViewCommand:
         if not self.folder.is_dir():
             raise VideoError(f"there is no folder {str(self.folder)!r} for screenshots and videos; make it first")
         if self.benchmark:
-            from ripple_sim.viewer.window import benchmark
-
             print(benchmark(self._window(off_screen=display_problem() is not None)))
         elif self.web:
             from ripple_sim.viewer.web import check_web, serve
@@ -374,20 +367,16 @@ class ViewCommand:
             check_web(self.port, self.host)
             serve(self._window(off_screen=True), self.port, self.host)
         else:
-            from ripple_sim.viewer.window import run
-
             check_display()
             run(self._window(off_screen=False))
 
     def _window(self, off_screen: bool) -> Window:
         from ripple_sim.viewer.opening import open_scene
         from ripple_sim.viewer.session import Session
+        from ripple_sim.viewer.window import Window
 
         scene = open_scene(
             self.scene, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair, wrap=self.wrap
         )
         session = Session(scene, resolution=self.resolution)
-
-        from ripple_sim.viewer.window import Window
-
         return Window(session, size=self.size, off_screen=off_screen, folder=self.folder)

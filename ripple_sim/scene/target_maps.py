@@ -201,9 +201,6 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
     return conditions
 
 
-Array = NDArray[np.float64]
-
-
 class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[[ripple.inside]]`: a body under the layer; the way to it from each texel inwards is the layer's thickness.
 
@@ -244,7 +241,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
         return load_inside(self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale)
 
 
-def moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], Array]) -> Mesh | Volume:
+def moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], NDArray[np.float64]]) -> Mesh | Volume:
     """A body where a function that moves points [..., 3] [m] puts it."""
     if isinstance(body, Mesh):
         return dataclasses.replace(body, V=to_atlas(body.V))

@@ -190,9 +190,7 @@ class Shadows:
             actor.SetVisibility(dark > 0 and above > -half and geom not in parked)
             actor.prop.opacity = dark
             wide = _WIDER * radius * (1 + 0.1 * max(0.0, above) / radius)
-            pose = np.diag([wide, wide, 1.0, 1.0])
-            pose[:3, 3] = x, y, ground + _ABOVE * radius
-            actor.user_matrix = pose
+            _place(actor, np.array([x, y, ground + _ABOVE * radius]), np.diag([wide, wide, 1.0]))
 
 
 # Bodies farther away than this many distances of the first camera wait for their turn, and are hidden.
@@ -211,8 +209,7 @@ class Stage:
     """
 
     def __init__(self, plotter: pv.Plotter, session: Session) -> None:
-        self._plotter, self._session = plotter, session
-        self._heatmap = False
+        self._session, self._heatmap = session, False
         # shadows lie side by side on the floor: plain blending will do, without buffers of the window's size
         plotter.renderer.SetUseOIT(False)
         plotter.set_background(BACKGROUND)
@@ -237,7 +234,13 @@ class Stage:
         self.shadows: Shadows | None = None
         if floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL:
             self.shadows = Shadows(plotter, session, casting, floor)
-        self._add_bar()
+        first = next(iter(self.skins.values()))
+        self._bar = plotter.add_scalar_bar(
+            HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
+            n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
+        )  # fmt: skip
+        self._bar.SetVerticalTitleSeparation(10)
+        self._bar.SetVisibility(self._heatmap)
         camera = plotter.camera
         camera.position, camera.focal_point, camera.up = pose.position, pose.focus, (0.0, 0.0, 1.0)
         camera.view_angle = pose.fovy
@@ -258,12 +261,3 @@ class Stage:
         self._heatmap = not self._heatmap
         self._bar.SetVisibility(self._heatmap)
         self.update()
-
-    def _add_bar(self) -> None:
-        first = next(iter(self.skins.values()))
-        self._bar = self._plotter.add_scalar_bar(
-            HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
-            n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
-        )  # fmt: skip
-        self._bar.SetVerticalTitleSeparation(10)
-        self._bar.SetVisibility(self._heatmap)

@@ -110,14 +110,11 @@ def _is_own(netloc: str, host: str) -> bool:
     A number is no name that another site's name server could give; where this machine alone is served it must be one
     of the machine's own.
     """
+    local = is_local(host)
     try:
         name = urlsplit(f"//{netloc}").hostname or ""
-    except ValueError:
-        return False
-    local = is_local(host)
-    if name == "localhost" or (not local and name in (host.lower(), socket.gethostname().lower())):
-        return True
-    try:
+        if name == "localhost" or (not local and name in (host.lower(), socket.gethostname().lower())):
+            return True
         number = ipaddress.ip_address(name)
     except ValueError:
         return False
