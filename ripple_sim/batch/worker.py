@@ -215,8 +215,9 @@ def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str
         "values": values,
         **record.finish(),
     }
-    facts["files"] = {path.relative_to(folder).as_posix(): _digest(path) for path in _files(folder)}
-    facts["bytes"] = sum(path.stat().st_size for path in _files(folder))
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    facts["files"] = {path.relative_to(folder).as_posix(): _digest(path) for path in files}
+    facts["bytes"] = sum(path.stat().st_size for path in files)
     facts["hash"] = facts_hash(facts)
     _write_json(folder / FACTS, facts)
     write_thumbnail(FinishedScene(number, folder), record.frame, batch.thumbnail(number))
@@ -238,10 +239,6 @@ def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> FrameRecord:
             simulation.advance_frame()
         record(simulation)
     return record
-
-
-def _files(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if path.is_file() and path.name not in (FACTS, TIMES))
 
 
 def _digest(path: Path) -> str:

@@ -96,10 +96,9 @@ class RippleViewer:
     """
 
     def __init__(self, handle: Any, data: mujoco.MjData, ripples: Ripples, threads: set[threading.Thread]) -> None:
-        self._threads = threads
-        self._handle, self._data, self._ripples, self._time = handle, data, ripples, data.time
-        share = _TRIANGLES // len(ripples)
-        self._skins = {name: _Skin(ripples[name], share) for name in ripples}
+        self._handle, self._threads = handle, threads
+        self._data, self._ripples, self._time = data, ripples, data.time
+        self._skins = {name: _Skin(ripples[name], _TRIANGLES // len(ripples)) for name in ripples}
         self.sync()
 
     def __getattr__(self, name: str) -> Any:
