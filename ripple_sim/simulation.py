@@ -76,7 +76,15 @@ class Simulation:
         self.scene = scene
         self._on_step = on_step
         self.model = copy.copy(scene.model)
-        self.steps_per_frame = _steps_per_frame(fps, self.model.opt.timestep)
+        # the smallest number of equal steps that are no longer than the model's
+        timestep = self.model.opt.timestep
+        steps = 1 / (fps * timestep)
+        if not steps < _MOST_STEPS_PER_FRAME:
+            raise SceneError(
+                f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are at most "
+                f"{_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
+            )
+        self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
         self.model.opt.timestep = 1 / (fps * self.steps_per_frame)
         self.data = mujoco.MjData(self.model)
         self._reset_bodies()
@@ -204,14 +212,3 @@ class Simulation:
             mujoco.mj_resetData(self.model, self.data)
         with physics_errors():
             mujoco.mj_forward(self.model, self.data)
-
-
-def _steps_per_frame(fps: float, timestep: float) -> int:
-    """Smallest number of equal physics steps per frame that are no longer than the model's [s]."""
-    steps = 1 / (fps * timestep)
-    if not steps < _MOST_STEPS_PER_FRAME:
-        raise SceneError(
-            f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are at most "
-            f"{_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
-        )
-    return max(1, math.ceil(steps - 1e-9))

@@ -84,14 +84,8 @@ def drop_model(
         name="target", uservert=enough.ravel(), userface=F.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     )
     spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_SDF, meshname="target")
-    spec.worldbody.add_geom(
-        name="floor",
-        type=_GEOM.mjGEOM_PLANE,
-        size=[12, 12, 0.1],
-        rgba=[0.86, 0.87, 0.88, 1],
-        condim=6,
-        friction=[0.8, 0.01, 0.02],
-    )
+    floor = spec.worldbody.add_geom(name="floor", type=_GEOM.mjGEOM_PLANE, size=[12, 12, 0.1], condim=6)
+    floor.rgba, floor.friction = [0.86, 0.87, 0.88, 1], [0.8, 0.01, 0.02]
     landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
     interval = 3.4 / max(len(shapes), 1)
     drops: list[DropEntry] = []

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.coupling.geoms import find_target, to_body
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, texture_map
+from ripple_sim.solver import Mesh, Volume, load_mesh, load_volume, texture_map
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.volume import is_volume
 from ripple_sim.solver.operator.plate_rim import RIMS, Rim
@@ -147,20 +147,17 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
             return evaluate(self.expression, dict(zip("xyz", np.moveaxis(places, -1, 0), strict=True)))
         if self.map is not None:
             return texture_map(atlas, self.map, self.low, self.high, self.channel)
-        return _saved(self.field or "", atlas)
-
-
-def _saved(path: str, atlas: Atlas) -> NDArray[np.float64]:
-    try:
-        field = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
-    shape = atlas.areas.shape
-    if not isinstance(field, np.ndarray) or field.shape != shape or field.dtype.kind not in "iuf":
-        raise SceneError(f"saved field {path!r} holds {getattr(field, 'shape', 'no array')}; valid are numbers {shape}")
-    if not np.isfinite(field).all():
-        raise SceneError(f"saved field {path!r} has heights that are not finite")
-    return field.astype(np.float64)
+        path, shape = self.field or "", atlas.areas.shape
+        try:
+            field = np.load(path, allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
+        if not isinstance(field, np.ndarray) or field.shape != shape or field.dtype.kind not in "iuf":
+            held = getattr(field, "shape", "no array")
+            raise SceneError(f"saved field {path!r} holds {held}; valid are numbers {shape}")
+        if not np.isfinite(field).all():
+            raise SceneError(f"saved field {path!r} has heights that are not finite")
+        return field.astype(np.float64)
 
 
 def check_rim(rim: str | dict[str, str]) -> None:

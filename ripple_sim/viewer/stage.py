@@ -50,7 +50,6 @@ def add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, r
 HEIGHT = "height [mm]"
 _PER_METRE = 1000.0
 
-_COLORMAP = "coolwarm"
 _STEPS = (1.0, 2.0, 5.0)  # times a power of ten end the colours, so that these do not change with every frame
 _SEGMENTS = 8  # of a geom, per right angle
 
@@ -104,16 +103,9 @@ class SkinActor:
         mesh.point_data.set_array(_PER_METRE * shape.height, HEIGHT)
         mesh.set_active_scalars(HEIGHT)
         self.actor = plotter.add_mesh(
-            mesh,
-            scalars=HEIGHT,
-            cmap=_COLORMAP,
-            clim=(-1.0, 1.0),
-            color=color.tolist(),
-            show_scalar_bar=False,
-            copy_mesh=False,
-            interpolation="Phong",
-            **_SHADING,
-        )
+            mesh, scalars=HEIGHT, cmap="coolwarm", clim=(-1.0, 1.0), color=color.tolist(), show_scalar_bar=False,
+            copy_mesh=False, interpolation="Phong", **_SHADING,
+        )  # fmt: skip
         self.actor.prop.specular_color = "white"
 
     def update(self, shape: Displaced, pose: tuple[NDArray, NDArray], limit: float | None) -> None:

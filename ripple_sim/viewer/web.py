@@ -29,8 +29,6 @@ from ripple_sim.errors import DisplayError
 from .controls import CONTROLS
 from .window import Window
 
-LOOPBACK = "127.0.0.1"
-
 # Of a message from the browser [bytes]: it sends keys and movements of the pointer.
 LARGEST_MESSAGE = 64 * 1024
 
@@ -75,7 +73,7 @@ def restrict(server: Any, *, host: str, port: int, secret: str) -> None:
     server : trame_server.Server
         Not started yet.
     host : str
-        Name or address to listen at; `LOOPBACK` is reached from this machine alone.
+        Name or address to listen at; 127.0.0.1 is reached from this machine alone.
     port : int
     secret : str
         From `new_secret`.
