@@ -102,10 +102,9 @@ class Simulation:
             pulse={entry.geom: entry.pulse for entry in scene.targets},
             modulus={entry.geom: entry.modulus for entry in scene.targets},
         )
-        for entry in scene.targets:
-            apply_maps(self.ripples, entry)
         self.limited = {}
         for entry in scene.targets:
+            apply_maps(self.ripples, entry)
             self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
             if not (entry.limit and entry.warn):
                 self.ripples.allow_any_height(entry.geom)

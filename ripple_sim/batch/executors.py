@@ -55,7 +55,7 @@ class DaskExecutor(Executor):
             ) from error
         self._address = address
         self._log = logging.getLogger("distributed.client")
-        self._log.addFilter(_nothing)  # that the scheduler is gone is said once, by `refusal`
+        self._log.disabled = True  # that the scheduler is gone is said once, by `refusal`
         self._places, self._counted = 0, -math.inf
         self._executor = self._client.get_executor(pure=False, retries=0)
 
@@ -73,7 +73,7 @@ class DaskExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the cluster; without `wait` what is not yet done is given up."""
-        self._log.removeFilter(_nothing)
+        self._log.disabled = False
         self._executor.shutdown(wait=wait)
         self._client.close()
 
@@ -85,10 +85,6 @@ class DaskExecutor(Executor):
             f"the Dask scheduler at {self._address} is gone; finished scenes are kept: start it, and run the same "
             "command again to go on"
         )
-
-
-def _nothing(_: logging.LogRecord) -> bool:
-    return False
 
 
 def available_cores() -> list[int]:

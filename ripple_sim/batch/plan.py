@@ -145,8 +145,7 @@ def _plain(value: Any) -> Any:
     return float(f"{value:.12g}")
 
 
-_STEP = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?(?:\.|$)")
-
+_STEP = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
 
 # A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern with *; "" without.
 Step = tuple[str, str]
@@ -154,19 +153,12 @@ Step = tuple[str, str]
 
 def parse_key(key: str) -> tuple[Step, ...]:
     """Read a key of a plan; raises `SceneError` if it is not names between dots."""
-    steps, place = [], 0
-    while place < len(key):
-        found = _STEP.match(key, place)
-        if found is None:
-            break
-        steps.append((found[1], found[2] or ""))
-        place = found.end()
-    if not steps or place < len(key) or key.endswith("."):
+    if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", key):
         raise SceneError(
             f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or a pattern in "
             "brackets, such as camera.azimuth, ripple[duck].material.speed or geom[ball*].size"
         )
-    return tuple(steps)
+    return tuple(re.findall(_STEP, key))
 
 
 def choose(names: Sequence[str], step: Step, where: str) -> list[int]:

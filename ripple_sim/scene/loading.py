@@ -260,8 +260,7 @@ def load_scene(
     moved: list[DropEntry | ThrowEntry] = [*content.drop, *content.throw]
     for each in moved:
         if each.position is not None and each.body in shifts:
-            x, y, z = np.add(each.position, shifts[each.body]).tolist()
-            each.position = x, y, z
+            each.position = tuple(np.add(each.position, shifts[each.body]).tolist())
     return scene_of(path.stem, model, content)
 
 

@@ -222,10 +222,9 @@ class Stage:
         self._bodies = BodyActors(plotter, session, pose.focus, _REACH * pose.distance)
         floor = find_floor(simulation.model, simulation.ripples.geom_ids.values())
         rigid = [geom for geom in simulation.ripples.geom_ids.values() if not is_soft(simulation.model, geom)]
-        casting = [*rigid, *self._bodies.solid]
         self.shadows: Shadows | None = None
         if floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL:
-            self.shadows = Shadows(plotter, session, casting, floor)
+            self.shadows = Shadows(plotter, session, [*rigid, *self._bodies.solid], floor)
         first = next(iter(self.skins.values()))
         self._bar = plotter.add_scalar_bar(
             HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
