@@ -108,7 +108,7 @@ def drop_scene(
     rim = sum(float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum()) for rim in mesh.rims)
     slender = extent.area / (np.pi * max(rim, 2 * extent.size) * extent.size)
     scale = float(np.clip(slender / _SLENDER, _SMALLEST, 1.0))
-    # waves slow and high enough to watch under bodies of that scale
+    # waves slow and high enough to watch under typical bodies of that scale, crest behind crest
     mass, speed = TYPICAL_HIT
     hit, radius = (mass * scale**3, speed), TYPICAL_FOOTPRINT * scale
     amplitude = min(_THICK * extent.radius / extent.size, _SLIM * slender, _DEEPEST if mesh.closed else _DEEPEST_OPEN)
