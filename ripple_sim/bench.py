@@ -345,12 +345,9 @@ def as_text(report: Mapping[str, Any]) -> str:
         for n, row in report["cpu"].items()
     ]
     meshes = [
-        (
-            name,
-            *(f"{row[k]:,}" for k in ("triangles", "texels")),
-            f"{row['atlas [s]']:.2f}",
-            f"{1e3 * row['substep [s]']:.3f}",
-        )
+        [name]
+        + [f"{row[key]:,}" for key in ("triangles", "texels")]
+        + [f"{row['atlas [s]']:.2f}", f"{1e3 * row['substep [s]']:.3f}"]
         for name, row in report["meshes"].items()
     ]
     coupling = [

@@ -57,7 +57,7 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[s
             "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software: "
             f"{_install_nvidia()}"
         )
-    if found or _render_nodes(devices) or any(devices.glob("nvidia[0-9]*")):
+    if found or any(devices.glob("dri/renderD*")) or any(devices.glob("nvidia[0-9]*")):
         return found
     return [
         f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*): "
@@ -99,7 +99,7 @@ def _vendor_problems() -> Iterator[str]:
 
 
 def _device_problems(devices: Path) -> Iterator[str]:
-    for node in _render_nodes(devices):
+    for node in sorted(devices.glob("dri/renderD*")):
         if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
             number = node.stat().st_gid
             try:
@@ -136,23 +136,9 @@ def _library_of(file: Path) -> str | None:
         return None
 
 
-def _render_nodes(devices: Path) -> list[Path]:
-    return sorted((devices / "dri").glob("renderD*"))
-
-
 PACKAGES = (
-    "ripple-sim",
-    "mujoco",
-    "numpy",
-    "scipy",
-    "numba",
-    "libigl",
-    "trimesh",
-    "embreex",
-    "moderngl",
-    "av",
-    "pyvista",
-)
+    "ripple-sim", "mujoco", "numpy", "scipy", "numba", "libigl", "trimesh", "embreex", "moderngl", "av", "pyvista",
+)  # fmt: skip
 
 
 def collect() -> dict[str, Any]:

@@ -16,11 +16,10 @@ from ripple_sim.coupling.stepping import divergence, physics_errors
 from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.scene_file import SensorEntry, apply_maps, uniform_material
+from ripple_sim.scene.scene_file import apply_maps, uniform_material
 from ripple_sim.scene.target_maps import rim_of
 from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
 from ripple_sim.solver.kernel import work_clock
-from ripple_sim.solver.waves.sensor import Sensor
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
@@ -77,7 +76,15 @@ class Simulation:
         self.scene = scene
         self._on_step = on_step
         self.model = copy.copy(scene.model)
-        self.steps_per_frame = _steps_per_frame(fps, self.model.opt.timestep)
+        # the smallest number of equal steps that are no longer than the model's
+        timestep = self.model.opt.timestep
+        steps = 1 / (fps * timestep)
+        if not steps < _MOST_STEPS_PER_FRAME:
+            raise SceneError(
+                f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are at most "
+                f"{_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
+            )
+        self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
         self.model.opt.timestep = 1 / (fps * self.steps_per_frame)
         self.data = mujoco.MjData(self.model)
         self._reset_bodies()
@@ -95,10 +102,9 @@ class Simulation:
             pulse={entry.geom: entry.pulse for entry in scene.targets},
             modulus={entry.geom: entry.modulus for entry in scene.targets},
         )
-        for entry in scene.targets:
-            apply_maps(self.ripples, entry)
         self.limited = {}
         for entry in scene.targets:
+            apply_maps(self.ripples, entry)
             self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
             if not (entry.limit and entry.warn):
                 self.ripples.allow_any_height(entry.geom)
@@ -107,19 +113,19 @@ class Simulation:
         self._raise_surfaces()
         self._materials = {name: self.ripples[name].material for name in self.ripples}
         self._script = Script(self.model, scene.events, list(self.ripples))
-        self.sensors = {entry.name: _sensor(self.ripples, entry) for entry in scene.sensors}
+        self.sensors = {}
+        for sensor in scene.sensors:
+            points = [sensor.point] if sensor.point is not None else sensor.points
+            at = sensor.site if sensor.site is not None else self.ripples.to_geom(sensor.geom, points)
+            waves = self.ripples[sensor.geom]
+            self.sensors[sensor.name] = waves.sensor(at, sensor.kind, sensor.rate, thickness=sensor.thickness)
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
         self._steps = 0  # of the next frame, already taken
 
     @classmethod
     def of(
-        cls,
-        scene: Scene,
-        options: Any,
-        *,
-        operator: str = "fem",
-        on_step: Callable[[Simulation], None] | None = None,
+        cls, scene: Scene, options: Any, *, operator: str = "fem", on_step: Callable[[Simulation], None] | None = None
     ) -> Self:
         """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
         chosen = {name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")}
@@ -205,20 +211,3 @@ class Simulation:
             mujoco.mj_resetData(self.model, self.data)
         with physics_errors():
             mujoco.mj_forward(self.model, self.data)
-
-
-def _sensor(ripples: Ripples, entry: SensorEntry) -> Sensor:
-    points = [entry.point] if entry.point is not None else entry.points
-    at = entry.site if entry.site is not None else ripples.to_geom(entry.geom, points)
-    return ripples[entry.geom].sensor(at, entry.kind, entry.rate, thickness=entry.thickness)
-
-
-def _steps_per_frame(fps: float, timestep: float) -> int:
-    """Smallest number of equal physics steps per frame that are no longer than the model's [s]."""
-    steps = 1 / (fps * timestep)
-    if not steps < _MOST_STEPS_PER_FRAME:
-        raise SceneError(
-            f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are at most "
-            f"{_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
-        )
-    return max(1, math.ceil(steps - 1e-9))

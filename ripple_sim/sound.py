@@ -60,7 +60,19 @@ class Microphone:
         self.rate, self._ripples = RATE * slow_motion, ripples
         self._ears = {name: Ear(ripples[name], ripples.model.opt.timestep) for name in ripples}
         for name in ripples:
-            _warn_if_unheard(name, ripples[name], slow_motion)
+            # long waves may be too slow to be heard
+            material, atlas = ripples[name].material, ripples[name].atlas
+            size = float(np.ptp(atlas.positions.reshape(-1, 3), axis=0).max())
+            texels = range(0, atlas.areas.size, 97)
+            highest = max(hertz(material, texel, size / _PARTS) for texel in texels) / slow_motion
+            if highest < _HEARD:
+                ringing = 200 * size / 0.77 * slow_motion
+                warnings.warn(
+                    f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound at {highest:.2g} Hz at "
+                    f"most, below hearing ({_HEARD:g} Hz); a speed of {ringing:.2g} m/s would ring at 200 Hz",
+                    RippleWarning,
+                    stacklevel=2,
+                )
 
     def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:
         """Stand at a point in the world from now on [m], [3]; call it again when it or a target has moved."""
@@ -170,17 +182,3 @@ def write_wav(path: Path, signals: NDArray, rate: int) -> None:
     content = b"WAVE" + b"".join(riff_chunk(*part) for part in parts)
     with atomic_write(path) as unfinished:
         unfinished.write_bytes(riff_chunk(b"RIFF", content))
-
-
-def _warn_if_unheard(name: str, waves: WaveSolver, slow_motion: float) -> None:
-    """Say of a target whose long waves are too slow to be heard, and of what would ring."""
-    size = float(np.ptp(waves.atlas.positions.reshape(-1, 3), axis=0).max())
-    texels = range(0, waves.atlas.areas.size, 97)
-    highest = max(hertz(waves.material, texel, size / _PARTS) for texel in texels) / slow_motion
-    if highest < _HEARD:
-        warnings.warn(
-            f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound at {highest:.2g} Hz at most, "
-            f"below hearing ({_HEARD:g} Hz); a speed of {200 * size / 0.77 * slow_motion:.2g} m/s would ring at 200 Hz",
-            RippleWarning,
-            stacklevel=3,
-        )

@@ -55,7 +55,7 @@ class DaskExecutor(Executor):
             ) from error
         self._address = address
         self._log = logging.getLogger("distributed.client")
-        self._log.addFilter(_nothing)  # that the scheduler is gone is said once, by `refusal`
+        self._log.disabled = True  # that the scheduler is gone is said once, by `refusal`
         self._places, self._counted = 0, -math.inf
         self._executor = self._client.get_executor(pure=False, retries=0)
 
@@ -73,7 +73,7 @@ class DaskExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the cluster; without `wait` what is not yet done is given up."""
-        self._log.removeFilter(_nothing)
+        self._log.disabled = False
         self._executor.shutdown(wait=wait)
         self._client.close()
 
@@ -85,10 +85,6 @@ class DaskExecutor(Executor):
             f"the Dask scheduler at {self._address} is gone; finished scenes are kept: start it, and run the same "
             "command again to go on"
         )
-
-
-def _nothing(_: logging.LogRecord) -> bool:
-    return False
 
 
 def available_cores() -> list[int]:
@@ -122,7 +118,7 @@ class LocalExecutor(Executor):
     def __init__(self, workers: int) -> None:
         self.places = workers
         self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
-        self._starts = [functools.partial(_pool, cores) for cores in shares(available_cores(), workers)]
+        self._cores = shares(available_cores(), workers)
         self._pools: dict[int, ProcessPoolExecutor] = {}
         self._processes: dict[int, Future[int]] = {}
         for place in range(workers):
@@ -150,20 +146,15 @@ class LocalExecutor(Executor):
 
     def _pool(self, place: int) -> ProcessPoolExecutor:
         if place not in self._pools:
-            self._pools[place] = pool = self._starts[place]()
-            self._processes[place] = pool.submit(os.getpid)
+            spawn = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
+            pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin, initargs=(self._cores[place],))
+            self._pools[place], self._processes[place] = pool, pool.submit(os.getpid)
         return self._pools[place]
 
     def _release(self, place: int, future: Future) -> None:
         if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
             self._pools.pop(place).shutdown(wait=False)
         self._free.put(place)
-
-
-def _pool(cores: list[int]) -> ProcessPoolExecutor:
-    """A process that keeps to some cores."""
-    context = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
-    return ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(cores,))
 
 
 def _begin(cores: list[int]) -> None:

@@ -8,10 +8,10 @@ import fcntl
 import hashlib
 import io
 import shutil
+import tarfile
 import zipfile
 from collections.abc import Container, Iterator
 from pathlib import Path
-from tarfile import TarInfo
 from typing import Any
 
 import av
@@ -25,7 +25,7 @@ from ripple_sim.export.fields import DTYPES
 from ripple_sim.export.tables import COLUMNS
 from ripple_sim.solver.files import atomic_write
 
-from .folder import BatchFolder, member_name, members, times_of, write_tar
+from .folder import BatchFolder, members, times_of
 
 # An array `height_TARGET` a target, [frames, C, n, n] float32, in metres, a frame a chunk.
 HEIGHTS = "heights.zarr.zip"
@@ -42,7 +42,7 @@ def facts_hash(facts: dict[str, Any]) -> str:
 class FinishedScene:
     """A scene of a batch: in a folder, or in a tar file, whose `members` it has by their names behind its number."""
 
-    def __init__(self, number: int, path: Path, members: dict[str, TarInfo] | None = None) -> None:
+    def __init__(self, number: int, path: Path, members: dict[str, tarfile.TarInfo] | None = None) -> None:
         self.number, self._path, self._members = number, path, members
 
     def __repr__(self) -> str:
@@ -194,10 +194,15 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
         times = {str(number): scene.times() for number, scene in scenes.items()}
         with atomic_write(times_of(tar)) as path:
             path.write_bytes(msgspec.json.encode(times))
-        files = (
-            (member_name(number, name), scene.read(name)) for number, scene in scenes.items() for name in scene.names()
-        )
-        write_tar(tar, files)
+        # it appears whole, and tells nothing of who wrote it and when
+        with atomic_write(tar) as path, tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as file:
+            for number, scene in scenes.items():
+                for name in scene.names():
+                    # WebDataset takes what is before the first dot for the scene
+                    member = tarfile.TarInfo(f"{number:06d}.{name.replace('/', '.')}")
+                    content = scene.read(name)
+                    member.size = len(content)
+                    file.addfile(member, io.BytesIO(content))
         for number in loose:  # others shall see everything of a folder or nothing
             hidden = batch.work / f"packed-{number:06d}"
             shutil.rmtree(hidden, ignore_errors=True)  # of a process that was killed

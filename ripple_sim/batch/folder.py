@@ -11,12 +11,11 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import hashlib
-import io
 import os
 import re
 import shutil
 import tarfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +31,6 @@ from ripple_sim.video.settings import scene_digest, versions
 from .plan import Plan, check_plan
 
 NUMBER = re.compile(r"\d{6,}")
-
-
-def member_name(number: int, name: str) -> str:
-    """Name of a scene's file in a tar file: WebDataset takes what is before the first dot for the scene."""
-    return f"{number:06d}.{name.replace('/', '.')}"
 
 
 def times_of(tar: Path) -> Path:
@@ -55,15 +49,6 @@ def members(tar: Path) -> dict[int, dict[str, tarfile.TarInfo]]:
     except (tarfile.TarError, EOFError, ValueError, OSError) as error:
         raise BatchError(f"{tar} is damaged: {error}; remove it, and run the batch again") from error
     return found
-
-
-def write_tar(tar: Path, files: Iterable[tuple[str, bytes]]) -> None:
-    """Write a tar file of names and contents; it appears whole, and tells nothing of who wrote it and when."""
-    with atomic_write(tar) as path, tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as file:
-        for name, content in files:
-            member = tarfile.TarInfo(name)
-            member.size = len(content)
-            file.addfile(member, io.BytesIO(content))
 
 
 # Until a scene is put aside: errors of its own, and deaths of its worker, which may have another reason.
@@ -207,10 +192,6 @@ def _entries(folder: Path) -> list[Path]:
     return sorted(folder.iterdir()) if folder.is_dir() else []
 
 
-# A larger batch begins like a smaller one; tar files tell themselves what is in them.
-_MAY_CHANGE = ("plan.count",)
-
-
 class StoredPlan(msgspec.Struct, frozen=True):
     """A plan with all that decides its scenes: fingerprints of its files, and versions of the software."""
 
@@ -235,9 +216,9 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
     """
     if batch.plan.exists():
         before, now = _flat(load_stored(batch.plan)), _flat(plan)
-        changed = sorted(
-            key for key in before.keys() | now.keys() if before.get(key) != now.get(key) and key not in _MAY_CHANGE
-        )
+        # a larger batch begins like a smaller one; tar files tell themselves what is in them
+        keys = (before.keys() | now.keys()) - {"plan.count"}
+        changed = sorted(key for key in keys if before.get(key) != now.get(key))
         if changed:
             key = changed[0]
             more = f", and {len(changed) - 1} more ({', '.join(changed[1:4])})" if len(changed) > 1 else ""

@@ -23,6 +23,7 @@ import trimesh
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.scene import read_toml, shipped_scenes
+from ripple_sim.scene.scene_file import check_keys, converted
 from ripple_sim.solver.errors import shown
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.settings import check_options
@@ -79,21 +80,18 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
         if self.integers is not None:
             whole = rng.integers(self.integers[0], self.integers[1], size=self.length, endpoint=True)
             return whole.tolist() if self.length else int(whole)
-        return _plain(self._number(rng))
-
-    def _number(self, rng: np.random.Generator) -> Any:
         if self.uniform is not None:
-            return rng.uniform(*self.uniform, size=self.length)
+            return _plain(rng.uniform(*self.uniform, size=self.length))
         if self.log_uniform is not None:
-            low, high = np.log(np.array(self.log_uniform[0])), np.log(np.array(self.log_uniform[1]))
-            return np.exp(rng.uniform(low, high, size=self.length))
+            low, high = (np.log(np.array(end)) for end in self.log_uniform)
+            return _plain(np.exp(rng.uniform(low, high, size=self.length)))
         mean, deviation = self.normal or (0.0, 0.0)
         least, greatest = self.limits or (-math.inf, math.inf)
         number = rng.normal(mean, deviation, size=self.length)
         for _ in range(_MOST_DRAWS):
             outside = (number < least) | (number > greatest)
             if not np.any(outside):
-                return number
+                return _plain(number)
             number = np.where(outside, rng.normal(mean, deviation, size=self.length), number)
         raise SceneError(f"normal {self.normal} hardly ever lies within the limits {self.limits}; widen them")
 
@@ -105,8 +103,8 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
                 f"plan: {key} is drawn from {' and '.join(given) or 'nothing'}; valid is one of {', '.join(KINDS)}"
             )
         kind = given[0]
-        for other, extra in (("weights", self.weights), ("limits", self.limits)):
-            if extra is not None and kind != {"weights": "choice", "limits": "normal"}[other]:
+        for other, extra, fitting in (("weights", self.weights, "choice"), ("limits", self.limits, "normal")):
+            if extra is not None and kind != fitting:
                 raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
         if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
             raise SceneError(f"plan: {key} has length {self.length}; valid is 1 or more, of numbers")
@@ -147,8 +145,7 @@ def _plain(value: Any) -> Any:
     return float(f"{value:.12g}")
 
 
-_STEP = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?(?:\.|$)")
-
+_STEP = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
 
 # A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern with *; "" without.
 Step = tuple[str, str]
@@ -156,19 +153,12 @@ Step = tuple[str, str]
 
 def parse_key(key: str) -> tuple[Step, ...]:
     """Read a key of a plan; raises `SceneError` if it is not names between dots."""
-    steps, place = [], 0
-    while place < len(key):
-        found = _STEP.match(key, place)
-        if found is None:
-            break
-        steps.append((found[1], found[2] or ""))
-        place = found.end()
-    if not steps or place < len(key) or key.endswith("."):
+    if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", key):
         raise SceneError(
             f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or a pattern in "
             "brackets, such as camera.azimuth, ripple[duck].material.speed or geom[ball*].size"
         )
-    return tuple(steps)
+    return tuple(re.findall(_STEP, key))
 
 
 def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
@@ -189,13 +179,10 @@ def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
     return found
 
 
-Video = Literal["mp4", "webm", "gif", "webp", "png", "exr", "none"]
-
-
 class StoreEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[store]`: what is kept of each scene."""
 
-    video: Video = "mp4"
+    video: Literal["mp4", "webm", "gif", "webp", "png", "exr", "none"] = "mp4"
     """`mp4`, `webm`, `gif`, `webp`; `png` or `exr`: a folder of frames; `none`: nothing is drawn."""
     size: tuple[int, int] = (256, 256)
     """Of the frames [pixels]."""
@@ -237,19 +224,6 @@ def options_of(store: StoreEntry) -> VideoOptions:
     shared = {field.name for field in dataclasses.fields(VideoOptions)} & set(StoreEntry.__struct_fields__)
     options = VideoOptions(**{name: getattr(store, name) for name in shared})
     return dataclasses.replace(options, frame_format="exr" if store.video == "exr" else "png")
-
-
-def check_store(store: StoreEntry) -> None:
-    """Make sure that scenes can be kept in this way, before one is made.
-
-    Raises `RippleError` naming what is invalid, or the package that is missing.
-    """
-    if store.passes and store.video == "none":
-        raise SceneError("plan: store.passes need frames, and store.video is 'none'; name a video, or leave passes out")
-    if store.heights and importlib.util.find_spec("zarr") is None:
-        raise SceneError("plan: store.heights needs the package zarr; install it with: pip install 'ripple-sim[zarr]'")
-    with tempfile.TemporaryDirectory(prefix="ripple-sim-plan-") as folder:
-        check_options(options_of(store), Path(folder) / (video_name(store) or "frames"))
 
 
 MOST_SCENES = 10_000_000
@@ -324,15 +298,9 @@ def read_plan(path: str | Path) -> Plan:
     path = Path(path)
     if path.exists() and not path.is_file():
         raise SceneError(f"plan {str(path)!r} is not a regular file; give the path of a TOML file")
-    table = read_toml(path, "plan")
-    valid = [field.name for field in msgspec.structs.fields(PlanFile)]
-    for key in table:
-        if key not in valid:
-            raise SceneError(f"plan {str(path)!r}: unknown key {key!r}; valid are {', '.join(valid)}")
-    try:
-        content = msgspec.convert(table, PlanFile)
-    except msgspec.ValidationError as error:
-        raise SceneError(f"plan {str(path)!r}: {str(error).replace('`$.', '`')}") from error
+    table, what = read_toml(path, "plan"), f"plan {str(path)!r}"
+    check_keys(table, PlanFile, what)
+    content = converted(table, PlanFile, what)
     plan = Plan(
         count=content.count,
         seed=content.seed,
@@ -347,17 +315,26 @@ def read_plan(path: str | Path) -> Plan:
 
 
 def check_plan(plan: Plan) -> None:
-    """Make sure that scenes can be made by a plan; raises `SceneError` with the key, its value and what is valid."""
+    """Make sure that scenes can be made and kept by a plan, before one is made.
+
+    Raises `RippleError` with the key, its value and what is valid, or the package that is missing.
+    """
+    store = plan.store
     for name, value, least, most in (
         ("count", plan.count, 1, MOST_SCENES),
         ("seed", plan.seed, 0, 2**63),
-        ("store.scenes_per_tar", plan.store.scenes_per_tar, 1, MOST_SCENES),
+        ("store.scenes_per_tar", store.scenes_per_tar, 1, MOST_SCENES),
     ):
         if not least <= value <= most:
             raise SceneError(f"plan: {name} is {value}; valid is a whole number from {least} to {most}")
     if not plan.sources:
         raise SceneError("plan: it names no scene; write scenes = ['duck'], or [meshes] with files = ['*.obj']")
-    check_store(plan.store)
+    if store.passes and store.video == "none":
+        raise SceneError("plan: store.passes need frames, and store.video is 'none'; name a video, or leave passes out")
+    if store.heights and importlib.util.find_spec("zarr") is None:
+        raise SceneError("plan: store.heights needs the package zarr; install it with: pip install 'ripple-sim[zarr]'")
+    with tempfile.TemporaryDirectory(prefix="ripple-sim-plan-") as folder:
+        check_options(options_of(store), Path(folder) / (video_name(store) or "frames"))
     if plan.meshes is not None and isinstance(plan.meshes.bodies, Distribution):
         plan.meshes.bodies.check("meshes.bodies")
     for key, given in (*plan.vary.items(), *plan.model.items()):
@@ -376,20 +353,17 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
             )
         yield name if name in shipped else str(path.resolve())
     for pattern in content.meshes.files if content.meshes else ():
-        found = _meshes(folder / pattern)
+        # files that fit; of folders those that hold a mesh by their endings
+        fitting = sorted(glob.glob(str(folder / pattern)))  # noqa: PTH207 - absolute ones too
+        paths = [Path(name).resolve() for name in fitting]
+        within = [file for path in paths if path.is_dir() for file in sorted(path.iterdir())]
+        found = [path for path in paths if path.is_file()]
+        found += [file for file in within if file.suffix[1:].lower() in trimesh.available_formats()]
         if not found:
             raise SceneError(
                 f"plan: no mesh fits {pattern!r}; valid is a file, a folder or a pattern, relative to the plan"
             )
         yield from map(str, found)
-
-
-def _meshes(pattern: Path) -> list[Path]:
-    """Files that fit a pattern; of folders those that hold a mesh by their endings."""
-    paths = [Path(name).resolve() for name in sorted(glob.glob(str(pattern)))]  # noqa: PTH207 - absolute ones too
-    within = [file for path in paths if path.is_dir() for file in sorted(path.iterdir())]
-    endings = trimesh.available_formats()
-    return [path for path in paths if path.is_file()] + [file for file in within if file.suffix[1:].lower() in endings]
 
 
 def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Distribution]]:
@@ -399,8 +373,5 @@ def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Di
         if isinstance(value, dict) and not set(value) & {*KINDS, "apply"}:
             yield from _distributions(value, key)
             continue
-        try:
-            given = msgspec.convert(value if isinstance(value, dict) else {"constant": value}, Distribution)
-        except msgspec.ValidationError as error:
-            raise SceneError(f"plan: {key}: {str(error).replace('`$.', '`')}") from error
-        yield key, given
+        table_of_value = value if isinstance(value, dict) else {"constant": value}
+        yield key, converted(table_of_value, Distribution, f"plan: {key}")

@@ -90,8 +90,14 @@ def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
         for number, failure in batch.failures().items()
     }
     listed = [each for _, each in sorted((failed | damaged | rows).items())]
+    names = dict.fromkeys(["number", *(name for each in listed for name in each)])
+    columns = {name: [each.get(name) for each in listed] for name in names}
+    for name, values in columns.items():
+        kinds = {float if isinstance(value, int) and not isinstance(value, bool) else type(value) for value in values}
+        if len(kinds - {type(None)}) > 1 or dict in kinds:  # values of several kinds are kept as JSON
+            columns[name] = [json.dumps(value) for value in values]
     with atomic_write(batch.index) as path:
-        parquet().write_table(pyarrow.table(_columns(listed)), path)
+        parquet().write_table(pyarrow.table(columns), path)
     write_page(batch, listed)
 
 
@@ -108,17 +114,6 @@ def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:
         "energy_end": sum(each["energy_end"] for each in targets),
         **facts["values"],
     }
-
-
-def _columns(rows: list[dict[str, Any]]) -> dict[str, list[Any]]:
-    """Lists of values by column; a column of values of several kinds holds their JSON."""
-    names = dict.fromkeys(name for each in rows for name in each)
-    columns = {name: [each.get(name) for each in rows] for name in ("number", *(n for n in names if n != "number"))}
-    for name, values in columns.items():
-        kinds = {float if isinstance(value, int) and not isinstance(value, bool) else type(value) for value in values}
-        if len(kinds - {type(None)}) > 1 or dict in kinds:
-            columns[name] = [json.dumps(value) for value in values]
-    return columns
 
 
 class Batch(Sequence):

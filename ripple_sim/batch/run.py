@@ -153,7 +153,16 @@ class BatchRun:
         elif outcome.state == "full":
             self.full = f"the disk is full: {outcome.error}"
         elif outcome.state in ("failed", "died"):
-            self._note_failure(number, outcome)
+            before, died = self.failures.get(number, Failure()), outcome.state == "died"
+            failure = Failure(before.errors + (not died), before.deaths + died, outcome.error)
+            self.progress.failures += before.attempts == 0
+            self.failures[number] = failure
+            self.batch.note_failure(number, failure, outcome.log)
+            if not failure.aside:
+                self.pending.append(number)  # again, after all others
+            else:
+                self.progress.aside += 1
+                self._close(number)
         else:
             self.progress.finished += 1
             if outcome.state == "made":
@@ -163,20 +172,6 @@ class BatchRun:
                 self.rows[number] = row(outcome.row, outcome.times)
             if self.failures.pop(number, None) is not None:
                 self.batch.forget_failure(number)
-            self._close(number)
-
-    def _note_failure(self, number: int, outcome: Outcome) -> None:
-        """Try a scene again after all others, or put it aside."""
-        before = self.failures.get(number, Failure())
-        self.progress.failures += before.attempts == 0
-        died = outcome.state == "died"
-        failure = Failure(before.errors + (not died), before.deaths + died, outcome.error)
-        self.failures[number] = failure
-        self.batch.note_failure(number, failure, outcome.log)
-        if not failure.aside:
-            self.pending.append(number)
-        else:
-            self.progress.aside += 1
             self._close(number)
 
     def _close(self, number: int) -> None:

@@ -234,24 +234,13 @@ class Variation:
                 if not isinstance(bodies, int):
                     raise SceneError(f"plan: the number of bodies is {bodies!r}; draw it from integers")
             values["bodies"] = bodies
-            scene = drop_scene(
-                self.source,
-                bodies=bodies,
-                seed=self.seed,
-                up=meshes.up,
-                look=meshes.look,
-                edit=edit,
-                repair=meshes.repair,
-                wrap=meshes.wrap,
-            )
-            table = _table(scene)
+            given = {name: getattr(meshes, name) for name in ("up", "look", "repair", "wrap")}
+            scene = drop_scene(self.source, bodies=bodies, seed=self.seed, edit=edit, **given)
+            # what a scene file would say of it: what is not as by default, as plain values
+            parts = {"ripple": list(scene.targets), "camera": scene.camera}
+            parts |= {name: list(events) for name, events in vars(scene.events).items()}
+            table = {"model": scene.name, "duration": scene.duration, "two_way": scene.two_way}
+            table |= {key: msgspec.to_builtins(part) for key, part in parts.items() if part}
             change(table)
             scene = scene_of(scene.name, scene.model, parse_scene(table, scene.name), scene.notes)
         return scene, dict(sorted(values.items()))
-
-
-def _table(scene: Scene) -> dict[str, Any]:
-    """What a scene file would say of a scene that was made without one: what is not as by default, as plain values."""
-    parts = {"ripple": scene.targets, "camera": scene.camera, **vars(scene.events)}
-    table = {key: msgspec.to_builtins(list(part) if key != "camera" else part) for key, part in parts.items() if part}
-    return {"model": scene.name, "duration": scene.duration, "two_way": scene.two_way, **table}

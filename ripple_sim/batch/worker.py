@@ -25,7 +25,6 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 from numpy.lib.format import open_memmap
-from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.errors import BatchError, EncodingError
@@ -91,12 +90,20 @@ class FrameRecord:
                 self._positions = open_memmap(self._folder / POSITIONS, mode="w+", dtype=np.float64, shape=shape)
             self._positions[self.frame] = data.qpos
         self._digest.update(data.qpos.tobytes() + data.qvel.tobytes())
-        heights = {name: ripples[name].height for name in ripples}
-        self._write(heights)
-        for name, height in heights.items():
+        for name in ripples:
+            height = ripples[name].height
+            if self._heights is not None:
+                suffix = re.sub(r"\W", "_", name)
+                if not self.frame:
+                    dimensions = ["time", *(f"{each}_{suffix}" for each in ("chart", "row", "column"))]
+                    array = self._heights.grow(f"height_{suffix}", dimensions, height, "m", chunk=1)
+                    array.attrs["target"] = name
+                self._heights.add(f"height_{suffix}", height)
             self._digest.update(height.tobytes())
             self._highest[name] = max(self._highest.get(name, 0.0), float(np.abs(height).max()))
             self._energies.setdefault(name, []).append(ripples[name].energy())
+        if self._heights is not None:
+            self._heights.flush()  # so that memory does not grow with the scene
         self._sensors = simulation.sensors
         self._total += sum(each.impulse for each in simulation.impulses)
         self._rows += rows(self.frame, data, simulation.impulses)
@@ -109,7 +116,11 @@ class FrameRecord:
             self._positions = None
         if self._heights is not None:
             self._heights.finish()
-            self._pack(self._folder / HEIGHTS.removesuffix(".zip"))
+            folder = self._folder / HEIGHTS.removesuffix(".zip")
+            with zipfile.ZipFile(self._folder / HEIGHTS, "w") as archive:
+                for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+                    archive.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix(), _ALWAYS), path.read_bytes())
+            shutil.rmtree(folder)
         if self._sensors:
             arrays = {name: sensor.samples for name, sensor in self._sensors.items()}
             times = {f"{name} time": sensor.times for name, sensor in self._sensors.items()}
@@ -133,26 +144,6 @@ class FrameRecord:
             },
             "states": self._digest.hexdigest(),
         }
-
-    def _write(self, heights: Mapping[str, NDArray]) -> None:
-        """Add the heights of a frame, by target."""
-        if self._heights is None:
-            return
-        for name, height in heights.items():
-            suffix = re.sub(r"\W", "_", name)
-            if not self.frame:
-                dimensions = ["time", *(f"{each}_{suffix}" for each in ("chart", "row", "column"))]
-                array = self._heights.grow(f"height_{suffix}", dimensions, height, "m", chunk=1)
-                array.attrs["target"] = name
-            self._heights.add(f"height_{suffix}", height)
-        self._heights.flush()  # so that memory does not grow with the scene
-
-    def _pack(self, folder: Path) -> None:
-        """Put a store's files into the zip file."""
-        with zipfile.ZipFile(self._folder / HEIGHTS, "w") as file:
-            for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-                file.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix(), _ALWAYS), path.read_bytes())
-        shutil.rmtree(folder)
 
 
 # The renderer's context belongs to one scene at a time, also where an executor has threads.
@@ -200,9 +191,12 @@ def make_scene(folder: str, number: int) -> Outcome:
             _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
         except Exception as error:  # of any kind: the batch goes on without this scene
             clear(place)
-            state: Literal["full", "failed"] = "full" if _is_full(error) else "failed"
-            reason = " ".join(str(error).split()) or type(error).__name__
-            return Outcome(number, state, error=reason, log=traceback.format_exc())
+            reason: BaseException | None = error
+            while isinstance(reason, EncodingError):  # which names the file
+                reason = reason.__cause__
+            full = isinstance(reason, OSError) and reason.errno in (errno.ENOSPC, errno.EDQUOT)
+            said = " ".join(str(error).split()) or type(error).__name__
+            return Outcome(number, "full" if full else "failed", error=said, log=traceback.format_exc())
         batch.finish(number, place)
     return Outcome(number, "made", times, facts)
 
@@ -221,8 +215,9 @@ def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str
         "values": values,
         **record.finish(),
     }
-    facts["files"] = {path.relative_to(folder).as_posix(): _digest(path) for path in _files(folder)}
-    facts["bytes"] = sum(path.stat().st_size for path in _files(folder))
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    facts["files"] = {path.relative_to(folder).as_posix(): _digest(path) for path in files}
+    facts["bytes"] = sum(path.stat().st_size for path in files)
     facts["hash"] = facts_hash(facts)
     _write_json(folder / FACTS, facts)
     write_thumbnail(FinishedScene(number, folder), record.frame, batch.thumbnail(number))
@@ -246,10 +241,6 @@ def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> FrameRecord:
     return record
 
 
-def _files(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if path.is_file() and path.name not in (FACTS, TIMES))
-
-
 def _digest(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
@@ -257,10 +248,3 @@ def _digest(path: Path) -> str:
 
 def _write_json(path: Path, content: Any) -> None:
     path.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=1))
-
-
-def _is_full(error: Exception) -> bool:
-    reason: BaseException | None = error
-    while isinstance(reason, EncodingError):  # which names the file
-        reason = reason.__cause__
-    return isinstance(reason, OSError) and reason.errno in (errno.ENOSPC, errno.EDQUOT)

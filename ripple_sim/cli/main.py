@@ -54,9 +54,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the arguments `argv` (by default the process's own) and return its exit status."""
     end_at_once()
     _open_standard_streams()
-    command = _parse(list(sys.argv[1:] if argv is None else argv))
-    if isinstance(command, int):
-        return command
+    argv = list(sys.argv[1:] if argv is None else argv)
+    if any("\0" in word for word in argv):
+        return _fail("a word of the command line holds a NUL; no name can", BAD_INPUT)
+    try:
+        command = parse(argv)
+        sys.stdout.flush()  # of the help, the version or a completion script
+    except RippleError as error:
+        return _fail(error, BAD_INPUT)
+    except OSError as error:
+        return _give_up_output(error)
+    if command is None:
+        return DONE
     with warnings.catch_warnings():
         # in one line, without the place in the code
         warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
@@ -150,20 +159,6 @@ def _open_standard_streams() -> None:
             setattr(sys, name, Path(os.devnull).open("w" if number else "r"))  # noqa: SIM115
 
 
-def _parse(argv: list[str]) -> Any:
-    """Return the command to run, or the exit status if there is nothing to run."""
-    if any("\0" in word for word in argv):
-        return _fail("a word of the command line holds a NUL; no name can", BAD_INPUT)
-    try:
-        command = parse(argv)
-        sys.stdout.flush()  # of the help, the version or a completion script
-    except RippleError as error:
-        return _fail(error, BAD_INPUT)
-    except OSError as error:
-        return _give_up_output(error)
-    return DONE if command is None else command
-
-
 def completion(
     shell: Annotated[
         Positional[Literal["bash", "zsh"]], arg(metavar="SHELL", help="Shell to complete in: bash or zsh.")
@@ -212,19 +207,13 @@ def parse(argv: Sequence[str]) -> Any:
                 config=(tyro.conf.FlagCreatePairsOff,),
             )
     except SystemExit as ending:
-        if ending.code:
-            command = f" {argv[0]}" if argv and argv[0] in COMMANDS else ""
-            raise RippleError(f"{_first_part(complaint.getvalue())}; see ripple-sim{command} --help") from None
-        return None
-
-
-def _first_part(box: str) -> str:
-    """Reduce tyro's complaint to the text between its first two rules, without the help texts (indented by 8).
-
-    A complaint is a title, a rule, what is wrong, a rule, and hints; it is framed where stdout is UTF-8.
-    """
-    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
+        if not ending.code:
+            return None
+    # tyro's complaint is a title, a rule, what is wrong, a rule, and hints; it is framed where stdout is UTF-8. What is
+    # between the first two rules counts, without the help texts (indented by 8).
+    text = re.sub(r"\x1b\[[0-9;]*m", "", complaint.getvalue())
     parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
     part = parts[1] if len(parts) > 1 else text
-    said = [line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)]
-    return " ".join(said).strip().rstrip(".")
+    said = " ".join(line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)).strip()
+    command = f" {argv[0]}" if argv and argv[0] in COMMANDS else ""
+    raise RippleError(f"{said.rstrip('.')}; see ripple-sim{command} --help")

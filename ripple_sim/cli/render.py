@@ -22,45 +22,22 @@ from ripple_sim.errors import VideoError
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.video.options import SceneOptions, VideoOptions
 
-from .arguments import (
-    Aperture,
-    Baseline,
-    Count,
-    Device,
-    Duration,
-    Exposures,
-    Factor,
-    Focus,
-    FrameRate,
-    Limit,
-    Overlay,
-    Passes,
-    Resolution,
-    Rim,
-    SceneLayout,
-    SceneSeed,
-    Seed,
-    Shutter,
-    Size,
-    Supersample,
-    UpAxis,
-)
+from . import arguments
 
 if TYPE_CHECKING:
     from ripple_sim.scene.scene import Scene
-    from ripple_sim.video.render_video import Summary
     from ripple_sim.viewer.window import Window
 
 
 # Fields, defaults and help of commands are those of the options; what is not here is read as its type says.
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _SceneCommand(SceneOptions):
-    size: Size = SceneOptions.size
-    duration: Duration = SceneOptions.duration
-    slow_motion: Factor = SceneOptions.slow_motion
-    resolution: Resolution = SceneOptions.resolution
-    layout: SceneLayout = SceneOptions.layout
-    rim: Rim = SceneOptions.rim
+    size: arguments.Size = SceneOptions.size
+    duration: arguments.Duration = SceneOptions.duration
+    slow_motion: arguments.Factor = SceneOptions.slow_motion
+    resolution: arguments.Resolution = SceneOptions.resolution
+    layout: arguments.SceneLayout = SceneOptions.layout
+    rim: arguments.Rim = SceneOptions.rim
     camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
     """Camera of the MJCF."""
 
@@ -75,16 +52,16 @@ class _SceneCommand(SceneOptions):
 class ExportCommand(_SceneCommand, ExportOptions):
     """Simulate a scene, and write it to the file of another program."""
 
-    fps: Count = ExportOptions.fps
-    triangles: Count = ExportOptions.triangles
-    chunk: Limit = ExportOptions.chunk
+    fps: arguments.Count = ExportOptions.fps
+    triangles: arguments.Count = ExportOptions.triangles
+    chunk: arguments.Limit = ExportOptions.chunk
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...), on which bodies
     then drop."""
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file; its ending says what is written: .usdc, .usda or .usdz (the moving scene), .html (a player),
     .zarr (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or what is heard)."""
-    seed: SceneSeed = None
+    seed: arguments.SceneSeed = None
     """Seed of the scene's random variation, or of the bodies that drop on a mesh."""
 
     def run(self) -> None:
@@ -111,9 +88,6 @@ class ExportCommand(_SceneCommand, ExportOptions):
             f"{summary.output}: {summary.frames} frames{f', {size / 1e6:.1f} MB' if size else ''}\n"
             f"stages    simulation {summary.simulate_seconds:.1f} s, writing {summary.write_seconds:.1f} s"
         )
-
-
-Report = Callable[[int, int], None]
 
 
 # What the kernels of a package do, in a user's words; the longest name that fits counts.
@@ -150,7 +124,7 @@ def _stage(module: str) -> str:
 
 
 @contextlib.contextmanager
-def frame_progress(title: str, total: int | None = None) -> Iterator[Report | None]:
+def frame_progress(title: str, total: int | None = None) -> Iterator[Callable[[int, int], None] | None]:
     """Show a title, and below it frames done of a total, rate and remaining time, on stderr while the block runs.
 
     Yields a function of the number of frames done and of all frames, or None if stderr is not a terminal.
@@ -167,22 +141,22 @@ def frame_progress(title: str, total: int | None = None) -> Iterator[Report | No
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _VideoCommand(_SceneCommand, VideoOptions):
-    fps: FrameRate = VideoOptions.fps
-    supersample: Supersample = VideoOptions.supersample
-    shutter: Shutter = VideoOptions.shutter
-    aperture: Aperture = VideoOptions.aperture
-    focus: Focus = None
-    exposures: Exposures = VideoOptions.exposures
-    passes: Passes = ()
-    overlay: Overlay = None
-    compare: Baseline = VideoOptions.compare
+    fps: arguments.FrameRate = VideoOptions.fps
+    supersample: arguments.Supersample = VideoOptions.supersample
+    shutter: arguments.Shutter = VideoOptions.shutter
+    aperture: arguments.Aperture = VideoOptions.aperture
+    focus: arguments.Focus = None
+    exposures: arguments.Exposures = VideoOptions.exposures
+    passes: arguments.Passes = ()
+    overlay: arguments.Overlay = None
+    compare: arguments.Baseline = VideoOptions.compare
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file ending in .mp4, .webm, .gif or .webp, or a name without ending for a folder of frames."""
-    device: Device = None
+    device: arguments.Device = None
     """EGL device to render on, by number, where there are several."""
     renderer: Literal["gl", "cycles"] = "gl"
     """Ours, with OpenGL, or Cycles, Blender's path tracer (needs bpy), which takes seconds to minutes a frame."""
-    samples: Count = 64
+    samples: arguments.Count = 64
     """Paths a pixel that Cycles takes."""
 
     def options(self) -> VideoOptions:
@@ -221,7 +195,16 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         title = f"renderer {shared_context().renderer}, waves {options.backend}"
         with frame_progress(title, frame_count(options)) as progress:
             summary = render_video(scene, self.output, options, progress=progress)
-        print(_summary_text(summary))
+        resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
+        compiling = f"compiling (once) {summary.compile_seconds:.1f} s, " if summary.compile_seconds >= 0.05 else ""
+        print(
+            f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
+            f"renderer  {summary.renderer}\n"
+            f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
+            f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+            f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
+            f"encoding {summary.encode_seconds:.1f} s"
+        )
 
     def _run_cycles(self) -> None:
         from ripple_sim.cycles.render import check_cycles, render_cycles
@@ -244,7 +227,7 @@ class RenderCommand(_VideoCommand):
 
     scene: Annotated[Positional[str], arg(metavar="SCENE")]
     """Name of a shipped scene, such as duck, or path of a scene file (TOML)."""
-    seed: SceneSeed = None
+    seed: arguments.SceneSeed = None
     """Seed of the scene's random variation, in place of the one in its [random]."""
 
     def check_input(self) -> None:
@@ -266,11 +249,11 @@ class DropCommand(_VideoCommand):
 
     mesh: Annotated[Positional[Path], arg(metavar="MESH")]
     """Mesh file (OBJ, OFF, PLY, STL, GLB ...)."""
-    bodies: Count = 12
+    bodies: arguments.Count = 12
     """Number of falling bodies."""
-    seed: Seed = 0
+    seed: arguments.Seed = 0
     """Seed for the bodies' places and sizes; the same seed gives the same video."""
-    up: UpAxis = None
+    up: arguments.UpAxis = None
     """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
@@ -289,31 +272,11 @@ class DropCommand(_VideoCommand):
         """Build a scene around the mesh."""
         from ripple_sim.scene.drop import drop_scene
 
-        scene = drop_scene(
-            self.mesh,
-            bodies=self.bodies,
-            seed=self.seed,
-            up=self.up,
-            texture=self.texture,
-            repair=self.repair,
-            wrap=self.wrap,
-        )
+        given = ("bodies", "seed", "up", "texture", "repair", "wrap")
+        scene = drop_scene(self.mesh, **{name: getattr(self, name) for name in given})
         for note in scene.notes:
             print(f"{self.mesh.name}: {note}", file=sys.stderr)
         return scene
-
-
-def _summary_text(summary: Summary) -> str:
-    resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
-    compiling = f"compiling (once) {summary.compile_seconds:.1f} s, " if summary.compile_seconds >= 0.05 else ""
-    return (
-        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
-        f"renderer  {summary.renderer}\n"
-        f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
-        f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
-        f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
-        f"encoding {summary.encode_seconds:.1f} s"
-    )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -327,15 +290,15 @@ class ViewCommand:
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...)."""
-    size: Size = (800, 600)
+    size: arguments.Size = (800, 600)
     """Window size in pixels."""
-    resolution: Count = 64
+    resolution: arguments.Count = 64
     """Texels along the edge of a chart; more resolve finer waves and take longer."""
-    bodies: Seed = 3
+    bodies: arguments.Seed = 3
     """Number of bodies that fall on a mesh; 0 for none."""
-    seed: Seed = 0
+    seed: arguments.Seed = 0
     """Seed for the bodies' places and sizes."""
-    up: UpAxis = None
+    up: arguments.UpAxis = None
     """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
@@ -345,7 +308,7 @@ class ViewCommand:
     """Folder for screenshots and videos."""
     web: bool = False
     """Serve a web page to a browser on this machine instead of a window (needs the extra ripple-sim[web])."""
-    port: Count = 8080
+    port: arguments.Count = 8080
     """Port of the web page."""
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
     """Address of the web page; any other than this machine's own lets other machines see and drive the viewer."""
@@ -357,7 +320,7 @@ class ViewCommand:
         from ripple_sim.encode.output import check_size
         from ripple_sim.scene.drop import is_scene
         from ripple_sim.viewer.opening import display_problem
-        from ripple_sim.viewer.window import check_display
+        from ripple_sim.viewer.window import benchmark, check_display, run
 
         # refuse what cannot work before anything that takes time: first what is asked for, then what this machine lacks
         is_scene(self.scene)
@@ -365,8 +328,6 @@ class ViewCommand:
         if not self.folder.is_dir():
             raise VideoError(f"there is no folder {str(self.folder)!r} for screenshots and videos; make it first")
         if self.benchmark:
-            from ripple_sim.viewer.window import benchmark
-
             print(benchmark(self._window(off_screen=display_problem() is not None)))
         elif self.web:
             from ripple_sim.viewer.web import check_web, serve
@@ -374,20 +335,16 @@ class ViewCommand:
             check_web(self.port, self.host)
             serve(self._window(off_screen=True), self.port, self.host)
         else:
-            from ripple_sim.viewer.window import run
-
             check_display()
             run(self._window(off_screen=False))
 
     def _window(self, off_screen: bool) -> Window:
         from ripple_sim.viewer.opening import open_scene
         from ripple_sim.viewer.session import Session
+        from ripple_sim.viewer.window import Window
 
         scene = open_scene(
             self.scene, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair, wrap=self.wrap
         )
         session = Session(scene, resolution=self.resolution)
-
-        from ripple_sim.viewer.window import Window
-
         return Window(session, size=self.size, off_screen=off_screen, folder=self.folder)

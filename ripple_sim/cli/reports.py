@@ -139,20 +139,30 @@ class BatchCommand:
 
     def run(self) -> None:
         """Do what is asked for."""
-        from ripple_sim.batch.report import parquet
+        from ripple_sim.batch.report import parquet, status_text
 
         plan, folder = self._plan_and_folder()
         parquet()  # before anything that takes time
         if self.status:
-            from ripple_sim.batch.report import status_text
-
             print(status_text(folder))
         elif self.dry_run:
             from ripple_sim.batch.run import trial_text
 
             print(trial_text(plan, folder, self.workers))
         else:
-            self._make(plan, folder)
+            from ripple_sim.batch.run import RunOptions, run_batch
+
+            options = RunOptions(
+                workers=self.workers,
+                shard=self.shard or (1, 1),
+                limit=self.limit,
+                dask=self.dask,
+                retry_failed=self.retry_failed,
+                keep_free=self.keep_free * 1e9,
+            )
+            with batch_progress() as progress:
+                run_batch(plan, folder, options, progress=progress)
+            print(status_text(folder))
 
     def _plan_and_folder(self) -> tuple[Plan | None, Path]:
         from ripple_sim.errors import BatchError
@@ -167,22 +177,6 @@ class BatchCommand:
         if self.output is None and not self.dry_run:
             raise BatchError("a plan needs a folder for its scenes: add -o DIR")
         return plan, self.output or self.plan.with_suffix("")
-
-    def _make(self, plan: Plan | None, folder: Path) -> None:
-        from ripple_sim.batch.report import status_text
-        from ripple_sim.batch.run import RunOptions, run_batch
-
-        options = RunOptions(
-            workers=self.workers,
-            shard=self.shard or (1, 1),
-            limit=self.limit,
-            dask=self.dask,
-            retry_failed=self.retry_failed,
-            keep_free=self.keep_free * 1e9,
-        )
-        with batch_progress() as progress:
-            run_batch(plan, folder, options, progress=progress)
-        print(status_text(folder))
 
 
 _BETWEEN = 60.0  # lines in a log [s]

@@ -73,21 +73,14 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    if _does_harm(frame):
-        signal.signal(signal.SIGALRM, lambda _, then: _raise(number, then))
-        signal.setitimer(signal.ITIMER_REAL, _RETRY)
-        return
+    while frame is not None:  # from the innermost of the functions that are running
+        name = f"{frame.f_globals.get('__name__', '')}.{frame.f_code.co_qualname}"
+        if frame.f_code.co_name == "__del__" or name.startswith(_NEVER_IN):  # an exception does harm: try again
+            signal.signal(signal.SIGALRM, lambda _, then: _raise(number, then))
+            signal.setitimer(signal.ITIMER_REAL, _RETRY)
+            return
+        frame = frame.f_back
     end_at_once()
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     sys.exit(128 + number)
-
-
-def _does_harm(frame: FrameType | None) -> bool:
-    """Whether an exception does harm in one of the functions that are running, from the innermost."""
-    while frame is not None:
-        name = f"{frame.f_globals.get('__name__', '')}.{frame.f_code.co_qualname}"
-        if frame.f_code.co_name == "__del__" or name.startswith(_NEVER_IN):
-            return True
-        frame = frame.f_back
-    return False

@@ -245,8 +245,22 @@ class ModesCommand:
         found = modes(atlas, material, self.count, rim=self.rim)
         if self.plot is not None:
             self._plot(self.plot, atlas, found)
-        report = _modes_report(found)
-        print(json_format.dumps(report, indent=2) if self.json else _modes_text(report))
+        first = found.frequencies[0]
+        report = [  # as JSON can hold them, in [Hz] and [s]
+            {
+                "frequency": float(frequency),
+                "ratio": float(frequency / first) if first else None,
+                "decay_time": float(decay) if np.isfinite(decay) else None,
+            }
+            for frequency, decay in zip(found.frequencies, found.decay_times, strict=True)
+        ]
+        if self.json:
+            print(json_format.dumps(report, indent=2))
+            return
+        print("mode  frequency [Hz]   ratio  falls to 1/e in [s]")
+        for number, mode in enumerate(report, 1):
+            ratio, last = ("-" if mode[key] is None else f"{mode[key]:.4g}" for key in ("ratio", "decay_time"))
+            print(f"{number:4}  {mode['frequency']:14.5g}  {ratio:>6}  {last}")
 
     def _plot(self, path: Path, atlas: Atlas, found: Modes) -> None:
         from ripple_sim.figures.mode_plot import plot_modes
@@ -257,25 +271,3 @@ class ModesCommand:
         subtitle = f"{self.material[0]}, {size} m{rim}; red is outwards, blue is inwards"
         up = self.up or usual_up(self.mesh)
         plot_modes(atlas, found, path, title=f"Modes of {self.mesh.stem}", subtitle=subtitle, up=up)
-
-
-def _modes_report(found: Modes) -> list[dict[str, float | None]]:
-    """A mode's frequency [Hz], its ratio to the first, and its decay time [s], as JSON can hold them."""
-    first = found.frequencies[0]
-    return [
-        {
-            "frequency": float(frequency),
-            "ratio": float(frequency / first) if first else None,
-            "decay_time": float(decay) if np.isfinite(decay) else None,
-        }
-        for frequency, decay in zip(found.frequencies, found.decay_times, strict=True)
-    ]
-
-
-def _modes_text(report: list[dict[str, float | None]]) -> str:
-    """The same as a table."""
-    rows = ["mode  frequency [Hz]   ratio  falls to 1/e in [s]"]
-    for number, mode in enumerate(report, 1):
-        ratio, decay = ("-" if mode[key] is None else f"{mode[key]:.4g}" for key in ("ratio", "decay_time"))
-        rows.append(f"{number:4}  {mode['frequency']:14.5g}  {ratio:>6}  {decay}")
-    return "\n".join(rows)

@@ -28,14 +28,12 @@ BODY_SHAPES = {
     "cylinder": (_GEOM.mjGEOM_CYLINDER, (0.9, 0.5, 0.0)),
 }
 
-
 _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 
 # Of the bodies [m], [kg/m^3], and how high above the target they start [m].
 _RADII, _DENSITY, _HEIGHTS = (0.05, 0.085), 400.0, (0.8, 1.2)
 
 _CLEAR = 0.2  # between the middles of bodies that fall one after the other [m]
-_FEWEST_VERTICES = 4
 _UPWARD, _ROOM = 0.6, 0.05  # least upward part of the normal, and room on all sides [m], of a good landing point
 _STEPS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 _TRIED = 1000  # points, among which there may be no good one
@@ -80,53 +78,34 @@ def drop_model(
     spec.default.geom.solref = [0.01, 0.2]
     spec.default.geom.friction = [0.4, 0.005, 0.0001]
     # MuJoCo asks for four vertices, and a triangle has three; the last one is in no triangle
-    enough = V if len(V) >= _FEWEST_VERTICES else np.vstack([V, V[:1]])
+    enough = V if len(V) >= 4 else np.vstack([V, V[:1]])
     # sheets may have no volume
     spec.add_mesh(
         name="target", uservert=enough.ravel(), userface=F.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     )
     spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_SDF, meshname="target")
-    spec.worldbody.add_geom(
-        name="floor",
-        type=_GEOM.mjGEOM_PLANE,
-        size=[12, 12, 0.1],
-        rgba=[0.86, 0.87, 0.88, 1],
-        condim=6,
-        friction=[0.8, 0.01, 0.02],
-    )
+    floor = spec.worldbody.add_geom(name="floor", type=_GEOM.mjGEOM_PLANE, size=[12, 12, 0.1], condim=6)
+    floor.rgba, floor.friction = [0.86, 0.87, 0.88, 1], [0.8, 0.01, 0.02]
     landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
     interval = 3.4 / max(len(shapes), 1)
-    drops = [_add_body(spec, i, shape, 0.1 + interval * i, landing[i], rng, scale) for i, shape in enumerate(shapes)]
-    for before, drop, (x, y, z) in zip(drops, drops[1:], landing[1:].tolist(), strict=False):
+    drops: list[DropEntry] = []
+    last = 0.0, 0.0, -np.inf
+    for i, (shape, (x, y, z)) in enumerate(zip(shapes, landing.tolist(), strict=True)):
+        kind, proportions = BODY_SHAPES[shape]
+        radius = scale * rng.uniform(*_RADII)
+        name = f"body_{i}"
+        # parked high above until it drops, out of sight and out of reach of the others
+        body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 20.0 + i], quat=rng.standard_normal(4))
+        body.add_freejoint()
+        color = colorsys.hsv_to_rgb(_HUES[i % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95))
+        body.add_geom(name=name, type=kind, size=[radius * p for p in proportions], density=_DENSITY, rgba=[*color, 1])
+        start = z + rng.uniform(*_HEIGHTS)
         # not into the one before, which has fallen for a while
-        assert before.position is not None and drop.position is not None
-        clear = before.position[2] - 9.81 / 2 * interval**2 + _CLEAR
-        if np.hypot(before.position[0] - x, before.position[1] - y) < _CLEAR and drop.position[2] < clear:
-            drop.position = x, y, min(clear, z + _HEIGHTS[1])
+        if np.hypot(last[0] - x, last[1] - y) < _CLEAR:
+            start = max(start, min(last[2] - 9.81 / 2 * interval**2 + _CLEAR, z + _HEIGHTS[1]))
+        last = x, y, start
+        drops.append(DropEntry(body=name, time=0.1 + interval * i, position=last))
     return spec, drops
-
-
-def _add_body(
-    spec: mujoco.MjSpec,
-    number: int,
-    shape: str,
-    time: float,
-    landing: NDArray[np.float64],
-    rng: np.random.Generator,
-    scale: float,
-) -> DropEntry:
-    """Add a body of a shape that drops at a time [s] on a landing point [m]."""
-    kind, proportions = BODY_SHAPES[shape]
-    radius = scale * rng.uniform(*_RADII)
-    name = f"body_{number}"
-    # parked high above until it drops, out of sight and out of reach of the others
-    body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 20.0 + number], quat=rng.standard_normal(4))
-    body.add_freejoint()
-    color = colorsys.hsv_to_rgb(_HUES[number % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95))
-    body.add_geom(name=name, type=kind, size=[radius * p for p in proportions], density=_DENSITY, rgba=[*color, 1.0])
-    height = rng.uniform(*_HEIGHTS)
-    x, y, z = landing
-    return DropEntry(body=name, time=time, position=(float(x), float(y), float(z + height)))
 
 
 def _landing_points(

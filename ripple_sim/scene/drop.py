@@ -99,7 +99,7 @@ def drop_scene(
     if up is not None and up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, **reading)
-    V = _standing(mesh, up or _flat_along(mesh) or _up(mesh, usual_up(mesh_path)))
+    V = _standing(mesh, up or _up(mesh, usual_up(mesh_path)))
     camera, eye = _camera(V, mesh.F, mesh.closed)
     # MuJoCo may throw boxes and cylinders aside from a sheet
     shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape not in ("box", "cylinder")]
@@ -108,7 +108,13 @@ def drop_scene(
     rim = sum(float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum()) for rim in mesh.rims)
     slender = extent.area / (np.pi * max(rim, 2 * extent.size) * extent.size)
     scale = float(np.clip(slender / _SLENDER, _SMALLEST, 1.0))
+    # waves slow and high enough to watch under typical bodies of that scale, crest behind crest
+    mass, speed = TYPICAL_HIT
+    hit, radius = (mass * scale**3, speed), TYPICAL_FOOTPRINT * scale
     amplitude = min(_THICK * extent.radius / extent.size, _SLIM * slender, _DEEPEST if mesh.closed else _DEEPEST_OPEN)
+    suited = Material.suited(SIZE, hit, radius=radius, amplitude=amplitude, crossing=1.5, decay=2.5)
+    given = {name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))}
+    material = MaterialEntry(**given | {"stiffness": max(_STIFFNESS, given["stiffness"])})
     rng = np.random.default_rng(seed)
     spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], rng, eye, scale)
     if not mesh.closed:
@@ -121,22 +127,12 @@ def drop_scene(
     return Scene(
         name=Path(mesh_path).stem,
         model=model,
-        targets=(RippleEntry(geom="target", look=look, material=_material(amplitude, scale), warn=False),),
+        targets=(RippleEntry(geom="target", look=look, material=material, warn=False),),
         camera=camera,
         duration=DURATION,
         events=Events(drop=tuple(drops)),
         notes=mesh.notes,
     )
-
-
-def _material(amplitude: float, scale: float) -> MaterialEntry:
-    """Waves slow and high enough to watch under typical bodies of a scale, crest behind crest."""
-    mass, speed = TYPICAL_HIT
-    suited = Material.suited(
-        SIZE, (mass * scale**3, speed), radius=TYPICAL_FOOTPRINT * scale, amplitude=amplitude, crossing=1.5, decay=2.5
-    )
-    given = {name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))}
-    return MaterialEntry(**given | {"stiffness": max(_STIFFNESS, given["stiffness"])})
 
 
 # Candidates of the camera: three-quarter views, first those of what faces -y, as most files have it [degrees].
@@ -168,7 +164,7 @@ def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple
     base = points[points[:, 2] <= np.quantile(points[:, 2], 0.1)]
     head = (upper.mean(axis=0) - base.mean(axis=0))[:2] / SIZE
     bins = np.rint(1.5 * normals).astype(int) @ [25, 5, 1] + 62
-    scene, best = RayScene(V, F), -np.inf
+    scene, views = RayScene(V, F), []
     for azimuth in _AZIMUTHS:
         lookat, distance, eye = _fitted(V, azimuth, elevation)
         rays = eye - points
@@ -182,15 +178,12 @@ def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple
         towards = (eye - lookat)[:2] / distance
         detail = (scene.distances(corners + 1e-3 * (eye - corners), eye - corners) > 1).mean()
         score = variety + top + 2 * head @ towards + np.log(max(shown.sum() * detail, 1e-300))
-        if score > best:
-            best, chosen, eye_of_best = score, (azimuth, lookat, distance), eye
-    azimuth, lookat, distance = chosen
-    x, y, z = (float(each) for each in lookat)
-    start = azimuth - _ORBIT * DURATION / 2
+        views.append((score, azimuth - _ORBIT * DURATION / 2, tuple(lookat.tolist()), distance, eye))
+    _, start, at, distance, eye = max(views, key=lambda view: view[0])
     entry = CameraEntry(
-        lookat=(x, y, z), distance=float(distance), azimuth=start, elevation=float(elevation), fovy=_FOVY, orbit=_ORBIT
+        lookat=at, distance=distance, azimuth=start, elevation=float(elevation), fovy=_FOVY, orbit=_ORBIT
     )
-    return entry, eye_of_best
+    return entry, eye
 
 
 def _sampled(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -221,20 +214,18 @@ def _fitted(
     return lookat, distance, pose.position
 
 
-def _flat_along(mesh: Mesh) -> str | None:
-    """Axis along which a mesh has no extent, if it is one that can point up."""
-    extents = np.ptp(mesh.V, axis=0)
-    return next((axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()), None)
-
-
 def _up(mesh: Mesh, usual: str) -> str:
-    """Axis along which a mesh stands: the usual one, unless it would fall over on that and not on the other."""
-    return min(UP_AXES, key=lambda axis: (not _stands(_standing(mesh, axis), mesh.F), axis != usual))
+    """Axis along which a mesh has no extent; or else the usual one, unless it falls on that and not on the other."""
+    extents = np.ptp(mesh.V, axis=0)
+    if flat := [axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()]:
+        return flat[0]
+    return min(UP_AXES, key=lambda axis: (not _stands(mesh, axis), axis != usual))
 
 
-def _stands(V: NDArray[np.float64], F: NDArray[np.int64]) -> bool:
+def _stands(mesh: Mesh, up: str) -> bool:
     """Whether the middle of a surface is above what touches the floor, give or take."""
-    below = V[V[:, 2] <= _FOOT * SIZE][:, :2] - _sampled(V, F)[0].mean(axis=0)[:2]
+    V = _standing(mesh, up)
+    below = V[V[:, 2] <= _FOOT * SIZE][:, :2] - _sampled(V, mesh.F)[0].mean(axis=0)[:2]
     angles = np.sort(np.arctan2(below[:, 1], below[:, 0]))
     return bool(np.diff(angles, append=angles[0] + 2 * np.pi).max() < np.pi)
 

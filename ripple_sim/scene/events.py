@@ -96,11 +96,8 @@ def free_joint(model: mujoco.MjModel, entry: DropEntry | ThrowEntry | PlaceEntry
         )
     joint = int(model.body_jntadr[body])
     if joint < 0 or model.jnt_type[joint] != int(mujoco.mjtJoint.mjJNT_FREE):
-        raise SceneError(
-            f"[[{verb}]] names the body {entry.body!r}, which has no <freejoint/>; only free bodies can {verb}"
-            if verb == "drop"
-            else f"[[{verb}]] names the body {entry.body!r}, which has no <freejoint/>; valid are free bodies"
-        )
+        valid = "only free bodies can drop" if verb == "drop" else "valid are free bodies"
+        raise SceneError(f"[[{verb}]] names the body {entry.body!r}, which has no <freejoint/>; {valid}")
     check_time(verb, entry.body, entry.time)
     if entry.orientation is not None and not np.linalg.norm(entry.orientation) > 0:
         raise SceneError(
@@ -194,22 +191,9 @@ class Script:
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
         """Carry out the events that are due."""
-        self._move(data)
-        while self._controls and self._controls[0][0].time <= data.time + 1e-9:
-            entry, actuator = self._controls.pop(0)
-            data.ctrl[actuator] = entry.value
-        while self._surface_events and self._surface_events[0].time <= data.time + 1e-9:
-            event = self._surface_events.pop(0)
-            if isinstance(event, PokeEntry):
-                ripples.poke(event.geom, event.point, event.impulse, event.radius)
-            else:
-                ripples.change_material(event.geom, **given_fields(event.material))
-
-    def _move(self, data: mujoco.MjData) -> None:
-        """Hold bodies that wait for their drop, and set the bodies in motion whose time has come."""
         begun = 0
         for entry, position, velocity in self._moved:
-            if isinstance(entry, DropEntry):
+            if isinstance(entry, DropEntry):  # held in place until its time has come
                 pose = slice(position, position + 7)
                 data.qpos[pose] = self._home.setdefault(entry.body, data.qpos[pose].copy())
                 data.qvel[velocity : velocity + 6] = 0
@@ -218,6 +202,15 @@ class Script:
                 begun += 1
         # sorted by time: those that have begun are the first
         del self._moved[:begun]
+        while self._controls and self._controls[0][0].time <= data.time + 1e-9:
+            control, actuator = self._controls.pop(0)
+            data.ctrl[actuator] = control.value
+        while self._surface_events and self._surface_events[0].time <= data.time + 1e-9:
+            event = self._surface_events.pop(0)
+            if isinstance(event, PokeEntry):
+                ripples.poke(event.geom, event.point, event.impulse, event.radius)
+            else:
+                ripples.change_material(event.geom, **given_fields(event.material))
 
 
 def _check_target(model: mujoco.MjModel, verb: str, entry: PokeEntry | ChangeEntry, targets: Sequence[str]) -> None:

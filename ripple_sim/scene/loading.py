@@ -260,26 +260,16 @@ def load_scene(
     moved: list[DropEntry | ThrowEntry] = [*content.drop, *content.throw]
     for each in moved:
         if each.position is not None and each.body in shifts:
-            x, y, z = np.add(each.position, shifts[each.body]).tolist()
-            each.position = x, y, z
+            each.position = tuple(np.add(each.position, shifts[each.body]).tolist())
     return scene_of(path.stem, model, content)
 
 
 def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[str, ...] = ()) -> Scene:
     """The scene of a name and notes that the content of a scene file makes of a model, checked; raises as that does."""
     events = Events(**{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)})
+    targets = tuple(_suited(model, entry) for entry in content.ripple)
     look = content.two_way, tuple(content.overlay), content.lighting
-    scene = Scene(
-        name,
-        model,
-        tuple(_suited(model, entry) for entry in content.ripple),
-        content.camera,
-        content.duration,
-        events,
-        *look,
-        notes,
-        tuple(content.sensor),
-    )
+    scene = Scene(name, model, targets, content.camera, content.duration, events, *look, notes, tuple(content.sensor))
     check_scene(scene)
     return scene
 
@@ -287,9 +277,10 @@ def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[
 def _suited(model: mujoco.MjModel, entry: RippleEntry) -> RippleEntry:
     """The entry with what its preset "suited" leaves out, if it has that, found from the model."""
     preset = entry.material.preset
-    if (preset if preset is None or isinstance(preset, str) else preset.name) != "suited":
+    preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
+    if preset is None or preset.name != "suited":
         return entry
-    given = {} if preset is None or isinstance(preset, str) else given_fields(preset, without="name")
+    given = given_fields(preset, without="name")
     if not {"size", "hit"} <= set(given):
         given = typical_hit(model, entry.geom) | given
     material = msgspec.structs.replace(entry.material, preset=PresetEntry(name="suited", **given))

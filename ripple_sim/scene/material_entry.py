@@ -20,7 +20,6 @@ from ripple_sim.solver.operator.presets import PRESETS
 
 # Constructors of `Material`; the presets of a scene file are these and the real materials by name.
 LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water", "suited")
-_LAYERED = ("layer", "jelly")
 
 
 class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -76,7 +75,7 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
         """
         given = given_fields(self, without="name")
         if thickness is not None:
-            if _law(self.name) not in _LAYERED:
+            if _law(self.name) not in ("layer", "jelly"):
                 raise SceneError(
                     f"[[ripple.inside]] needs a material with a layer, not the preset {self.name!r}; {_LAYER}"
                 )

@@ -20,7 +20,6 @@ from ripple_sim.render.tone_mapping import linear_to_srgb
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.files import read_image
 
-_SUFFIXES = (".png", ".jpg", ".jpeg")
 _SCENES = (".glb", ".gltf")
 
 
@@ -38,7 +37,7 @@ def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
         found: list[Any] = _embedded(mesh_path)
     else:
         named = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
-        beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in _SUFFIXES]
+        beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in (".png", ".jpg", ".jpeg")]
         found = named or [path for path in beside if path.is_file()][:1]
     if len(found) > 1:
         warnings.warn(
@@ -110,10 +109,8 @@ def _embedded(mesh_path: Path) -> list[Image.Image]:
     for error in logged:
         if isinstance(error, Image.DecompressionBombError):
             raise SceneError(f"an image in {mesh_path.name} cannot be read: {error} Scale it down")
-    materials = {
-        id(material): material for part in parts if (material := getattr(part.visual, "material", None)) is not None
-    }
-    images = (getattr(material, "baseColorTexture", None) for material in materials.values())
+    materials = (getattr(part.visual, "material", None) for part in parts)
+    images = (getattr(material, "baseColorTexture", None) for material in materials)
     return list({id(image): image for image in images if image is not None}.values())
 
 

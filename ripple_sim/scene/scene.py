@@ -23,7 +23,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 
 from .events import Events
-from .scene_file import CameraEntry, RippleEntry, SensorEntry, check_camera
+from .scene_file import CameraEntry, RippleEntry, SensorEntry, check_camera, converted
 
 MAX_DURATION = 86_400  # [s], a day
 MAX_SLOW_MOTION = 1000
@@ -93,10 +93,7 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
     Raises `SceneError` if a value is invalid, or would have no effect.
     """
     given = {name: value for name, value in changes.items() if value is not None}
-    try:
-        camera = msgspec.convert({**msgspec.structs.asdict(scene.camera), **given}, CameraEntry)
-    except msgspec.ValidationError as error:
-        raise SceneError(f"camera: {str(error).replace('`$.', '`')}") from error
+    camera = converted({**msgspec.structs.asdict(scene.camera), **given}, CameraEntry, "camera")
     check_camera(scene.model, camera)
     if "focus" in given and not camera.aperture:
         raise SceneError("a focus needs a lens: give the camera an aperture of more than 0 m, such as 0.05")
@@ -149,7 +146,15 @@ def parse_request(words: Iterable[str]) -> Request:
             raise SceneError(f"there is no overlay {name!r}; valid are {', '.join(NAMES)}")
         if given and name not in HEATMAPS:
             raise SceneError(f"overlay {word.strip()!r}: {name} has no range; only {' and '.join(HEATMAPS)} have one")
-        chosen[name] = _positive(word, value, HEATMAPS[name]) if given else None
+        chosen[name] = None
+        if given:
+            limit = math.nan
+            with contextlib.suppress(ValueError):
+                limit = float(value)
+            if not 0 < limit < math.inf:
+                unit = HEATMAPS[name]
+                raise SceneError(f"overlay {word.strip()!r}: the range must be a positive number [{unit}]")
+            chosen[name] = limit
     heatmaps = [name for name in HEATMAPS if name in chosen]
     if len(heatmaps) > 1:
         raise SceneError(f"overlays {' and '.join(heatmaps)} cannot both colour the surface; choose one")
@@ -158,16 +163,6 @@ def parse_request(words: Iterable[str]) -> Request:
         limit=chosen[heatmaps[0]] if heatmaps else None,
         **{name: name in chosen for name in NAMES if name not in HEATMAPS},
     )
-
-
-def _positive(word: str, value: str, unit: str) -> float:
-    try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not (number > 0 and math.isfinite(number)):
-        raise SceneError(f"overlay {word.strip()!r}: the range must be a positive number [{unit}]")
-    return number
 
 
 # By ending: what a file is that is taken for a scene file, and what to do with it.

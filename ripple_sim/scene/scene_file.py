@@ -30,6 +30,8 @@ from .target_maps import HeightEntry, InsideEntry, moved
 
 MAX_EXPOSURES = 1024
 
+Entry = typing.TypeVar("Entry")
+
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[camera]`: where the video is seen from."""
@@ -216,30 +218,36 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
 
 def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
     """Check a scene's table against the schema; raises `SceneError` naming the place, the value and what is valid."""
-    _check_keys(table, SceneFile, "", origin)
-    _check_values(table, "", origin)
+    what = f"scene file {origin!r}"
+    check_keys(table, SceneFile, what)
+    _check_values(table, "", what)
+    return converted(table, SceneFile, what)
+
+
+def converted(table: Any, schema: type[Entry], what: str) -> Entry:
+    """A table read by a schema; raises `SceneError` with what it is, the key and the value if they do not fit."""
     try:
-        return msgspec.convert(table, SceneFile)
+        return msgspec.convert(table, schema)
     except msgspec.ValidationError as error:
-        raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
+        raise SceneError(f"{what}: {str(error).replace('`$.', '`')}") from error
 
 
 # Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not overflow.
 _LARGEST = 1e12
 
 
-def _check_values(value: Any, place: str, origin: str) -> None:
+def _check_values(value: Any, place: str, what: str) -> None:
     """Refuse NaN, infinity, absurdly large numbers and texts with a NUL anywhere."""
     if isinstance(value, dict):
         for key, inner in value.items():
-            _check_values(inner, f"{place}.{key}" if place else key, origin)
+            _check_values(inner, f"{place}.{key}" if place else key, what)
     elif isinstance(value, list):
         for inner in value:
-            _check_values(inner, place, origin)
+            _check_values(inner, place, what)
     elif isinstance(value, str) and re.search("[\0\ud800-\udfff]", value):  # the latter are halves of pairs
-        raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are names without a NUL")
+        raise SceneError(f"{what}: {place} is {shown(value)}; valid are names without a NUL")
     elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
-        raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
+        raise SceneError(f"{what}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
 
 
 _TABLES: dict[str, type[msgspec.Struct]] = {
@@ -263,25 +271,24 @@ _TABLES: dict[str, type[msgspec.Struct]] = {
 }
 
 
-def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: str) -> None:
-    """Refuse unknown keys before msgspec does, with the list of valid ones."""
+def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str = "") -> None:
+    """Refuse unknown keys before msgspec does, with the list of valid ones; raises `SceneError` with what it is."""
     if not isinstance(table, dict):
         return
     fields = {field.name: field.type for field in msgspec.structs.fields(schema)}
     for key, value in table.items():
         if key not in fields:
             where = f" in [{place}]" if place else ""
-            raise SceneError(f"scene file {origin!r}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
+            raise SceneError(f"{what}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
         inner_place = f"{place}.{key}" if place else key
         inner = _TABLES.get(inner_place)
         if inner is not None:
             if isinstance(value, dict) and typing.get_origin(fields[key]) is list:
                 raise SceneError(
-                    f"scene file {origin!r}: [{inner_place}] is one table, where there may be several; write "
-                    f"[[{inner_place}]]"
+                    f"{what}: [{inner_place}] is one table, where there may be several; write [[{inner_place}]]"
                 )
             for item in value if isinstance(value, list) else [value]:
-                _check_keys(item, inner, inner_place, origin)
+                check_keys(item, inner, what, inner_place)
 
 
 def uniform_material(entry: RippleEntry) -> Material:

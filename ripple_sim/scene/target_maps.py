@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.coupling.geoms import find_target, to_body
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, texture_map
+from ripple_sim.solver import Mesh, Volume, load_mesh, load_volume, texture_map
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.volume import is_volume
 from ripple_sim.solver.operator.plate_rim import RIMS, Rim
@@ -34,7 +34,6 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{name: (getattr(np, name), 2) for name in ("hypot", "minimum", "maximum")},
     "where": (np.where, 3),
 }
-_CONSTANTS = {"pi": np.pi}
 _OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -64,7 +63,7 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
             raise SceneError(f"it has {len(text)} characters, valid are {_LONGEST} at most")
         tree = ast.parse(text.strip(), mode="eval")
         with np.errstate(all="ignore"):
-            value = _value(tree.body, {**_CONSTANTS, **variables})
+            value = _value(tree.body, {"pi": np.pi, **variables})
         result = np.zeros_like(next(iter(variables.values()))) + np.asarray(value, dtype=np.float64)
     except SceneError as wrong:
         raise SceneError(f"the expression {shown(text)} cannot be used: {wrong}") from None
@@ -148,20 +147,17 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
             return evaluate(self.expression, dict(zip("xyz", np.moveaxis(places, -1, 0), strict=True)))
         if self.map is not None:
             return texture_map(atlas, self.map, self.low, self.high, self.channel)
-        return _saved(self.field or "", atlas)
-
-
-def _saved(path: str, atlas: Atlas) -> NDArray[np.float64]:
-    try:
-        field = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
-    shape = atlas.areas.shape
-    if not isinstance(field, np.ndarray) or field.shape != shape or field.dtype.kind not in "iuf":
-        raise SceneError(f"saved field {path!r} holds {getattr(field, 'shape', 'no array')}; valid are numbers {shape}")
-    if not np.isfinite(field).all():
-        raise SceneError(f"saved field {path!r} has heights that are not finite")
-    return field.astype(np.float64)
+        path, shape = self.field or "", atlas.areas.shape
+        try:
+            field = np.load(path, allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
+        if not isinstance(field, np.ndarray) or field.shape != shape or field.dtype.kind not in "iuf":
+            held = getattr(field, "shape", "no array")
+            raise SceneError(f"saved field {path!r} holds {held}; valid are numbers {shape}")
+        if not np.isfinite(field).all():
+            raise SceneError(f"saved field {path!r} has heights that are not finite")
+        return field.astype(np.float64)
 
 
 def check_rim(rim: str | dict[str, str]) -> None:
@@ -200,9 +196,6 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
         return found
 
     return conditions
-
-
-Array = NDArray[np.float64]
 
 
 class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -245,7 +238,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
         return load_inside(self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale)
 
 
-def moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], Array]) -> Mesh | Volume:
+def moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], NDArray[np.float64]]) -> Mesh | Volume:
     """A body where a function that moves points [..., 3] [m] puts it."""
     if isinstance(body, Mesh):
         return dataclasses.replace(body, V=to_atlas(body.V))

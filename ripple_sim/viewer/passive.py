@@ -96,10 +96,9 @@ class RippleViewer:
     """
 
     def __init__(self, handle: Any, data: mujoco.MjData, ripples: Ripples, threads: set[threading.Thread]) -> None:
-        self._threads = threads
-        self._handle, self._data, self._ripples, self._time = handle, data, ripples, data.time
-        share = _TRIANGLES // len(ripples)
-        self._skins = {name: _Skin(ripples[name], share) for name in ripples}
+        self._handle, self._threads = handle, threads
+        self._data, self._ripples, self._time = data, ripples, data.time
+        self._skins = {name: _Skin(ripples[name], _TRIANGLES // len(ripples)) for name in ripples}
         self.sync()
 
     def __getattr__(self, name: str) -> Any:
@@ -165,22 +164,18 @@ class RippleViewer:
             local, drag = (point - position) @ rotation, (pull.refselpos - point) @ rotation
             texel = np.linalg.norm(waves.atlas.positions.reshape(-1, 3) - local, axis=1).argmin()
             inwards = -float(drag @ waves.atlas.normals.reshape(-1, 3)[texel])
-            radius, stiffness = _finger(waves)
-            waves.add_impulse(local, stiffness * inwards * elapsed, radius)
+            radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
+            speed, stiffness, density = (float(np.max(getattr(waves.material, name))) for name in SWINGING)
+            # force that presses the surface in by a metre [N/m], as in `poke_strength`: a mass of pi r^2 sigma / 4 that
+            # swings at omega^2 = (2 c / r)^2 + k
+            firmness = np.pi * density * (speed**2 + stiffness * radius**2 / 4)
+            waves.add_impulse(local, firmness * inwards * elapsed, radius)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
         self.close()
-
-
-def _finger(waves: WaveSolver) -> tuple[float, float]:
-    """Radius of a finger [m], and the force on it that presses the surface in by a metre [N/m]."""
-    radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
-    speed, stiffness, density = (float(np.max(getattr(waves.material, name))) for name in SWINGING)
-    # as `poke_strength`: a mass of pi r^2 sigma / 4 that swings at omega^2 = (2 c / r)^2 + k
-    return radius, np.pi * density * (speed**2 + stiffness * radius**2 / 4)
 
 
 def _look(model: mujoco.MjModel, target: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

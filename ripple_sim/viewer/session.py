@@ -167,7 +167,12 @@ class Session:
         for name in self.simulation.ripples:
             position, rotation = self._pose(name)
             local, heading = (start - position) @ rotation, along @ rotation
-            triangle, far, _, _ = self._scene(name).cast(local[None], heading[None])
+            waves = self.simulation.ripples[name]
+            V, scene = self._scenes.get(name, (None, None))
+            if scene is None or waves.vertices is not V:
+                scene = RayScene(waves.atlas.mesh.V, waves.atlas.mesh.F)
+                self._scenes[name] = waves.vertices, scene
+            triangle, far, _, _ = scene.cast(local[None], heading[None])
             if triangle[0] >= 0:
                 distance = float(far[0])
                 hits.append((name, local + distance * heading, distance))
@@ -193,15 +198,6 @@ class Session:
         middle, _ = self._pose(self.simulation.scene.targets[0].geom)
         reach = max(float((middle - start) @ along / (along @ along)), 0.0) if hit is None else hit[2]
         return self._balls.throw(self.simulation.data, start, start + reach * along, FLIGHT)
-
-    def _scene(self, name: str) -> RayScene:
-        """A target's undisplaced surface where it is."""
-        waves = self.simulation.ripples[name]
-        V, scene = self._scenes.get(name, (None, None))
-        if scene is None or waves.vertices is not V:
-            scene = RayScene(waves.atlas.mesh.V, waves.atlas.mesh.F)
-            self._scenes[name] = waves.vertices, scene
-        return scene
 
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Position [m] and rotation matrix of a geom in the world."""

@@ -50,7 +50,6 @@ def add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, r
 HEIGHT = "height [mm]"
 _PER_METRE = 1000.0
 
-_COLORMAP = "coolwarm"
 _STEPS = (1.0, 2.0, 5.0)  # times a power of ten end the colours, so that these do not change with every frame
 _SEGMENTS = 8  # of a geom, per right angle
 
@@ -104,16 +103,9 @@ class SkinActor:
         mesh.point_data.set_array(_PER_METRE * shape.height, HEIGHT)
         mesh.set_active_scalars(HEIGHT)
         self.actor = plotter.add_mesh(
-            mesh,
-            scalars=HEIGHT,
-            cmap=_COLORMAP,
-            clim=(-1.0, 1.0),
-            color=color.tolist(),
-            show_scalar_bar=False,
-            copy_mesh=False,
-            interpolation="Phong",
-            **_SHADING,
-        )
+            mesh, scalars=HEIGHT, cmap="coolwarm", clim=(-1.0, 1.0), color=color.tolist(), show_scalar_bar=False,
+            copy_mesh=False, interpolation="Phong", **_SHADING,
+        )  # fmt: skip
         self.actor.prop.specular_color = "white"
 
     def update(self, shape: Displaced, pose: tuple[NDArray, NDArray], limit: float | None) -> None:
@@ -190,9 +182,7 @@ class Shadows:
             actor.SetVisibility(dark > 0 and above > -half and geom not in parked)
             actor.prop.opacity = dark
             wide = _WIDER * radius * (1 + 0.1 * max(0.0, above) / radius)
-            pose = np.diag([wide, wide, 1.0, 1.0])
-            pose[:3, 3] = x, y, ground + _ABOVE * radius
-            actor.user_matrix = pose
+            _place(actor, np.array([x, y, ground + _ABOVE * radius]), np.diag([wide, wide, 1.0]))
 
 
 # Bodies farther away than this many distances of the first camera wait for their turn, and are hidden.
@@ -211,8 +201,7 @@ class Stage:
     """
 
     def __init__(self, plotter: pv.Plotter, session: Session) -> None:
-        self._plotter, self._session = plotter, session
-        self._heatmap = False
+        self._session, self._heatmap = session, False
         # shadows lie side by side on the floor: plain blending will do, without buffers of the window's size
         plotter.renderer.SetUseOIT(False)
         plotter.set_background(BACKGROUND)
@@ -233,11 +222,16 @@ class Stage:
         self._bodies = BodyActors(plotter, session, pose.focus, _REACH * pose.distance)
         floor = find_floor(simulation.model, simulation.ripples.geom_ids.values())
         rigid = [geom for geom in simulation.ripples.geom_ids.values() if not is_soft(simulation.model, geom)]
-        casting = [*rigid, *self._bodies.solid]
         self.shadows: Shadows | None = None
         if floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL:
-            self.shadows = Shadows(plotter, session, casting, floor)
-        self._add_bar()
+            self.shadows = Shadows(plotter, session, [*rigid, *self._bodies.solid], floor)
+        first = next(iter(self.skins.values()))
+        self._bar = plotter.add_scalar_bar(
+            HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
+            n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
+        )  # fmt: skip
+        self._bar.SetVerticalTitleSeparation(10)
+        self._bar.SetVisibility(self._heatmap)
         camera = plotter.camera
         camera.position, camera.focal_point, camera.up = pose.position, pose.focus, (0.0, 0.0, 1.0)
         camera.view_angle = pose.fovy
@@ -258,12 +252,3 @@ class Stage:
         self._heatmap = not self._heatmap
         self._bar.SetVisibility(self._heatmap)
         self.update()
-
-    def _add_bar(self) -> None:
-        first = next(iter(self.skins.values()))
-        self._bar = self._plotter.add_scalar_bar(
-            HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
-            n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
-        )  # fmt: skip
-        self._bar.SetVerticalTitleSeparation(10)
-        self._bar.SetVisibility(self._heatmap)

@@ -29,8 +29,6 @@ from ripple_sim.errors import DisplayError
 from .controls import CONTROLS
 from .window import Window
 
-LOOPBACK = "127.0.0.1"
-
 # Of a message from the browser [bytes]: it sends keys and movements of the pointer.
 LARGEST_MESSAGE = 64 * 1024
 
@@ -75,7 +73,7 @@ def restrict(server: Any, *, host: str, port: int, secret: str) -> None:
     server : trame_server.Server
         Not started yet.
     host : str
-        Name or address to listen at; `LOOPBACK` is reached from this machine alone.
+        Name or address to listen at; 127.0.0.1 is reached from this machine alone.
     port : int
     secret : str
         From `new_secret`.
@@ -110,14 +108,11 @@ def _is_own(netloc: str, host: str) -> bool:
     A number is no name that another site's name server could give; where this machine alone is served it must be one
     of the machine's own.
     """
+    local = is_local(host)
     try:
         name = urlsplit(f"//{netloc}").hostname or ""
-    except ValueError:
-        return False
-    local = is_local(host)
-    if name == "localhost" or (not local and name in (host.lower(), socket.gethostname().lower())):
-        return True
-    try:
+        if name == "localhost" or (not local and name in (host.lower(), socket.gethostname().lower())):
+            return True
         number = ipaddress.ip_address(name)
     except ValueError:
         return False

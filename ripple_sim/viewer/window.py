@@ -30,7 +30,6 @@ from .stage import Stage
 # A click that moves the pointer farther than this turns the camera and pokes nothing [pixels].
 _STILL = 4
 
-
 _MULTISAMPLES = 8
 # The status line is rewritten this often [s]: text is slow to draw.
 _STATUS_EVERY = 0.25

@@ -158,7 +158,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 @pytest.mark.parametrize(
     ("number", "status", "word", "where"),
     [
-        (signal.SIGINT, 130, "interrupted", "cli._parse = meet_signal"),
+        (signal.SIGINT, 130, "interrupted", "cli.parse = meet_signal"),
         (signal.SIGTERM, 143, "terminated", "reports.InfoCommand.run = meet_signal"),
     ],
 )

@@ -21,7 +21,7 @@ LIMIT = 60.0  # [s]
 
 
 @asynccontextmanager
-async def served(name: str, host: str = web.LOOPBACK) -> AsyncIterator[tuple[int, Any, list[str]]]:
+async def served(name: str, host: str = "127.0.0.1") -> AsyncIterator[tuple[int, Any, list[str]]]:
     """Port of a page of trame's, a client, and the calls that reached the server."""
     from trame.app import get_server
 
