@@ -55,7 +55,8 @@ class DaskExecutor(Executor):
             ) from error
         self._address = address
         self._log = logging.getLogger("distributed.client")
-        self._log.disabled = True  # that the scheduler is gone is said once, by `refusal`
+        self._silence = lambda record: False  # that the scheduler is gone is said once, by `refusal`
+        self._log.addFilter(self._silence)
         self._places, self._counted = 0, -math.inf
         self._executor = self._client.get_executor(pure=False, retries=0)
 
@@ -73,7 +74,7 @@ class DaskExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the cluster; without `wait` what is not yet done is given up."""
-        self._log.disabled = False
+        self._log.removeFilter(self._silence)
         self._executor.shutdown(wait=wait)
         self._client.close()
 

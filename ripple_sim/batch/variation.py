@@ -234,8 +234,16 @@ class Variation:
                 if not isinstance(bodies, int):
                     raise SceneError(f"plan: the number of bodies is {bodies!r}; draw it from integers")
             values["bodies"] = bodies
-            given = {name: getattr(meshes, name) for name in ("up", "look", "repair", "wrap")}
-            scene = drop_scene(self.source, bodies=bodies, seed=self.seed, edit=edit, **given)
+            scene = drop_scene(
+                self.source,
+                bodies=bodies,
+                seed=self.seed,
+                up=meshes.up,
+                look=meshes.look,
+                edit=edit,
+                repair=meshes.repair,
+                wrap=meshes.wrap,
+            )
             # what a scene file would say of it: what is not as by default, as plain values
             parts = {"ripple": list(scene.targets), "camera": scene.camera}
             parts |= {name: list(events) for name, events in vars(scene.events).items()}

@@ -272,8 +272,15 @@ class DropCommand(_VideoCommand):
         """Build a scene around the mesh."""
         from ripple_sim.scene.drop import drop_scene
 
-        given = ("bodies", "seed", "up", "texture", "repair", "wrap")
-        scene = drop_scene(self.mesh, **{name: getattr(self, name) for name in given})
+        scene = drop_scene(
+            self.mesh,
+            bodies=self.bodies,
+            seed=self.seed,
+            up=self.up,
+            texture=self.texture,
+            repair=self.repair,
+            wrap=self.wrap,
+        )
         for note in scene.notes:
             print(f"{self.mesh.name}: {note}", file=sys.stderr)
         return scene

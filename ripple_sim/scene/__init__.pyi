@@ -30,6 +30,7 @@ from .loading import (
 )
 from .material_entry import (
     LAWS as LAWS,
+    MapEntry as MapEntry,
     MaterialChange as MaterialChange,
     MaterialEntry as MaterialEntry,
     PresetEntry as PresetEntry,
@@ -53,7 +54,6 @@ from .scene import (
 from .scene_file import (
     MAX_EXPOSURES as MAX_EXPOSURES,
     CameraEntry as CameraEntry,
-    MapEntry as MapEntry,
     RippleEntry as RippleEntry,
     SceneFile as SceneFile,
     StillEntry as StillEntry,
@@ -62,4 +62,9 @@ from .scene_file import (
     parse_scene as parse_scene,
     uniform_material as uniform_material,
 )
-from .target_maps import InsideEntry as InsideEntry, evaluate as evaluate, load_inside as load_inside
+from .target_maps import (
+    HeightEntry as HeightEntry,
+    InsideEntry as InsideEntry,
+    evaluate as evaluate,
+    load_inside as load_inside,
+)

@@ -25,7 +25,7 @@ from ripple_sim.solver.errors import shown
 
 from .bodies import RandomEntry
 from .events import ChangeEntry, ControlEntry, DropEntry, PlaceEntry, PokeEntry, ThrowEntry, Vector
-from .material_entry import MapEntry, MaterialChange, MaterialEntry, PresetEntry
+from .material_entry import MaterialEntry
 from .target_maps import HeightEntry, InsideEntry, moved
 
 MAX_EXPOSURES = 1024
@@ -158,6 +158,12 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
             height=None if self.height is None else self.height.located(folder),
         )
 
+    def files(self) -> list[str]:
+        """Paths of what it reads, files or folders; its own paths are the same texts."""
+        height = self.height or HeightEntry()
+        paths = [self.still_map, height.map, height.field, *(each.mesh or each.volume for each in self.inside)]
+        return [each.map for each in self.material.maps().values()] + [path for path in paths if path is not None]
+
 
 class SensorEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[[sensor]]`: a signal from a target's surface, at a site or at points."""
@@ -250,25 +256,11 @@ def _check_values(value: Any, place: str, what: str) -> None:
         raise SceneError(f"{what}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
 
 
-_TABLES: dict[str, type[msgspec.Struct]] = {
-    "ripple": RippleEntry,
-    "ripple.material": MaterialEntry,
-    **{f"ripple.material.{field.name}": MapEntry for field in msgspec.structs.fields(MaterialEntry)},
-    "ripple.material.preset": PresetEntry,
-    "ripple.still": StillEntry,
-    "ripple.inside": InsideEntry,
-    "ripple.height": HeightEntry,
-    "camera": CameraEntry,
-    "drop": DropEntry,
-    "throw": ThrowEntry,
-    "place": PlaceEntry,
-    "poke": PokeEntry,
-    "change": ChangeEntry,
-    "change.material": MaterialChange,
-    "control": ControlEntry,
-    "sensor": SensorEntry,
-    "random": RandomEntry,
-}
+def _table_of(kind: Any) -> type[msgspec.Struct] | None:
+    """The table that a field of some type may be, or one of a list of tables."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        return kind
+    return next(filter(None, map(_table_of, typing.get_args(kind))), None)
 
 
 def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str = "") -> None:
@@ -280,8 +272,7 @@ def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str =
         if key not in fields:
             where = f" in [{place}]" if place else ""
             raise SceneError(f"{what}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
-        inner_place = f"{place}.{key}" if place else key
-        inner = _TABLES.get(inner_place)
+        inner, inner_place = _table_of(fields[key]), f"{place}.{key}" if place else key
         if inner is not None:
             if isinstance(value, dict) and typing.get_origin(fields[key]) is list:
                 raise SceneError(

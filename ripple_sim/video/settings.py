@@ -9,9 +9,10 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
+import itertools
 from importlib.metadata import version
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import msgspec
 import mujoco
@@ -56,22 +57,32 @@ def versions() -> dict[str, str]:
 
 
 def scene_digest(scene: Scene) -> str:
-    """Fingerprint of the model, the surfaces, the camera and the script, 16 hexadecimal digits."""
+    """Fingerprint of the model, the surfaces, the camera and the script, 16 hexadecimal digits.
+
+    Of files the contents count, not the paths: it is the same where all lies in another folder.
+    """
     hasher = hashlib.blake2b(digest_size=8)
-    model = np.zeros(mujoco.mj_sizeModel(scene.model), np.uint8)
-    mujoco.mj_saveModel(scene.model, None, model)
-    hasher.update(model.tobytes())
-    for entry in scene.targets:
-        for each in entry.material.maps().values():
-            hasher.update(Path(each.map).read_bytes())
-        if entry.still_map is not None:
-            hasher.update(Path(entry.still_map).read_bytes())
-    hasher.update(
-        msgspec.json.encode(
-            (scene.targets, scene.camera, scene.events, scene.two_way, *([scene.sensors] if scene.sensors else []))
-        )
+    _add_fields(hasher, scene.model)
+    entries = msgspec.json.encode(
+        (scene.targets, scene.camera, scene.events, scene.two_way, *([scene.sensors] if scene.sensors else []))
     )
+    for path in itertools.chain.from_iterable(entry.files() for entry in scene.targets):
+        entries = entries.replace(msgspec.json.encode(path), b'""')
+        for file in sorted(Path(path).rglob("*")) if Path(path).is_dir() else [Path(path)]:
+            if file.is_file():
+                hasher.update(file.read_bytes())
+    hasher.update(entries)
     return hasher.hexdigest()
+
+
+def _add_fields(hasher: Any, struct: Any) -> None:
+    """Add the fields of a struct of MuJoCo, but for the paths of its files, and its size, in which these count."""
+    for name in dir(struct):
+        value = None if name.startswith("_") or "path" in name or name == "nbuffer" else getattr(struct, name)
+        if isinstance(value, int | float | bytes | np.ndarray):
+            hasher.update(name.encode() + np.asarray(value).tobytes())
+        elif type(value).__module__.startswith("mujoco") and not callable(value):
+            _add_fields(hasher, value)
 
 
 # Options that replace those of the scene's camera, by the same names.

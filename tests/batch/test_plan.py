@@ -29,7 +29,7 @@ def test_keys_may_be_written_as_tables_or_with_quotes(tmp_path):
         ('scenes = ["scene.toml"]', "", "names no scene"),
         ('scenes = ["scene.toml"]', 'meshes = {files = ["*.obj"]}', r"no mesh fits '\*.obj'"),
         ("uniform = [0, 360]", "uniform = 360", "camera.azimuth: Expected `array"),
-        ("fps = 20", "fsp = 20", "unknown field `fsp`"),
+        ("fps = 20", "fsp = 20", r"unknown key 'fsp' in \[store\]; valid are video, size, fps"),
         ("fps = 20", 'video = "avi"', "Invalid enum value 'avi'"),
     ],
     ids=lambda value: value[:30] or "none",

@@ -1,6 +1,8 @@
 """Options of a video: what the scene and the output decide, what is refused, and how many frames there are."""
 
 import dataclasses
+import importlib.resources
+import shutil
 from pathlib import Path
 
 import msgspec
@@ -8,9 +10,21 @@ import mujoco
 import pytest
 
 from ripple_sim.errors import RippleError, SceneError
-from ripple_sim.scene import MAX_DURATION, MAX_SLOW_MOTION, CameraEntry, MapEntry, MaterialEntry, RippleEntry, Scene
+from ripple_sim.scene import (
+    MAX_DURATION,
+    MAX_SLOW_MOTION,
+    CameraEntry,
+    HeightEntry,
+    InsideEntry,
+    MapEntry,
+    MaterialEntry,
+    RippleEntry,
+    Scene,
+    load_scene,
+)
 from ripple_sim.video import VideoOptions, check_options, frame_count, scene_digest, settled
 
+SCENES = Path(str(importlib.resources.files("ripple_sim.scenes")))
 MJCF = '<mujoco><worldbody><geom name="egg" size="{}"/></worldbody></mujoco>'
 
 
@@ -73,6 +87,12 @@ def test_the_same_scene_has_the_same_fingerprint_whatever_its_name_and_length() 
     assert scene_digest(made(name="other", duration=9.0, overlay=("time",))) == digest
 
 
+@pytest.mark.parametrize("name", ["face", "skull"])
+def test_a_scene_in_another_folder_has_the_same_fingerprint(tmp_path: Path, name: str) -> None:
+    copy = shutil.copytree(SCENES, tmp_path / "a longer folder", ignore=shutil.ignore_patterns("*.py*"))
+    assert scene_digest(load_scene(copy / f"{name}.toml")) == scene_digest(load_scene(SCENES / f"{name}.toml"))
+
+
 def test_everything_that_moves_or_shows_changes_the_fingerprint() -> None:
     base = made()
     entry = base.targets[0]
@@ -89,13 +109,20 @@ def test_everything_that_moves_or_shows_changes_the_fingerprint() -> None:
     assert len(digests) == 1 + len(others)
 
 
-def test_the_content_of_a_picture_counts(tmp_path: Path) -> None:
-    speed, still = tmp_path / "speed.png", tmp_path / "still.png"
-    entry = RippleEntry(geom="egg", material=MaterialEntry(speed=MapEntry(map=str(speed))), still_map=str(still))
+def test_the_content_of_files_counts(tmp_path: Path) -> None:
+    paths = [tmp_path / name for name in ("speed.png", "still.png", "bone.obj", "start.npy")]
+    speed, still, bone, start = map(str, paths)
+    entry = RippleEntry(
+        geom="egg",
+        material=MaterialEntry(speed=MapEntry(map=speed)),
+        still_map=still,
+        inside=[InsideEntry(mesh=bone)],
+        height=HeightEntry(field=start),
+    )
     digests = []
-    for contents in ((b"a", b"b"), (b"A", b"b"), (b"a", b"B"), (b"a", b"b")):
-        for path, content in zip((speed, still), contents, strict=True):
-            path.write_bytes(content)
+    for changed in (None, *paths, None):
+        for path in paths:
+            path.write_bytes(b"other" if path == changed else b"same")
         digests.append(scene_digest(made(targets=(entry,))))
-    assert digests[0] == digests[3]
-    assert len(set(digests)) == 3
+    assert digests[0] == digests[-1]
+    assert len(set(digests)) == 1 + len(paths)
