@@ -216,7 +216,7 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
     """
     if batch.plan.exists():
         before, now = _flat(load_stored(batch.plan)), _flat(plan)
-        # a larger batch begins like a smaller one; tar files tell themselves what is in them
+        # a larger batch begins like a smaller one
         keys = (before.keys() | now.keys()) - {"plan.count"}
         changed = sorted(key for key in keys if before.get(key) != now.get(key))
         if changed:
