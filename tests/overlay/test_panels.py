@@ -10,7 +10,7 @@ from mujoco_models import posed
 from ripple_sim import overlay
 from ripple_sim.coupling import Energy, Impulse
 from ripple_sim.overlay import Layout, Mark, Notes, Painter, Projection, Sprite
-from ripple_sim.render import Camera, Pose
+from ripple_sim.render import Camera
 from ripple_sim.scene import NAMES, parse_request
 from ripple_sim.solver import sphere_atlas
 
@@ -215,18 +215,14 @@ SCENE = """<mujoco><worldbody><geom type="box" size=".5 .5 .5"/>
 <geom name="veil" type="box" size=".01 9 9" pos="2 0 0" group="{}"/></worldbody></mujoco>"""
 
 
-def ray(pose: Pose, size: tuple[int, int], pixel: np.ndarray) -> np.ndarray:
-    """Way from the camera through a pixel, from the angle of view alone."""
-    up = np.tan(np.radians(pose.fovy) / 2)
-    x, y = (2 * pixel[0] / size[0] - 1) * up * size[0] / size[1], (1 - 2 * pixel[1] / size[1]) * up
-    return pose.rotation @ [x, y, -1.0]
-
-
 @pytest.mark.parametrize("size", [(640, 480), (480, 640), (33, 17)])
 def test_points_on_the_ray_through_a_pixel_come_back_to_it_and_those_behind_to_none(size: tuple[int, int]) -> None:
     pose = CAMERA.pose()
+    up = np.tan(np.radians(pose.fovy) / 2)
     for pixel in np.random.default_rng(0).uniform(0, size, (20, 2)):
-        points = pose.position + np.array([[0.1], [3.0], [400.0]]) * ray(pose, size, pixel)
+        # from the angle of view alone
+        x, y = (2 * pixel[0] / size[0] - 1) * up * size[0] / size[1], (1 - 2 * pixel[1] / size[1]) * up
+        points = pose.position + np.array([[0.1], [3.0], [400.0]]) * (pose.rotation @ [x, y, -1.0])
         np.testing.assert_allclose(Projection(pose, *size).pixels(points), np.tile(pixel, (3, 1)), rtol=1e-9)
     behind = pose.position + np.array([[1.0], [0.0], [-1.0]]) * pose.rotation[:, 2]
     np.testing.assert_array_equal(np.isnan(Projection(pose, *size).pixels(behind)).all(axis=1), [True, True, False])

@@ -9,12 +9,7 @@ from hand_made import flat_torus, polygon, square, two_squares
 from ripple_sim.solver import Material, TexelMesh, texel_atlas
 from ripple_sim.solver.backends import CPUBackend, advance
 from ripple_sim.solver.operator import WaveOperator, build_operator
-from ripple_sim.solver.texels import Stencil, stiffness_matrix
-
-
-def matrix(stencil: Stencil | None, size: int) -> np.ndarray:
-    """Matrix of a stencil's sums: minus its stiffness."""
-    return np.zeros((size, size)) if stencil is None else -stiffness_matrix(stencil).toarray()
+from ripple_sim.solver.texels import stiffness_matrix
 
 
 class DenseWaves:
@@ -27,8 +22,10 @@ class DenseWaves:
         self.forces, self.acceleration = np.zeros_like(self.h), 0.0
         size = len(self.h)
         laplace, rigidity = operator.bending or (None, np.zeros(size))
-        stencils = operator.stencil, operator.viscosity_stencil, laplace
-        self._tension, self._viscosity, self._laplace = (matrix(each, size) for each in stencils)
+        self._tension, self._viscosity, self._laplace = (
+            np.zeros((size, size)) if stencil is None else -stiffness_matrix(stencil).toarray()
+            for stencil in (operator.stencil, operator.viscosity_stencil, laplace)
+        )
         self._rigidity = rigidity.ravel()
 
     def advance(self, substeps: int, dt: float) -> None:

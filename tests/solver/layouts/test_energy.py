@@ -104,34 +104,23 @@ def gradients(A):
     return 2 * A.ravel(), np.array([s, -r, -q, p])
 
 
-def full_hessian(A):
-    _, wd, wj, wdd, wdj, wjj = density_derivatives(np.sum(A * A), np.linalg.det(A), SPHERE)
-    gd, gj = gradients(A)
-    mixed = np.outer(gd, gj)
-    squares = wdd * np.outer(gd, gd) + wdj * (mixed + mixed.T) + wjj * np.outer(gj, gj)
-    return wd * SECOND_OF_D + wj * SECOND_OF_J + squares
-
-
-def rotated(s1, s2):
-    turn = [np.array([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]]) for t in (0.4, -1.1)]
-    return turn[0] @ np.diag([s1, s2]) @ turn[1]
-
-
 @pytest.mark.parametrize(
     ("s1", "s2"), [(1, 1), (1.1, 0.9), (2, 2), (0.3, 0.3), (2, 0.5), (0.6, 0.4), (0.5, 0.1), (3, 0.01), (1.5, 1.4)]
 )
 @pytest.mark.parametrize("area", [1.0, 0.01])
 def test_projected_hessian_is_the_positive_part_of_the_full_one(s1, s2, area):
-    A = rotated(s1, s2)
+    turn = [np.array([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]]) for t in (0.4, -1.1)]
+    A = turn[0] @ np.diag([s1, s2]) @ turn[1]
     energy, shares = projected_hessian(area, np.sum(A * A), np.linalg.det(A), SPHERE)
-    w, wd, wj, *_ = density_derivatives(np.sum(A * A), np.linalg.det(A), SPHERE)
+    w, wd, wj, wdd, wdj, wjj = density_derivatives(np.sum(A * A), np.linalg.det(A), SPHERE)
     np.testing.assert_allclose([energy, *shares[:2]], area * np.array([w, wd, wj]), rtol=1e-12)
     bend_d, bend_j, dd, dj, jj = shares[2:]
     gd, gj = gradients(A)
     mixed = np.outer(gd, gj)
     H = bend_d * SECOND_OF_D + bend_j * SECOND_OF_J + dd * np.outer(gd, gd) + dj * (mixed + mixed.T)
     H += jj * np.outer(gj, gj)
-    values, vectors = np.linalg.eigh(full_hessian(A))
+    squares = wdd * np.outer(gd, gd) + wdj * (mixed + mixed.T) + wjj * np.outer(gj, gj)
+    values, vectors = np.linalg.eigh(wd * SECOND_OF_D + wj * SECOND_OF_J + squares)
     expected = area * (vectors * np.maximum(values, 0)) @ vectors.T
     np.testing.assert_allclose(H, expected, atol=1e-8 * np.abs(expected).max())
 

@@ -81,11 +81,7 @@ def held_cap(n: int, kind: str) -> tuple[WaveSolver, np.ndarray]:
     center = np.array([0.36, -0.48, 0.8])
     angle = np.arccos(np.clip(atlas.positions @ center, -1, 1))
     cap = angle < 1.0
-    materials = {
-        "held": hold(atlas, Material(), cap),
-        "clamped": Material(fixed=cap),
-        "free": Material(1.0 * ~cap),
-    }
+    materials = {"held": hold(atlas, Material(), cap), "clamped": Material(fixed=cap), "free": Material(1.0 * ~cap)}
     waves = WaveSolver(atlas, materials[kind], backend="cpu")
     pulse = np.exp(-(((angle - 1.8) / 0.12) ** 2))
     waves.height, waves.velocity = pulse, -2 * (angle - 1.8) / 0.12**2 * pulse

@@ -55,12 +55,6 @@ def quadrics_of(V, F):
     return vertex_quadrics(np.ascontiguousarray(F, dtype=np.int32).ravel(), np.asarray(V, dtype=float))
 
 
-def quadric_error(q, p):
-    """Sum of squared distances of p from the planes of a quadric [10], as a form of (x, y, z, 1)."""
-    matrix = np.array([[q[0], q[1], q[2], q[6]], [q[1], q[3], q[4], q[7]], [q[2], q[4], q[5], q[8]], [*q[6:9], q[9]]])
-    return np.append(p, 1) @ matrix @ np.append(p, 1)
-
-
 def test_quadric_error_is_the_sum_of_squared_distances_weighted_by_area():
     V, F = crumpled()
     quadrics = quadrics_of(V, F)
@@ -72,7 +66,9 @@ def test_quadric_error_is_the_sum_of_squared_distances_weighted_by_area():
             normal = np.cross(b - a, c - a)
             twice_area = np.linalg.norm(normal)
             total += twice_area / 2 * (normal / twice_area @ (p - a)) ** 2
-        assert quadric_error(quadrics[v], p) == pytest.approx(total, rel=1e-10)
+        q = quadrics[v]  # a form of (x, y, z, 1)
+        rows = [q[0], q[1], q[2], q[6]], [q[1], q[3], q[4], q[7]], [q[2], q[4], q[5], q[8]], [*q[6:9], q[9]]
+        assert np.append(p, 1) @ np.array(rows) @ np.append(p, 1) == pytest.approx(total, rel=1e-10)
 
 
 @pytest.mark.parametrize("third", [[2.0, 0, 0], [0.0, 0, 0]], ids=["in line", "a point twice"])
