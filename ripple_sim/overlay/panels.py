@@ -289,7 +289,12 @@ class EnergyPlot:
         sprite = panel(self._width, self._height, em)
         sprite.text(round(0.7 * em), 1.4 * em, _TITLE, em)
         sprite.text(round(0.7 * em) + text_width(_TITLE, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
-        self._draw_names(sprite, small)
+        x, titles = float(self._width - round(0.7 * em)), text_width(f"{_TITLE} J", em) + em
+        # where there is no room for the names, the runs' titles have the curves' colours anyway
+        if sum(text_width(name, small) + 0.9 * em for name in self._names) <= x - titles:
+            for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
+                sprite.text(x, 1.4 * em, name, small, color, "right")
+                x -= text_width(name, small) + 0.9 * em
         hair = max(1, round(em / 16))
         half = [goal / 2] if self._bottom - self._top > 2.6 * small else []
         for value in [0.0, *half, goal] if goal else [0.0]:
@@ -302,18 +307,9 @@ class EnergyPlot:
         for k in range(last + 1):
             x = round(float(self._column(k * step)))
             sprite.box(x, self._bottom, x + hair, self._bottom + 0.25 * em, INK)
-            unit = " s" if k == last else ""
-            sprite.text(x, self._bottom + 1.25 * em, number(k * step) + unit, small, INK, "middle")
+            text = number(k * step) + (" s" if k == last else "")
+            sprite.text(x, self._bottom + 1.25 * em, text, small, INK, "middle")
         return sprite
-
-    def _draw_names(self, sprite: Sprite, size: int) -> None:
-        x = float(self._width - round(0.7 * self._em))
-        titles = text_width(f"{_TITLE} J", self._em) + self._em
-        if sum(text_width(name, size) + 0.9 * self._em for name in self._names) > x - titles:
-            return  # too narrow; the runs' titles have the curves' colours anyway
-        for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
-            sprite.text(x, 1.4 * self._em, name, size, color, "right")
-            x -= text_width(name, size) + 0.9 * self._em
 
     def _draw_curve(self, sprite: Sprite, times: NDArray, values: NDArray, limit: float, color: Color) -> None:
         if len(times) == 0 or limit <= 0:

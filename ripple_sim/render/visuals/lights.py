@@ -183,7 +183,12 @@ def sky_colors(
 
     Parameters as for `set_lighting`.
     """
-    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else _far_light(lighting, pose) * floor_albedo
+    tint = np.array([0.40, 0.42, 0.46])
+    if floor_albedo is not None:
+        # irradiance over pi of the floor far away, as far as it tints the background
+        away = [light.at(pose.focus, np.array([0.0, 0.0, 1.0])) for light in lighting.lights if light.position is None]
+        far = np.minimum(sum(away, lighting.ambient), _FLOOR_IN_BACKGROUND)
+        tint = (_FLOOR_IN_BACKGROUND if lighting.studio else far) * floor_albedo
     zenith = tint * np.array([0.36, 0.40, 0.48])
     if lighting.studio:
         return tint, zenith, 0.75 * (0.7 * tint + 0.3 * zenith)
@@ -223,15 +228,6 @@ def set_lighting(
     frame.set_vector("zenith", zenith)
     frame.set_vector("sky", light_above, 1.0 if lighting.studio else 0.0)
     frame.set_vector("floor_fade", [*(STUDIO_FADE if lighting.studio else FADE), 0.0])
-
-
-def _far_light(lighting: Lighting, pose: Pose) -> NDArray[np.float64]:
-    """Irradiance over pi of the floor far away, as far as it tints the background, shape [3]."""
-    if lighting.studio:
-        return np.full(3, _FLOOR_IN_BACKGROUND)
-    up = np.array([0.0, 0.0, 1.0])
-    far = [light.at(pose.focus, up) for light in lighting.lights if light.position is None]
-    return np.minimum(sum(far, lighting.ambient), _FLOOR_IN_BACKGROUND)
 
 
 def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float64]:
@@ -290,8 +286,7 @@ class SceneLight:
     ) -> list[Light]:
         """Set the frame's light and background; return the lights. The floor's colour and normal are [3] each."""
         lighting = lighting_of(self._model, data, pose, self._lighting)
-        mean: NDArray[np.float64] | None = None if self._sky is None else self._sky[1]
-        set_lighting(frame, lighting, pose, floor_albedo, mean)
+        set_lighting(frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky[1])
         if floor_normal is not None:
             frame.set_vector("floor_light", lighting.on(pose.focus, floor_normal))
         return lighting.lights

@@ -152,13 +152,11 @@ class Visual:
     def half_sizes(self) -> NDArray[np.float64]:
         """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane is infinite."""
         match self.kind:
-            case _ if self.pose is not None:  # a scene has them as they are
-                return self.size
-            case _GEOM.mjGEOM_SPHERE:
+            case _GEOM.mjGEOM_SPHERE if self.pose is None:
                 return np.full(3, self.size[0])
-            case _GEOM.mjGEOM_CAPSULE | _GEOM.mjGEOM_CYLINDER:
+            case _GEOM.mjGEOM_CAPSULE | _GEOM.mjGEOM_CYLINDER if self.pose is None:
                 return self.size[[0, 0, 1]]
-            case _:
+            case _:  # as a scene has those of all kinds
                 return self.size
 
 
@@ -322,6 +320,5 @@ def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     height, width, channels = (int(n[texture]) for n in (model.tex_height, model.tex_width, model.tex_nchannel))
     start = int(model.tex_adr[texture])
     pixels = np.asarray(model.tex_data[start : start + height * width * channels]).reshape(height, width, channels)
-    return np.ascontiguousarray(
-        np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3], dtype=np.uint8
-    )
+    colors = np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3]
+    return np.ascontiguousarray(colors, dtype=np.uint8)
