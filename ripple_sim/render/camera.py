@@ -180,10 +180,12 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera
 
 def view_matrix(pose: Pose) -> NDArray[np.float64]:
     """World to eye coordinates, shape [4, 4]."""
-    view = np.eye(4)
-    view[:3, :3] = pose.rotation.T
-    view[:3, 3] = -pose.rotation.T @ pose.eye
-    return view
+    return view_along(pose.rotation.T, pose.rotation.T @ pose.eye)
+
+
+def view_along(rotation: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
+    """World to eye coordinates, shape [4, 4]; `eye` is the eye's position along the rows of `rotation`."""
+    return np.block([[rotation, -eye[:, None]], [np.array([0.0, 0.0, 0.0, 1.0])]])
 
 
 def perspective(

@@ -77,8 +77,8 @@ class SurfaceMesh:
         self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
         look, rgb, mapping = appearance(assets.model, geom, surface)
         self.transparent, self.occludes, self.casts = look.transparency > 0.0, True, True
-        heatmap = surface.heatmap_colors is not None
-        identity = geom_visual(assets.model, geom).identity
+        colors, identity = surface.heatmap_colors, geom_visual(assets.model, geom).identity
+        heatmap = colors is not None
         number = assets.objects.add(
             look, geom, identity=identity, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block
         )
@@ -99,9 +99,7 @@ class SurfaceMesh:
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
         self._unit, self._image = mapping.unit, None if mapping.texture < 0 else assets.texture(mapping.texture)
-        self._heatmap = None
-        if surface.heatmap_colors is not None:
-            self._heatmap = HeatmapTexture(resources, page, surface.heatmap_colors)
+        self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
         options = {"MAPPING": mapping.kind, "HEATMAP": int(heatmap), "GRID": int(surface.grid > 0)}
         self._program = resources.program("surfaces/surface", **options)
         self._program["resolution"] = float(page.resolution)
@@ -291,12 +289,7 @@ class DrawnScene:
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
     def update(
-        self,
-        ctx: moderngl.Context,
-        data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
-        pose: Pose,
-        sharp: bool = False,
+        self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, sharp: bool = False
     ) -> None:
         """Bring everything on the GPU up to date; `sharp` is as for `Instances.update`."""
         for target in self.targets:

@@ -174,8 +174,12 @@ class MovingOcclusion:
         spacing = float(np.sqrt(Mesh(V, F).area / count))
         apart = 2 * spacing * normals  # so that the two sides of a thin body are far from each other
         vertices, coarse = coarse_mesh(F, np.hstack([V, apart]), count)
-        near = np.hstack([V, apart])[vertices], np.hstack([points, 2 * spacing * directions])
-        self._baked, (self._near, self._weights) = baked, _nearest(*near)
+        samples = cKDTree(np.hstack([V, apart])[vertices])
+        drawn = np.hstack([points, 2 * spacing * directions])
+        distance, near = samples.query(drawn, min(_NEAR + 1, samples.n))
+        # the farthest one's weight is 0: no point jumps
+        weights = (1 - distance / np.maximum(distance[:, -1:], 1e-300)) ** 2 + 1e-12
+        self._baked, self._near, self._weights = baked, near, weights / weights.sum(axis=1, keepdims=True)
         self._vertices, self._F, self._radius = vertices, coarse, bounding_radius(V)
         # triangles of a coarse mesh may lie slightly over its vertices
         self._start = 0.3 * spacing if count < len(V) else 0.0
@@ -199,11 +203,3 @@ class MovingOcclusion:
         V = self._of(V)
         _, directions, normals = self._frames(V)
         return cast(V, self._F, frames_about(normals, directions), self._count, self._radius, self._start)
-
-
-def _nearest(samples: NDArray, points: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The samples nearest to each point, [n, k], and weights, of which that of the farthest is 0: no point jumps."""
-    distance, near = cKDTree(samples).query(points, min(_NEAR + 1, len(samples)))
-    reach = np.maximum(distance[:, -1:], 1e-300)
-    weights = (1 - distance / reach) ** 2 + 1e-12
-    return near, weights / weights.sum(axis=1, keepdims=True)

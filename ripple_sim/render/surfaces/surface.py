@@ -50,8 +50,7 @@ class Charts(NamedTuple):
 
 
 def split_at_charts(
-    mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]],
-    charts: Charts,
+    mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]], charts: Charts
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Cut the triangles of a mesh where they leave a chart.
 
