@@ -334,8 +334,7 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     if atlas.layout == "cube":
         show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
         show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
-        sphere = sphere_image(painter, atlas.resolution, front, 380)
-        show(figure, (0.42, 0.07, 0.20, 0.355), sphere, "on the sphere")
+        show(figure, (0.42, 0.07, 0.20, 0.355), sphere_image(painter, atlas.resolution, front, 380), "on the sphere")
         show(figure, (0.635, 0.455, 0.35, 0.47), cross(painter, atlas.resolution, 160), "the six charts, unfolded")
     else:
         colors = np.broadcast_to(chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3))
@@ -354,8 +353,7 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     """Share of the surface over stretch, in the colours of the images, as their legend."""
     bins = np.geomspace(1 / STRETCH_RANGE, STRETCH_RANGE, 121)
     share, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
-    middles = np.sqrt(bins[1:] * bins[:-1])
-    colors = STRETCH_COLORS(stretch_shade(middles))
+    colors = STRETCH_COLORS(stretch_shade(np.sqrt(bins[1:] * bins[:-1])))  # those of the middles
     axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
     axes.stairs(share / share.max(), bins, color=FAINT, linewidth=0.7)  # pale bars need an outline
     axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")

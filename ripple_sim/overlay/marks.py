@@ -248,12 +248,11 @@ class ContactMarks:
         waves = self._simulation.ripples[contact.geom]
         normal = waves.atlas.normals[contact.texel]
         place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
-        opacity = (contact.impulse / contact.largest - _FADED) / (_FADING - _FADED)
         return Mark(
             point=position + rotation @ (place + height * normal),
             axis=rotation @ normal,
             impulse=contact.impulse,
-            opacity=min(opacity, 1.0),
+            opacity=min((contact.impulse / contact.largest - _FADED) / (_FADING - _FADED), 1.0),
         )
 
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -236,8 +236,7 @@ def traces(sensors: Mapping[str, Sensor]) -> list[Trace]:
     made = []
     for name, sensor in sensors.items():
         values = sensor.samples[:, 0]
-        stride = max(1, -(-len(values) // COLUMNS))
-        begins = np.arange(0, len(values), stride)
+        begins = np.arange(0, len(values), max(1, -(-len(values) // COLUMNS)))
         low, high = (each.reduceat(values, begins) if len(values) else values for each in (np.minimum, np.maximum))
         made.append((name, sensor.times[begins], low, high, UNITS[sensor.kind]))
     return made

@@ -75,8 +75,7 @@ class Layout:
             left = self.margin
         elif "right" in corner:
             left = self.width - self.margin - width
-        top = self.margin if "top" in corner else self.height - self.margin - height
-        return left, top
+        return left, self.margin if "top" in corner else self.height - self.margin - height
 
 
 _SHOWN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
@@ -111,8 +110,7 @@ class Projection:
     def seen(self, model: Any, data: Any, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether no geom of a MuJoCo model, its targets undeformed, hides points [k, 3] in the world."""
         eye, hit = self._pose.position, np.zeros(1, np.int32)
-        ways = points - eye
-        reach = np.array([mujoco.mj_ray(model, data, eye, way, _SHOWN_GROUPS, 1, -1, hit) for way in ways])
+        reach = np.array([mujoco.mj_ray(model, data, eye, way, _SHOWN_GROUPS, 1, -1, hit) for way in points - eye])
         return (reach < 0) | (reach > 1 - _TOUCHING)
 
 
@@ -262,13 +260,11 @@ class EnergyPlot:
         self._height = round(min(8.6 * em, 0.38 * layout.height)) + line
         self._left, self._right = round(3.6 * em), self._width - round(1.1 * em)
         self._top, self._bottom = round(2.4 * em) + line, self._height - round(1.95 * em)
-        self._axes: tuple[tuple[float, float], Sprite] | None = None
+        self._axes = functools.lru_cache(maxsize=1)(self._draw_axes)
 
     def draw(self, curves: Sequence[Curve], limit: float, goal: float, ledger: Energy | None = None) -> Sprite:
         """Draw curves up to the present, from 0 to `limit`, with labels at half and whole of `goal`, and a ledger."""
-        if self._axes is None or self._axes[0] != (limit, goal):
-            self._axes = (limit, goal), self._draw_axes(limit, goal)
-        sprite = copy.deepcopy(self._axes[1])
+        sprite = copy.deepcopy(self._axes(limit, goal))
         for color, (times, values) in zip(COLORS, curves, strict=False):
             self._draw_curve(sprite, times, values, limit, color)
         if ledger is None or not self._has_ledger:

@@ -69,11 +69,12 @@ class Resources:
         """One of the renderer's compute shaders, likewise; it is shared."""
         return self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options)
 
-    def clamped_texture(
-        self, size: tuple[int, int], components: int, *, mipmaps: bool = False, **options: Any
-    ) -> moderngl.Texture:
-        """Texture (width, height) that does not repeat, read linearly, over its mipmaps too where it has some."""
-        texture = self.texture(size, components, **options)
+    def clamped_texture(self, size: tuple[int, ...], components: int, *, mipmaps: bool = False, **options: Any) -> Any:
+        """Texture (width, height), or array of them with a number of layers, that does not repeat.
+
+        It is read linearly, over its mipmaps too where it has some.
+        """
+        texture = (self.texture if len(size) == 2 else self.texture_array)(size, components, **options)
         texture.repeat_x = texture.repeat_y = False
         texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR, moderngl.LINEAR)
         return texture
@@ -219,9 +220,7 @@ class HeightMapTextures:
     def __init__(self, resources: Resources, pages: Sequence[ChartPage]) -> None:
         self._pages = pages
         width, height = (max((page.size[axis] for page in pages), default=1) for axis in range(2))
-        self._texture = resources.texture_array((width, height, max(len(pages), 1)), 4, dtype="f4")
-        self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self._texture.repeat_x = self._texture.repeat_y = False
+        self._texture = resources.clamped_texture((width, height, max(len(pages), 1)), 4, dtype="f4")
 
     def write(self, layer: int, height_map: NDArray[np.float32] | DeviceHeightMap) -> float:
         """Replace a target's height map, [C, n + 2, n + 2, 4]; return the largest height in it [m]."""

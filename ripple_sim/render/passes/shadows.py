@@ -67,8 +67,7 @@ class ShadowMaps:
         blockers = count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER
         self._blockers = resources.clamped_texture(blockers, 4, mipmaps=True, dtype="f4")
         self._blockers_target = resources.framebuffer([self._blockers])
-        program = resources.program("passes/blockers", SHADOWS=count)
-        self._find_blockers = resources.vertex_array(program, [])
+        self._find_blockers = resources.vertex_array(resources.program("passes/blockers", SHADOWS=count), [])
 
     def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
         """Aim the maps at a ball [m] that contains all casters, set the frame's shadows, and return their lights."""
@@ -308,8 +307,7 @@ class FloorOcclusion:
         if floor is None:
             self._map = self._seen = self._bounce = resources.texture((1, 1), 4, bytes(4))
             return
-        program = resources.program("passes/floor_occlusion", **options, TILES=0)
-        self._pass = resources.vertex_array(program, [])
+        self._pass = resources.vertex_array(resources.program("passes/floor_occlusion", **options, TILES=0), [])
         ceiling = _CEILING_SIZE, _CEILING_SIZE
         self._ceiling = resources.clamped_texture(ceiling, 4, dtype="nu2")
         self._ceiling.filter = (moderngl.NEAREST, moderngl.NEAREST)

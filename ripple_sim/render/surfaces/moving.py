@@ -175,8 +175,7 @@ class MovingOcclusion:
         apart = 2 * spacing * normals  # so that the two sides of a thin body are far from each other
         vertices, coarse = coarse_mesh(F, np.hstack([V, apart]), count)
         samples = cKDTree(np.hstack([V, apart])[vertices])
-        drawn = np.hstack([points, 2 * spacing * directions])
-        distance, near = samples.query(drawn, min(_NEAR + 1, samples.n))
+        distance, near = samples.query(np.hstack([points, 2 * spacing * directions]), min(_NEAR + 1, samples.n))
         # the farthest one's weight is 0: no point jumps
         weights = (1 - distance / np.maximum(distance[:, -1:], 1e-300)) ** 2 + 1e-12
         self._baked, self._near, self._weights = baked, near, weights / weights.sum(axis=1, keepdims=True)

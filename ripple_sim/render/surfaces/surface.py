@@ -125,11 +125,8 @@ class HeatmapTexture:
 
     def __init__(self, resources: Resources, page: ChartPage, colors: NDArray[np.uint8]) -> None:
         self._page, self._shape = page, (page.charts, page.block, page.block)
-        self._values = resources.texture_array((*page.size, 1), 1, dtype="f4")
-        self._colors = resources.texture((len(colors), 1), 3, np.ascontiguousarray(colors).tobytes(), alignment=1)
-        for texture in (self._values, self._colors):
-            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-            texture.repeat_x = texture.repeat_y = False
+        self._values = resources.clamped_texture((*page.size, 1), 1, dtype="f4")
+        self._colors = resources.clamped_texture((len(colors), 1), 3, data=colors.tobytes(), alignment=1)
         self.set(np.zeros(self._shape, np.float32), 1.0)
 
     def set(self, values: NDArray[np.float32], limit: float) -> None:

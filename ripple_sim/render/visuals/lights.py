@@ -109,12 +109,11 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     out as in MuJoCo both where it faces all lights and where it faces none.
     """
     head = model.vis.headlight
-    ambient = np.array(head.ambient, dtype=np.float64) if head.active else np.zeros(3)
-    lights = []
+    ambient, lights = np.zeros(3), []
     if head.active:
-        towards = pose.rotation[:, 2]
+        ambient += head.ambient
         radiance = np.array(head.diffuse, dtype=np.float64)
-        lights.append(Light(direction=towards, radiance=radiance, gloss=_gloss(head.specular)))
+        lights.append(Light(direction=pose.rotation[:, 2], radiance=radiance, gloss=_gloss(head.specular)))
     for index in range(model.nlight):
         if model.light_active[index] and model.light_type[index] != _KIND.mjLIGHT_IMAGE:
             ambient += model.light_ambient[index]
@@ -268,10 +267,9 @@ class SceneLight:
         self._lighting, studio = lighting, in_studio(model, lighting)
         self._sky = None if studio else assets.skybox()
         casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
-        near = model.light_type != _KIND.mjLIGHT_DIRECTIONAL
         self.options = {
             "SKYBOX": int(self._sky is not None),
-            "NEAR_LIGHTS": int(not studio and near.any()),
+            "NEAR_LIGHTS": int(not studio and (model.light_type != _KIND.mjLIGHT_DIRECTIONAL).any()),
             "LIGHTS": 1 if studio else int(np.clip(model.nlight + 1, 1, MAX_LIGHTS)),  # with the headlight
             "SHADOWS": 1 if studio else int(np.clip(casting.sum(), 1, MAX_SHADOWS)),
         }

@@ -305,12 +305,11 @@ def look_of(model: Any, visual: Visual) -> Look:
     roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
     if roughness < 0:
         roughness = 0.15 + 0.55 * (1.0 - float(model.mat_shininess[material]))
-    coat = 0.4 * float(model.mat_specular[material]) + float(model.mat_reflectance[material])
     return Look(
         color=rgb,
         roughness=float(np.clip(roughness, 0.05, 1.0)),
         metallic=max(metallic, 0.0),
-        coat=min(coat, 1.0),
+        coat=min(0.4 * float(model.mat_specular[material]) + float(model.mat_reflectance[material]), 1.0),
         emission=float(model.mat_emission[material]),
     )
 
