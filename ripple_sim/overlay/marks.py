@@ -248,12 +248,9 @@ class ContactMarks:
         waves = self._simulation.ripples[contact.geom]
         normal = waves.atlas.normals[contact.texel]
         place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
-        return Mark(
-            point=position + rotation @ (place + height * normal),
-            axis=rotation @ normal,
-            impulse=contact.impulse,
-            opacity=min((contact.impulse / contact.largest - _FADED) / (_FADING - _FADED), 1.0),
-        )
+        point = position + rotation @ (place + height * normal)
+        opacity = min((contact.impulse / contact.largest - _FADED) / (_FADING - _FADED), 1.0)
+        return Mark(point, axis=rotation @ normal, impulse=contact.impulse, opacity=opacity)
 
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])

@@ -195,7 +195,6 @@ _LEAST = 1e-3
 # A contact's first dent is much deeper than its waves, but brief [s].
 _MEMORY = 0.25
 
-
 Trace: TypeAlias = tuple[str, NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], str]
 Scale: TypeAlias = tuple[float, float]  # its present end, and the round number that this approaches
 

@@ -118,7 +118,6 @@ _LONGEST = 1.5  # times the scale's arrow; a growing scale lags for a moment
 _HIDDEN = 0.3  # opacity behind other geoms
 _SAMPLES = 9  # along an arrow, to find its hidden parts
 
-
 # an arrow on a frame: tip and tail [pixels], and the opacity along it
 PlacedMark: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 

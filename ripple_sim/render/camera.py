@@ -104,12 +104,9 @@ class Camera:
         if not 0 <= index < model.ncam:
             names = ", ".join(f"{model.camera(i).name!r} (id {i})" for i in range(model.ncam)) or "none"
             raise SceneError(f"the model has no camera {name!r}; it has: {names}")
-        return FixedCamera(
-            position=np.array(data.cam_xpos[index]),
-            rotation=np.array(data.cam_xmat[index]).reshape(3, 3),
-            distance=float(max(np.linalg.norm(data.cam_xpos[index] - model.stat.center), 1e-3 * model.stat.extent)),
-            fovy=float(model.cam_fovy[index]),
-        )
+        position, rotation = np.array(data.cam_xpos[index]), np.array(data.cam_xmat[index]).reshape(3, 3)
+        distance = float(max(np.linalg.norm(position - model.stat.center), 1e-3 * model.stat.extent))
+        return FixedCamera(position, rotation, distance, fovy=float(model.cam_fovy[index]))
 
 
 # A camera with a given pose, such as one that a MuJoCo model fixes to a body.
@@ -172,10 +169,8 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera
             f"the MjvCamera's type is {camera.type}; valid are mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
             f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and mjCAMERA_FIXED ({int(kinds.mjCAMERA_FIXED)})"
         )
-    x, y, z = (float(each) for each in lookat)
-    return Camera(
-        (x, y, z), float(camera.distance), float(camera.azimuth), float(camera.elevation), model.vis.global_.fovy
-    )
+    x, y, z, *seen_from = (float(each) for each in (*lookat, camera.distance, camera.azimuth, camera.elevation))
+    return Camera((x, y, z), *seen_from, model.vis.global_.fovy)
 
 
 def view_matrix(pose: Pose) -> NDArray[np.float64]:

@@ -86,9 +86,7 @@ class SurfaceMesh:
         pixel = 2 * self._radius / size[1]
         self._vertices = vertices = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
         self._balls = vertices.balls
-        self._adaptive = AdaptiveTessellation(
-            vertices, page, tolerance=_TOLERANCE * pixel, min_length=1.5 * _PIXELS * pixel
-        )
+        self._adaptive = AdaptiveTessellation(vertices, page, _TOLERANCE * pixel, min_length=1.5 * _PIXELS * pixel)
         self._indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
         self._written: NDArray[np.int32] | None = None  # the triangles that the buffer holds
         self._on_device: DeviceTessellation | None = None
@@ -254,10 +252,7 @@ class DrawnScene:
         self._assets, self._model, self._height = assets, assets.model, size[1]
         ordered = sorted(targets.items())
         self.height_maps = HeightMapTextures(assets.resources, [surface.charts.page for _, surface in ordered])
-        self.targets = [
-            SurfaceMesh(assets, geom, surface, self.height_maps, index, size)
-            for index, (geom, surface) in enumerate(ordered)
-        ]
+        self.targets = [SurfaceMesh(assets, *each, self.height_maps, index, size) for index, each in enumerate(ordered)]
         self._occluders = Occluders(assets.resources, assets.model, np.zeros(0, dtype=np.int64))
         self._made: dict[tuple[Any, ...], Instances] = {}
         self.show([])

@@ -57,12 +57,9 @@ class ShadowMaps:
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._target = resources.framebuffer(depth_attachment=self._depth)
+        linear = moderngl.LINEAR, moderngl.LINEAR
         self._test = resources.sampler(
-            texture=self._depth,
-            compare_func="<=",
-            filter=(moderngl.LINEAR, moderngl.LINEAR),
-            repeat_x=False,
-            repeat_y=False,
+            texture=self._depth, compare_func="<=", filter=linear, repeat_x=False, repeat_y=False
         )
         blockers = count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER
         self._blockers = resources.clamped_texture(blockers, 4, mipmaps=True, dtype="f4")

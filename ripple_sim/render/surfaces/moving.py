@@ -12,6 +12,7 @@ from ripple_sim.render.visuals.corners import bounding_radius, cast, frames_abou
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
 from ripple_sim.solver.mesh.queries import ClosestPoints
+from ripple_sim.solver.mesh.vectors import cross, dot, row, subtract
 from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 from .tessellation import coarse_mesh
@@ -62,16 +63,12 @@ class MovingVertices:
 @kernel
 def _frame(V: Floats, F: Ints, i: int, frame: Floats) -> float:
     """Two sides and the unit normal of a triangle, as rows; return twice its area."""
+    first = row(V, F[i, 0])
+    u, v = subtract(row(V, F[i, 1]), first), subtract(row(V, F[i, 2]), first)
+    normal = cross(u, v)
+    length = np.sqrt(dot(normal, normal))
     for k in range(3):
-        frame[0, k], frame[1, k] = V[F[i, 1], k] - V[F[i, 0], k], V[F[i, 2], k] - V[F[i, 0], k]
-    square = 0.0
-    for k in range(3):
-        y, z = (k + 1) % 3, (k + 2) % 3
-        frame[2, k] = frame[0, y] * frame[1, z] - frame[0, z] * frame[1, y]
-        square += frame[2, k] ** 2
-    length = np.sqrt(square)
-    for k in range(3):
-        frame[2, k] /= max(length, 1e-300)
+        frame[0, k], frame[1, k], frame[2, k] = u[k], v[k], normal[k] / max(length, 1e-300)
     return length
 
 
@@ -86,11 +83,9 @@ def _vertex_maps(rest: Floats, moved: Floats, F: Ints) -> Floats:
         if not area > 0:
             continue
         # rows dual to the two sides and the normal
+        first, second = cross(row(old, 1), row(old, 2)), cross(row(old, 2), row(old, 0))
         for k in range(3):
-            y, z = (k + 1) % 3, (k + 2) % 3
-            back[0, k] = (old[1, y] * old[2, z] - old[1, z] * old[2, y]) / area
-            back[1, k] = (old[2, y] * old[0, z] - old[2, z] * old[0, y]) / area
-            back[2, k] = old[2, k]
+            back[0, k], back[1, k], back[2, k] = first[k] / area, second[k] / area, old[2, k]
         for corner in range(3):
             v = F[i, corner]
             areas[v] += area
@@ -110,11 +105,7 @@ def _turn(mean: Floats, rest: Floats, i: int, out: Floats32) -> None:
     """A unit normal under the cofactors of a map."""
     square = 0.0
     for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        total = 0.0
-        for k in range(3):
-            y, z = (k + 1) % 3, (k + 2) % 3
-            total += (mean[b, y] * mean[c, z] - mean[b, z] * mean[c, y]) * rest[i, k]
+        total = dot(cross(row(mean, (a + 1) % 3), row(mean, (a + 2) % 3)), row(rest, i))
         out[i, a] = total
         square += total * total
     length = np.sqrt(square)

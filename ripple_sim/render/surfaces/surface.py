@@ -87,12 +87,9 @@ def split_at_charts(
     key = alike * charts.page.charts + chart[:, None]
     _, where, index = np.unique(key, return_index=True, return_inverse=True)
     row = source.ravel()[where]
-    return (
-        index.reshape(-1, 3),
-        np.concatenate([attributes, cut])[row],
-        np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row],
-        key.ravel()[where] % charts.page.charts,
-    )
+    attributes = np.concatenate([attributes, cut])[row]
+    same = np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row]
+    return index.reshape(-1, 3), attributes, same, key.ravel()[where] % charts.page.charts
 
 
 def shared_places(uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray) -> NDArray[np.float64]:

@@ -125,11 +125,8 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     total = sum((light.radiance for light in lights), np.zeros(3)).max()
     base = srgb_to_linear(ambient.max())
     scale = (srgb_to_linear(min(ambient.max() + total, _BRIGHTEST)) - base) / total if total > 0 else 0.0
-    return Lighting(
-        [dataclasses.replace(light, radiance=max(scale, 0.0) * light.radiance) for light in lights],
-        srgb_to_linear(ambient),
-        studio=False,
-    )
+    lights = [dataclasses.replace(light, radiance=max(scale, 0.0) * light.radiance) for light in lights]
+    return Lighting(lights, srgb_to_linear(ambient), studio=False)
 
 
 def _gloss(specular: ArrayLike) -> float:
