@@ -169,8 +169,8 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera
             f"the MjvCamera's type is {camera.type}; valid are mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
             f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and mjCAMERA_FIXED ({int(kinds.mjCAMERA_FIXED)})"
         )
-    x, y, z, *seen_from = (float(each) for each in (*lookat, camera.distance, camera.azimuth, camera.elevation))
-    return Camera((x, y, z), *seen_from, model.vis.global_.fovy)
+    x, y, z, distance, azimuth, elevation = map(float, (*lookat, camera.distance, camera.azimuth, camera.elevation))
+    return Camera((x, y, z), distance, azimuth, elevation, model.vis.global_.fovy)
 
 
 def view_matrix(pose: Pose) -> NDArray[np.float64]:

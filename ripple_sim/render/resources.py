@@ -145,7 +145,8 @@ def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Te
 
     Where the driver takes none as large it is scaled down, with a warning.
     """
-    pixels = fitted(pixels, _limit(resources, "GL_MAX_TEXTURE_SIZE"))
+    with resources.gl as ctx:
+        pixels = fitted(pixels, ctx.info["GL_MAX_TEXTURE_SIZE"])
     height, width, _ = pixels.shape
     opaque = Image.fromarray(pixels).convert("RGBA").tobytes()
     return _trilinear(resources.texture((width, height), 4, opaque, internal_format=SRGB8_ALPHA8))
@@ -153,8 +154,8 @@ def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Te
 
 def srgb_cube(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
     """Cube map with mipmaps, of pixels [6 size, size, 3]: its faces below one another."""
-    largest = _limit(resources, "GL_MAX_CUBE_MAP_TEXTURE_SIZE")
-    faces = [fitted(face, largest) for face in np.split(pixels, 6)]
+    with resources.gl as ctx:
+        faces = [fitted(face, ctx.info["GL_MAX_CUBE_MAP_TEXTURE_SIZE"]) for face in np.split(pixels, 6)]
     opaque, size = Image.fromarray(np.concatenate(faces)).convert("RGBA").tobytes(), faces[0].shape[1]
     return _trilinear(resources.texture_cube((size, size), 4, opaque, internal_format=SRGB8_ALPHA8))
 
@@ -173,11 +174,6 @@ def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
         stacklevel=3,
     )
     return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
-
-
-def _limit(resources: Resources, name: str) -> int:
-    with resources.gl as ctx:
-        return int(ctx.info[name])
 
 
 def _trilinear(texture: Any) -> Any:

@@ -126,14 +126,14 @@ def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]
     # the quadrilateral 0 1 4 5 that is left of those with two is cut along its shorter diagonal
     diagonals = np.linalg.norm(positions[two[:, :2]] - positions[two[:, 4:]], axis=2)
     shorter = diagonals[:, 0] <= diagonals[:, 1]
-    pieces = [
+    patterns = [
         (three, [[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 5]]),
         (one, [[0, 3, 2], [3, 1, 2]]),
         (two, [[5, 4, 2]]),
         (two[shorter], [[0, 1, 4], [0, 4, 5]]),
         (two[~shorter], [[0, 1, 5], [1, 4, 5]]),
     ]
-    return np.concatenate([F[count == 0], *(each[:, corners] for each, some in pieces for corners in some)])
+    return np.concatenate([F[count == 0], *(each[:, corners] for each, some in patterns for corners in some)])
 
 
 def coarse_mesh(

@@ -44,10 +44,10 @@ def rounded_parts(mesh: Mesh, chart_map: ChartMap) -> tuple[PartsMesh, NDArray[n
     V, w = parts.V.copy(), parts.barycentrics
     V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out[parts.triangle])
     # corner normals are the same to the last bit where they differ by round-off at a vertex
-    carried = normalized(parts.carry(normals)).reshape(-1, 3)
-    key = np.column_stack([parts.F.ravel(), np.rint(carried / _ALIKE).astype(np.int64)])
+    normals = normalized(parts.carry(normals)).reshape(-1, 3)
+    key = np.column_stack([parts.F.ravel(), np.rint(normals / _ALIKE).astype(np.int64)])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return parts, V, carried[first[group.ravel()]].reshape(-1, 3, 3)
+    return parts, V, normals[first[group.ravel()]].reshape(-1, 3, 3)
 
 
 _BITS = 10  # of a coordinate

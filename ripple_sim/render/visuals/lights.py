@@ -205,8 +205,7 @@ def set_lighting(
         Mean linear colour of a skybox.
     """
     frame.values["lights"] = 0  # where there are fewer, the others are dark
-    for index, light in enumerate(lighting.lights):
-        record = frame.values["lights"][index]
+    for record, light in zip(frame.values["lights"], lighting.lights, strict=False):
         record["position"] = [0, 0, 0, 0] if light.position is None else [*light.position, 1]
         record["direction"] = [*light.direction, np.cos(light.cutoff)]
         record["radiance"] = [*light.radiance, light.exponent]
