@@ -303,15 +303,11 @@ def stretch_shade(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
 def chart_colors(topology: TexelTopology) -> NDArray[np.float64]:
     """A pale colour for each chart, [C, 3], never that of a chart beside it."""
     hues = np.full(len(topology.glued), -1)
-    meeting: list[set[int]] = [set() for _ in range(int(topology.corners.max()) + 1)]
-    for chart, corners in enumerate(topology.corners.tolist()):
-        for corner in corners:
-            meeting[corner].add(chart)
-    for chart, corners in enumerate(topology.corners.tolist()):
-        near = {int(hues[other]) for corner in corners for other in meeting[corner]}
+    for chart, corners in enumerate(topology.corners):
+        near = hues[np.isin(topology.corners, corners).any(axis=1)]
         # steps of 5 hues of 12 visit all of them, far from each other
-        free = [hue for hue in (5 * (chart + k) % _HUES for k in range(_HUES)) if hue not in near]
-        hues[chart] = free[0] if free else chart % _HUES
+        free = (hue for hue in (5 * (chart + k) % _HUES for k in range(_HUES)) if hue not in near)
+        hues[chart] = next(free, chart % _HUES)
     return np.array([colorsys.hls_to_rgb(hue / _HUES, 0.74 - 0.08 * (hue % 2), 0.62) for hue in hues.tolist()])
 
 
@@ -338,8 +334,7 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     if atlas.layout == "cube":
         show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
         show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
-        sphere = sphere_image(painter, atlas.resolution, front, 380)
-        show(figure, (0.42, 0.07, 0.20, 0.355), sphere, "on the sphere")
+        show(figure, (0.42, 0.07, 0.20, 0.355), sphere_image(painter, atlas.resolution, front, 380), "on the sphere")
         show(figure, (0.635, 0.455, 0.35, 0.47), cross(painter, atlas.resolution, 160), "the six charts, unfolded")
     else:
         colors = np.broadcast_to(chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3))
@@ -358,8 +353,7 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     """Share of the surface over stretch, in the colours of the images, as their legend."""
     bins = np.geomspace(1 / STRETCH_RANGE, STRETCH_RANGE, 121)
     share, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
-    middles = np.sqrt(bins[1:] * bins[:-1])
-    colors = STRETCH_COLORS(stretch_shade(middles))
+    colors = STRETCH_COLORS(stretch_shade(np.sqrt(bins[1:] * bins[:-1])))  # those of the middles
     axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
     axes.stairs(share / share.max(), bins, color=FAINT, linewidth=0.7)  # pale bars need an outline
     axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")
@@ -372,8 +366,7 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     axes.set_yticks([])
     axes.tick_params(length=0, pad=3)
     axes.set_xlabel("stretch: texel width relative to an even spread", fontsize=11.5, color=FAINT)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    axes.spines[:].set_visible(False)
 
 
 def _figures(figure: Figure, atlas: Atlas) -> None:
@@ -414,19 +407,13 @@ def plot_thickness(
     figure = dressed(title, subtitle)
     show(figure, (0.03, 0.17, 0.45, 0.70), painter.mesh(View(up=up), 800))
     show(figure, (0.52, 0.17, 0.45, 0.70), painter.mesh(View(azimuth=View.azimuth + 180, up=up), 800), "the other side")
-    _thickness_histogram(figure.add_axes((0.3, 0.075, 0.38, 0.07)), thickness, atlas.areas, (low, high))
-    save_plot(figure, path)
-
-
-def _thickness_histogram(
-    axes: Axes, thickness: NDArray[np.float64], areas: NDArray[np.float64], ends: tuple[float, float]
-) -> None:
-    """Share of the surface over thickness, in the colours of the images, as their legend."""
-    bins = np.linspace(*ends, 101)
-    share, _ = np.histogram(thickness.clip(*ends), bins, weights=areas)
+    # share of the surface over thickness, in the colours of the images, as their legend
+    axes, bins = figure.add_axes((0.3, 0.075, 0.38, 0.07)), np.linspace(low, high, 101)
+    share, _ = np.histogram(thickness.clip(low, high), bins, weights=atlas.areas)
     colors = _COLORS((bins[:-1] - bins[0]) / (bins[-1] - bins[0]))
     axes.bar(bins[:-1] * 1e3, share / share.max(), np.diff(bins) * 1e3, align="edge", color=colors, edgecolor="none")
     axes.set_yticks([])
-    axes.set_xlim(ends[0] * 1e3, ends[1] * 1e3)
+    axes.set_xlim(low * 1e3, high * 1e3)
     axes.spines[["top", "left", "right"]].set_visible(False)
     axes.set_xlabel("thickness [mm]; height: share of the surface", fontsize=11.5)
+    save_plot(figure, path)

@@ -78,49 +78,37 @@ def plot_modes(atlas: Atlas, found: Modes, path: str | Path, *, title: str, subt
         If the ending is unknown or the file cannot be written.
     """
     check_plot_path(path)
-    view, painter, figure = _view(atlas, up), ModePainter(atlas), dressed(title, subtitle)
+    thin = "xyz"[np.ptp(atlas.mesh.V, axis=0).argmin()]
+    view = View(up=thin, elevation=_HIGH) if _is_sheet(atlas) and thin != "x" else View(up=up)
+    painter, figure = ModePainter(atlas), dressed(title, subtitle)
     left, bottom, width, height = _PLACE
     across, along = figure.get_size_inches() * figure.dpi
     count = len(found.shapes)
     size = round(min(_LARGEST, 1.2 * np.sqrt(width * across * height * along / count)))
-    images = _cropped(np.stack([painter.mode(shape, view, size) for shape in found.shapes]))
+    images = np.stack([painter.mode(shape, view, size) for shape in found.shapes])
+    seen = images[..., 3].max(axis=0)
+    rows, columns = (np.flatnonzero(seen.max(axis=axis)) for axis in (1, 0))
+    images = images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]  # without the margin that all have
     aspect = images.shape[1] / images.shape[2]
 
     def scale(columns: int) -> float:
         """Width of the pictures [pixels]."""
-        rows = -(-count // columns)
-        return min(_FILLED * width * across / columns, (height * along / rows - _CAPTION) / aspect)
+        return min(_FILLED * width * across / columns, (height * along / -(-count // columns) - _CAPTION) / aspect)
 
-    columns = max(range(1, count + 1), key=scale)
-    pitch, box = width / columns, scale(columns) / across
+    most = max(range(1, count + 1), key=scale)  # pictures side by side
+    pitch, box = width / most, scale(most) / across
     for k, image in enumerate(images):
-        row, column = divmod(k, columns)
-        x, y = left + (column + 0.5) * pitch, bottom + height * (1 - row / -(-count // columns))
+        row, column = divmod(k, most)
+        x, y = left + (column + 0.5) * pitch, bottom + height * (1 - row / -(-count // most))
         tall = aspect * box * across / along
         show(figure, (x - box / 2, y - tall, box, tall), image)
-        caption = f"{k + 1}:  {_number(found.frequencies[k])} Hz"
+        frequency = found.frequencies[k]
+        digits = max(0, 3 - int(np.floor(np.log10(frequency)))) if frequency else 0  # four in all
+        caption = f"{k + 1}:  {frequency:.{digits}f} Hz"
         figure.text(x, y - tall - _CAPTION / 3 / along, caption, fontsize=12, color=TEXT, ha="center", va="center")
     save_plot(figure, path)
-
-
-def _cropped(images: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Images [k, h, w, 4] without the margin that all of them have."""
-    seen = images[..., 3].max(axis=0)
-    rows, columns = np.flatnonzero(seen.max(axis=1)), np.flatnonzero(seen.max(axis=0))
-    return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
 def _is_sheet(atlas: Atlas) -> bool:
     extents = np.ptp(atlas.mesh.V, axis=0)
     return bool(extents.min() < _FLAT * extents.max())
-
-
-def _view(atlas: Atlas, up: str) -> View:
-    """From where a surface is looked at: a sheet lies down."""
-    thin = "xyz"[np.ptp(atlas.mesh.V, axis=0).argmin()]
-    return View(up=thin, elevation=_HIGH) if _is_sheet(atlas) and thin != "x" else View(up=up)
-
-
-def _number(value: float) -> str:
-    """Four digits."""
-    return f"{value:.{max(0, 3 - int(np.floor(np.log10(value))))}f}" if value else "0"

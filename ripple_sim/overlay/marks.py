@@ -53,13 +53,7 @@ class Sprite:
         self._alpha += alpha * (1 - self._alpha)
 
     def box(
-        self,
-        left: float,
-        top: float,
-        right: float,
-        bottom: float,
-        color: NDArray | Color,
-        opacity: float = 1.0,
+        self, left: float, top: float, right: float, bottom: float, color: NDArray | Color, opacity: float = 1.0
     ) -> None:
         """Fill an upright rectangle."""
         across, down = overlap(left, right, self.width), overlap(top, bottom, self.height)
@@ -153,23 +147,18 @@ def draw_arrow(sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float
     along = way / max(length, 1e-9)
     x, y = np.arange(sprite.width) + 0.5 - tip[0], np.arange(sprite.height)[:, None] + 0.5 - tip[1]
     u, across = x * along[0] + y * along[1], np.abs(y * along[0] - x * along[1])
-    outside = _distance(u, across, length, thickness)
+    # distance of the pixels from the shape, `u` along the arrow from its tip and `across`; negative inside
+    outside = np.hypot(u, across) - DOT * thickness
+    if length >= DOT * thickness:  # else all of it is within the dot
+        head = min(HEAD_LENGTH * thickness, length)
+        half = HEAD_WIDTH / HEAD_LENGTH * head
+        triangle = np.maximum((across * head - u * half) / np.hypot(head, half), u - head)
+        shaft = np.maximum(across - thickness / 2, np.maximum(0.8 * head - u, u - length))
+        outside = np.minimum(np.minimum(triangle, shaft), outside)
     place = np.clip(u / max(length, 1e-9), 0, 1) * (len(opacity) - 1)
     here = np.interp(place, np.arange(len(opacity)), opacity)
     sprite.fill(np.clip(0.5 - (outside - RIM * thickness), 0, 1) * here, PAPER, 0.9)
     sprite.fill(np.clip(0.5 - outside, 0, 1) * here, INK)
-
-
-def _distance(u: NDArray, across: NDArray, length: float, thickness: float) -> NDArray[np.float64]:
-    """Distance [pixels] of places, `u` along the arrow from its tip and `across`, from the shape; negative inside."""
-    dot = np.hypot(u, across) - DOT * thickness
-    if length < DOT * thickness:
-        return dot
-    head = min(HEAD_LENGTH * thickness, length)
-    half = HEAD_WIDTH / HEAD_LENGTH * head
-    triangle = np.maximum((across * head - u * half) / np.hypot(head, half), u - head)
-    shaft = np.maximum(across - thickness / 2, np.maximum(0.8 * head - u, u - length))
-    return np.minimum(np.minimum(triangle, shaft), dot)
 
 
 MEMORY = 0.25  # time in which a mark fades to 1/e [s]; it holds the impulse of about this time
@@ -259,13 +248,9 @@ class ContactMarks:
         waves = self._simulation.ripples[contact.geom]
         normal = waves.atlas.normals[contact.texel]
         place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
-        opacity = (contact.impulse / contact.largest - _FADED) / (_FADING - _FADED)
-        return Mark(
-            point=position + rotation @ (place + height * normal),
-            axis=rotation @ normal,
-            impulse=contact.impulse,
-            opacity=min(opacity, 1.0),
-        )
+        point = position + rotation @ (place + height * normal)
+        opacity = min((contact.impulse / contact.largest - _FADED) / (_FADING - _FADED), 1.0)
+        return Mark(point, axis=rotation @ normal, impulse=contact.impulse, opacity=opacity)
 
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])

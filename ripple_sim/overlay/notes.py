@@ -45,7 +45,7 @@ _XYZ_TO_RGB = np.array(
 @functools.lru_cache(maxsize=1)
 def color_table() -> NDArray[np.uint8]:
     """Return the colours, sRGB uint8 [SIZE, 3], from the most negative to the most positive value."""
-    negative, positive = (_evenly(_arm(*hues)) for hues in (_BLUE, _RED))
+    negative, positive = (_arm(*hues) for hues in (_BLUE, _RED))
     lab = np.concatenate([negative[::-1], positive[1:]])
     table = np.rint(255 * np.clip(lab_to_srgb(lab), 0, 1)).astype(np.uint8)
     table.setflags(write=False)
@@ -62,20 +62,16 @@ def lab_to_srgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
     """SRGB values (IEC 61966-2-1) of CIELAB colours under D65, [..., 3]; outside of 0 to 1 where sRGB has none."""
     f = (lab[..., :1] + 16) / 116 + np.stack([lab[..., 1] / 500, np.zeros(lab.shape[:-1]), -lab[..., 2] / 200], axis=-1)
     xyz = _WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
-    rgb = xyz @ _XYZ_TO_RGB.T
-    return linear_to_srgb(rgb)
+    return linear_to_srgb(xyz @ _XYZ_TO_RGB.T)
 
 
 def _arm(hue_near: float, hue_end: float) -> NDArray[np.float64]:
-    """CIELAB colours from zero to an end, [k, 3], through the control points."""
+    """CIELAB colours from zero to an end, through the control points, [SIZE // 2 + 1, 3]."""
     place, knots = np.linspace(0, 1, 1025), np.linspace(0, 1, len(_ARM))
     lightness, chroma = (np.polyval(np.polyfit(knots, column, len(knots) - 1), place) for column in _ARM.T)
     hue = np.radians(hue_near + (hue_end - hue_near) * place)
-    return np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=1)
-
-
-def _evenly(lab: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points of a curve at equal differences of colour (CIE 1976), [SIZE // 2 + 1, 3]."""
+    lab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=1)
+    # points of that curve at equal differences of colour (CIE 1976)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lab, axis=0), axis=1))])
     even = np.linspace(0, length[-1], SIZE // 2 + 1)
     return np.stack([np.interp(even, length, column) for column in lab.T], axis=1)
@@ -199,7 +195,6 @@ _LEAST = 1e-3
 # A contact's first dent is much deeper than its waves, but brief [s].
 _MEMORY = 0.25
 
-
 Trace: TypeAlias = tuple[str, NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], str]
 Scale: TypeAlias = tuple[float, float]  # its present end, and the round number that this approaches
 
@@ -240,8 +235,7 @@ def traces(sensors: Mapping[str, Sensor]) -> list[Trace]:
     made = []
     for name, sensor in sensors.items():
         values = sensor.samples[:, 0]
-        stride = max(1, -(-len(values) // COLUMNS))
-        begins = np.arange(0, len(values), stride)
+        begins = np.arange(0, len(values), max(1, -(-len(values) // COLUMNS)))
         low, high = (each.reduceat(values, begins) if len(values) else values for each in (np.minimum, np.maximum))
         made.append((name, sensor.times[begins], low, high, UNITS[sensor.kind]))
     return made
@@ -262,7 +256,12 @@ class Notebook:
 
     def __init__(self, request: Request, simulations: Sequence[Simulation], frames: int, rate: float) -> None:
         self._request, self._simulations, self._dt = request, simulations, 1 / rate
-        self._heatmap_limit = Limit(self._least_limit(), request.limit, _MEMORY)
+        ripples = simulations[0].ripples
+        if request.heatmap == "velocity":
+            size = max(float(np.max(ripples[name].material.speed)) for name in ripples)
+        else:
+            size = max(float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples)
+        self._heatmap_limit = Limit(_LEAST * size, request.limit, _MEMORY)
         self._mark_limit, self._energy_limit = Limit(), Limit()
         self._marks = [ContactMarks(simulation, self._dt) for simulation in simulations]
         self._energies, self._followed = np.zeros((len(simulations), frames)), 0
@@ -296,10 +295,3 @@ class Notebook:
     def _heatmaps(self, ripples: Ripples, shown: str) -> dict[str, NDArray[np.float32]]:
         each = {name: ripples[name] for name in ripples}
         return {name: with_filled_halo(on.atlas.texels.topology, getattr(on, shown)) for name, on in each.items()}
-
-    def _least_limit(self) -> float:
-        ripples = self._simulations[0].ripples
-        sizes = [float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples]
-        if self._request.heatmap != "velocity":
-            return _LEAST * max(sizes)
-        return _LEAST * max(float(np.max(ripples[name].material.speed)) for name in ripples)

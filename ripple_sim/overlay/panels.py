@@ -75,8 +75,7 @@ class Layout:
             left = self.margin
         elif "right" in corner:
             left = self.width - self.margin - width
-        top = self.margin if "top" in corner else self.height - self.margin - height
-        return left, top
+        return left, self.margin if "top" in corner else self.height - self.margin - height
 
 
 _SHOWN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
@@ -111,15 +110,13 @@ class Projection:
     def seen(self, model: Any, data: Any, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether no geom of a MuJoCo model, its targets undeformed, hides points [k, 3] in the world."""
         eye, hit = self._pose.position, np.zeros(1, np.int32)
-        ways = points - eye
-        reach = np.array([mujoco.mj_ray(model, data, eye, way, _SHOWN_GROUPS, 1, -1, hit) for way in ways])
+        reach = np.array([mujoco.mj_ray(model, data, eye, way, _SHOWN_GROUPS, 1, -1, hit) for way in points - eye])
         return (reach < 0) | (reach > 1 - _TOUCHING)
 
 
 _LONGEST = 1.5  # times the scale's arrow; a growing scale lags for a moment
 _HIDDEN = 0.3  # opacity behind other geoms
 _SAMPLES = 9  # along an arrow, to find its hidden parts
-
 
 # an arrow on a frame: tip and tail [pixels], and the opacity along it
 PlacedMark: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -262,13 +259,11 @@ class EnergyPlot:
         self._height = round(min(8.6 * em, 0.38 * layout.height)) + line
         self._left, self._right = round(3.6 * em), self._width - round(1.1 * em)
         self._top, self._bottom = round(2.4 * em) + line, self._height - round(1.95 * em)
-        self._axes: tuple[tuple[float, float], Sprite] | None = None
+        self._axes = functools.lru_cache(maxsize=1)(self._draw_axes)
 
     def draw(self, curves: Sequence[Curve], limit: float, goal: float, ledger: Energy | None = None) -> Sprite:
         """Draw curves up to the present, from 0 to `limit`, with labels at half and whole of `goal`, and a ledger."""
-        if self._axes is None or self._axes[0] != (limit, goal):
-            self._axes = (limit, goal), self._draw_axes(limit, goal)
-        sprite = copy.deepcopy(self._axes[1])
+        sprite = copy.deepcopy(self._axes(limit, goal))
         for color, (times, values) in zip(COLORS, curves, strict=False):
             self._draw_curve(sprite, times, values, limit, color)
         if ledger is None or not self._has_ledger:
@@ -289,7 +284,12 @@ class EnergyPlot:
         sprite = panel(self._width, self._height, em)
         sprite.text(round(0.7 * em), 1.4 * em, _TITLE, em)
         sprite.text(round(0.7 * em) + text_width(_TITLE, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
-        self._draw_names(sprite, small)
+        x, titles = float(self._width - round(0.7 * em)), text_width(f"{_TITLE} J", em) + em
+        # where there is no room for the names, the runs' titles have the curves' colours anyway
+        if sum(text_width(name, small) + 0.9 * em for name in self._names) <= x - titles:
+            for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
+                sprite.text(x, 1.4 * em, name, small, color, "right")
+                x -= text_width(name, small) + 0.9 * em
         hair = max(1, round(em / 16))
         half = [goal / 2] if self._bottom - self._top > 2.6 * small else []
         for value in [0.0, *half, goal] if goal else [0.0]:
@@ -302,18 +302,9 @@ class EnergyPlot:
         for k in range(last + 1):
             x = round(float(self._column(k * step)))
             sprite.box(x, self._bottom, x + hair, self._bottom + 0.25 * em, INK)
-            unit = " s" if k == last else ""
-            sprite.text(x, self._bottom + 1.25 * em, number(k * step) + unit, small, INK, "middle")
+            text = number(k * step) + (" s" if k == last else "")
+            sprite.text(x, self._bottom + 1.25 * em, text, small, INK, "middle")
         return sprite
-
-    def _draw_names(self, sprite: Sprite, size: int) -> None:
-        x = float(self._width - round(0.7 * self._em))
-        titles = text_width(f"{_TITLE} J", self._em) + self._em
-        if sum(text_width(name, size) + 0.9 * self._em for name in self._names) > x - titles:
-            return  # too narrow; the runs' titles have the curves' colours anyway
-        for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
-            sprite.text(x, 1.4 * self._em, name, size, color, "right")
-            x -= text_width(name, size) + 0.9 * self._em
 
     def _draw_curve(self, sprite: Sprite, times: NDArray, values: NDArray, limit: float, color: Color) -> None:
         if len(times) == 0 or limit <= 0:

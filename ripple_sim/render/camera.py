@@ -104,12 +104,9 @@ class Camera:
         if not 0 <= index < model.ncam:
             names = ", ".join(f"{model.camera(i).name!r} (id {i})" for i in range(model.ncam)) or "none"
             raise SceneError(f"the model has no camera {name!r}; it has: {names}")
-        return FixedCamera(
-            position=np.array(data.cam_xpos[index]),
-            rotation=np.array(data.cam_xmat[index]).reshape(3, 3),
-            distance=float(max(np.linalg.norm(data.cam_xpos[index] - model.stat.center), 1e-3 * model.stat.extent)),
-            fovy=float(model.cam_fovy[index]),
-        )
+        position, rotation = np.array(data.cam_xpos[index]), np.array(data.cam_xmat[index]).reshape(3, 3)
+        distance = float(max(np.linalg.norm(position - model.stat.center), 1e-3 * model.stat.extent))
+        return FixedCamera(position, rotation, distance, fovy=float(model.cam_fovy[index]))
 
 
 # A camera with a given pose, such as one that a MuJoCo model fixes to a body.
@@ -172,18 +169,18 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera
             f"the MjvCamera's type is {camera.type}; valid are mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
             f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and mjCAMERA_FIXED ({int(kinds.mjCAMERA_FIXED)})"
         )
-    x, y, z = (float(each) for each in lookat)
-    return Camera(
-        (x, y, z), float(camera.distance), float(camera.azimuth), float(camera.elevation), model.vis.global_.fovy
-    )
+    x, y, z, distance, azimuth, elevation = map(float, (*lookat, camera.distance, camera.azimuth, camera.elevation))
+    return Camera((x, y, z), distance, azimuth, elevation, model.vis.global_.fovy)
 
 
 def view_matrix(pose: Pose) -> NDArray[np.float64]:
     """World to eye coordinates, shape [4, 4]."""
-    view = np.eye(4)
-    view[:3, :3] = pose.rotation.T
-    view[:3, 3] = -pose.rotation.T @ pose.eye
-    return view
+    return view_along(pose.rotation.T, pose.rotation.T @ pose.eye)
+
+
+def view_along(rotation: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
+    """World to eye coordinates, shape [4, 4]; `eye` is the eye's position along the rows of `rotation`."""
+    return np.block([[rotation, -eye[:, None]], [np.array([0.0, 0.0, 0.0, 1.0])]])
 
 
 def perspective(

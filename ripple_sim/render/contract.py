@@ -130,10 +130,6 @@ class Struct:
         self.dtype: np.dtype[Any] = np.dtype(fields)
         self.members = " ".join(declarations)
 
-    def defines(self) -> dict[str, str]:
-        """`NAME_MEMBERS`: the declarations."""
-        return {f"{self.name.upper()}_MEMBERS": self.members}
-
 
 def numbered(names: type[IntEnum], suffix: str = "") -> dict[str, int]:
     """Defines of an enumeration's names, aliases too, each with a suffix."""
@@ -202,10 +198,7 @@ DEFINES: dict[str, object] = {
     **numbered(MappingKind),
     **numbered(CasterMap, "_MAP"),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
-    **LIGHT.defines(),
-    **SHADOW.defines(),
-    **FRAME.defines(),
-    **OBJECT.defines(),
+    **{f"{each.name.upper()}_MEMBERS": each.members for each in (LIGHT, SHADOW, FRAME, OBJECT)},
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,
     **CURVES,

@@ -77,8 +77,8 @@ class SurfaceMesh:
         self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
         look, rgb, mapping = appearance(assets.model, geom, surface)
         self.transparent, self.occludes, self.casts = look.transparency > 0.0, True, True
-        heatmap = surface.heatmap_colors is not None
-        identity = geom_visual(assets.model, geom).identity
+        colors, identity = surface.heatmap_colors, geom_visual(assets.model, geom).identity
+        heatmap = colors is not None
         number = assets.objects.add(
             look, geom, identity=identity, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block
         )
@@ -86,9 +86,7 @@ class SurfaceMesh:
         pixel = 2 * self._radius / size[1]
         self._vertices = vertices = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
         self._balls = vertices.balls
-        self._adaptive = AdaptiveTessellation(
-            vertices, page, tolerance=_TOLERANCE * pixel, min_length=1.5 * _PIXELS * pixel
-        )
+        self._adaptive = AdaptiveTessellation(vertices, page, _TOLERANCE * pixel, min_length=1.5 * _PIXELS * pixel)
         self._indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
         self._written: NDArray[np.int32] | None = None  # the triangles that the buffer holds
         self._on_device: DeviceTessellation | None = None
@@ -99,9 +97,7 @@ class SurfaceMesh:
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
         self._unit, self._image = mapping.unit, None if mapping.texture < 0 else assets.texture(mapping.texture)
-        self._heatmap = None
-        if surface.heatmap_colors is not None:
-            self._heatmap = HeatmapTexture(resources, page, surface.heatmap_colors)
+        self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
         options = {"MAPPING": mapping.kind, "HEATMAP": int(heatmap), "GRID": int(surface.grid > 0)}
         self._program = resources.program("surfaces/surface", **options)
         self._program["resolution"] = float(page.resolution)
@@ -256,10 +252,7 @@ class DrawnScene:
         self._assets, self._model, self._height = assets, assets.model, size[1]
         ordered = sorted(targets.items())
         self.height_maps = HeightMapTextures(assets.resources, [surface.charts.page for _, surface in ordered])
-        self.targets = [
-            SurfaceMesh(assets, geom, surface, self.height_maps, index, size)
-            for index, (geom, surface) in enumerate(ordered)
-        ]
+        self.targets = [SurfaceMesh(assets, *each, self.height_maps, index, size) for index, each in enumerate(ordered)]
         self._occluders = Occluders(assets.resources, assets.model, np.zeros(0, dtype=np.int64))
         self._made: dict[tuple[Any, ...], Instances] = {}
         self.show([])
@@ -291,12 +284,7 @@ class DrawnScene:
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
     def update(
-        self,
-        ctx: moderngl.Context,
-        data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
-        pose: Pose,
-        sharp: bool = False,
+        self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, sharp: bool = False
     ) -> None:
         """Bring everything on the GPU up to date; `sharp` is as for `Instances.update`."""
         for target in self.targets:

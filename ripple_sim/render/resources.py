@@ -69,11 +69,12 @@ class Resources:
         """One of the renderer's compute shaders, likewise; it is shared."""
         return self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options)
 
-    def clamped_texture(
-        self, size: tuple[int, int], components: int, *, mipmaps: bool = False, **options: Any
-    ) -> moderngl.Texture:
-        """Texture (width, height) that does not repeat, read linearly, over its mipmaps too where it has some."""
-        texture = self.texture(size, components, **options)
+    def clamped_texture(self, size: tuple[int, ...], components: int, *, mipmaps: bool = False, **options: Any) -> Any:
+        """Texture (width, height), or array of them with a number of layers, that does not repeat.
+
+        It is read linearly, over its mipmaps too where it has some.
+        """
+        texture = (self.texture if len(size) == 2 else self.texture_array)(size, components, **options)
         texture.repeat_x = texture.repeat_y = False
         texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR, moderngl.LINEAR)
         return texture
@@ -144,7 +145,8 @@ def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Te
 
     Where the driver takes none as large it is scaled down, with a warning.
     """
-    pixels = fitted(pixels, _limit(resources, "GL_MAX_TEXTURE_SIZE"))
+    with resources.gl as ctx:
+        pixels = fitted(pixels, ctx.info["GL_MAX_TEXTURE_SIZE"])
     height, width, _ = pixels.shape
     opaque = Image.fromarray(pixels).convert("RGBA").tobytes()
     return _trilinear(resources.texture((width, height), 4, opaque, internal_format=SRGB8_ALPHA8))
@@ -152,8 +154,8 @@ def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Te
 
 def srgb_cube(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
     """Cube map with mipmaps, of pixels [6 size, size, 3]: its faces below one another."""
-    largest = _limit(resources, "GL_MAX_CUBE_MAP_TEXTURE_SIZE")
-    faces = [fitted(face, largest) for face in np.split(pixels, 6)]
+    with resources.gl as ctx:
+        faces = [fitted(face, ctx.info["GL_MAX_CUBE_MAP_TEXTURE_SIZE"]) for face in np.split(pixels, 6)]
     opaque, size = Image.fromarray(np.concatenate(faces)).convert("RGBA").tobytes(), faces[0].shape[1]
     return _trilinear(resources.texture_cube((size, size), 4, opaque, internal_format=SRGB8_ALPHA8))
 
@@ -172,11 +174,6 @@ def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
         stacklevel=3,
     )
     return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
-
-
-def _limit(resources: Resources, name: str) -> int:
-    with resources.gl as ctx:
-        return int(ctx.info[name])
 
 
 def _trilinear(texture: Any) -> Any:
@@ -219,9 +216,7 @@ class HeightMapTextures:
     def __init__(self, resources: Resources, pages: Sequence[ChartPage]) -> None:
         self._pages = pages
         width, height = (max((page.size[axis] for page in pages), default=1) for axis in range(2))
-        self._texture = resources.texture_array((width, height, max(len(pages), 1)), 4, dtype="f4")
-        self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self._texture.repeat_x = self._texture.repeat_y = False
+        self._texture = resources.clamped_texture((width, height, max(len(pages), 1)), 4, dtype="f4")
 
     def write(self, layer: int, height_map: NDArray[np.float32] | DeviceHeightMap) -> float:
         """Replace a target's height map, [C, n + 2, n + 2, 4]; return the largest height in it [m]."""

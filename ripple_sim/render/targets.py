@@ -199,19 +199,14 @@ class Readback:
             with self._gl:
                 buffer.read_into(pixels)
         frame = np.empty((*pixels.shape[:2], 4 if self._format.alpha else 3), pixels.dtype)
-        _turn(pixels, frame)
+        for channel in range(frame.shape[2]):  # all at once would be rows of three numbers, which are slow
+            frame[..., channel] = pixels[::-1, :, channel]
         self._free.append(buffer)
         if self._format.linear:
             return frame.view(np.float16)
         if self._format.alpha:
             _unpremultiply(frame)
         return frame
-
-
-def _turn(pixels: NDArray, frame: NDArray) -> None:
-    """Copy pixels [height, width, 4], bottom row first, to a frame [height, width, 3 or 4], top row first."""
-    for channel in range(frame.shape[2]):  # all at once would be rows of three numbers, which are slow
-        frame[..., channel] = pixels[::-1, :, channel]
 
 
 @kernel

@@ -211,8 +211,7 @@ class DeferredShading:
         self._solids = FramePass(resources, "passes/deferred", size, **options, LAYER=0)
         # where solids may show, square tiles are classified, as instances
         self._extent = 2.0 * TILE / np.array(size)  # of a tile, where the frame extends from -1 to 1
-        most = -(-size[0] // TILE) * -(-size[1] // TILE)
-        self._corners = resources.buffer(reserve=8 * most, dynamic=True)
+        self._corners = resources.buffer(reserve=8 * -(-size[0] // TILE) * -(-size[1] // TILE), dynamic=True)
         classify = resources.program("passes/classify", **options, LAYER=0, TILES=1)
         classify["level"] = 0.5  # any will do
         classify["extent"] = tuple(self._extent)

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import orthographic, perspective
+from ripple_sim.render.camera import orthographic, perspective, view_along
 from ripple_sim.render.contract import CasterMap, MappingKind, Unit
 from ripple_sim.render.resources import FrameUniforms, Resources
 from ripple_sim.render.tone_mapping import srgb_to_linear
@@ -57,18 +57,14 @@ class ShadowMaps:
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._target = resources.framebuffer(depth_attachment=self._depth)
+        linear = moderngl.LINEAR, moderngl.LINEAR
         self._test = resources.sampler(
-            texture=self._depth,
-            compare_func="<=",
-            filter=(moderngl.LINEAR, moderngl.LINEAR),
-            repeat_x=False,
-            repeat_y=False,
+            texture=self._depth, compare_func="<=", filter=linear, repeat_x=False, repeat_y=False
         )
         blockers = count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER
         self._blockers = resources.clamped_texture(blockers, 4, mipmaps=True, dtype="f4")
         self._blockers_target = resources.framebuffer([self._blockers])
-        program = resources.program("passes/blockers", SHADOWS=count)
-        self._find_blockers = resources.vertex_array(program, [])
+        self._find_blockers = resources.vertex_array(resources.program("passes/blockers", SHADOWS=count), [])
 
     def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
         """Aim the maps at a ball [m] that contains all casters, set the frame's shadows, and return their lights."""
@@ -123,7 +119,7 @@ def _fit_far(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: 
     shadow["depth"] = depth, 0, 0, 1
     shadow["width"] = 2 * half_width, 0, size, 0
     shadow["penumbra"] = light.size, 0, _WIDEST, 0
-    return orthographic(half_width, depth) @ _view(rotation, eye)
+    return orthographic(half_width, depth) @ view_along(rotation, eye)
 
 
 def _fit_near(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float) -> NDArray[np.float64]:
@@ -142,7 +138,7 @@ def _fit_near(shadow: NDArray, light: Light, size: int, centre: NDArray, radius:
     shadow["width"] = 0, 2 * np.tan(half), size, 0
     shadow["penumbra"] = 0, light.size, _WIDEST, 0
     rotation = _axes(towards)
-    return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ _view(rotation, rotation @ position)
+    return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ view_along(rotation, rotation @ position)
 
 
 def _axes(back: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -151,14 +147,6 @@ def _axes(back: NDArray[np.float64]) -> NDArray[np.float64]:
     right = np.cross(helper, back)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(back, right), back])
-
-
-def _view(rotation: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World to eye coordinates; `eye` is the eye's position along the rows of `rotation`."""
-    view = np.eye(4)
-    view[:3, :3] = rotation
-    view[:3, 3] = -eye
-    return view
 
 
 class TransmissionMaps:
@@ -274,26 +262,24 @@ class Floor:
     def shade(self, frame: FrameUniforms, lights: list[Light], casters: NDArray[np.float64]) -> None:
         """Set the parts of the floor on which the shadows of some balls may fall, for each light."""
         points = casters[:, None, :3] + casters[:, 3:, None] * _CORNERS
+        height = np.maximum((points - self.origin) @ self.normal, 0.0)
         for shadow, light in zip(frame.values["shadows"], lights, strict=False):
-            shadow["floor"] = self._shaded_box(light, points)
+            towards = light.direction if light.position is None else light.position - points
+            rise = np.broadcast_to(towards @ self.normal, height.shape)
+            low = rise < _LOWEST_SINE * np.linalg.norm(towards, axis=-1)
+            shadows = points - towards * (height / np.where(low, 1.0, rise))[..., None]
+            local = ((shadows - self.origin) @ self.rotation)[..., :2] - self.centre[:2]
+            least, most = local.min(axis=(0, 1)), local.max(axis=(0, 1))
+            if low.any():
+                least, most = np.full(2, -_ENDLESS), np.full(2, _ENDLESS)
+            # lower and upper corner, in the floor map, of a box about the shadows
+            box = np.concatenate([least / self.half_width - _SOFT, most / self.half_width + _SOFT])
+            shadow["floor"] = 0.5 + 0.5 * box
 
     def bind(self) -> None:
         """Bind the floor's texture."""
         if self._image is not None:
             self._image.use(Unit.FLAT_IMAGE)
-
-    def _shaded_box(self, light: Light, points: NDArray) -> NDArray[np.float64]:
-        """Lower and upper corner, in the floor map, of a box about the shadows of points [m]."""
-        towards = light.direction if light.position is None else light.position - points
-        height = np.maximum((points - self.origin) @ self.normal, 0.0)
-        rise = np.broadcast_to(towards @ self.normal, height.shape)
-        low = rise < _LOWEST_SINE * np.linalg.norm(towards, axis=-1)
-        shadows = points - towards * (height / np.where(low, 1.0, rise))[..., None]
-        local = ((shadows - self.origin) @ self.rotation)[..., :2] - self.centre[:2]
-        least, most = local.min(axis=(0, 1)), local.max(axis=(0, 1))
-        if low.any():
-            least, most = np.full(2, -_ENDLESS), np.full(2, _ENDLESS)
-        return 0.5 + 0.5 * np.concatenate([least / self.half_width - _SOFT, most / self.half_width + _SOFT])
 
 
 _CEILING_SIZE, _MAP_SIZE = 224, 112
@@ -318,8 +304,7 @@ class FloorOcclusion:
         if floor is None:
             self._map = self._seen = self._bounce = resources.texture((1, 1), 4, bytes(4))
             return
-        program = resources.program("passes/floor_occlusion", **options, TILES=0)
-        self._pass = resources.vertex_array(program, [])
+        self._pass = resources.vertex_array(resources.program("passes/floor_occlusion", **options, TILES=0), [])
         ceiling = _CEILING_SIZE, _CEILING_SIZE
         self._ceiling = resources.clamped_texture(ceiling, 4, dtype="nu2")
         self._ceiling.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -336,9 +321,8 @@ class FloorOcclusion:
         if floor is None:
             return
         # height above the floor becomes depth; this mirrors the scene: what faces the floor goes clockwise
-        view = np.eye(4)
-        view[:3, :3] = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
-        view[:3, 3] = -view[:3, :3] @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2])
+        turned = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
+        view = view_along(turned, turned @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2]))
         matrix = orthographic(floor.half_width, floor.half_width) @ view
         self._ceiling_framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)

@@ -12,6 +12,7 @@ from ripple_sim.render.visuals.corners import bounding_radius, cast, frames_abou
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
 from ripple_sim.solver.mesh.queries import ClosestPoints
+from ripple_sim.solver.mesh.vectors import cross, dot, row, subtract
 from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 from .tessellation import coarse_mesh
@@ -62,16 +63,12 @@ class MovingVertices:
 @kernel
 def _frame(V: Floats, F: Ints, i: int, frame: Floats) -> float:
     """Two sides and the unit normal of a triangle, as rows; return twice its area."""
+    first = row(V, F[i, 0])
+    u, v = subtract(row(V, F[i, 1]), first), subtract(row(V, F[i, 2]), first)
+    normal = cross(u, v)
+    length = np.sqrt(dot(normal, normal))
     for k in range(3):
-        frame[0, k], frame[1, k] = V[F[i, 1], k] - V[F[i, 0], k], V[F[i, 2], k] - V[F[i, 0], k]
-    square = 0.0
-    for k in range(3):
-        y, z = (k + 1) % 3, (k + 2) % 3
-        frame[2, k] = frame[0, y] * frame[1, z] - frame[0, z] * frame[1, y]
-        square += frame[2, k] ** 2
-    length = np.sqrt(square)
-    for k in range(3):
-        frame[2, k] /= max(length, 1e-300)
+        frame[0, k], frame[1, k], frame[2, k] = u[k], v[k], normal[k] / max(length, 1e-300)
     return length
 
 
@@ -86,11 +83,9 @@ def _vertex_maps(rest: Floats, moved: Floats, F: Ints) -> Floats:
         if not area > 0:
             continue
         # rows dual to the two sides and the normal
+        first, second = cross(row(old, 1), row(old, 2)), cross(row(old, 2), row(old, 0))
         for k in range(3):
-            y, z = (k + 1) % 3, (k + 2) % 3
-            back[0, k] = (old[1, y] * old[2, z] - old[1, z] * old[2, y]) / area
-            back[1, k] = (old[2, y] * old[0, z] - old[2, z] * old[0, y]) / area
-            back[2, k] = old[2, k]
+            back[0, k], back[1, k], back[2, k] = first[k] / area, second[k] / area, old[2, k]
         for corner in range(3):
             v = F[i, corner]
             areas[v] += area
@@ -110,11 +105,7 @@ def _turn(mean: Floats, rest: Floats, i: int, out: Floats32) -> None:
     """A unit normal under the cofactors of a map."""
     square = 0.0
     for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        total = 0.0
-        for k in range(3):
-            y, z = (k + 1) % 3, (k + 2) % 3
-            total += (mean[b, y] * mean[c, z] - mean[b, z] * mean[c, y]) * rest[i, k]
+        total = dot(cross(row(mean, (a + 1) % 3), row(mean, (a + 2) % 3)), row(rest, i))
         out[i, a] = total
         square += total * total
     length = np.sqrt(square)
@@ -174,8 +165,11 @@ class MovingOcclusion:
         spacing = float(np.sqrt(Mesh(V, F).area / count))
         apart = 2 * spacing * normals  # so that the two sides of a thin body are far from each other
         vertices, coarse = coarse_mesh(F, np.hstack([V, apart]), count)
-        near = np.hstack([V, apart])[vertices], np.hstack([points, 2 * spacing * directions])
-        self._baked, (self._near, self._weights) = baked, _nearest(*near)
+        samples = cKDTree(np.hstack([V, apart])[vertices])
+        distance, near = samples.query(np.hstack([points, 2 * spacing * directions]), min(_NEAR + 1, samples.n))
+        # the farthest one's weight is 0: no point jumps
+        weights = (1 - distance / np.maximum(distance[:, -1:], 1e-300)) ** 2 + 1e-12
+        self._baked, self._near, self._weights = baked, near, weights / weights.sum(axis=1, keepdims=True)
         self._vertices, self._F, self._radius = vertices, coarse, bounding_radius(V)
         # triangles of a coarse mesh may lie slightly over its vertices
         self._start = 0.3 * spacing if count < len(V) else 0.0
@@ -199,11 +193,3 @@ class MovingOcclusion:
         V = self._of(V)
         _, directions, normals = self._frames(V)
         return cast(V, self._F, frames_about(normals, directions), self._count, self._radius, self._start)
-
-
-def _nearest(samples: NDArray, points: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The samples nearest to each point, [n, k], and weights, of which that of the farthest is 0: no point jumps."""
-    distance, near = cKDTree(samples).query(points, min(_NEAR + 1, len(samples)))
-    reach = np.maximum(distance[:, -1:], 1e-300)
-    weights = (1 - distance / reach) ** 2 + 1e-12
-    return near, weights / weights.sum(axis=1, keepdims=True)

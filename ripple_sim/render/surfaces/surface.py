@@ -50,8 +50,7 @@ class Charts(NamedTuple):
 
 
 def split_at_charts(
-    mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]],
-    charts: Charts,
+    mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]], charts: Charts
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Cut the triangles of a mesh where they leave a chart.
 
@@ -88,12 +87,9 @@ def split_at_charts(
     key = alike * charts.page.charts + chart[:, None]
     _, where, index = np.unique(key, return_index=True, return_inverse=True)
     row = source.ravel()[where]
-    return (
-        index.reshape(-1, 3),
-        np.concatenate([attributes, cut])[row],
-        np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row],
-        key.ravel()[where] % charts.page.charts,
-    )
+    attributes = np.concatenate([attributes, cut])[row]
+    same = np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row]
+    return index.reshape(-1, 3), attributes, same, key.ravel()[where] % charts.page.charts
 
 
 def shared_places(uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray) -> NDArray[np.float64]:
@@ -126,11 +122,8 @@ class HeatmapTexture:
 
     def __init__(self, resources: Resources, page: ChartPage, colors: NDArray[np.uint8]) -> None:
         self._page, self._shape = page, (page.charts, page.block, page.block)
-        self._values = resources.texture_array((*page.size, 1), 1, dtype="f4")
-        self._colors = resources.texture((len(colors), 1), 3, np.ascontiguousarray(colors).tobytes(), alignment=1)
-        for texture in (self._values, self._colors):
-            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-            texture.repeat_x = texture.repeat_y = False
+        self._values = resources.clamped_texture((*page.size, 1), 1, dtype="f4")
+        self._colors = resources.clamped_texture((len(colors), 1), 3, data=colors.tobytes(), alignment=1)
         self.set(np.zeros(self._shape, np.float32), 1.0)
 
     def set(self, values: NDArray[np.float32], limit: float) -> None:

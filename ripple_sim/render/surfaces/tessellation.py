@@ -60,7 +60,7 @@ def tessellate(
     while len(F) < most:
         edges = edges_of(F)
         weld, inner = welded(edges, F, same)
-        length = _length(attributes[edges.ends[:, 0], POSITION] - attributes[edges.ends[:, 1], POSITION])
+        length = np.linalg.norm(attributes[edges.ends[:, 0], POSITION] - attributes[edges.ends[:, 1], POSITION], axis=1)
         marked = _longest(length, max_length, max_faces - len(F))
         if crease_length is not None and not marked.any():
             marked = _longest(np.where(inner, 0.0, length), crease_length, most - len(F))
@@ -91,7 +91,7 @@ def midpoints(ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDA
     a, b = attributes[ends[:, 0]], attributes[ends[:, 1]]
     middle = (a + b) / 2
     middle[:, POSITION] += bulges(ends, inner, attributes)
-    middle[:, NORMAL] /= np.maximum(_length(middle[:, NORMAL]), 1e-12)[:, None]
+    middle[:, NORMAL] /= np.maximum(np.linalg.norm(middle[:, NORMAL], axis=1, keepdims=True), 1e-12)
     return middle
 
 
@@ -101,10 +101,6 @@ def bulges(ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArra
     half = (b[:, POSITION] - a[:, POSITION]) / 2
     above_a, above_b = (np.einsum("ij,ij->i", half, end[:, NORMAL])[:, None] * end[:, NORMAL] for end in (a, b))
     return inner[:, None] * ((above_b - above_a) / 4)
-
-
-def _length(vectors: NDArray) -> NDArray[np.float64]:
-    return np.linalg.norm(vectors, axis=1)
 
 
 def _longest(length: NDArray, max_length: float, new_faces: int) -> NDArray[np.bool_]:
@@ -120,29 +116,24 @@ def _longest(length: NDArray, max_length: float, new_faces: int) -> NDArray[np.b
 
 def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]:
     """Cut every triangle into 1 to 4 by the midpoints of its sides (side k runs from corner k to k + 1), -1 = none."""
-    count = (middle >= 0).sum(axis=1)
-    parts = [F[count == 0]]
-
-    f, m = F[count == 3], middle[count == 3]
-    parts += [np.stack([f[:, k], m[:, k], m[:, k - 1]], axis=1) for k in range(3)] + [m]
-
-    # turn the triangle so that its only split side, or its only whole one, is side 0
-    f, m = _turned(F[count == 1], middle[count == 1], np.argmax(middle[count == 1] >= 0, axis=1))
-    parts += [np.stack([f[:, 0], m[:, 0], f[:, 2]], axis=1), np.stack([m[:, 0], f[:, 1], f[:, 2]], axis=1)]
-
-    f, m = _turned(F[count == 2], middle[count == 2], np.argmin(middle[count == 2] >= 0, axis=1))
-    parts.append(np.stack([m[:, 2], m[:, 1], f[:, 2]], axis=1))
-    # the remaining quadrilateral f0 f1 m1 m2 is cut along its shorter diagonal
-    first = _length(positions[f[:, 0]] - positions[m[:, 1]]) <= _length(positions[f[:, 1]] - positions[m[:, 2]])
-    a, b = np.flatnonzero(first), np.flatnonzero(~first)
-    parts += [np.stack([f[a, 0], f[a, 1], m[a, 1]], axis=1), np.stack([f[a, 0], m[a, 1], m[a, 2]], axis=1)]
-    parts += [np.stack([f[b, 0], f[b, 1], m[b, 2]], axis=1), np.stack([f[b, 1], m[b, 1], m[b, 2]], axis=1)]
-    return np.concatenate(parts)
-
-
-def _turned(F: NDArray, middle: NDArray, first: NDArray) -> tuple[NDArray, NDArray]:
+    split, count = middle >= 0, (middle >= 0).sum(axis=1)
+    # turn the triangles so that their only split side, or their only whole one, is side 0
+    first = np.where(count == 1, split.argmax(axis=1), split.argmin(axis=1))
     index = (first[:, None] + np.arange(3)) % 3
-    return np.take_along_axis(F, index, axis=1), np.take_along_axis(middle, index, axis=1)
+    # columns 0 to 2 are a triangle's corners, 3 to 5 the midpoints of its sides
+    points = np.hstack([np.take_along_axis(F, index, axis=1), np.take_along_axis(middle, index, axis=1)])
+    one, two, three = (points[count == number] for number in (1, 2, 3))
+    # the quadrilateral 0 1 4 5 that is left of those with two is cut along its shorter diagonal
+    diagonals = np.linalg.norm(positions[two[:, :2]] - positions[two[:, 4:]], axis=2)
+    shorter = diagonals[:, 0] <= diagonals[:, 1]
+    patterns = [
+        (three, [[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 5]]),
+        (one, [[0, 3, 2], [3, 1, 2]]),
+        (two, [[5, 4, 2]]),
+        (two[shorter], [[0, 1, 4], [0, 4, 5]]),
+        (two[~shorter], [[0, 1, 5], [1, 4, 5]]),
+    ]
+    return np.concatenate([F[count == 0], *(each[:, corners] for each, some in patterns for corners in some)])
 
 
 def coarse_mesh(

@@ -36,26 +36,18 @@ def rounded_parts(mesh: Mesh, chart_map: ChartMap) -> tuple[PartsMesh, NDArray[n
     parts, normals = parts_mesh(chart_map, mesh), corner_normals(mesh.V, mesh.F)
     if parts.V is mesh.V:
         return parts, mesh.V, normals
-    w, out = parts.barycentrics, _bulges_of_sides(mesh)[parts.triangle]
-    V = parts.V.copy()
-    V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out)
-    return parts, V, _unified(parts.F, normalized(parts.carry(normals)))
-
-
-def _bulges_of_sides(mesh: Mesh) -> NDArray[np.float64]:
-    """How far the midpoint of each triangle's side from corner k to k + 1 bulges out [m], [m, 3, 3]."""
-    vertices, F, normals, _, _ = split_corners(mesh.V, mesh.F)
-    attributes = np.concatenate([mesh.V[vertices], normals], axis=1)
-    edges = edges_of(F)
+    # how far the midpoint of each triangle's side from corner k to k + 1 bulges out [m], [m, 3, 3]
+    vertices, F, split_normals, _, _ = split_corners(mesh.V, mesh.F)
+    attributes, edges = np.concatenate([mesh.V[vertices], split_normals], axis=1), edges_of(F)
     _, inner = welded(edges, F, np.arange(len(attributes)))
-    return bulges(edges.ends, inner, attributes)[edges.of]
-
-
-def _unified(F: NDArray[np.int64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corner normals [m, 3, 3] that are the same to the last bit where they differ by round-off at a vertex."""
-    key = np.column_stack([F.ravel(), np.rint(normals.reshape(-1, 3) / _ALIKE).astype(np.int64)])
+    out = bulges(edges.ends, inner, attributes)[edges.of]
+    V, w = parts.V.copy(), parts.barycentrics
+    V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out[parts.triangle])
+    # corner normals are the same to the last bit where they differ by round-off at a vertex
+    normals = normalized(parts.carry(normals)).reshape(-1, 3)
+    key = np.column_stack([parts.F.ravel(), np.rint(normals / _ALIKE).astype(np.int64)])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return normals.reshape(-1, 3)[first[group.ravel()]].reshape(normals.shape)
+    return parts, V, normals[first[group.ravel()]].reshape(-1, 3, 3)
 
 
 _BITS = 10  # of a coordinate
@@ -143,14 +135,9 @@ def tessellated(
         at_parts[F] = parts.carry(np.concatenate([smooth, baked], axis=1)[mesh.F])
         smooth, baked = normalized(at_parts[:, :3]), at_parts[:, 3:]
     _, same = np.unique(np.column_stack([each, normals]), axis=0, return_inverse=True)
-    attributes = [V[each], normals, coordinates, smooth[each], baked[each], uv]
+    attributes = np.concatenate([V[each], normals, coordinates, smooth[each], baked[each], uv], axis=1)
     return tessellate(
-        split_F,
-        np.concatenate(attributes, axis=1),
-        same.ravel(),
-        max_length=max_length,
-        max_faces=max_faces,
-        crease_length=crease_length,
+        split_F, attributes, same.ravel(), max_length=max_length, max_faces=max_faces, crease_length=crease_length
     )
 
 
@@ -206,8 +193,7 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     edges = edges_of(faces)
     _, inner = welded(edges, faces, same)
     attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes)])
-    length = np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True)
-    attributes[:, DIRECTION] /= np.maximum(length, 1e-12)
+    attributes[:, DIRECTION] /= np.maximum(np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True), 1e-12)
     chart = np.concatenate([chart, chart[edges.ends[:, 0]]])
     chart_uv = charts.map.uv(attributes[:, COORDINATES], chart)
     places = charts.page.places(chart, chart_uv)
@@ -217,7 +203,11 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     balls = balls_about(attributes[:, POSITION][corners], _BALLS)
     apart = _APART * np.ptp(points, axis=0)[:3].max() / 2 * attributes[: len(same), DIRECTION]
     some, coarse = coarse_mesh(faces, np.hstack([attributes[: len(same), POSITION], apart]), _COARSE)
-    return SurfaceVertices(faces, attributes, edges, places, lookups, balls, some[coarse])
+    made = SurfaceVertices(faces, attributes, edges, places, lookups, balls, some[coarse])
+    for array in (*edges, *made):
+        if isinstance(array, np.ndarray):
+            array.flags.writeable = False
+    return made
 
 
 def mapped_coordinates(vertices: NDArray[np.float64], mapping: TextureMapping) -> NDArray[np.float64]:
@@ -234,7 +224,6 @@ _COARSE = 600  # vertices of what the floor sees: texels of its map are about as
 _APART = 0.1  # of the bounding radius: how far from each other the two sides of a thin body are
 _MOST_KEPT_FACES = 100_000  # of a surface that is kept: 30 MB
 
-
 _kept: ResultCache[SurfaceVertices] = ResultCache(4, lambda each: len(each.F) <= _MOST_KEPT_FACES)
 
 
@@ -247,11 +236,4 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
     arrays = charts.map.arrays()
     name = f"{charts.map.layout} {charts.page} {list(arrays)} {max_length!r} {max_faces}"
     key = content_key(name, [surface.V, surface.F, uv, *arrays.values()])
-    return _kept.get(key, lambda: _read_only(_surface_vertices(surface, max_length, max_faces)))
-
-
-def _read_only(vertices: SurfaceVertices) -> SurfaceVertices:
-    for array in (*vertices.edges, *vertices):
-        if isinstance(array, np.ndarray):
-            array.flags.writeable = False
-    return vertices
+    return _kept.get(key, lambda: _surface_vertices(surface, max_length, max_faces))

@@ -130,9 +130,14 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
         Walls nearer than that are not seen [m].
     """
     scene = RayScene(V, F)
+    # cosine-distributed directions on a spiral about every normal, turned differently at every vertex
+    index, golden = np.arange(count) + 0.5, np.pi * (3 - np.sqrt(5))
+    turn = index * golden + (np.arange(len(frames)) * golden)[:, None]
+    r, z = np.sqrt(index / count), np.sqrt(1 - index / count)
+    hemisphere = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z, turn.shape)], axis=2) @ frames
 
     def distances(side: float) -> NDArray[np.float64]:
-        directions = side * _hemisphere(frames, count)
+        directions = side * hemisphere
         origins = (V + side * 1e-3 * radius * frames[:, 2])[:, None] + start * directions
         hits = start + scene.distances(origins.reshape(-1, 3), directions.reshape(-1, 3))
         return (np.minimum(hits, 4.0 * radius) / radius).reshape(len(V), count)
@@ -151,21 +156,11 @@ def frames_about(normals: NDArray, along: NDArray | None = None) -> NDArray[np.f
     return np.stack([tangent, np.cross(normals, tangent), normals], axis=1)
 
 
-def _hemisphere(frames: NDArray, count: int) -> NDArray[np.float64]:
-    """Cosine-distributed directions on a spiral about every normal, turned differently at every vertex."""
-    index = np.arange(count) + 0.5
-    golden = np.pi * (3 - np.sqrt(5))
-    turn = index * golden + (np.arange(len(frames)) * golden)[:, None]
-    r, z = np.sqrt(index / count), np.sqrt(1 - index / count)
-    local = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z, turn.shape)], axis=2)
-    return local @ frames
-
-
-def _smoothed(values: NDArray, edges: NDArray, rounds: int = 2) -> NDArray[np.float64]:
-    """Average over neighbours along edges [k, 2], against the noise of few rays."""
+def _smoothed(values: NDArray, edges: NDArray) -> NDArray[np.float64]:
+    """Average twice over neighbours along edges [k, 2], against the noise of few rays."""
     both = np.concatenate([edges, edges[:, ::-1]])
     degree = np.bincount(both[:, 0], minlength=len(values))
-    for _ in range(rounds):
+    for _ in range(2):
         mean = np.bincount(both[:, 0], weights=values[both[:, 1]], minlength=len(values)) / np.maximum(degree, 1)
         values = (values + mean) / 2
     return values

@@ -117,9 +117,7 @@ class Instances:
             record["mapping"] = [*mapping.scale, mapping.stretch * mapping.scale[2]]
             record["tiling"] = mapping.tiling
         # with round edges, and with sharp ones
-        self._sizes = [
-            np.array([sizes(model, visual, *bevel) for visual, _ in members]) for bevel in ((), (_SHARPEST,))
-        ]
+        self._sizes = [np.array([sizes(model, each, *bevel) for each, _ in members]) for bevel in ((), (_SHARPEST,))]
         self._unit, self._image = mapping.unit, None if mapping.texture < 0 else self._assets.texture(mapping.texture)
         if self._buffer.size < self._records.nbytes:
             self._buffer.orphan(2 * self._records.nbytes)

@@ -109,12 +109,11 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     out as in MuJoCo both where it faces all lights and where it faces none.
     """
     head = model.vis.headlight
-    ambient = np.array(head.ambient, dtype=np.float64) if head.active else np.zeros(3)
-    lights = []
+    ambient, lights = np.zeros(3), []
     if head.active:
-        towards = pose.rotation[:, 2]
+        ambient += head.ambient
         radiance = np.array(head.diffuse, dtype=np.float64)
-        lights.append(Light(direction=towards, radiance=radiance, gloss=_gloss(head.specular)))
+        lights.append(Light(direction=pose.rotation[:, 2], radiance=radiance, gloss=_gloss(head.specular)))
     for index in range(model.nlight):
         if model.light_active[index] and model.light_type[index] != _KIND.mjLIGHT_IMAGE:
             ambient += model.light_ambient[index]
@@ -126,11 +125,8 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     total = sum((light.radiance for light in lights), np.zeros(3)).max()
     base = srgb_to_linear(ambient.max())
     scale = (srgb_to_linear(min(ambient.max() + total, _BRIGHTEST)) - base) / total if total > 0 else 0.0
-    return Lighting(
-        [dataclasses.replace(light, radiance=max(scale, 0.0) * light.radiance) for light in lights],
-        srgb_to_linear(ambient),
-        studio=False,
-    )
+    lights = [dataclasses.replace(light, radiance=max(scale, 0.0) * light.radiance) for light in lights]
+    return Lighting(lights, srgb_to_linear(ambient), studio=False)
 
 
 def _gloss(specular: ArrayLike) -> float:
@@ -183,7 +179,12 @@ def sky_colors(
 
     Parameters as for `set_lighting`.
     """
-    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else _far_light(lighting, pose) * floor_albedo
+    tint = np.array([0.40, 0.42, 0.46])
+    if floor_albedo is not None:
+        # irradiance over pi of the floor far away, as far as it tints the background
+        away = [light.at(pose.focus, np.array([0.0, 0.0, 1.0])) for light in lighting.lights if light.position is None]
+        far = np.minimum(sum(away, lighting.ambient), _FLOOR_IN_BACKGROUND)
+        tint = (_FLOOR_IN_BACKGROUND if lighting.studio else far) * floor_albedo
     zenith = tint * np.array([0.36, 0.40, 0.48])
     if lighting.studio:
         return tint, zenith, 0.75 * (0.7 * tint + 0.3 * zenith)
@@ -204,8 +205,7 @@ def set_lighting(
         Mean linear colour of a skybox.
     """
     frame.values["lights"] = 0  # where there are fewer, the others are dark
-    for index, light in enumerate(lighting.lights):
-        record = frame.values["lights"][index]
+    for record, light in zip(frame.values["lights"], lighting.lights, strict=False):
         record["position"] = [0, 0, 0, 0] if light.position is None else [*light.position, 1]
         record["direction"] = [*light.direction, np.cos(light.cutoff)]
         record["radiance"] = [*light.radiance, light.exponent]
@@ -223,15 +223,6 @@ def set_lighting(
     frame.set_vector("zenith", zenith)
     frame.set_vector("sky", light_above, 1.0 if lighting.studio else 0.0)
     frame.set_vector("floor_fade", [*(STUDIO_FADE if lighting.studio else FADE), 0.0])
-
-
-def _far_light(lighting: Lighting, pose: Pose) -> NDArray[np.float64]:
-    """Irradiance over pi of the floor far away, as far as it tints the background, shape [3]."""
-    if lighting.studio:
-        return np.full(3, _FLOOR_IN_BACKGROUND)
-    up = np.array([0.0, 0.0, 1.0])
-    far = [light.at(pose.focus, up) for light in lighting.lights if light.position is None]
-    return np.minimum(sum(far, lighting.ambient), _FLOOR_IN_BACKGROUND)
 
 
 def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float64]:
@@ -272,10 +263,9 @@ class SceneLight:
         self._lighting, studio = lighting, in_studio(model, lighting)
         self._sky = None if studio else assets.skybox()
         casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
-        near = model.light_type != _KIND.mjLIGHT_DIRECTIONAL
         self.options = {
             "SKYBOX": int(self._sky is not None),
-            "NEAR_LIGHTS": int(not studio and near.any()),
+            "NEAR_LIGHTS": int(not studio and (model.light_type != _KIND.mjLIGHT_DIRECTIONAL).any()),
             "LIGHTS": 1 if studio else int(np.clip(model.nlight + 1, 1, MAX_LIGHTS)),  # with the headlight
             "SHADOWS": 1 if studio else int(np.clip(casting.sum(), 1, MAX_SHADOWS)),
         }
@@ -290,8 +280,7 @@ class SceneLight:
     ) -> list[Light]:
         """Set the frame's light and background; return the lights. The floor's colour and normal are [3] each."""
         lighting = lighting_of(self._model, data, pose, self._lighting)
-        mean: NDArray[np.float64] | None = None if self._sky is None else self._sky[1]
-        set_lighting(frame, lighting, pose, floor_albedo, mean)
+        set_lighting(frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky[1])
         if floor_normal is not None:
             frame.set_vector("floor_light", lighting.on(pose.focus, floor_normal))
         return lighting.lights

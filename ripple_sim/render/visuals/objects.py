@@ -165,9 +165,11 @@ class Occluders:
 
     def hold(self, geoms: NDArray[np.int64]) -> None:
         """Be the capsules of these geoms from now on."""
-        self._geoms = geoms
-        self._centre, self._half_axis, self._radius = _capsules(self._model, geoms)
-        self._bounds = np.linalg.norm(self._model.geom_aabb[geoms, 3:], axis=1)
+        self._geoms, half = geoms, self._model.geom_aabb[geoms, 3:]
+        across = np.arange(3) != half.argmax(axis=1)[:, None]  # a capsule lies along its geom's longest axis
+        self._centre, self._bounds = self._model.geom_aabb[geoms, :3], np.linalg.norm(half, axis=1)
+        self._radius = np.sqrt(np.prod(half, axis=1, where=across))
+        self._half_axis = np.where(across, 0.0, np.maximum(half - self._radius[:, None], 0.0))
 
     def balls(self, data: Any) -> NDArray[np.float64]:
         """Bounding balls of the geoms."""
@@ -211,15 +213,3 @@ class Occluders:
     def _middles(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rotation = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
         return rotation, data.geom_xpos[self._geoms] + np.einsum("gij,gj->gi", rotation, self._centre)
-
-
-def _capsules(model: Any, geoms: NDArray[np.int64]) -> tuple[NDArray, NDArray, NDArray]:
-    """Centre, half axis and radius of a capsule of about each geom's size, in its frame."""
-    centre, half_axis, radius = np.zeros((len(geoms), 3)), np.zeros((len(geoms), 3)), np.zeros(len(geoms))
-    for index, geom in enumerate(geoms):
-        half = np.asarray(model.geom_aabb[geom][3:], dtype=np.float64)
-        centre[index] = model.geom_aabb[geom][:3]
-        longest = int(np.argmax(half))
-        radius[index] = np.sqrt(np.prod(np.delete(half, longest)))
-        half_axis[index, longest] = max(half[longest] - radius[index], 0.0)
-    return centre, half_axis, radius

@@ -89,16 +89,11 @@ def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     last = len(line) - 1
     row, column = np.divmod(np.arange(len(line) ** 2), len(line))
     a, b = 2 * column - last, 2 * row - last
-    lattice = np.concatenate(
-        [
-            last * normal + a[:, None] * u + b[:, None] * v
-            for normal, u, v in zip(CHART_NORMALS, CHART_U, CHART_V, strict=True)
-        ]
-    )
+    lattice = last * CHART_NORMALS[:, None] + a[:, None] * CHART_U[:, None] + b[:, None] * CHART_V[:, None]
     corner = (np.arange(last)[:, None] * len(line) + np.arange(last)).ravel()
     quad = np.stack([corner, corner + 1, corner + len(line) + 1, corner + len(line)], axis=1)
     quads = np.concatenate([quad + face * len(line) ** 2 for face in range(6)])
-    welded, index = np.unique(lattice, axis=0, return_inverse=True)
+    welded, index = np.unique(lattice.reshape(-1, 3), axis=0, return_inverse=True)
     return line[(welded + last) // 2], index.ravel()[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
 
 
@@ -107,23 +102,20 @@ def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArr
     turn = 2 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=1)
     axis = np.array([0.0, 0.0, 1.0])
-    inner = slice(1, -1)
 
     def rings(radius: NDArray, height: NDArray) -> NDArray[np.float64]:
-        body = radius[inner, None, None] * circle + height[inner, None, None] * axis
+        body = radius[1:-1, None, None] * circle + height[1:-1, None, None] * axis
         return np.concatenate([[height[0] * axis], body.reshape(-1, 3), [height[-1] * axis]])
 
     count = len(core_r) - 2
     index = 1 + np.arange(count * sides).reshape(count, sides)
     after = np.roll(index, -1, axis=1)
-    top = 1 + count * sides
-    faces = [np.stack([np.zeros(sides, dtype=np.int64), after[0], index[0]], axis=1)]
-    for lower in range(count - 1):
-        a, b, c, d = index[lower], after[lower], after[lower + 1], index[lower + 1]
-        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
-    faces.append(np.stack([index[-1], after[-1], np.full(sides, top)], axis=1))
+    bottom = np.stack([np.zeros(sides, dtype=np.int64), after[0], index[0]], axis=1)
+    a, b, c, d = index[:-1], after[:-1], after[1:], index[1:]
+    between = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=1)
+    top = np.stack([index[-1], after[-1], np.full(sides, 1 + count * sides)], axis=1)
     shell = normalized(rings(shell_r, shell_z))
-    return Shape(rings(core_r, core_z), shell, shell, np.concatenate(faces))
+    return Shape(rings(core_r, core_z), shell, shell, np.concatenate([bottom, between.reshape(-1, 3), top]))
 
 
 def _arrow(*profile: tuple[float, float]) -> Callable[[int], Shape]:
@@ -186,7 +178,6 @@ _SHAPES: dict[int, NamedShape] = {
     _GEOM.mjGEOM_ARROW1: ("arrow1", _arrow((0, 0), (1, 0), (1, 2), (0, 3))),
     _GEOM.mjGEOM_ARROW2: ("arrow2", _arrow((0, -3), (1.75, -2), (1, -2), (1, 2), (1.75, 2), (0, 3))),
 }
-_ARROWS = (_GEOM.mjGEOM_ARROW, _GEOM.mjGEOM_ARROW1, _GEOM.mjGEOM_ARROW2)
 
 
 def shape_of(model: Any, visual: Visual) -> NamedShape | None:
@@ -221,7 +212,7 @@ def sizes(model: Any, visual: Visual, bevel: float = _BEVEL) -> tuple[NDArray[np
         case _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX:
             round_edge = bevel * half.min()
             return half - round_edge, np.full(3, round_edge)
-        case kind if kind in _ARROWS:
+        case _GEOM.mjGEOM_ARROW | _GEOM.mjGEOM_ARROW1 | _GEOM.mjGEOM_ARROW2:
             return np.zeros(3), half / [1, 1, 6]
         case _:
             return np.zeros(3), np.ones(3)

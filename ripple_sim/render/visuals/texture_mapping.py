@@ -81,8 +81,10 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     towards +z; a cylinder's discs, a capsule's ends and each face of a box carry a whole texture of their own. On
     height fields, and on meshes without texture coordinates, they are projected from above.
     """
-    texture, material, half = _texture(model, visual.material), visual.material, visual.half_sizes
-    if texture < 0:
+    material, half = visual.material, visual.half_sizes
+    roles = [] if material < 0 else [int(model.mat_texid[material, role]) for role in _ROLES]
+    texture = next((each for each in roles if each >= 0), -1)
+    if texture < 0 or model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
         return TextureMapping()
     uniform = bool(model.mat_texuniform[material])
     if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE:
@@ -99,16 +101,14 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     if visual.kind in _MESHES and visual.asset >= 0 and model.mesh_texcoordadr[visual.asset] >= 0:
         return TextureMapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*times, 0.0, 0.0))
     if visual.kind == _GEOM.mjGEOM_PLANE:
-        return TextureMapping(MappingKind.FLAT_IMAGE, texture, tiling=_on_plane(half[:2], times))
+        # from the corner of the plane, or from half a texture before the origin if the plane is infinite
+        endless = half[:2] <= 0
+        scale = 0.5 * times / np.where(endless, 1.0, half[:2])
+        offset = np.where(endless, 0.0, 0.5 * times) - 0.5 * endless.any()
+        tiling = float(scale[0]), -float(scale[1]), float(offset[0]), float(offset[1])
+        return TextureMapping(MappingKind.FLAT_IMAGE, texture, tiling=tiling)
     scale = 0.5 * (repeat if uniform else repeat / np.where(half[:2] > 0, half[:2], 1.0))
     return TextureMapping(MappingKind.FLAT_IMAGE, texture, tiling=(scale[0], -scale[1], -0.5, -0.5))
-
-
-def _texture(model: Any, material: int) -> int:
-    """Id of the texture that colours a material, -1 without."""
-    roles = [] if material < 0 else [int(model.mat_texid[material, role]) for role in _ROLES]
-    texture = next((texture for texture in roles if texture >= 0), -1)
-    return -1 if texture >= 0 and model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX else texture
 
 
 def _on_primitive(
@@ -124,11 +124,3 @@ def _on_primitive(
         straight=float(half[2]) if round_ends else 0.0,
         stretch=float(half[2] / half[0]) if round_ends else 1.0,
     )
-
-
-def _on_plane(half: NDArray[np.float64], times: NDArray[np.float64]) -> _Tiling:
-    """Tiling that begins at the corner of a plane, or half a texture before the origin if the plane is infinite."""
-    endless = half <= 0
-    scale = 0.5 * times / np.where(endless, 1.0, half)
-    offset = np.where(endless, 0.0, 0.5 * times) - 0.5 * endless.any()
-    return (float(scale[0]), -float(scale[1]), float(offset[0]), float(offset[1]))

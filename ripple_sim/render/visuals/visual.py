@@ -152,13 +152,11 @@ class Visual:
     def half_sizes(self) -> NDArray[np.float64]:
         """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane is infinite."""
         match self.kind:
-            case _ if self.pose is not None:  # a scene has them as they are
-                return self.size
-            case _GEOM.mjGEOM_SPHERE:
+            case _GEOM.mjGEOM_SPHERE if self.pose is None:
                 return np.full(3, self.size[0])
-            case _GEOM.mjGEOM_CAPSULE | _GEOM.mjGEOM_CYLINDER:
+            case _GEOM.mjGEOM_CAPSULE | _GEOM.mjGEOM_CYLINDER if self.pose is None:
                 return self.size[[0, 0, 1]]
-            case _:
+            case _:  # as a scene has those of all kinds
                 return self.size
 
 
@@ -307,12 +305,11 @@ def look_of(model: Any, visual: Visual) -> Look:
     roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
     if roughness < 0:
         roughness = 0.15 + 0.55 * (1.0 - float(model.mat_shininess[material]))
-    coat = 0.4 * float(model.mat_specular[material]) + float(model.mat_reflectance[material])
     return Look(
         color=rgb,
         roughness=float(np.clip(roughness, 0.05, 1.0)),
         metallic=max(metallic, 0.0),
-        coat=min(coat, 1.0),
+        coat=min(0.4 * float(model.mat_specular[material]) + float(model.mat_reflectance[material]), 1.0),
         emission=float(model.mat_emission[material]),
     )
 
@@ -322,6 +319,5 @@ def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     height, width, channels = (int(n[texture]) for n in (model.tex_height, model.tex_width, model.tex_nchannel))
     start = int(model.tex_adr[texture])
     pixels = np.asarray(model.tex_data[start : start + height * width * channels]).reshape(height, width, channels)
-    return np.ascontiguousarray(
-        np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3], dtype=np.uint8
-    )
+    colors = np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3]
+    return np.ascontiguousarray(colors, dtype=np.uint8)

@@ -13,7 +13,6 @@ from textured import textured_model
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import MAX_OCCLUDERS, Camera, Renderer
 from ripple_sim.render.visuals import Occluders, geom_visual, look_of
-from ripple_sim.render.visuals.objects import _capsules
 from ripple_sim.scenes.shapes import peanut
 
 
@@ -68,12 +67,12 @@ def geoms_of(geoms: str):
         ('type="cylinder" size=".5 .02"', [0.4, 0, 0], 0.1),
     ],
 )
-def test_a_capsule_is_as_long_and_about_as_thick_as_its_geom(geom, axis, radius):
-    model, _ = geoms_of(f"<geom {geom}/>")
-    centre, half_axis, got = _capsules(model, np.array([0]))
-    np.testing.assert_allclose(centre[0], 0.0, atol=1e-9)
-    np.testing.assert_allclose(np.abs(half_axis[0]), axis, atol=1e-6)
-    assert got[0] == pytest.approx(radius)
+def test_a_capsule_is_as_long_and_about_as_thick_as_its_geom(resources, geom, axis, radius):
+    model, data = geoms_of(f"<geom {geom}/>")
+    ((first, last),) = bound(resources, model, data, [0, 0, 0])
+    np.testing.assert_allclose(first[:3] + last[:3], 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.abs(last - first)[:3] / 2, axis, atol=1e-6)
+    assert first[3] == pytest.approx(radius)
 
 
 def row_of_balls(count: int) -> str:
