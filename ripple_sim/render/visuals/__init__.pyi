@@ -46,4 +46,5 @@ from .visual import (
     texture_pixels as texture_pixels,
     visible_geoms as visible_geoms,
     visible_sites as visible_sites,
+    visuals_in as visuals_in,
 )

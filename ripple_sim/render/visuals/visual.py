@@ -161,7 +161,7 @@ class Visual:
 
 
 def geom_visual(model: Any, geom: int) -> Visual:
-    """Geom of a model, or a soft target, see `soft_ids`."""
+    """Geom of a model, or a soft target, see `find_soft`."""
     if is_soft(model, geom):
         skin = geom - first_skin(model)
         which, index = ("skin", skin) if skin >= 0 else ("flex", geom - first_flex(model))
@@ -226,6 +226,8 @@ def _corners_of(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> ND
             array.reshape(-1, width)[corners]
             for array, width in ((scene.flexface, 3), (scene.flexnormal, 3), (scene.flextexcoord, 2))
         )
+        if model.flex_texcoordadr[index] < 0:
+            uv = np.zeros_like(uv)  # MuJoCo leaves there what was in memory
     else:
         face, vertex = model.skin_faceadr[index], scene.skinvertadr[index]
         F = model.skin_face[face : face + model.skin_facenum[index]].ravel()

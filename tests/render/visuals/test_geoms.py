@@ -12,7 +12,7 @@ from textured import textured_model
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import MAX_OCCLUDERS, Camera, Renderer
-from ripple_sim.render.visuals import Occluders, geom_visual, look_of
+from ripple_sim.render.visuals import Occluders, geom_visual, look_of, visuals_in
 from ripple_sim.scenes.shapes import peanut
 
 
@@ -155,14 +155,14 @@ def test_a_long_geom_is_as_near_as_its_nearest_point(gl, resources):
 GEOM, FLEX = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_FLEX
 TENDON = """<body name="a" pos="0 0 .5"><joint type="slide"/><geom size=".02"/><site name="s" euler="180 0 0"/></body>
 <site name="w" pos=".6 0 .5"/>"""
+SHEET = """<flexcomp name="f" type="grid" count="3 3 1" spacing=".2 .2 .1" dim="2" pos="0 0 .5" rgba="1 0 0 1">
+<edge equality="true"/></flexcomp>"""
 
 
 def test_tendons_flexes_and_skins_are_drawn_and_what_has_no_surface_is_told_once(gl):
     spatial = '<tendon><spatial width=".05" rgba="1 0 0 1"><site site="s"/><site site="w"/></spatial></tendon>'
-    sheet = '<flexcomp name="f" type="grid" count="3 3 1" spacing=".2 .2 .1" dim="2" pos="0 0 .5" rgba="1 0 0 1">'
-    sheet += '<edge equality="true"/></flexcomp>'
-    cable = sheet.replace("3 3 1", "3 1 1").replace('dim="2"', 'dim="1" radius=".05"')
-    for body, rest in ((TENDON, spatial), (sheet, ""), (cable, "")):
+    cable = SHEET.replace("3 3 1", "3 1 1").replace('dim="2"', 'dim="1" radius=".05"')
+    for body, rest in ((TENDON, spatial), (SHEET, ""), (cable, "")):
         model, data = posed(f"<mujoco><worldbody>{FLOOR}{body}</worldbody>{rest}</mujoco>")
         unwarned = warnings.catch_warnings(action="error", category=RippleWarning)
         with unwarned, Renderer(gl, model, {}, size=SIZE) as renderer:
@@ -176,6 +176,15 @@ def test_tendons_flexes_and_skins_are_drawn_and_what_has_no_surface_is_told_once
         mujoco.mj_forward(model, data)
         renderer.render(data, {}, FRONT)
     assert len(told) == 1
+
+
+def test_a_flex_without_texture_coordinates_has_none():
+    model, data = posed(f"<mujoco><worldbody>{SHEET}</worldbody></mujoco>")
+    scene, option, camera = mujoco.MjvScene(model, 9), mujoco.MjvOption(), mujoco.MjvCamera()
+    mujoco.mjv_updateScene(model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    scene.flextexcoord[:] = np.nan  # MuJoCo leaves there what was in memory
+    (visual,) = visuals_in(model, scene, scene.geoms[0])
+    np.testing.assert_array_equal(visual.corners[:, 6:], 0.0)
 
 
 def test_flexes_that_stand_for_geoms_are_not_drawn(gl):
