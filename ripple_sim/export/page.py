@@ -9,7 +9,6 @@ heights are predicted well from earlier ones.
 from __future__ import annotations
 
 import base64
-import contextlib
 import html
 import importlib.resources
 import io
@@ -36,7 +35,7 @@ from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
 from ripple_sim.solver import Mesh
 
 from .moving_mesh import MovingMesh
-from .source import Source
+from .source import Source, Writer
 from .visuals import Finish, Solid, mean_color, solid_finish, solids, target_finish, target_uv
 
 __all__ = ["PageWriter", "made_here"]
@@ -76,12 +75,11 @@ def floor_of(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
     """The floor: height, albedo and texture."""
     visual = geom_visual(model, geom)
     mapping = mapping_of(model, visual)
-    half = [float(x) if x > 0 else 0.0 for x in visual.size[:2]]
     return {
         "body": int(model.geom_bodyid[geom]),
         "position": model.geom_pos[geom].tolist(),
         "quaternion": model.geom_quat[geom].tolist(),
-        "half": half,
+        "half": [float(x) if x > 0 else 0.0 for x in visual.size[:2]],
         "color": visual.color.tolist(),
         "mean": (visual.color * mean_color(model, mapping)).tolist(),
         "texture": mapping.texture if mapping.texture >= 0 else -1,
@@ -262,7 +260,7 @@ _SCRIPTS = (
 )
 
 
-class PageWriter:
+class PageWriter(Writer):
     """Writes a page that plays a run: the player, what stays the same, and chunks of frames, each when it is full."""
 
     def __init__(self, source: Source, path: Path) -> None:
@@ -289,11 +287,20 @@ class PageWriter:
         """Add a frame."""
         if number == 0:
             self._begin(data)
-        self._poses.append(self._pose(data))
-        self._arrows.append([self._arrow(data, impulse) for impulse in impulses])
+        ripples, pose, turn = self._source.ripples, self._source.pose(data), np.zeros(4)
+        mujoco.mju_mat2Quat(turn, np.ascontiguousarray(pose.rotation).ravel())
+        places = np.vstack(
+            [[*pose.position, *turn], np.hstack([data.xpos, data.xquat])]
+        )  # of the camera and all bodies
+        self._poses.append(np.round(places, 5).tolist())
+        self._arrows.append([])
+        for each in impulses:  # point and inward direction in the world, and impulse [N s]
+            _, rotation = target_pose(data, ripples.geom_ids[each.geom])
+            inwards = -rotation @ ripples[each.geom].atlas.normals[each.texel] * (-1 if each.inner else 1)
+            self._arrows[-1].append([round(float(x), 5) for x in (*each.point, *inwards, each.impulse)])
         for (name, mesh), motion in zip(self._meshes.items(), self._motions, strict=True):
-            waves = self._source.ripples[name]
-            motion.add(self._source.ripples.vertices(name, data))
+            waves = ripples[name]
+            motion.add(ripples.vertices(name, data))
             heights = mesh.shape(waves.height, waves.velocity).height[self._targets[name].vertices]
             steps = quantised(heights, self._steps[name])
             # a chunk begins from nothing, so that it can be decoded alone
@@ -310,12 +317,6 @@ class PageWriter:
         self._file.write(f'<script type="application/json" id="end">{{"frames": {self._frames}}}</script>\n')
         self._file.write("</body>\n</html>\n")
         self._file.close()
-
-    def close(self) -> str:
-        """Leave the page incomplete."""
-        with contextlib.suppress(OSError):
-            self._file.close()
-        return ""
 
     def _begin(self, data: mujoco.MjData) -> None:
         source, model = self._source, self._source.model
@@ -339,58 +340,31 @@ class PageWriter:
             "aspect": source.size[0] / source.size[1],
             "heat": color_table()[::8].tolist(),  # of the heights, from the lowest to the highest, sRGB
         }
-        self._file.write(_head(", ".join(self._meshes)))
+        folder = importlib.resources.files(__package__).joinpath("html")
+        page, *scripts = (folder.joinpath(name).read_text("utf-8") for name in ("page.html", *_SCRIPTS))
+        page = page.replace("TITLE", html.escape(", ".join(self._meshes))).replace("MARK", MARK)
+        self._file.write(page.replace("SCRIPTS", "\n".join(scripts)))
         arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
         self._file.write(f'<script type="application/json" id="meta">{json.dumps(meta)}</script>\n')
         self._file.write(f'<script type="text/plain" id="arrays">{packed(arrays)}</script>\n')
 
-    def _pose(self, data: mujoco.MjData) -> list[list[float]]:
-        """Position and quaternion of the camera and of all bodies."""
-        pose = self._source.pose(data)
-        quaternion = np.zeros(4)
-        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
-        rows = np.concatenate([[[*pose.position, *quaternion]], np.concatenate([data.xpos, data.xquat], axis=1)])
-        return np.round(rows, 5).tolist()
-
-    def _arrow(self, data: mujoco.MjData, impulse: Impulse) -> list[float]:
-        """Point and inward direction in the world, and impulse [N s]."""
-        ripples = self._source.ripples
-        _, rotation = target_pose(data, ripples.geom_ids[impulse.geom])
-        inwards = -rotation @ ripples[impulse.geom].atlas.normals[impulse.texel] * (-1 if impulse.inner else 1)
-        return [round(float(x), 5) for x in (*impulse.point, *inwards, impulse.impulse)]
-
     def _flush(self) -> None:
         """Write the frames that wait as a chunk."""
-        if self._poses:
-            middles, moved = self._moved()
-            text = json.dumps({"poses": self._poses, "arrows": self._arrows, "middles": middles}).encode()
-            content = len(text).to_bytes(4, "little") + text + b"".join(self._planes + moved)
-            self._file.write(f'<script type="text/plain" class="chunk">{packed(content)}</script>\n')
-            self._file.flush()
-        self._poses, self._arrows, self._planes = [], [], []
-
-    def _moved(self) -> tuple[dict[int, list[list[float]]], list[bytes]]:
-        """Middles and coded vertices of the targets that move, by number; each is told of before it first does."""
-        middles, planes = {}, []
+        if not self._poses:
+            return
+        middles: dict[int, list[list[float]]] = {}  # of the targets that move, by number
         for number, motion in enumerate(self._motions):
             places, coded = motion.chunk()
             if not motion.moves:
                 continue
-            if number not in self._told:
-                told = json.dumps(motion.told())
-                self._file.write(
-                    f'<script type="application/json" class="motion" data-target="{number}">{told}</script>\n'
-                )
+            if number not in self._told:  # before it first moves
+                told, name = json.dumps(motion.told()), f'class="motion" data-target="{number}"'
+                self._file.write(f'<script type="application/json" {name}>{told}</script>\n')
                 self._told.add(number)
             middles[number] = places
-            planes.append(coded)
-        return middles, planes
-
-
-def _head(title: str) -> str:
-    def read(name: str) -> str:
-        return importlib.resources.files(__package__).joinpath("html", name).read_text("utf-8")
-
-    page = read("page.html")
-    scripts = "\n".join(read(name) for name in _SCRIPTS)
-    return page.replace("TITLE", html.escape(title)).replace("MARK", MARK).replace("SCRIPTS", scripts)
+            self._planes.append(coded)
+        text = json.dumps({"poses": self._poses, "arrows": self._arrows, "middles": middles}).encode()
+        content = len(text).to_bytes(4, "little") + text + b"".join(self._planes)
+        self._file.write(f'<script type="text/plain" class="chunk">{packed(content)}</script>\n')
+        self._file.flush()
+        self._poses, self._arrows, self._planes = [], [], []
