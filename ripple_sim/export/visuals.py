@@ -115,9 +115,8 @@ def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
         own = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
         uv = texture_places(mapping, own)[mesh.faces]
     kind, own = ("site", model.site(visual.index)) if visual.site else ("geom", model.geom(visual.index))
-    name, body = own.name or f"{kind}_{visual.index}", int(own.bodyid[0])
-    position, quaternion = np.array(own.pos), np.array(own.quat)
+    name, position, quaternion = own.name or f"{kind}_{visual.index}", np.array(own.pos), np.array(own.quat)
     normals = normalized(mesh.normals)
     if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
         normals = normalized(normals / visual.half_sizes)
-    return Solid(visual, name, body, position, quaternion, points, normals, mesh.faces, uv)
+    return Solid(visual, name, int(own.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv)
