@@ -112,7 +112,8 @@ class MovingMesh:
         With the vertices of its mesh at V [vertex_count, 3] [m], where they have moved; velocities are those of the
         waves alone.
         """
-        shape = Displaced(*(np.empty_like(self.rest) for _ in range(3)), np.empty(len(self.rest), np.float32))
+        points, normals, velocities = (np.empty_like(self.rest) for _ in range(3))
+        shape = Displaced(points, normals, velocities, np.empty(len(self.rest), np.float32))
         height_map, rates = self._height_map(height), self._height_map.rates(height, velocity)
         still = self.rest, self.directions, self._normals
         if V is not None:

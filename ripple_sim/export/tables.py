@@ -86,7 +86,6 @@ class ParquetWriter(Writer):
     """Writes impulses or samples as columns, units in their metadata."""
 
     def __init__(self, source: Source, path: Path) -> None:
-        import pyarrow
         import pyarrow.parquet
 
         self._source = source
@@ -125,7 +124,6 @@ def made_here(path: Path) -> bool:
         with path.open("rb") as file:
             first = file.readline(1000).decode("utf-8", "replace").rstrip("\r\n")
         return first in (",".join(HEADER), ",".join(header(SIGNALS)))
-    import pyarrow
     import pyarrow.parquet
 
     try:

@@ -79,8 +79,8 @@ class Chunks:
                 f"cannot resume {source.output}: {damaged[0]} is damaged; leave --resume out to start again"
             )
         self.stored = self._part.frames
-        self._layer: Sdf.Layer | None = None
-        self._waiting = 0  # frames of the open layer
+        self._layer: Any = None  # open while frames wait
+        self._waiting = 0  # frames in it
 
     def write(self, number: int, write: Callable[[], None]) -> None:
         """Write a frame, by a function that sets its samples."""

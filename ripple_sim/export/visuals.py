@@ -95,8 +95,7 @@ def target_uv(model: mujoco.MjModel, geom: int, mesh: MovingMesh) -> NDArray[np.
 
 def texture_places(mapping: TextureMapping, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places [..., 2] in a flat texture, v from its lower edge, of a mapping's coordinates [..., 2 or 3]."""
-    scale, offset = np.array(mapping.tiling[:2]), np.array(mapping.tiling[2:])
-    places = coordinates[..., :2] * scale + offset
+    places = coordinates[..., :2] * mapping.tiling[:2] + mapping.tiling[2:]
     return np.stack([places[..., 0], 1.0 - places[..., 1]], axis=-1)
 
 
