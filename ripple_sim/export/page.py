@@ -214,6 +214,7 @@ class PageTarget:
         self._parents = parents_of(self._F, len(mesh.V))
         self._place_step = _PLACE_STEP * float(np.ptp(mesh.V, axis=0).max())
         self._frames: list[NDArray[np.float64]] = []
+        self._last = np.zeros(0, np.int64)  # steps of the frame before
         self.moves = False
 
     def add(self, V: NDArray[np.float64] | None) -> bytes:
@@ -221,8 +222,7 @@ class PageTarget:
         heights = self._surface.shape(self._waves.height, self._waves.velocity).height[self.part.vertices]
         steps = quantised(heights, self.step)
         # a chunk begins from nothing, so that it can be decoded alone
-        before = self._last if self._frames else np.zeros_like(steps)
-        self._last = steps
+        before, self._last = self._last if self._frames else np.zeros_like(steps), steps
         self.moves = self.moves or V is not None
         self._frames.append(self._rest if V is None else np.array(V))
         return residuals(steps, before, self._point_parents)
@@ -238,13 +238,8 @@ class PageTarget:
             np.rint(weights[points, :2] * 65535).astype("<u2"),
             np.rint(off[points] / far * 32767).astype("<i2"),
         ]
-        counts = {"points": len(self._order), "triangles": len(self._F)}
-        return {
-            **counts,
-            "step": self._place_step,
-            "far": far,
-            "arrays": packed(b"".join(each.tobytes() for each in arrays)),
-        }
+        meta = {"points": len(self._order), "triangles": len(self._F), "step": self._place_step, "far": far}
+        return {**meta, "arrays": packed(b"".join(each.tobytes() for each in arrays))}
 
     def chunk(self) -> tuple[list[list[float]], bytes]:
         """Middles [m] and coded vertices of the frames since the last chunk, both empty if the surface never moved."""

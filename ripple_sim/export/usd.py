@@ -88,12 +88,11 @@ class Chunks:
             self._sample(write)
             self._end()
         if self._layer is None:
-            layer = Sdf.Layer.CreateAnonymous(".usdc")
+            self._layer = layer = Sdf.Layer.CreateAnonymous(".usdc")
             layer.comment = MARK
             root = self._stage.GetRootLayer()
             layer.timeCodesPerSecond, layer.framesPerSecond = root.timeCodesPerSecond, root.framesPerSecond
             self._stage.GetSessionLayer().subLayerPaths = [layer.identifier]
-            self._layer = layer
         self._sample(write)
         self._waiting += 1
 
