@@ -137,8 +137,7 @@ _DIFFUSE_SHARE = 0.13 * np.pi / 4
 
 def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
-    model = source.model
-    pose = source.pose(data)
+    model, pose = source.model, source.pose(data)
     lighting = lighting_of(model, data, pose, source.lighting)
     studio = lighting.studio
     floor = find_floor(model, source.ripples.geom_ids.values())

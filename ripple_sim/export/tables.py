@@ -74,8 +74,7 @@ class CsvWriter(Writer):
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add the impulses of a frame, or the samples that are there."""
-        source = self._source
-        self._writer.writerows(samples(source.sensors) if source.signals else rows(number, data, impulses))
+        self._writer.writerows(samples(self._source.sensors) if self._source.signals else rows(number, data, impulses))
 
     def finish(self) -> None:
         """Complete the file."""

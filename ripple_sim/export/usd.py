@@ -82,7 +82,7 @@ class Chunks:
         self._layer: Any = None  # open while frames wait
         self._waiting = 0  # frames in it
 
-    def write(self, number: int, write: Callable[[], None]) -> None:
+    def write(self, write: Callable[[], None]) -> None:
         """Write a frame, by a function that sets its samples."""
         if self._layer is not None and self._waiting == self._source.chunk:
             self._sample(write)
@@ -149,10 +149,7 @@ class Chunks:
 _SENSOR = 0.024  # height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
 _TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
 _NEAR, _FAR = 0.01, 1000.0  # of the camera's distance
-
-
-# Frames are kept in memory until so many are there, and then appended to the file.
-_KEPT = 8
+_KEPT = 8  # so many frames are kept in memory, and then appended to the file
 
 
 class UsdWriter:
@@ -174,9 +171,8 @@ class UsdWriter:
         stage.SetDefaultPrim(world.GetPrim())
         self._materials = Materials(stage, world.GetPath().AppendChild("Looks"), source.model, self._images)
         self._camera = UsdGeom.Camera.Define(stage, world.GetPath().AppendChild("camera"))
-        width, height = source.size
         self._camera.CreateVerticalApertureAttr(_TENTHS * _SENSOR)
-        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * width / height)
+        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * source.size[0] / source.size[1])
         self._camera.CreateShutterOpenAttr(0.0)
         self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
         self._lamps = Lamps(stage, world.GetPath().AppendChild("lights"), source)
@@ -186,8 +182,8 @@ class UsdWriter:
             for i in range(source.model.nbody)
         ]
         for solid in solids(source.model, set(source.ripples.geom_ids.values())):
-            path = child(stage, self._bodies[solid.body].GetPath(), solid.name)
-            mesh = define_mesh(stage, path, solid.F, solid.uv, open_surface=False)
+            body = self._bodies[solid.body].GetPath()
+            mesh = define_mesh(stage, child(stage, body, solid.name), solid.F, solid.uv, open_surface=False)
             place(mesh, solid.position, solid.quaternion)
             mesh.CreatePointsAttr(vectors(solid.points))
             mesh.CreateNormalsAttr(vectors(solid.normals))
@@ -210,7 +206,7 @@ class UsdWriter:
             if number >= chunks.stored - 1:  # the one before tells of motion
                 shapes = self._shapes(data)
             if number >= chunks.stored:
-                chunks.write(number, lambda: self._sample(number, data, shapes))
+                chunks.write(lambda: self._sample(number, data, shapes))
         self._last = number
         if number % _KEPT == _KEPT - 1:
             succeed(self._stage.GetRootLayer().Save)
