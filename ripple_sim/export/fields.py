@@ -54,7 +54,9 @@ class Store:
         array = self._group.create_array(
             name, shape=(before, *like.shape), dtype=like.dtype, chunks=(chunk, *like.shape), fill_value=None
         )
-        array[...] = np.broadcast_to(like, array.shape)
+        for first in range(0, before, chunk):
+            last = min(first + chunk, before)
+            array[first:last] = np.broadcast_to(like, (last - first, *like.shape))
         array.attrs.update(_attributes(dimensions, unit, text))
         self._growing[name], self._waiting[name] = array, []
         return array
