@@ -86,11 +86,13 @@ def set_world(scene, settings):
     scene.world.cycles.sampling_method = "NONE"
     nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
     nodes.clear()
-    rays, seen = nodes.new("ShaderNodeLightPath"), sky_colors(nodes, links, settings)
+    rays, direction, parts = (nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "TexCoord", "SeparateXYZ"))
+    links.new(direction.outputs["Generated"], parts.inputs[0])
+    rise = smooth_step(nodes, links, parts.outputs["Z"], -0.1, 0.8)
+    seen = mixed(nodes, links, rise, settings["horizon"], settings["zenith"])
     boxes, axes = soft_boxes(nodes, links, settings["boxes"])
-    diffuse = vectors(
-        nodes, links, "ADD", settings["sky"], vectors(nodes, links, "SCALE", boxes, settings["boxes_diffuse"])
-    )
+    diffuse = vectors(nodes, links, "SCALE", boxes, settings["boxes_diffuse"])
+    diffuse = vectors(nodes, links, "ADD", settings["sky"], diffuse)
     glossy = vectors(nodes, links, "SCALE", boxes, settings["boxes_reflected"])
     glossy = vectors(nodes, links, "ADD", glossy, vectors(nodes, links, "SCALE", seen, 0.75))
     color = mixed(nodes, links, rays.outputs["Is Glossy Ray"], diffuse, glossy)
@@ -116,14 +118,6 @@ def soft_boxes(nodes, links, boxes):
         total = vectors(nodes, links, "ADD", total, vectors(nodes, links, "SCALE", box["radiance"], inside))
         axes.append([share.node for share in shares])
     return total, axes
-
-
-def sky_colors(nodes, links, settings):
-    """From the horizon's colour to the zenith's."""
-    direction, parts = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeSeparateXYZ")
-    links.new(direction.outputs["Generated"], parts.inputs[0])
-    rise = smooth_step(nodes, links, parts.outputs["Z"], -0.1, 0.8)
-    return mixed(nodes, links, rise, settings["horizon"], settings["zenith"])
 
 
 def smooth_step(nodes, links, value, low, high):
@@ -199,13 +193,9 @@ def axes_of(camera, box):
 
 
 def fading_floor(settings):
-    """Let the floor fade into the sky; return the node that takes the point from which it does."""
-    if settings["floor"] is None:
-        return None
-    floor = next(
-        (each for each in bpy.data.objects if each.type == "MESH" and each.name.split(".")[0] == settings["floor"]),
-        None,
-    )
+    """Let the floor, if there is one, fade into the sky; return the node that takes the point from which it does."""
+    meshes = (each for each in bpy.data.objects if each.type == "MESH")
+    floor = next((each for each in meshes if each.name.split(".")[0] == settings["floor"]), None)
     if floor is None or not floor.data.materials:
         return None
     material = floor.data.materials[0] = floor.data.materials[0].copy()

@@ -33,14 +33,7 @@ from ripple_sim.export.source import Source
 from ripple_sim.export.visuals import mean_color
 from ripple_sim.render.passes.shadows import find_floor
 from ripple_sim.render.tone_mapping import tone_mapped
-from ripple_sim.render.visuals.lights import (
-    BESIDE_LIGHTS,
-    FADE,
-    SOFT_BOX_LIGHTS,
-    STUDIO_FADE,
-    lighting_of,
-    sky_colors,
-)
+from ripple_sim.render.visuals.lights import BESIDE_LIGHTS, FADE, SOFT_BOX_LIGHTS, STUDIO_FADE, lighting_of, sky_colors
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.scene.scene import Scene, with_exposure
@@ -116,7 +109,6 @@ def frames_of_cycles(python: str, settings: dict[str, Any], folder: Path) -> Ite
         subprocess.Popen([python, str(path), str(told)], stdout=subprocess.PIPE, stderr=log, env=place) as process,
     ):
         try:
-            assert process.stdout is not None
             for number in range(settings["frames"]):
                 _wait_for(number, process, errors)
                 file = folder / f"{number}.npy"
@@ -145,8 +137,7 @@ _DIFFUSE_SHARE = 0.13 * np.pi / 4
 
 def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
-    model = source.model
-    pose = source.pose(data)
+    model, pose = source.model, source.pose(data)
     lighting = lighting_of(model, data, pose, source.lighting)
     studio = lighting.studio
     floor = find_floor(model, source.ripples.geom_ids.values())
@@ -215,10 +206,7 @@ def render_cycles(
     options = settled(dataclasses.replace(options, overlay=()), scene, output)
     scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
     frames, start = frame_count(options), time.perf_counter()
-    with (
-        open_video(output, options) as writer,
-        tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder,
-    ):
+    with open_video(output, options) as writer, tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
         stage = Path(folder) / "stage.usdc"
         simulation = Simulation.of(scene, options)
         exported_as = ExportOptions(fps=options.fps or 1, slow_motion=options.slow_motion, size=options.size)

@@ -8,7 +8,6 @@ import html
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import mujoco
@@ -26,7 +25,7 @@ from ripple_sim.video.settings import frame_count, origin
 
 from .options import MOST_TRIANGLES, ExportOptions
 from .place import Unfinished, check_export, check_options, check_written
-from .source import Chunking, Source
+from .source import Source
 
 
 class Exporter:
@@ -113,7 +112,8 @@ class Exporter:
             limited=dict.fromkeys(ripples, limit),
             tessellation=tessellation,
             triangles=triangles,
-            chunking=None if chunk is None else Chunking(chunk, Path(output)),
+            chunk=chunk or 0,
+            output=Path(output),
         )
         self._begin(source, output, overwrite)
 
@@ -126,7 +126,7 @@ class Exporter:
 
     def _begin(self, source: Source, output: str | Path, overwrite: bool) -> None:
         self.output, self.frames, self._source = Path(output), 0, source
-        ending = check_export(self.output, overwrite, chunked=source.chunking is not None)
+        ending = check_export(self.output, overwrite, chunked=source.chunk > 0)
         with self._reported():
             self._place: Unfinished | None = Unfinished(self.output, ending.made_here, overwrite)
             try:
@@ -205,9 +205,7 @@ class Exporter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.close()
         elif kept := self.discard():
@@ -304,8 +302,19 @@ def export_scene(
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)
     if options.chunk is not None:
-        chunking = Chunking(options.chunk, Path(output), _settings(scene, options, frames), resume=options.resume)
-        source = dataclasses.replace(source, chunking=chunking)
+        settings: dict[str, str | int | float] = {  # what decides the content, by the names in messages
+            "the number of frames": frames,
+            "the frame rate": options.fps,
+            "the frames in a chunk": options.chunk,
+            "the slow motion": options.slow_motion,
+            "the tessellation": options.tessellation,
+            "the number of triangles": options.triangles,
+            "the size": "{}x{}".format(*options.size),
+            **origin(scene, options),
+        }
+        source = dataclasses.replace(
+            source, chunk=options.chunk, output=Path(output), settings=settings, resume=options.resume
+        )
     with Exporter.of(source, output, options.overwrite) as exporter:
         for number in range(frames):
             start = time.perf_counter()
@@ -336,17 +345,3 @@ def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -
         sensors={} if options.sound else simulation.sensors,
         signals=options.signals,
     )
-
-
-def _settings(scene: Scene, options: ExportOptions, frames: int) -> dict[str, str | int | float]:
-    """What decides the content of an export, by the names in messages."""
-    return {
-        "the number of frames": frames,
-        "the frame rate": options.fps,
-        "the frames in a chunk": options.chunk or 0,
-        "the slow motion": options.slow_motion,
-        "the tessellation": options.tessellation,
-        "the number of triangles": options.triangles,
-        "the size": "{}x{}".format(*options.size),
-        **origin(scene, options),
-    }

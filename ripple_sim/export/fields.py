@@ -45,16 +45,9 @@ class Store:
         array.attrs.update(_attributes(dimensions, unit, text))
 
     def grow(
-        self,
-        name: str,
-        dimensions: list[str],
-        like: NDArray,
-        unit: str,
-        text: str = "",
-        *,
-        chunk: int = CHUNK,
+        self, name: str, dimensions: list[str], like: NDArray, unit: str, text: str = "", *, chunk: int = CHUNK,
         before: int = 0,
-    ) -> Any:
+    ) -> Any:  # fmt: skip
         """Begin an array of entries like one, which stands `before` times in it already; replace one of this name."""
         if name in self._group:
             del self._group[name]

@@ -73,19 +73,32 @@ class MovingMesh:
     def __init__(
         self, atlas: Atlas, tessellation: str = "refined", limit: bool = True, triangles: int = MOST_TRIANGLES
     ) -> None:
-        tessellate = _own if tessellation == "own" else _refined
-        self.F, self.uv, points, directions, normals, places = tessellate(atlas, triangles)
+        mesh, smooth = atlas.mesh, smooth_normals(atlas.mesh.V, atlas.mesh.F)
+        if tessellation == "own":  # vertices are split at creases
+            each, self.F, normals, _, _ = split_corners(mesh.V, mesh.F)
+            self.uv, points, directions = mesh.corner_uv, mesh.V[each], smooth[each]
+            chart, row, column = (place[each] for place in atlas.locate(mesh.V))
+        else:  # as the renderer makes them, of about the size of texels
+            charts, length = Charts.of(atlas), float(np.sqrt(atlas.areas.mean()))
+            F, attributes, same = tessellated(
+                mesh, charts, smooth=smooth, max_length=length, max_faces=triangles, corner_uv=mesh.corner_uv
+            )
+            # vertices that differ in their texture coordinates or charts alone become one
+            _, first, point = np.unique(same, return_index=True, return_inverse=True)
+            self.F, self.uv = point.ravel()[F], None if mesh.corner_uv is None else attributes[F][:, :, UV]
+            vertices = attributes[first]
+            points, directions, normals = (vertices[:, part] for part in (POSITION, DIRECTION, NORMAL))
+            chart, row, column = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
         self.rest, self.directions = points.astype(np.float32), normalized(directions).astype(np.float32)
         self._normals = normalized(normals).astype(np.float32)
-        self._texels, self._offsets = spline_samples(*places, atlas.resolution)
+        self._texels, self._offsets = spline_samples(chart, row, column, atlas.resolution)
         self._height_map = HeightMap.drawn(atlas, limit)
         self._atlas = atlas
 
     @functools.cached_property
     def vertices(self) -> MovingVertices:
         """The points as they ride on the mesh's own vertices."""
-        mesh = self._atlas.mesh
-        return MovingVertices(mesh.V, mesh.F, self.rest, self.directions, self._normals)
+        return MovingVertices(self._atlas.mesh.V, self._atlas.mesh.F, self.rest, self.directions, self._normals)
 
     @functools.cached_property
     def _gradients(self) -> MovedGradients:
@@ -109,48 +122,11 @@ class MovingMesh:
         return shape
 
 
-# triangles, texture coordinates of their corners, points, directions, normals, and their charts, rows and columns
-_Vertices = tuple[NDArray, NDArray | None, NDArray, NDArray, NDArray, tuple[NDArray, NDArray, NDArray]]
-
-
-def _own(atlas: Atlas, triangles: int) -> _Vertices:
-    """The mesh's own triangles, their vertices split at creases."""
-    V, F = atlas.mesh.V, atlas.mesh.F
-    each, split_F, normals, _, _ = split_corners(V, F)
-    chart, row, column = atlas.locate(V)
-    places = chart[each], row[each], column[each]
-    return split_F, atlas.mesh.corner_uv, V[each], smooth_normals(V, F)[each], normals, places
-
-
-def _refined(atlas: Atlas, triangles: int) -> _Vertices:
-    """Triangles as the renderer makes them, of about the size of texels."""
-    mesh, charts = atlas.mesh, Charts.of(atlas)
-    F, attributes, same = tessellated(
-        mesh,
-        charts,
-        smooth=smooth_normals(mesh.V, mesh.F),
-        max_length=float(np.sqrt(atlas.areas.mean())),
-        max_faces=triangles,
-        corner_uv=mesh.corner_uv,
-    )
-    # vertices that differ in their texture coordinates or charts alone become one
-    _, first, point = np.unique(same, return_index=True, return_inverse=True)
-    vertices, uv = attributes[first], None if mesh.corner_uv is None else attributes[F][:, :, UV]
-    places = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
-    return point.ravel()[F], uv, vertices[:, POSITION], vertices[:, DIRECTION], vertices[:, NORMAL], places
-
-
 @kernel
 def _displace(
-    height_map: Floats32,
-    rates: Floats32,
-    still: Floats32,
-    directions: Floats32,
-    upright: Floats32,
-    texels: Ints32,
-    offsets: Floats32,
-    shape: Displaced,
-) -> None:
+    height_map: Floats32, rates: Floats32, still: Floats32, directions: Floats32, upright: Floats32, texels: Ints32,
+    offsets: Floats32, shape: Displaced,
+) -> None:  # fmt: skip
     """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2].
 
     The surface without waves has its points `still`, directions and normals `upright`, [n, 3]. `texels` [n, 3] are the

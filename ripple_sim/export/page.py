@@ -9,7 +9,6 @@ heights are predicted well from earlier ones.
 from __future__ import annotations
 
 import base64
-import contextlib
 import html
 import importlib.resources
 import io
@@ -33,10 +32,9 @@ from ripple_sim.render.surfaces.vertices import memory_order
 from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, lighting_of
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
-from ripple_sim.solver import Mesh
 
 from .moving_mesh import MovingMesh
-from .source import Source
+from .source import Source, Writer
 from .visuals import Finish, Solid, mean_color, solid_finish, solids, target_finish, target_uv
 
 __all__ = ["PageWriter", "made_here"]
@@ -76,12 +74,11 @@ def floor_of(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
     """The floor: height, albedo and texture."""
     visual = geom_visual(model, geom)
     mapping = mapping_of(model, visual)
-    half = [float(x) if x > 0 else 0.0 for x in visual.size[:2]]
     return {
         "body": int(model.geom_bodyid[geom]),
         "position": model.geom_pos[geom].tolist(),
         "quaternion": model.geom_quat[geom].tolist(),
-        "half": half,
+        "half": [float(x) if x > 0 else 0.0 for x in visual.size[:2]],
         "color": visual.color.tolist(),
         "mean": (visual.color * mean_color(model, mapping)).tolist(),
         "texture": mapping.texture if mapping.texture >= 0 else -1,
@@ -155,8 +152,8 @@ def _data_uri(model: mujoco.MjModel, texture: int) -> str:
     image = Image.fromarray(texture_pixels(model, texture))
     image.thumbnail((_LARGEST_IMAGE, _LARGEST_IMAGE))
     file = io.BytesIO()
-    image.save(file, "JPEG", quality=88) if image.width > 64 else image.save(file, "PNG")
     kind = "jpeg" if image.width > 64 else "png"
+    image.save(file, kind, quality=88)  # which JPEG alone has
     return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
@@ -171,10 +168,9 @@ def parents_of(F: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """
     ordered = np.sort(F, axis=1)
     parents = np.full((count, 2), -1)
-    vertices, first = np.unique(ordered[:, 1], return_index=True)
-    parents[vertices] = ordered[first, :1]
-    vertices, first = np.unique(ordered[:, 2], return_index=True)
-    parents[vertices] = ordered[first, :2]
+    for column in (1, 2):
+        vertices, first = np.unique(ordered[:, column], return_index=True)
+        parents[vertices] = ordered[first, :column]
     return parents
 
 
@@ -197,48 +193,53 @@ def packed(content: bytes) -> str:
     return base64.b64encode(zlib.compress(content, 9)).decode()
 
 
+_STEP = 5e-5  # of heights, in sizes of the object
 _PLACE_STEP = 2e-5  # of moving vertices, in sizes of the mesh
 
 
-class PageMotion:
-    """The vertices of a target's own mesh over time; nothing is written of one that rests.
+class PageTarget:
+    """A target: its part of the page, and over time its heights and the vertices of its own mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        At rest.
-    surface : MovingMesh
-        The finer surface, which follows it.
-    points : int64 [n]
-        Which of its points the page has, in the page's order.
+    The part's finer surface follows that mesh, of which nothing is written while it rests. `step` is that of heights.
     """
 
-    def __init__(self, mesh: Mesh, surface: MovingMesh, points: NDArray[np.int64]) -> None:
-        self._rest, self._surface, self._points = mesh.V, surface, points
-        self._F, self._order, _ = memory_order(mesh.F, mesh.V)
+    def __init__(self, source: Source, name: str) -> None:
+        self._waves = source.ripples[name]
+        self._surface = MovingMesh(self._waves.rest, source.tessellation, source.limited[name], _TRIANGLES)
+        self.part = target_part(source, name, self._surface)
+        self.step = _STEP * float(np.ptp(self._surface.rest, axis=0).max())
+        self._point_parents = parents_of(self.part.F, len(self.part.vertices))
+        mesh = self._waves.rest.mesh
+        self._rest, (self._F, self._order, _) = mesh.V, memory_order(mesh.F, mesh.V)
         self._parents = parents_of(self._F, len(mesh.V))
-        self._step = _PLACE_STEP * float(np.ptp(mesh.V, axis=0).max())
+        self._place_step = _PLACE_STEP * float(np.ptp(mesh.V, axis=0).max())
         self._frames: list[NDArray[np.float64]] = []
+        self._last = np.zeros(0, np.int64)  # steps of the frame before
         self.moves = False
 
-    def add(self, V: NDArray[np.float64] | None) -> None:
-        """Add a frame, with the vertices at V [m], or at rest."""
+    def add(self, V: NDArray[np.float64] | None) -> bytes:
+        """Add a frame, with the vertices of its own mesh at V [m], or at rest; return its coded heights."""
+        heights = self._surface.shape(self._waves.height, self._waves.velocity).height[self.part.vertices]
+        steps = quantised(heights, self.step)
+        # a chunk begins from nothing, so that it can be decoded alone
+        before, self._last = self._last if self._frames else np.zeros_like(steps), steps
         self.moves = self.moves or V is not None
         self._frames.append(self._rest if V is None else np.array(V))
+        return residuals(steps, before, self._point_parents)
 
     def told(self) -> dict[str, Any]:
         """The mesh at rest, and how the page's points ride on it."""
-        corners, weights, off, *_ = self._surface.vertices.rest
+        (corners, weights, off, *_), points = self._surface.vertices.rest, self.part.vertices
         far = max(float(np.abs(off).max()), 1e-30)
         arrays = [
             self._rest[self._order].astype("<f4"),
             self._F.astype("<u4"),
-            np.argsort(self._order)[corners[self._points]].astype("<u4"),
-            np.rint(weights[self._points, :2] * 65535).astype("<u2"),
-            np.rint(off[self._points] / far * 32767).astype("<i2"),
+            np.argsort(self._order)[corners[points]].astype("<u4"),
+            np.rint(weights[points, :2] * 65535).astype("<u2"),
+            np.rint(off[points] / far * 32767).astype("<i2"),
         ]
-        counts = {"points": len(self._order), "triangles": len(self._F)}
-        return {**counts, "step": self._step, "far": far, "arrays": packed(b"".join(each.tobytes() for each in arrays))}
+        meta = {"points": len(self._order), "triangles": len(self._F), "step": self._place_step, "far": far}
+        return {**meta, "arrays": packed(b"".join(each.tobytes() for each in arrays))}
 
     def chunk(self) -> tuple[list[list[float]], bytes]:
         """Middles [m] and coded vertices of the frames since the last chunk, both empty if the surface never moved."""
@@ -247,7 +248,7 @@ class PageMotion:
         self._frames = []
         for V in frames if self.moves else ():
             middle = np.round(V.mean(axis=0), 6)
-            steps = quantised((V - middle)[self._order].T, self._step)
+            steps = quantised((V - middle)[self._order].T, self._place_step)
             planes += [residuals(now, last, self._parents) for now, last in zip(steps, before, strict=True)]
             middles.append(middle.tolist())
             before = steps
@@ -255,31 +256,19 @@ class PageMotion:
 
 
 _CHUNK = 16  # frames that are decoded together
-_STEP = 5e-5  # of heights, in sizes of the object
 _SCRIPTS = (
     *("algebra.js", "decode.js", "motion.js", "light_shaders.js", "shaders.js", "environment.js", "light.js"),
     *("programs.js", "parts.js", "groups.js", "lit_points.js", "floor.js", "drawing.js", "player.js"),
 )
 
 
-class PageWriter:
+class PageWriter(Writer):
     """Writes a page that plays a run: the player, what stays the same, and chunks of frames, each when it is full."""
 
     def __init__(self, source: Source, path: Path) -> None:
         self._source, self._file = source, path.open("w", encoding="utf-8")
-        self._meshes = {
-            name: MovingMesh(source.ripples[name].rest, source.tessellation, source.limited[name], _TRIANGLES)
-            for name in source.ripples
-        }
-        self._targets = {name: target_part(source, name, mesh) for name, mesh in self._meshes.items()}
-        self._parents = {name: parents_of(part.F, len(part.vertices)) for name, part in self._targets.items()}
-        self._steps = {name: _STEP * float(np.ptp(mesh.rest, axis=0).max()) for name, mesh in self._meshes.items()}
-        self._motions = [
-            PageMotion(source.ripples[name].rest.mesh, self._meshes[name], part.vertices)
-            for name, part in self._targets.items()
-        ]
+        self._targets = {name: PageTarget(source, name) for name in source.ripples}
         self._told: set[int] = set()  # targets whose motion has been told of
-        self._last: dict[str, Any] = {}
         self._poses: list[list[list[float]]] = []
         self._arrows: list[list[list[float]]] = []
         self._planes: list[bytes] = []
@@ -289,17 +278,16 @@ class PageWriter:
         """Add a frame."""
         if number == 0:
             self._begin(data)
-        self._poses.append(self._pose(data))
-        self._arrows.append([self._arrow(data, impulse) for impulse in impulses])
-        for (name, mesh), motion in zip(self._meshes.items(), self._motions, strict=True):
-            waves = self._source.ripples[name]
-            motion.add(self._source.ripples.vertices(name, data))
-            heights = mesh.shape(waves.height, waves.velocity).height[self._targets[name].vertices]
-            steps = quantised(heights, self._steps[name])
-            # a chunk begins from nothing, so that it can be decoded alone
-            before = self._last[name] if len(self._poses) > 1 else np.zeros_like(steps)
-            self._planes.append(residuals(steps, before, self._parents[name]))
-            self._last[name] = steps
+        ripples, pose, turn = self._source.ripples, self._source.pose(data), np.zeros(4)
+        mujoco.mju_mat2Quat(turn, np.ascontiguousarray(pose.rotation).ravel())
+        places = np.vstack([[*pose.position, *turn], np.hstack([data.xpos, data.xquat])])
+        self._poses.append(np.round(places, 5).tolist())  # of the camera and all bodies
+        self._arrows.append([])
+        for each in impulses:  # point and inward direction in the world, and impulse [N s]
+            _, rotation = target_pose(data, ripples.geom_ids[each.geom])
+            inwards = -rotation @ ripples[each.geom].atlas.normals[each.texel] * (-1 if each.inner else 1)
+            self._arrows[-1].append([round(float(x), 5) for x in (*each.point, *inwards, each.impulse)])
+        self._planes += [target.add(ripples.vertices(name, data)) for name, target in self._targets.items()]
         self._frames = number + 1
         if len(self._poses) == _CHUNK:
             self._flush()
@@ -311,25 +299,19 @@ class PageWriter:
         self._file.write("</body>\n</html>\n")
         self._file.close()
 
-    def close(self) -> str:
-        """Leave the page incomplete."""
-        with contextlib.suppress(OSError):
-            self._file.close()
-        return ""
-
     def _begin(self, data: mujoco.MjData) -> None:
         source, model = self._source, self._source.model
         targets = set(source.ripples.geom_ids.values())
         floor = find_floor(model, targets)
         found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
-        parts = [*self._targets.values(), *(_solid_part(model, solid) for solid in found)]
+        parts = [*(target.part for target in self._targets.values()), *(_solid_part(model, solid) for solid in found)]
         pose = source.pose(data)
         floor_meta = None if floor is None else floor_of(model, floor)
         textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])
         meta = {
             "fps": source.fps,
             "chunk": _CHUNK,
-            "steps": list(self._steps.values()),
+            "steps": [target.step for target in self._targets.values()],
             "parts": [part.meta for part in parts],
             "images": {each["texture"]: _data_uri(model, each["texture"]) for each in textured if each["texture"] >= 0},
             "floor": floor_meta,
@@ -339,58 +321,31 @@ class PageWriter:
             "aspect": source.size[0] / source.size[1],
             "heat": color_table()[::8].tolist(),  # of the heights, from the lowest to the highest, sRGB
         }
-        self._file.write(_head(", ".join(self._meshes)))
+        folder = importlib.resources.files(__package__).joinpath("html")
+        page, *scripts = (folder.joinpath(name).read_text("utf-8") for name in ("page.html", *_SCRIPTS))
+        page = page.replace("TITLE", html.escape(", ".join(self._targets))).replace("MARK", MARK)
+        self._file.write(page.replace("SCRIPTS", "\n".join(scripts)))
         arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
         self._file.write(f'<script type="application/json" id="meta">{json.dumps(meta)}</script>\n')
         self._file.write(f'<script type="text/plain" id="arrays">{packed(arrays)}</script>\n')
 
-    def _pose(self, data: mujoco.MjData) -> list[list[float]]:
-        """Position and quaternion of the camera and of all bodies."""
-        pose = self._source.pose(data)
-        quaternion = np.zeros(4)
-        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
-        rows = np.concatenate([[[*pose.position, *quaternion]], np.concatenate([data.xpos, data.xquat], axis=1)])
-        return np.round(rows, 5).tolist()
-
-    def _arrow(self, data: mujoco.MjData, impulse: Impulse) -> list[float]:
-        """Point and inward direction in the world, and impulse [N s]."""
-        ripples = self._source.ripples
-        _, rotation = target_pose(data, ripples.geom_ids[impulse.geom])
-        inwards = -rotation @ ripples[impulse.geom].atlas.normals[impulse.texel] * (-1 if impulse.inner else 1)
-        return [round(float(x), 5) for x in (*impulse.point, *inwards, impulse.impulse)]
-
     def _flush(self) -> None:
         """Write the frames that wait as a chunk."""
-        if self._poses:
-            middles, moved = self._moved()
-            text = json.dumps({"poses": self._poses, "arrows": self._arrows, "middles": middles}).encode()
-            content = len(text).to_bytes(4, "little") + text + b"".join(self._planes + moved)
-            self._file.write(f'<script type="text/plain" class="chunk">{packed(content)}</script>\n')
-            self._file.flush()
-        self._poses, self._arrows, self._planes = [], [], []
-
-    def _moved(self) -> tuple[dict[int, list[list[float]]], list[bytes]]:
-        """Middles and coded vertices of the targets that move, by number; each is told of before it first does."""
-        middles, planes = {}, []
-        for number, motion in enumerate(self._motions):
-            places, coded = motion.chunk()
-            if not motion.moves:
+        if not self._poses:
+            return
+        middles: dict[int, list[list[float]]] = {}  # of the targets that move, by number
+        for number, target in enumerate(self._targets.values()):
+            places, coded = target.chunk()
+            if not target.moves:
                 continue
-            if number not in self._told:
-                told = json.dumps(motion.told())
-                self._file.write(
-                    f'<script type="application/json" class="motion" data-target="{number}">{told}</script>\n'
-                )
+            if number not in self._told:  # before it first moves
+                told, name = json.dumps(target.told()), f'class="motion" data-target="{number}"'
+                self._file.write(f'<script type="application/json" {name}>{told}</script>\n')
                 self._told.add(number)
             middles[number] = places
-            planes.append(coded)
-        return middles, planes
-
-
-def _head(title: str) -> str:
-    def read(name: str) -> str:
-        return importlib.resources.files(__package__).joinpath("html", name).read_text("utf-8")
-
-    page = read("page.html")
-    scripts = "\n".join(read(name) for name in _SCRIPTS)
-    return page.replace("TITLE", html.escape(title)).replace("MARK", MARK).replace("SCRIPTS", scripts)
+            self._planes.append(coded)
+        text = json.dumps({"poses": self._poses, "arrows": self._arrows, "middles": middles}).encode()
+        content = len(text).to_bytes(4, "little") + text + b"".join(self._planes)
+        self._file.write(f'<script type="text/plain" class="chunk">{packed(content)}</script>\n')
+        self._file.flush()
+        self._poses, self._arrows, self._planes = [], [], []

@@ -43,9 +43,14 @@ class Unfinished:
     def finish(self) -> None:
         """Move everything to its place, unless something foreign stands there by now."""
         _check_replaceable(self._target, self._recognised, self._overwrite)  # again: a run takes long
+        made = {".png": made_here, ".usdc": self._recognised}
+
+        def own(file: Path) -> bool:
+            return file.suffix in made and (self._overwrite or made[file.suffix](file))
+
         written = sorted(self._folder.iterdir(), key=lambda each: each == self.path)
-        for each in written[:-1]:
-            check_companion(self._target.with_name(each.name), self._recognised, self._overwrite)
+        for each in written[:-1]:  # folders of images or chunks
+            check_folder(ExportError, each.suffix.removeprefix("."), self._target.with_name(each.name), own)
         for each in written:
             target = self._target.with_name(each.name)
             if target.is_dir():
@@ -55,19 +60,6 @@ class Unfinished:
     def remove(self) -> None:
         """Remove the folder with all that is in it."""
         shutil.rmtree(self._folder, ignore_errors=True)
-
-
-def check_companion(folder: Path, recognised: Recognised, overwrite: bool) -> None:
-    """Make sure that a folder of images or chunks that belongs to an export may be replaced.
-
-    Raises `ExportError` if it holds anything but those that were made here.
-    """
-    made = {".png": made_here, ".usdc": recognised}
-
-    def own(file: Path) -> bool:
-        return file.suffix in made and (overwrite or made[file.suffix](file))
-
-    check_folder(ExportError, folder.suffix.removeprefix("."), folder, own)
 
 
 def _check_replaceable(path: Path, recognised: Recognised, overwrite: bool) -> None:
@@ -175,7 +167,7 @@ MAX_FPS, LARGEST_MESH = 1000, 10_000_000
 
 def check_options(options: ExportOptions) -> None:
     """Make sure that the options are possible, before anything that takes time; raises `RippleError`."""
-    if not isinstance(options.fps, int) or not 1 <= options.fps <= MAX_FPS:
+    if options.fps > MAX_FPS:
         raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
     if options.resume and options.chunk is None:
         raise ExportError("only an export in chunks can be resumed; add --chunk, or leave --resume out")

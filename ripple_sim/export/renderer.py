@@ -6,7 +6,7 @@ import dataclasses
 import tempfile
 import warnings
 from pathlib import Path
-from typing import Any, Self, TypeAlias
+from typing import Self, TypeAlias
 
 import mujoco
 import numpy as np
@@ -168,7 +168,11 @@ class RippleRenderer:
             self._ripples.geom_ids[name]: height_map(heights[name], state)
             for name, height_map in self._height_maps.items()
         }
-        self._drawn, self._seen = (state, height_maps, seen), (now, self._entry(camera, seen))
+        if isinstance(seen, Camera) and not isinstance(camera, str):
+            entry = CameraEntry(**dataclasses.asdict(seen))
+        else:  # MuJoCo's free camera where `[camera]` of a scene file has no words for it
+            entry = camera_entry(self.model, camera if isinstance(camera, str) else None)
+        self._drawn, self._seen = (state, height_maps, seen), (now, entry)
 
     def render(
         self, data: mujoco.MjData | None = None, camera: AnyCamera | None = None, *, out: NDArray | None = None
@@ -214,7 +218,13 @@ class RippleRenderer:
         if self._shows == "colours":
             frame = self._renderer.render(*self._drawn, scene=self.scene)
         else:
-            frame = self._measured(self._renderer, *self._drawn)
+            image = self._renderer.surfaces(*self._drawn, scene=self.scene)
+            far = np.float32(self.model.vis.map.zfar * self.model.stat.extent)
+            nothing = (image.geom == -1) & (image.depth == 0) | (image.depth > far)  # beyond the far plane as in MuJoCo
+            if self._shows == "depth":
+                frame = np.where(nothing, far, image.depth)
+            else:
+                frame = np.where(nothing[..., None], np.int32(-1), image.identity)
         if out is None:
             return frame
         np.copyto(out, frame, casting="unsafe")
@@ -236,17 +246,6 @@ class RippleRenderer:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def _measured(
-        self, renderer: Renderer, state: mujoco.MjData, height_maps: dict[int, AnyHeightMap], seen: Viewpoint
-    ) -> NDArray:
-        """Depth or segmentation; as in MuJoCo nothing is seen beyond the far plane."""
-        image = renderer.surfaces(state, height_maps, seen, scene=self.scene)
-        far = np.float32(self.model.vis.map.zfar * self.model.stat.extent)
-        nothing = (image.geom == -1) & (image.depth == 0) | (image.depth > far)
-        if self._shows == "depth":
-            return np.where(nothing, far, image.depth)
-        return np.where(nothing[..., None], np.int32(-1), image.identity)
-
     def _own(self, camera: AnyCamera) -> mujoco.MjvCamera:
         """A camera of MuJoCo's for its scene; the free one where ours has no such words."""
         if isinstance(camera, mujoco.MjvCamera):
@@ -261,27 +260,15 @@ class RippleRenderer:
             own.type = mujoco.mjtCamera.mjCAMERA_FIXED
         return own
 
-    def _entry(self, camera: Any, seen: Viewpoint) -> CameraEntry:
-        """What `[camera]` of a scene file would say; MuJoCo's free camera where it has no words for it."""
-        if isinstance(seen, Camera) and not isinstance(camera, str):
-            return CameraEntry(**dataclasses.asdict(seen))
-        return camera_entry(self.model, camera if isinstance(camera, str) else None)
-
     def _repr_html_(self) -> str | None:
         """HTML for a notebook: the present state of what was rendered last, to turn and to zoom."""
         if self._seen is None:
             return None
-        data, camera = self._seen
+        (data, camera), size = self._seen, (self.width, self.height)
         with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
             page = Path(folder) / "now.html"
             with Exporter(
-                self.model,
-                self._ripples,
-                page,
-                camera=camera,
-                looks=self._looks,
-                size=(self.width, self.height),
-                limit=self._limit,
+                self.model, self._ripples, page, camera=camera, looks=self._looks, size=size, limit=self._limit
             ) as exporter:
                 exporter.write(data)
             return framed(page, self.width / self.height)

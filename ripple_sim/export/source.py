@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import mujoco
 
@@ -16,28 +17,6 @@ from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.solver.waves.sensor import Sensor
 
 from .moving_mesh import MovingMesh
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Chunking:
-    """How a run is divided over files.
-
-    Attributes
-    ----------
-    frames : int
-        In each.
-    output : Path
-        Of the whole; beside it stands NAME.part with the complete chunks until all is complete.
-    settings : mapping, optional
-        Everything that decides what is written, by name. With it complete chunks survive an interruption.
-    resume : bool
-        Keep those that are there.
-    """
-
-    frames: int
-    output: Path
-    settings: Mapping[str, str | int | float] | None = None
-    resume: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,8 +42,14 @@ class Source:
         Whether heights are bent, by the target's name.
     tessellation, triangles : str, int
         Of the surfaces, see `MovingMesh`.
-    chunking : Chunking, optional
-        Of the formats that have it.
+    chunk : int
+        Frames in each of the files over which a run is divided, or 0: it is one file.
+    output : Path
+        Of a run in chunks; beside it stands NAME.part with the complete ones until all is complete.
+    settings : mapping, optional
+        Everything that decides what is written, by name. With it complete chunks survive an interruption.
+    resume : bool
+        Keep those that are there.
     sensors : mapping
         Of a scene, by name.
     signals : bool
@@ -82,7 +67,10 @@ class Source:
     tessellation: str
     triangles: int
     slow_motion: float = 1.0
-    chunking: Chunking | None = None
+    chunk: int = 0
+    output: Path = Path()
+    settings: Mapping[str, str | int | float] | None = None
+    resume: bool = False
     sensors: Mapping[str, Sensor] = dataclasses.field(default_factory=dict)
     signals: bool = False
 
@@ -98,6 +86,8 @@ class Source:
 class Writer(Protocol):
     """Writes a run to a file or folder, frame by frame; it is made with its source and path."""
 
+    _file: Any = None  # what is open all the time, if anything
+
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame, of a number from 0, with the impulses since the frame before; the ripples are the source's."""
 
@@ -106,4 +96,7 @@ class Writer(Protocol):
 
     def close(self) -> str:
         """Leave the file incomplete; say what is kept for later, if anything."""
-        return ""  # and no file is open
+        with contextlib.suppress(OSError):
+            if self._file is not None:
+                self._file.close()
+        return ""

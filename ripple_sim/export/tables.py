@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -14,7 +13,7 @@ from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.encode.replace import MARK
 from ripple_sim.solver.waves.sensor import UNITS, Sensor
 
-from .source import Source
+from .source import Source, Writer
 
 # Name and unit of every column, and its type for pyarrow.
 COLUMNS = {
@@ -61,40 +60,31 @@ def samples(sensors: Mapping[str, Sensor]) -> Iterator[tuple]:
     for name, sensor in sensors.items():
         times, values = sensor.read()
         for point, column in enumerate(values.T.tolist()):
-            unit = UNITS[sensor.kind]
-            yield from ((name, point, at, value, unit) for at, value in zip(times.tolist(), column, strict=True))
+            for at, value in zip(times.tolist(), column, strict=True):
+                yield name, point, at, value, UNITS[sensor.kind]
 
 
-class CsvWriter:
+class CsvWriter(Writer):
     """Writes impulses or samples as comma-separated values, one a row, units in the header."""
 
     def __init__(self, source: Source, path: Path) -> None:
-        self._file = path.open("w", newline="", encoding="utf-8")
+        self._source, self._file = source, path.open("w", newline="", encoding="utf-8")
         self._writer = csv.writer(self._file)
-        self._source = source
         self._writer.writerow(header(SIGNALS if source.signals else COLUMNS))
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add the impulses of a frame, or the samples that are there."""
-        source = self._source
-        self._writer.writerows(samples(source.sensors) if source.signals else rows(number, data, impulses))
+        self._writer.writerows(samples(self._source.sensors) if self._source.signals else rows(number, data, impulses))
 
     def finish(self) -> None:
         """Complete the file."""
         self._file.close()
 
-    def close(self) -> str:
-        """Leave the file incomplete."""
-        with contextlib.suppress(OSError):
-            self._file.close()
-        return ""
 
-
-class ParquetWriter:
+class ParquetWriter(Writer):
     """Writes impulses or samples as columns, units in their metadata."""
 
     def __init__(self, source: Source, path: Path) -> None:
-        import pyarrow
         import pyarrow.parquet
 
         self._source = source
@@ -103,7 +93,7 @@ class ParquetWriter:
             for name, (unit, kind) in (SIGNALS if source.signals else COLUMNS).items()
         ]
         self._schema = pyarrow.schema(fields, metadata={"software": MARK})
-        self._writer = pyarrow.parquet.ParquetWriter(path, self._schema)
+        self._file = pyarrow.parquet.ParquetWriter(path, self._schema)
         self._rows: list[tuple] = []
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
@@ -115,19 +105,13 @@ class ParquetWriter:
     def finish(self) -> None:
         """Complete the file."""
         self._flush()
-        self._writer.close()
-
-    def close(self) -> str:
-        """Leave the file incomplete."""
-        with contextlib.suppress(OSError):
-            self._writer.close()
-        return ""
+        self._file.close()
 
     def _flush(self) -> None:
         import pyarrow
 
         columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [[] for _ in self._schema]
-        self._writer.write_table(pyarrow.table(columns, schema=self._schema))
+        self._file.write_table(pyarrow.table(columns, schema=self._schema))
         self._rows = []
 
 
@@ -139,7 +123,6 @@ def made_here(path: Path) -> bool:
         with path.open("rb") as file:
             first = file.readline(1000).decode("utf-8", "replace").rstrip("\r\n")
         return first in (",".join(HEADER), ",".join(header(SIGNALS)))
-    import pyarrow
     import pyarrow.parquet
 
     try:

@@ -28,7 +28,7 @@ from ripple_sim.errors import VideoError
 from ripple_sim.solver.files import final_path
 
 from .moving_mesh import Displaced, MovingMesh
-from .source import Chunking, Source
+from .source import Source
 from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
 from .visuals import solid_finish, solids, target_finish, target_uv
 
@@ -67,44 +67,39 @@ class Chunks:
         If another process writes to the same place, or a run that is to be resumed has other settings, or is damaged.
     """
 
-    def __init__(self, stage: Usd.Stage, path: Sdf.Path, chunking: Chunking) -> None:
-        self._stage, self._path, self._chunking = stage, path, chunking
+    def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
+        self._stage, self._path, self._source = stage, path, source
+        target, settings = final_path(source.output), source.settings or {}
         self._part: Any = Part(  # None once it is handed over or closed
-            final_path(chunking.output),
-            suffix=".usdc",
-            length=chunking.frames,
-            settings=chunking.settings or {},
-            resume=chunking.resume,
-            overwrite=True,
+            target, suffix=".usdc", length=source.chunk, settings=settings, resume=source.resume, overwrite=True
         )
         if damaged := [segment.name for segment, _ in self._part.segments if not made_here(segment)]:
             self._part.keep()
             raise VideoError(
-                f"cannot resume {chunking.output}: {damaged[0]} is damaged; leave --resume out to start again"
+                f"cannot resume {source.output}: {damaged[0]} is damaged; leave --resume out to start again"
             )
         self.stored = self._part.frames
-        self._layer: Sdf.Layer | None = None
-        self._waiting = 0  # frames of the open layer
+        self._layer: Any = None  # open while frames wait
+        self._waiting = 0  # frames in it
 
-    def write(self, number: int, write: Callable[[], None]) -> None:
+    def write(self, write: Callable[[], None]) -> None:
         """Write a frame, by a function that sets its samples."""
-        if self._layer is not None and self._waiting == self._chunking.frames:
+        if self._layer is not None and self._waiting == self._source.chunk:
             self._sample(write)
             self._end()
         if self._layer is None:
-            layer = Sdf.Layer.CreateAnonymous(".usdc")
+            self._layer = layer = Sdf.Layer.CreateAnonymous(".usdc")
             layer.comment = MARK
             root = self._stage.GetRootLayer()
             layer.timeCodesPerSecond, layer.framesPerSecond = root.timeCodesPerSecond, root.framesPerSecond
             self._stage.GetSessionLayer().subLayerPaths = [layer.identifier]
-            self._layer = layer
         self._sample(write)
         self._waiting += 1
 
-    def check_state(self, source: Source, number: int, data: mujoco.MjData) -> None:
+    def check_state(self, number: int, data: mujoco.MjData) -> None:
         """Record the fingerprint of a frame's state, or compare it with that of the run which is resumed."""
-        if number % min(_CHECKED, self._chunking.frames) == 0:
-            heights = (source.ripples[name].height for name in source.ripples)
+        if number % min(_CHECKED, self._source.chunk) == 0:
+            heights = (self._source.ripples[name].height for name in self._source.ripples)
             self._part.check_state(number, state_digest(data, heights))
 
     def finish(self, folder: Path, last: int) -> None:
@@ -131,7 +126,7 @@ class Chunks:
         part, self._part = self._part, None
         if part is None:
             return ""
-        if self._chunking.settings is None:
+        if self._source.settings is None:
             part.remove()
             return ""
         return f"{part.frames} frames are kept in {part.folder}; --resume carries on from there" if part.keep() else ""
@@ -141,8 +136,7 @@ class Chunks:
             write()
 
     def _end(self) -> None:
-        if self._layer is not None:
-            succeed(self._layer.Export, str(self._part.unfinished))
+        succeed(self._layer.Export, str(self._part.unfinished))
         self._drop()
         self._part.store(self._waiting)
         self._waiting = 0
@@ -155,10 +149,7 @@ class Chunks:
 _SENSOR = 0.024  # height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
 _TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
 _NEAR, _FAR = 0.01, 1000.0  # of the camera's distance
-
-
-# Frames are kept in memory until so many are there, and then appended to the file.
-_KEPT = 8
+_KEPT = 8  # so many frames are kept in memory, and then appended to the file
 
 
 class UsdWriter:
@@ -180,9 +171,8 @@ class UsdWriter:
         stage.SetDefaultPrim(world.GetPrim())
         self._materials = Materials(stage, world.GetPath().AppendChild("Looks"), source.model, self._images)
         self._camera = UsdGeom.Camera.Define(stage, world.GetPath().AppendChild("camera"))
-        width, height = source.size
         self._camera.CreateVerticalApertureAttr(_TENTHS * _SENSOR)
-        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * width / height)
+        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * source.size[0] / source.size[1])
         self._camera.CreateShutterOpenAttr(0.0)
         self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
         self._lamps = Lamps(stage, world.GetPath().AppendChild("lights"), source)
@@ -191,11 +181,18 @@ class UsdWriter:
             UsdGeom.Xform.Define(stage, child(stage, bodies, source.model.body(i).name or f"body_{i}"))
             for i in range(source.model.nbody)
         ]
-        self._define_solids()
+        for solid in solids(source.model, set(source.ripples.geom_ids.values())):
+            body = self._bodies[solid.body].GetPath()
+            mesh = define_mesh(stage, child(stage, body, solid.name), solid.F, solid.uv, open_surface=False)
+            place(mesh, solid.position, solid.quaternion)
+            mesh.CreatePointsAttr(vectors(solid.points))
+            mesh.CreateNormalsAttr(vectors(solid.normals))
+            mesh.CreateExtentAttr(extent(solid.points))
+            self._materials.bind(mesh, solid_finish(source.model, solid.visual))
         self._before: dict[str, NDArray[np.float32]] = {}
         self._surfaces = {name: self._define_surface(name) for name in source.ripples}
         self._last = 0
-        self._chunks = None if source.chunking is None else Chunks(stage, world.GetPath(), source.chunking)
+        self._chunks = Chunks(stage, world.GetPath(), source) if source.chunk else None
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame, unless it is there from an earlier run."""
@@ -205,11 +202,11 @@ class UsdWriter:
         if chunks is None:
             self._sample(number, data, self._shapes(data))
         else:
-            chunks.check_state(self._source, number, data)
+            chunks.check_state(number, data)
             if number >= chunks.stored - 1:  # the one before tells of motion
                 shapes = self._shapes(data)
             if number >= chunks.stored:
-                chunks.write(number, lambda: self._sample(number, data, shapes))
+                chunks.write(lambda: self._sample(number, data, shapes))
         self._last = number
         if number % _KEPT == _KEPT - 1:
             succeed(self._stage.GetRootLayer().Save)
@@ -282,17 +279,6 @@ class UsdWriter:
             mesh.GetNormalsAttr().Set(vectors(shape.normals), time)
             mesh.GetVelocitiesAttr().Set(vectors(shape.velocities), time)
             mesh.GetExtentAttr().Set(extent(shape.points), time)
-
-    def _define_solids(self) -> None:
-        model = self._source.model
-        for solid in solids(model, set(self._source.ripples.geom_ids.values())):
-            path = child(self._stage, self._bodies[solid.body].GetPath(), solid.name)
-            mesh = define_mesh(self._stage, path, solid.F, solid.uv, open_surface=False)
-            place(mesh, solid.position, solid.quaternion)
-            mesh.CreatePointsAttr(vectors(solid.points))
-            mesh.CreateNormalsAttr(vectors(solid.normals))
-            mesh.CreateExtentAttr(extent(solid.points))
-            self._materials.bind(mesh, solid_finish(model, solid.visual))
 
     def _define_surface(self, name: str) -> tuple[MovingMesh, UsdGeom.Mesh]:
         source, model = self._source, self._source.model

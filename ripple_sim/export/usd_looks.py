@@ -14,7 +14,7 @@ from PIL import Image
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
 from ripple_sim.encode.replace import png_mark
-from ripple_sim.render.visuals.lights import Light, Lighting, lighting_of
+from ripple_sim.render.visuals.lights import Lighting, lighting_of
 from ripple_sim.render.visuals.visual import texture_pixels
 
 from .source import Source
@@ -60,11 +60,8 @@ def place(prim: UsdGeom.Xformable, position: NDArray, quaternion: NDArray, time:
 
 def placing(prim: UsdGeom.Xformable) -> tuple[UsdGeom.XformOp, UsdGeom.XformOp]:
     """Translation and orientation of a prim, added where there are none."""
-    translate, orient = prim.GetOrderedXformOps() or (
-        prim.AddTranslateOp(),
-        prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble),
-    )
-    return translate, orient
+    double = UsdGeom.XformOp.PrecisionDouble
+    return tuple(prim.GetOrderedXformOps()) or (prim.AddTranslateOp(), prim.AddOrientOp(double))
 
 
 def child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:
@@ -104,9 +101,29 @@ class Lamps:
         lighting = self._lighting(data)
         for index, light in enumerate(lighting.lights):
             path = self._path.AppendChild(f"lamp_{index}")
-            define = _far if light.position is None else _near
-            self._lamps.append(define(self._stage, path, light, self._source.model.stat.center))
-            placing(self._lamps[-1])
+            if light.position is None:
+                lamp, angle = UsdLux.DistantLight.Define(self._stage, path), 2 * np.arctan(light.size)
+                lamp.CreateAngleAttr(float(np.degrees(angle)))
+                lamp.CreateNormalizeAttr(True)
+                _set_light(lamp, light.radiance, np.pi, light.gloss)
+                keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())  # [W/m^2], as Blender has it
+                keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
+            else:
+                lamp = UsdLux.SphereLight.Define(self._stage, path)
+                lamp.CreateRadiusAttr(max(light.size, _LEAST_RADIUS))
+                lamp.CreateNormalizeAttr(True)
+                distance = max(float(np.linalg.norm(light.position - self._source.model.stat.center)), 1e-3)
+                # a sphere's irradiance is its intensity over four times the distance squared
+                strength = np.pi / float(light.falloff @ [1.0, distance, distance**2])
+                _set_light(lamp, light.radiance, 4 * distance**2 * strength, light.gloss)
+                watts = 4 * np.pi * distance**2 * strength * light.radiance.max()
+                keep(lamp.GetPrim(), "power", watts)  # as Blender has it
+                if light.cutoff < np.pi:
+                    shaping = UsdLux.ShapingAPI.Apply(lamp.GetPrim())
+                    shaping.CreateShapingConeAngleAttr(float(np.degrees(light.cutoff)))
+                    shaping.CreateShapingFocusAttr(light.exponent)
+            placing(lamp)
+            self._lamps.append(lamp)
         sky = lighting.ambient + (_STUDIO_SKY if lighting.studio else 0.0)
         if sky.any():
             dome = UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky"))
@@ -115,39 +132,12 @@ class Lamps:
     def write(self, data: mujoco.MjData, time: float) -> None:
         """Add a frame."""
         for lamp, light in zip(self._lamps, self._lighting(data).lights, strict=False):
-            position = np.zeros(3) if light.position is None else light.position
-            place(lamp, position, _towards(light.direction), time)
+            quaternion = np.zeros(4)  # it shines along its -z, against the direction
+            mujoco.mju_quatZ2Vec(quaternion, np.ascontiguousarray(light.direction))
+            place(lamp, np.zeros(3) if light.position is None else light.position, quaternion, time)
 
     def _lighting(self, data: mujoco.MjData) -> Lighting:
-        pose = self._source.pose(data)
-        return lighting_of(self._source.model, data, pose, self._source.lighting)
-
-
-def _far(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> UsdGeom.Xformable:
-    lamp = UsdLux.DistantLight.Define(stage, path)
-    angle = 2 * np.arctan(light.size)
-    lamp.CreateAngleAttr(float(np.degrees(angle)))
-    lamp.CreateNormalizeAttr(True)
-    _set_light(lamp, light.radiance, np.pi, light.gloss)
-    keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())  # [W/m^2], as Blender has it
-    keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
-    return lamp
-
-
-def _near(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> UsdGeom.Xformable:
-    lamp = UsdLux.SphereLight.Define(stage, path)
-    lamp.CreateRadiusAttr(max(light.size, _LEAST_RADIUS))
-    lamp.CreateNormalizeAttr(True)
-    distance = 1.0 if light.position is None else max(float(np.linalg.norm(light.position - middle)), 1e-3)
-    # a sphere's irradiance is its intensity over four times the distance squared
-    strength = np.pi / float(light.falloff @ [1.0, distance, distance**2])
-    _set_light(lamp, light.radiance, 4 * distance**2 * strength, light.gloss)
-    keep(lamp.GetPrim(), "power", 4 * np.pi * distance**2 * strength * light.radiance.max())  # [W], as Blender has it
-    if light.cutoff < np.pi:
-        shaping = UsdLux.ShapingAPI.Apply(lamp.GetPrim())
-        shaping.CreateShapingConeAngleAttr(float(np.degrees(light.cutoff)))
-        shaping.CreateShapingFocusAttr(light.exponent)
-    return lamp
+        return lighting_of(self._source.model, data, self._source.pose(data), self._source.lighting)
 
 
 def _set_light(lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float, gloss: float = 1.0) -> None:
@@ -155,13 +145,6 @@ def _set_light(lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float, g
     lamp.CreateColorAttr(Gf.Vec3f(*(float(each) / brightest for each in radiance)))
     lamp.CreateIntensityAttr(intensity * brightest)
     lamp.CreateSpecularAttr(gloss)
-
-
-def _towards(direction: NDArray) -> NDArray[np.float64]:
-    """Quaternion of a light that shines along its -z, against a direction."""
-    quaternion = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quaternion, np.ascontiguousarray(direction))
-    return quaternion
 
 
 _COAT_ROUGHNESS = 0.1
@@ -227,7 +210,12 @@ class Materials:
         reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
         image = UsdShade.Shader.Define(self._stage, path.AppendChild("image"))
         image.CreateIdAttr("UsdUVTexture")
-        image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._file(texture))
+        if texture not in self._textures:  # where it is, from the stage's file
+            self._images.mkdir(exist_ok=True)
+            name = f"texture_{texture}.png"
+            Image.fromarray(texture_pixels(self._model, texture)).save(self._images / name, pnginfo=png_mark())
+            self._textures[texture] = f"./{self._images.name}/{name}"
+        image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._textures[texture])
         image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
         image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*tint, 1))
         for side in ("wrapS", "wrapT"):
@@ -235,12 +223,3 @@ class Materials:
         st = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
         image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(st)
         return image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
-
-    def _file(self, texture: int) -> str:
-        """Write a texture once, and return where it is, from the stage's file."""
-        if texture not in self._textures:
-            self._images.mkdir(exist_ok=True)
-            name = f"texture_{texture}.png"
-            Image.fromarray(texture_pixels(self._model, texture)).save(self._images / name, pnginfo=png_mark())
-            self._textures[texture] = f"./{self._images.name}/{name}"
-        return self._textures[texture]

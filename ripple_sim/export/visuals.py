@@ -95,8 +95,7 @@ def target_uv(model: mujoco.MjModel, geom: int, mesh: MovingMesh) -> NDArray[np.
 
 def texture_places(mapping: TextureMapping, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places [..., 2] in a flat texture, v from its lower edge, of a mapping's coordinates [..., 2 or 3]."""
-    scale, offset = np.array(mapping.tiling[:2]), np.array(mapping.tiling[2:])
-    places = coordinates[..., :2] * scale + offset
+    places = coordinates[..., :2] * mapping.tiling[:2] + mapping.tiling[2:]
     return np.stack([places[..., 0], 1.0 - places[..., 1]], axis=-1)
 
 
@@ -115,9 +114,8 @@ def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
         own = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
         uv = texture_places(mapping, own)[mesh.faces]
     kind, own = ("site", model.site(visual.index)) if visual.site else ("geom", model.geom(visual.index))
-    name, body = own.name or f"{kind}_{visual.index}", int(own.bodyid[0])
-    position, quaternion = np.array(own.pos), np.array(own.quat)
+    name, position, quaternion = own.name or f"{kind}_{visual.index}", np.array(own.pos), np.array(own.quat)
     normals = normalized(mesh.normals)
     if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
         normals = normalized(normals / visual.half_sizes)
-    return Solid(visual, name, body, position, quaternion, points, normals, mesh.faces, uv)
+    return Solid(visual, name, int(own.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv)
