@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from .topology import SPLITS, distinct, labels, sides_of, turned, undirected
+from .topology import SPLITS, distinct, edges_of, labels, sides_of, turned
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,9 +125,9 @@ def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.i
 
     Closed surfaces never change: only boundaries are examined.
     """
-    edge, counts = np.unique(undirected(F)[0], return_counts=True)
-    low, high = np.divmod(edge[counts == 1], F.max() + 1)
-    rim = np.union1d(low[low != high], high[low != high])
+    edges = edges_of(F)
+    alone = edges.ends[edges.rim]
+    rim = np.unique(alone[alone[:, 0] != alone[:, 1]])
     if len(rim) == 0:
         return F
     width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
@@ -151,13 +151,13 @@ def without_slivers(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, 
 
     What bordered on the longest side of one gets the middle corner.
     """
-    flat = _flat(V, corners.F)[0]
+    flat, length = _flat(V, corners.F)
     before = int(flat.sum())
     for _ in range(_ROUNDS):
         if not flat.any():
             return corners, before
-        corners = _round(V, corners)
-        flat = _flat(V, corners.F)[0]
+        corners = _without_longest(V, corners, flat, length)
+        flat, length = _flat(V, corners.F)
     return corners.kept(~flat), before
 
 
@@ -169,16 +169,15 @@ def _flat(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.bool
     return twice_area <= _FLAT * length.max(axis=1) ** 2, length
 
 
-def _round(V: NDArray[np.float64], corners: Corners) -> Corners:
-    """Take out slivers of which no two are neighbours, the longest first."""
-    F = corners.F
-    flat, length = _flat(V, F)
-    longest = length.argmax(axis=1)
+def _without_longest(
+    V: NDArray[np.float64], corners: Corners, flat: NDArray[np.bool_], length: NDArray[np.float64]
+) -> Corners:
+    """Take out slivers of which no two are neighbours, the longest first; of the two arrays see `_flat`."""
+    F, longest = corners.F, length.argmax(axis=1)
     rank = np.full(len(F), -1)
     rank[np.lexsort((length.max(axis=1), flat))] = np.arange(len(F))
     rank[~flat] = -1
-    key = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=-1), axis=-1) @ [len(V), 1]
-    edge = np.unique(key, return_inverse=True)[1].reshape(-1, 3)
+    edge = edges_of(F).of
     highest = np.full(edge.max() + 1, -1)
     np.maximum.at(highest, edge, np.repeat(rank[:, None], 3, axis=1))
     out = flat & (highest[edge] == rank[:, None]).all(axis=1)
