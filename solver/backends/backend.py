@@ -49,7 +49,6 @@ class FluidBackend(FieldBackend):
         self._fields = RowLayout(operator.topology)
         self._h, self._v = self._fields.zeros(), self._fields.zeros()
         self._forces = np.zeros(operator.mass.size)
-        self._probes: Probes | None = None
 
     def move(self, operator: WaveOperator) -> None:
         """Refuse: this backend cannot move; see `MovingOperator`."""

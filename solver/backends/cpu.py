@@ -189,7 +189,6 @@ class CPUBackend(FieldBackend):
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
-        self._probes: kernels.Probes | None = None
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 

@@ -23,6 +23,7 @@ class FieldBackend:
     _v: Any
     _dent: Any = None
     _crests: Any = None
+    _probes: Any = None
     _sums: NDArray[np.float32]
 
     def height(self) -> NDArray[np.float32]:
