@@ -218,8 +218,9 @@ class GLBackend(FieldBackend):
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = StencilBuffer(fields, operator.stencil)
         self._response = fields.upload(operator.response)
-        # a number for each part, where there are several: held by the load, and given at once
-        self._held, self._given = (None if operator.parts is None else Pressure(fields, operator) for _ in range(2))
+        # a number for each part, where there are several: given at once, and held by the load
+        self._given = None if operator.parts is None else Pressure(fields, operator)
+        self._held: Pressure | None = None
         self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
         self._extra = ExtraForces(fields, operator)
         if operator.yield_height is not None:
@@ -356,9 +357,8 @@ class GLBackend(FieldBackend):
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
             self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
             rate = volume_rate(self._operator, dt) if self.keeps_volume else None
-            if rate is not None or (self._held is not None and self._held.follow is not None):
-                needed = rate is not None or self._operator.parts is not None
-                self._held = Pressure(self._fields, self._operator, rate) if needed else None
+            several = rate is not None or self._operator.parts is not None
+            self._held = Pressure(self._fields, self._operator, rate) if several else None
             self._prepared = (dt, self.keeps_volume)
         k = self._step
         if new_length or self._load_is_new:

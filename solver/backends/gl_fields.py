@@ -181,15 +181,10 @@ class FieldLayout:
             places = np.frombuffer(buffer.read(), np.float32)
         return places.reshape(self._places)[:, 1:-1, 1:-1].copy()
 
-    def write(self, buffer: moderngl.Buffer, field: NDArray[np.float32]) -> None:
+    def write(self, buffer: moderngl.Buffer, field: NDArray[np.float32] | np.float32) -> None:
         """Replace a field's texels; the halo becomes 0."""
         with self.gl:
             buffer.write(self._with_halo(field))
-
-    def clear(self, buffer: moderngl.Buffer) -> None:
-        """Make a field 0."""
-        with self.gl:
-            buffer.clear()
 
     def _with_halo(self, *fields: NDArray | np.float32) -> NDArray[np.float32]:
         places = np.zeros((len(fields), *self._places), np.float32)
@@ -236,14 +231,9 @@ class Pressure:
         with fields.gl as ctx:
             self._asked = ctx.buffer(reserve=4 * self._count)
             self.amplitudes = self._asked if rate is None else ctx.buffer(reserve=4 * self._count)
-        self.follow = None if rate is None else self._following(rate, fields)
-
-    def set(self, amplitude: Amplitude) -> None:
-        """Write what the load asks for: a number, or one for each part."""
-        with self._gl:
-            self._asked.write(np.full(self._count, amplitude, np.float32).tobytes())
-
-    def _following(self, rate: VolumeRate, fields: FieldLayout) -> Callable[[moderngl.Buffer, moderngl.Buffer], None]:
+        self.follow: Callable[[moderngl.Buffer, moderngl.Buffer], None] | None = None
+        if rate is None:
+            return
         begins, texels, heights, velocities = rate
         # the entries of each part in chunks: first and one after the last of each; where those of a part begin
         cuts = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
@@ -264,7 +254,12 @@ class Pressure:
             bind_buffers(asked, sums, first, amplitudes)
             fields.run_list(balance, count)
 
-        return follow
+        self.follow = follow
+
+    def set(self, amplitude: Amplitude) -> None:
+        """Write what the load asks for: a number, or one for each part."""
+        with self._gl:
+            self._asked.write(np.full(self._count, amplitude, np.float32).tobytes())
 
 
 class DeviceProbes:

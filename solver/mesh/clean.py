@@ -90,14 +90,30 @@ _NEEDLE = 10
 
 
 def merged_vertices(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Triangles [m, 3] in which equal positions are one vertex, the first of them; and how many cracks' ends joined."""
+    """Triangles [m, 3] in which equal positions are one vertex, the first of them; and how many cracks' ends joined.
+
+    Those are boundary vertices that lie within round-off of each other. Inside of a surface none is joined.
+    """
     used = distinct(F)
     first = np.arange(len(V))
     # + 0.0 turns -0.0 into 0.0, which are the same place
     first[used] = used[_first_equal(V[used] + 0.0)]
     F = first[F]
-    joined = _joined_cracks(V, F)
-    return joined, 0 if joined is F else len(distinct(F)) - len(distinct(joined))
+    edges = edges_of(F)
+    alone = edges.ends[edges.rim]
+    rim = np.unique(alone[alone[:, 0] != alone[:, 1]])
+    if len(rim) == 0:
+        return F, 0
+    width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
+    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
+    target = np.arange(len(V))
+    target[rim] = rim[np.unique(label, return_index=True)[1]][label]
+    # a needle is as thin as a crack, but no crack
+    lost = collapsed(target[F]) & ~collapsed(F)
+    length = np.linalg.norm(V[F[lost]] - V[np.roll(F[lost], 1, axis=1)], axis=-1).max(axis=1)
+    needles = np.isin(target, target[F[lost][length > _NEEDLE * width]])
+    joined = np.where(needles, np.arange(len(V)), target)[F]
+    return joined, len(distinct(F)) - len(distinct(joined))
 
 
 def distinct_triangles(F: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -118,27 +134,6 @@ def _first_equal(rows: NDArray) -> NDArray[np.int64]:
     first = np.empty(len(rows), dtype=np.int64)
     first[order] = order[starts][np.cumsum(starts) - 1]
     return first
-
-
-def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles with boundary vertices joined that lie within round-off of each other.
-
-    Closed surfaces never change: only boundaries are examined.
-    """
-    edges = edges_of(F)
-    alone = edges.ends[edges.rim]
-    rim = np.unique(alone[alone[:, 0] != alone[:, 1]])
-    if len(rim) == 0:
-        return F
-    width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
-    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
-    target = np.arange(len(V))
-    target[rim] = rim[np.unique(label, return_index=True)[1]][label]
-    # a needle is as thin as a crack, but no crack
-    lost = collapsed(target[F]) & ~collapsed(F)
-    length = np.linalg.norm(V[F[lost]] - V[np.roll(F[lost], 1, axis=1)], axis=-1).max(axis=1)
-    needles = np.isin(target, target[F[lost][length > _NEEDLE * width]])
-    return np.where(needles, np.arange(len(V)), target)[F]
 
 
 # Height over longest side below which three corners lie on a line: a little above the round-off of float64.
