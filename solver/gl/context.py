@@ -229,7 +229,7 @@ class GLContext:
         self._before: int | None = None
         # programs that nobody uses, by their number in OpenGL, the longest idle first; of all, the sources and the
         # uniforms that they began with
-        self._idle: dict[int, moderngl.Program] = {}
+        self._idle: dict[int, Any] = {}
         self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
         release_current()
 
