@@ -7,7 +7,6 @@ from .backend import (
 from .cpu import CPUBackend as CPUBackend, RowLayout as RowLayout
 from .gl_fields import (
     DeviceField as DeviceField,
-    Dispatch as Dispatch,
     FieldLayout as FieldLayout,
     TexelList as TexelList,
     bind_buffers as bind_buffers,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib.metadata
+import itertools
 import os
 import platform
 import time
@@ -49,7 +50,6 @@ class FluidBackend(FieldBackend):
         self._fields = RowLayout(operator.topology)
         self._h, self._v = self._fields.zeros(), self._fields.zeros()
         self._forces = np.zeros(operator.mass.size)
-        self._probes: Probes | None = None
 
     def move(self, operator: WaveOperator) -> None:
         """Refuse: this backend cannot move; see `MovingOperator`."""
@@ -191,12 +191,9 @@ def measure(gl: GLContext) -> Measured:
 
 def _seconds(backend: GLBackend | CPUBackend) -> float:
     """The least time of a frame's substeps [s]; the first, which compiles, does not count."""
-    least, count, begun = np.inf, 0, 0.0
-    while count <= _LEAST or time.perf_counter() - begun < _SPELL:
-        start = time.perf_counter()
+    ends: list[float] = []
+    while len(ends) <= _LEAST or ends[-1] - ends[0] < _SPELL:
         backend.advance(_SUBSTEPS, 1e-3)
         backend.wait()
-        now = time.perf_counter()
-        least, begun = (min(least, now - start), begun) if count else (least, now)
-        count += 1
-    return float(least)
+        ends.append(time.perf_counter())
+    return min(end - start for start, end in itertools.pairwise(ends))

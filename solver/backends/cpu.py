@@ -113,14 +113,10 @@ class RowLayout:
         """Copy of a field's texels, [C, n, n]."""
         return self.texels(field).copy()
 
-    def write(self, field: NDArray[np.float32], values: NDArray) -> None:
+    def write(self, field: NDArray[np.float32], values: NDArray | np.float32) -> None:
         """Replace a field's texels; all else becomes 0, also what was no number between charts."""
         field[:] = 0
         self.texels(field)[:] = values
-
-    def clear(self, field: NDArray[np.float32]) -> None:
-        """Make a field 0."""
-        field[:] = 0
 
     def _address(self, address: NDArray[np.int64]) -> NDArray[np.int64]:
         """From an address in [C, n + 2, n + 2] to one in a field here."""
@@ -189,7 +185,6 @@ class CPUBackend(FieldBackend):
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
-        self._probes: kernels.Probes | None = None
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 

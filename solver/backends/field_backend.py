@@ -14,7 +14,7 @@ from .gl_fields import DeviceField
 class FieldBackend:
     """Fields of one layout, each float32: height, velocity, and what stays of the height where anything does.
 
-    The layout `_fields` makes fields of zeros, reads and writes their texels, and clears them.
+    The layout `_fields` makes fields of zeros, and reads and writes their texels.
     """
 
     _operator: WaveOperator
@@ -23,6 +23,7 @@ class FieldBackend:
     _v: Any
     _dent: Any = None
     _crests: Any = None
+    _probes: Any = None
     _sums: NDArray[np.float32]
 
     def height(self) -> NDArray[np.float32]:
@@ -53,7 +54,7 @@ class FieldBackend:
             self._crests = self._fields.zeros()
         self._raise_crests()
         crests = self._fields.read(self._crests)
-        self._fields.clear(self._crests)
+        self._fields.write(self._crests, np.float32(0))
         return crests
 
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:

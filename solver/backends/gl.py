@@ -19,7 +19,7 @@ from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_li
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
-from .gl_fields import DeviceField, DeviceProbes, Dispatch, FieldLayout, Pressure, TexelList, bind_buffers, to_buffer
+from .gl_fields import DeviceField, DeviceProbes, FieldLayout, Pressure, TexelList, bind_buffers, to_buffer
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
@@ -33,8 +33,8 @@ class DeviceStiffness:
     [C, n, n] is in kg.
     """
 
-    def __init__(self, gl: GLContext, dispatch: Dispatch, stencil: MovedStencil, mass: NDArray[np.float64]) -> None:
-        self._gl, self._dispatch, self._mass = gl, dispatch, mass
+    def __init__(self, fields: FieldLayout, stencil: MovedStencil, mass: NDArray[np.float64]) -> None:
+        self._fields, self._mass, gl = fields, mass, fields.gl
         topology, texels, ride = stencil.topology, stencil.cells, stencil.places.ride
         self._width, self._count = topology.halo.shape[1], topology.halo.size
         at = texels.special_places
@@ -49,16 +49,16 @@ class DeviceStiffness:
             self._vertices = ctx.buffer(reserve=stencil.places.V.nbytes)
             self._places, self._sides = ctx.buffer(reserve=24 * self._count), ctx.buffer(reserve=24 * self._count)
             self._values, self._peak = ctx.buffer(reserve=4 * (1 + len(added))), ctx.buffer(bytes(4))
-        self._corners, self._texels = (to_buffer(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
-        self._weights, quads = to_buffer(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
+        self._corners, quads = to_buffer(gl, ride.corners, np.int32), stencil.coefficient[0]
+        self._weights = to_buffer(gl, np.nan_to_num(ride.weights), np.float64)
         self._conductance, self._per_area, self._detours, self._shares, self._masses, self._beside = (
             to_buffer(gl, each, np.float32)
             for each in (quads.conductance, quads.per_area, quads.detours, shares, mass, np.zeros(mass.size))
         )
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
-        self._shaders = {name: dispatch.shader(name) for name in names}
+        self._shaders = {name: fields.shader(name) for name in names}
         law = {name: float(getattr(cells, name)) for name in _LAW}
-        self._shaders["quads"] = dispatch.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
+        self._shaders["quads"] = fields.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
 
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
         """Write the nine-point stencil into a buffer of `FieldLayout.links`; return the irregular links."""
@@ -67,7 +67,7 @@ class DeviceStiffness:
         self._around[:, stencil.cells.special_places] = self._special[-1]
         values, of_cells = stencil.cells.special(self._around, stencil.coefficient)
         irregular = stencil.with_added(of_cells)
-        with self._gl:
+        with self._fields.gl:
             self._vertices.write(V.tobytes())
             self._values.write(values.astype(np.float32).tobytes() or bytes(4))
             self._run("ride", self._count, self._vertices, self._corners, self._weights, self._places)
@@ -84,20 +84,18 @@ class DeviceStiffness:
                 beside[irregular.texels] = np.add.reduceat(np.abs(irregular.weights), irregular.begins[:-1])
                 self._beside.write(beside.tobytes())
             self._peak.write(bytes(4))
-            buffers = buffer, self._peak, self._texels, self._shares, self._beside, self._masses
+            buffers = buffer, self._peak, self._fields.texel_addresses, self._shares, self._beside, self._masses
             self._run("link_rates", self._mass.size, *buffers, width=self._width)
             stencil.known_fastest = float(np.frombuffer(self._peak.read(), np.float32)[0])
         return irregular
 
     def _run(self, name: str, count: int, *buffers: moderngl.Buffer, **uniforms: float) -> None:
         """Run a shader over a list of so many entries, if there are any."""
-        if not count:
-            return
         shader = self._shaders[name]
         for uniform, value in uniforms.items():
             shader[uniform] = value
         bind_buffers(*buffers)
-        self._dispatch.run_list(shader, count)
+        self._fields.run_list(shader, count)
 
 
 def _link_groups(
@@ -116,9 +114,9 @@ def _link_groups(
 class StencilBuffer:
     """The nine-point stencil as the wave step reads it, and the irregular links."""
 
-    def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, stencil: Stencil) -> None:
-        self._gl, self._fields, self._dispatch = gl, fields, dispatch
-        self.buffer, self.irregular = to_buffer(gl, fields.links(stencil), np.float32), stencil.irregular
+    def __init__(self, fields: FieldLayout, stencil: Stencil) -> None:
+        self._fields = fields
+        self.buffer, self.irregular = to_buffer(fields.gl, fields.links(stencil), np.float32), stencil.irregular
         self._device: DeviceStiffness | None = None
 
     def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
@@ -127,13 +125,13 @@ class StencilBuffer:
         It can be where texels lie on their triangles, and none of them twice. A software driver's shaders run on the
         processor's own cores, where the CPU's loops take a fifth of the time.
         """
-        moved = stencil if isinstance(stencil, MovedStencil) and not self._gl.software else None
+        moved = stencil if isinstance(stencil, MovedStencil) and not self._fields.gl.software else None
         if moved and moved.places.ride.on_triangles:
             if self._device is None:
-                self._device = DeviceStiffness(self._gl, self._dispatch, moved, mass)
+                self._device = DeviceStiffness(self._fields, moved, mass)
             self.irregular = self._device.write(moved, self.buffer)
         else:
-            with self._gl:
+            with self._fields.gl:
                 self.buffer.write(self._fields.links(stencil))
             self.irregular = stencil.irregular
 
@@ -144,21 +142,21 @@ class ExtraForces:
     `field` is the sum of these forces; None for a material without any.
     """
 
-    def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, operator: WaveOperator) -> None:
-        self._gl, self._fields, self._dispatch = gl, fields, dispatch
+    def __init__(self, fields: FieldLayout, operator: WaveOperator) -> None:
+        self._fields = fields
         self._viscosity: StencilBuffer | None = None
         self._laplace: StencilBuffer | None = None
         if operator.viscosity_stencil is not None:
-            self._viscosity = StencilBuffer(gl, fields, dispatch, operator.viscosity_stencil)
-            self._apply_viscosity = dispatch.texel_shader("apply")
+            self._viscosity = StencilBuffer(fields, operator.viscosity_stencil)
+            self._apply_viscosity = fields.texel_shader("apply")
         if operator.bending is not None:
-            self._laplace = StencilBuffer(gl, fields, dispatch, operator.bending.laplace)
+            self._laplace = StencilBuffer(fields, operator.bending.laplace)
             self._rigidity, self._moment = fields.upload(operator.bending.rigidity), fields.zeros()
-            self._apply_rigidity = dispatch.texel_shader("apply", FACTOR=1)
+            self._apply_rigidity = fields.texel_shader("apply", FACTOR=1)
             added = {"ADD": 1} if self._viscosity else {}
-            self._subtract_laplace = dispatch.texel_shader("apply", SUBTRACT=1, **added)
+            self._subtract_laplace = fields.texel_shader("apply", SUBTRACT=1, **added)
         self.field = fields.zeros() if self._viscosity or self._laplace else None
-        self._irregular = dispatch.shader("irregular", KICK=0)
+        self._irregular = fields.shader("irregular", KICK=0)
         self._link(operator)
 
     def move(self, operator: WaveOperator) -> None:
@@ -175,11 +173,11 @@ class ExtraForces:
         if self.field is None:
             return
         if self._viscosity:
-            self._dispatch.fill_halo(velocity)
+            self._fields.fill_halo(velocity)
             self._apply(self._apply_viscosity, self._viscosity, self._viscosity_links, velocity, self.field)
         if self._laplace:
             self._apply(self._apply_rigidity, self._laplace, self._moment_links, height, self._moment, self._rigidity)
-            self._dispatch.fill_halo(self._moment)
+            self._fields.fill_halo(self._moment)
             self._apply(self._subtract_laplace, self._laplace, self._bending_links, self._moment, self.field)
 
     def _link(self, operator: WaveOperator) -> None:
@@ -199,11 +197,11 @@ class ExtraForces:
         field: moderngl.Buffer, result: moderngl.Buffer, *factors: moderngl.Buffer,
     ) -> None:  # fmt: skip
         bind_buffers(field, result, None, stencil.buffer, *factors)
-        self._dispatch.run_texels(shader)
+        self._fields.run_texels(shader)
         count, *buffers = links
         if count:
             bind_buffers(field, result, None, *buffers)
-            self._dispatch.run_list(self._irregular, count)
+            self._fields.run_list(self._irregular, count)
 
 
 class GLBackend(FieldBackend):
@@ -216,24 +214,21 @@ class GLBackend(FieldBackend):
         self._gl = gl if gl is not None else shared_context()
         self._operator = operator
         self._fields = fields = FieldLayout(self._gl, operator.topology)
-        self._dispatch = Dispatch(self._gl, fields)
         self._yield: moderngl.Buffer | None = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
-        self._stencil = StencilBuffer(self._gl, fields, self._dispatch, operator.stencil)
+        self._stencil = StencilBuffer(fields, operator.stencil)
         self._response = fields.upload(operator.response)
-        # a number for each part, where there are several: held by the load, and given at once
-        self._held, self._given = (
-            None if operator.parts is None else Pressure(self._gl, fields, operator, self._dispatch) for _ in range(2)
-        )
+        # a number for each part, where there are several: given at once, and held by the load
+        self._given = None if operator.parts is None else Pressure(fields, operator)
+        self._held: Pressure | None = None
         self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
-        self._extra = ExtraForces(self._gl, fields, self._dispatch, operator)
+        self._extra = ExtraForces(fields, operator)
         if operator.yield_height is not None:
             self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
-            self._yielding = self._dispatch.texel_shader("flow")
-        self._kick, self._irregular_kick = self._dispatch.shader("kick"), self._dispatch.shader("irregular", KICK=1)
-        self._drift = self._dispatch.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
+            self._yielding = fields.texel_shader("flow")
+        self._kick, self._irregular_kick = fields.shader("kick"), fields.shader("irregular", KICK=1)
+        self._drift = fields.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
         self._shift: Amplitude = 0.0
-        self._probes: DeviceProbes | None = None
         self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
@@ -268,7 +263,7 @@ class GLBackend(FieldBackend):
                 self._probes.begin(substeps)
             for step in range(substeps):
                 drift = dt if step < substeps - 1 else dt / 2
-                self._dispatch.fill_halo(self._h)
+                self._fields.fill_halo(self._h)
                 self._extra.gather(self._h, self._v)
                 if self._held is not None and self._held.follow is not None:
                     self._held.follow(self._h, self._v)
@@ -276,12 +271,12 @@ class GLBackend(FieldBackend):
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
                 operator = self._stencil.buffer, self._coefficients, self._extra.field
                 bind_buffers(self._h, self._v, self._h_next, *operator, *pressure)
-                self._dispatch.run_texels(kick_drift)
+                self._fields.run_texels(kick_drift)
                 links, *buffers = self._links
                 if links:
                     self._irregular_kick["dt"] = drift
                     bind_buffers(self._h, self._v, self._h_next, *buffers)
-                    self._dispatch.run_list(self._irregular_kick, links)
+                    self._fields.run_list(self._irregular_kick, links)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
                 if self._probes is not None:
@@ -292,7 +287,7 @@ class GLBackend(FieldBackend):
 
     def probe(self, probes: Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
-        self._probes = probes and DeviceProbes(self._gl, self._fields, self._dispatch, probes)
+        self._probes = probes and DeviceProbes(self._fields, probes)
 
     def probed(self) -> NDArray[np.float32]:
         """The sums of the latest `advance`, [substeps, k]."""
@@ -332,19 +327,19 @@ class GLBackend(FieldBackend):
             else:
                 self._given.set(self._shift)
                 bind_buffers(self._h, self._v, self._response, self._given.parts, self._given.amplitudes)
-            self._dispatch.run_texels(self._drift)
+            self._fields.run_texels(self._drift)
         self._shift = 0.0
 
     def _flow(self) -> None:
         if self._dent is not None and self._yield is not None:
             bind_buffers(self._h, self._dent, self._yield)
-            self._dispatch.run_texels(self._yielding)
+            self._fields.run_texels(self._yielding)
 
     def _raise_crests(self) -> None:
         with self._gl:
-            shader = self._dispatch.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
+            shader = self._fields.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
             bind_buffers(self._h, self._crests, self._dent)
-            self._dispatch.run_texels(shader)
+            self._fields.run_texels(shader)
 
     def _apply_kicks(self) -> None:
         with self._gl:
@@ -362,9 +357,8 @@ class GLBackend(FieldBackend):
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
             self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
             rate = volume_rate(self._operator, dt) if self.keeps_volume else None
-            if rate is not None or (self._held is not None and self._held.follow is not None):
-                needed = rate is not None or self._operator.parts is not None
-                self._held = Pressure(self._gl, self._fields, self._operator, self._dispatch, rate) if needed else None
+            several = rate is not None or self._operator.parts is not None
+            self._held = Pressure(self._fields, self._operator, rate) if several else None
             self._prepared = (dt, self.keeps_volume)
         k = self._step
         if new_length or self._load_is_new:
@@ -374,7 +368,7 @@ class GLBackend(FieldBackend):
                 self._held.set(self._acceleration)
             self._load_is_new = False
         defines = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
-        kick_drift = self._dispatch.texel_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
+        kick_drift = self._fields.texel_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
         if self._held is None:
             kick_drift["acceleration"] = self._acceleration
         if not self._maps:
@@ -385,4 +379,4 @@ class GLBackend(FieldBackend):
         if kicks.count:
             self._kick["dt"] = dt
             bind_buffers(self._h, self._v, kicks.places, kicks.values)
-            self._dispatch.run_list(self._kick, kicks.count)
+            self._fields.run_list(self._kick, kicks.count)

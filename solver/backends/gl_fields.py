@@ -90,29 +90,55 @@ class DeviceField:
         return self.read().astype(np.float32 if dtype is None else dtype, copy=False)
 
 
+# Threads of a group that works through a list.
+_LISTED = 64
+
+
 class FieldLayout:
-    """Charts with their halo, [C, n + 2, n + 2] float32.
+    """Charts with their halo, [C, n + 2, n + 2] float32, and the shaders in `shaders/` that run over them.
 
     Attributes
     ----------
-    n, count : int
-        Texels along a chart's side, and of all charts.
+    gl : GLContext
     texels : int64 [C n^2]
         Address of every texel, by flat texel index.
-    halo_pairs : moderngl.Buffer
-        (place in the halo, texel it shows), `halo_count` of them.
     """
 
     def __init__(self, gl: GLContext, topology: TexelTopology) -> None:
-        self._gl, self._places = gl, topology.halo.shape
-        self.texels, ghosts, sources = topology.addresses
-        self.n, self.count, self.halo_count = topology.shape[1], len(self.texels), len(ghosts)
-        self.halo_pairs = to_buffer(gl, np.stack([ghosts, sources], axis=1), np.int32)
+        self.gl, self._places, self._n = gl, topology.halo.shape, topology.shape[1]
+        self.texels, *halo = topology.addresses
+        # places in the halo, and the texels that they show
+        self._halo, self._halo_count = to_buffer(gl, np.stack(halo, axis=1), np.int32), len(halo[0])
+        self._fill_halo = self.shader("halo")
+
+    def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
+        """A shader that runs over a list."""
+        return self.gl.compute_shader("ripple_sim.solver.backends.shaders", name, GROUP=_LISTED, **defines)
+
+    def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
+        """A shader that runs over all texels, see charts.glsl."""
+        return self.shader(name, N=self._n, **defines)
+
+    def run_texels(self, shader: moderngl.ComputeShader) -> None:
+        """Run a shader over all texels."""
+        self.run_list(shader, len(self.texels))
+
+    def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
+        """Run a shader over a list of so many entries, of which it is told, if there are any."""
+        if count:
+            shader["count"] = count
+            shader.run(-(-count // _LISTED))
+            self.gl.barrier()
+
+    def fill_halo(self, field: moderngl.Buffer) -> None:
+        """Fill the halo of a field."""
+        bind_buffers(field, self._halo)
+        self.run_list(self._fill_halo, self._halo_count)
 
     @functools.cached_property
     def texel_addresses(self) -> moderngl.Buffer:
         """`texels`, on the GPU."""
-        return to_buffer(self._gl, self.texels, np.int32)
+        return to_buffer(self.gl, self.texels, np.int32)
 
     def zeros(self) -> moderngl.Buffer:
         """A field of zeros."""
@@ -120,7 +146,7 @@ class FieldLayout:
 
     def upload(self, *fields: NDArray | np.float32) -> moderngl.Buffer:
         """Fields [C, n, n], or numbers, one after the other, with zeros round them."""
-        with self._gl as ctx:
+        with self.gl as ctx:
             return ctx.buffer(self._with_halo(*fields))
 
     def links(self, stencil: Stencil) -> NDArray[np.float32]:
@@ -146,24 +172,19 @@ class FieldLayout:
         texels = np.stack([self.texels[links.texels], links.begins[:-1], links.begins[1:]], axis=1)
         bits = (scale * links.weights).astype(np.float32).view(np.int32)
         others = np.stack([self.texels[links.others], bits], axis=1)
-        return len(links.texels), to_buffer(self._gl, texels, np.int32), to_buffer(self._gl, others, np.int32)
+        return len(links.texels), to_buffer(self.gl, texels, np.int32), to_buffer(self.gl, others, np.int32)
 
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [C, n, n]."""
-        with self._gl:
-            self._gl.wait()
+        with self.gl:
+            self.gl.wait()
             places = np.frombuffer(buffer.read(), np.float32)
         return places.reshape(self._places)[:, 1:-1, 1:-1].copy()
 
-    def write(self, buffer: moderngl.Buffer, field: NDArray[np.float32]) -> None:
+    def write(self, buffer: moderngl.Buffer, field: NDArray[np.float32] | np.float32) -> None:
         """Replace a field's texels; the halo becomes 0."""
-        with self._gl:
+        with self.gl:
             buffer.write(self._with_halo(field))
-
-    def clear(self, buffer: moderngl.Buffer) -> None:
-        """Make a field 0."""
-        with self._gl:
-            buffer.clear()
 
     def _with_halo(self, *fields: NDArray | np.float32) -> NDArray[np.float32]:
         places = np.zeros((len(fields), *self._places), np.float32)
@@ -190,43 +211,6 @@ class TexelList:
                 self.values.write(values.astype(np.float32).tobytes())
 
 
-# Threads of a group that works through a list.
-_LISTED = 64
-
-
-class Dispatch:
-    """Runs the shaders in `shaders/` on fields of one layout."""
-
-    def __init__(self, gl: GLContext, fields: FieldLayout) -> None:
-        self._gl, self._fields = gl, fields
-        self._halo = self.shader("halo")
-
-    def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
-        """A shader that runs over a list."""
-        return self._gl.compute_shader("ripple_sim.solver.backends.shaders", name, GROUP=_LISTED, **defines)
-
-    def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
-        """A shader that runs over all texels, see charts.glsl."""
-        return self.shader(name, N=self._fields.n, **defines)
-
-    def run_texels(self, shader: moderngl.ComputeShader) -> None:
-        """Run a shader over all texels."""
-        self.run_list(shader, self._fields.count)
-
-    def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
-        """Run a shader over a list of so many entries, of which it is told."""
-        shader["count"] = count
-        shader.run(-(-count // _LISTED))
-        self._gl.barrier()
-
-    def fill_halo(self, field: moderngl.Buffer) -> None:
-        """Fill the halo of a field."""
-        count = self._fields.halo_count
-        if count:
-            bind_buffers(field, self._fields.halo_pairs)
-            self.run_list(self._halo, count)
-
-
 # Entries of a list that one group of threads adds up.
 _CHUNK = 2048
 
@@ -240,26 +224,16 @@ class Pressure:
         With a `rate`: sets the amplitudes of the coming substep by its height and velocity, so that the volume stays.
     """
 
-    def __init__(
-        self, gl: GLContext, fields: FieldLayout, operator: WaveOperator, dispatch: Dispatch,
-        rate: VolumeRate | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, fields: FieldLayout, operator: WaveOperator, rate: VolumeRate | None = None) -> None:
         numbers = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
-        self._gl, self._count = gl, int(numbers.max()) + 1
+        self._gl, self._count = fields.gl, int(numbers.max()) + 1
         self.parts = fields.upload(numbers)
-        with gl as ctx:
+        with fields.gl as ctx:
             self._asked = ctx.buffer(reserve=4 * self._count)
             self.amplitudes = self._asked if rate is None else ctx.buffer(reserve=4 * self._count)
-        self.follow = None if rate is None else self._following(rate, fields, dispatch)
-
-    def set(self, amplitude: Amplitude) -> None:
-        """Write what the load asks for: a number, or one for each part."""
-        with self._gl:
-            self._asked.write(np.full(self._count, amplitude, np.float32).tobytes())
-
-    def _following(
-        self, rate: VolumeRate, fields: FieldLayout, dispatch: Dispatch
-    ) -> Callable[[moderngl.Buffer, moderngl.Buffer], None]:
+        self.follow: Callable[[moderngl.Buffer, moderngl.Buffer], None] | None = None
+        if rate is None:
+            return
         begins, texels, heights, velocities = rate
         # the entries of each part in chunks: first and one after the last of each; where those of a part begin
         cuts = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
@@ -269,7 +243,7 @@ class Pressure:
         tables = ((fields.texels[texels], np.int32), (factors, np.float32), (chunks, np.int32), (bounds, np.int32))
         *entries, first = (to_buffer(self._gl, *each) for each in tables)
         sums = to_buffer(self._gl, np.zeros(len(chunks)), np.float32)
-        weigh, balance = dispatch.shader("volume"), dispatch.shader("volume", PARTS=1)
+        weigh, balance = fields.shader("volume"), fields.shader("volume", PARTS=1)
         # by themselves: a circle with `self` would keep buffers until Python looks for garbage
         gl, asked, amplitudes, count = self._gl, self._asked, self.amplitudes, self._count
 
@@ -278,21 +252,26 @@ class Pressure:
             weigh.run(len(chunks))
             gl.barrier()
             bind_buffers(asked, sums, first, amplitudes)
-            dispatch.run_list(balance, count)
+            fields.run_list(balance, count)
 
-        return follow
+        self.follow = follow
+
+    def set(self, amplitude: Amplitude) -> None:
+        """Write what the load asks for: a number, or one for each part."""
+        with self._gl:
+            self._asked.write(np.full(self._count, amplitude, np.float32).tobytes())
 
 
 class DeviceProbes:
     """The sums of `Probes`, one group of threads each; those of all substeps of a step are read back together."""
 
-    def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, probes: Probes) -> None:
-        self._gl, self._count, self._steps, self._room = gl, len(probes.heights), 0, 0
-        self._shaders = dispatch.shader("probe"), dispatch.shader("probe", DENT=1)
+    def __init__(self, fields: FieldLayout, probes: Probes) -> None:
+        self._gl, self._count, self._steps, self._room = fields.gl, len(probes.heights), 0, 0
+        self._shaders = fields.shader("probe"), fields.shader("probe", DENT=1)
         weights = probes.weights.astype(np.float32).view(np.int32)
         entries = np.stack([fields.texels[probes.texels], weights], axis=1)
         rows = np.stack([probes.begins[:-1], probes.begins[1:], probes.heights], axis=1)
-        self._rows, self._entries = to_buffer(gl, rows, np.int32), to_buffer(gl, entries, np.int32)
+        self._rows, self._entries = (to_buffer(fields.gl, each, np.int32) for each in (rows, entries))
 
     def begin(self, substeps: int) -> None:
         """Make room for the sums of so many substeps."""

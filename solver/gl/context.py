@@ -179,44 +179,7 @@ _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
 _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
 
-_MOST = 64  # idle at a time
-
-
-class ProgramPool:
-    """Compiled programs by their sources, with the uniforms that they began with."""
-
-    def __init__(self) -> None:
-        self._idle: dict[int, Any] = {}  # by their number in OpenGL, the longest idle first
-        self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
-
-    def take(self, sources: tuple[str, ...], compiled: Callable[[], Any]) -> Any:
-        """An idle program with its uniforms as after compilation, or else a new one; within the context."""
-        for number in reversed(self._idle):
-            known, begun = self._begun[number]
-            if known == sources:
-                program = self._idle.pop(number)
-                for name, value in begun.items():
-                    program[name].write(value)
-                return program
-        program = compiled()
-        begun = {name: program[name].read() for name in program if isinstance(program[name], moderngl.Uniform)}
-        self._begun[program.glo] = sources, begun
-        return program
-
-    def give_back(self, program: Any) -> Any:
-        """Take back a program that is used no longer; return the one to be released for it, or None.
-
-        That is the longest idle one where there are too many, and the program itself where it is unknown.
-        """
-        if program.glo not in self._begun:
-            return program
-        self._idle[program.glo] = program
-        if len(self._idle) <= _MOST:
-            return None
-        oldest = next(iter(self._idle))
-        del self._begun[oldest]
-        return self._idle.pop(oldest)
-
+_MOST = 64  # idle programs at a time
 
 # How long a thread waits for another to leave the context [s]: longer than any frame takes.
 _PATIENCE = 120.0
@@ -264,7 +227,10 @@ class GLContext:
         self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
         self._shaders: dict[str, moderngl.ComputeShader] = {}
         self._before: int | None = None
-        self._pool = ProgramPool()
+        # programs that nobody uses, by their number in OpenGL, the longest idle first; of all, the sources and the
+        # uniforms that they began with
+        self._idle: dict[int, Any] = {}
+        self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
         release_current()
 
     @property
@@ -292,8 +258,20 @@ class GLContext:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: Any) -> None:
         self._depth -= 1
         try:
-            if not self._depth:
-                self._leave(error)
+            if self._depth:
+                return
+            recorded = self._ctx.error
+            self._ctx.__exit__(None, None, None)
+            if self._before is None:
+                release_current()
+            if recorded == "GL_OUT_OF_MEMORY":
+                raise GLError(
+                    f"{self.renderer} is out of memory: take a lower resolution or smaller frames, or backend 'cpu'"
+                ) from error
+            if isinstance(error, moderngl.Error):
+                raise GLError(f"OpenGL failed on {self.renderer}: {error}; see `ripple-sim info`") from error
+            if recorded != "GL_NO_ERROR" and error is None:
+                raise GLError(f"OpenGL reported {recorded} on {self.renderer}; see `ripple-sim info`")
         finally:
             self._lock.release()
 
@@ -318,20 +296,6 @@ class GLContext:
             collected = self._ctx.objects.popleft()
             if hasattr(collected, "release"):
                 collected.release()
-
-    def _leave(self, error: BaseException | None) -> None:
-        recorded = self._ctx.error
-        self._ctx.__exit__(None, None, None)
-        if self._before is None:
-            release_current()
-        if recorded == "GL_OUT_OF_MEMORY":
-            raise GLError(
-                f"{self.renderer} is out of memory: take a lower resolution or smaller frames, or backend 'cpu'"
-            ) from error
-        if isinstance(error, moderngl.Error):
-            raise GLError(f"OpenGL failed on {self.renderer}: {error}; see `ripple-sim info`") from error
-        if recorded != "GL_NO_ERROR" and error is None:
-            raise GLError(f"OpenGL reported {recorded} on {self.renderer}; see `ripple-sim info`")
 
     def barrier(self) -> None:
         """Make what compute shaders have written visible to later commands."""
@@ -387,6 +351,8 @@ class GLContext:
     def program(self, package: str, name: str, *captured: str, **defines: object) -> moderngl.Program:
         """Compile and link the stages "vertex" and "fragment" of `{name}.glsl` below `package`; see `load_shader`.
 
+        An idle program of the same text is taken instead, its uniforms as after compilation.
+
         `VARYING` is what the one hands to the other: `out` and `in`. With `captured`, names of outputs of the
         vertex stage, there is no other, and transform feedback captures these. A shader may say `binding = N` of its
         samplers and uniform blocks, each by a name of its own: GLSL has that from 4.2 on, and here it is done.
@@ -404,16 +370,29 @@ class GLContext:
                 setattr(member, "value" if isinstance(member, moderngl.Uniform) else "binding", bindings[each])
             return program
 
+        sources = vertex, *fragment, *captured
         with self as ctx:
-            return self._pool.take((vertex, *fragment, *captured), lambda: _compiled(name, linked))
+            number = next((each for each in reversed(self._idle) if self._begun[each][0] == sources), None)
+            if number is None:
+                program = _compiled(name, linked)
+                uniforms = [each for each in program if isinstance(program[each], moderngl.Uniform)]
+                self._begun[program.glo] = sources, {each: program[each].read() for each in uniforms}
+                return program
+            for each, value in self._begun[number][1].items():
+                self._idle[number][each].write(value)
+            return self._idle.pop(number)
 
     def release(self, created: Any) -> None:
-        """Release an object; programs are kept for whoever asks for the same ones next."""
+        """Release an object; programs are kept for whoever asks for the same ones next, up to a number."""
         with self:
-            if isinstance(created, moderngl.Program):
-                created = self._pool.give_back(created)
-            if created is not None:
-                created.release()
+            if isinstance(created, moderngl.Program) and created.glo in self._begun:
+                self._idle[created.glo] = created
+                if len(self._idle) <= _MOST:
+                    return
+                oldest = next(iter(self._idle))
+                del self._begun[oldest]
+                created = self._idle.pop(oldest)
+            created.release()
 
 
 def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
@@ -435,11 +414,10 @@ def select_device(device: int | None) -> None:
         _selected = device
 
 
-def shared_context(device: int | None = None) -> GLContext:
-    """Return the process-wide context of a device (by default the selected one), created at the first call."""
+def shared_context() -> GLContext:
+    """Return the process-wide context of the selected device, created at the first call."""
     with _lock:
-        device = _selected if device is None else device
-        if device not in _shared:
-            _shared[device] = GLContext(device)
-        _shared[device].check_process()
-        return _shared[device]
+        if _selected not in _shared:
+            _shared[_selected] = GLContext(_selected)
+        _shared[_selected].check_process()
+        return _shared[_selected]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from .topology import SPLITS, distinct, labels, sides_of, turned, undirected
+from .topology import SPLITS, distinct, edges_of, labels, sides_of, turned
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,14 +90,30 @@ _NEEDLE = 10
 
 
 def merged_vertices(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Triangles [m, 3] in which equal positions are one vertex, the first of them; and how many cracks' ends joined."""
+    """Triangles [m, 3] in which equal positions are one vertex, the first of them; and how many cracks' ends joined.
+
+    Those are boundary vertices that lie within round-off of each other. Inside of a surface none is joined.
+    """
     used = distinct(F)
     first = np.arange(len(V))
     # + 0.0 turns -0.0 into 0.0, which are the same place
     first[used] = used[_first_equal(V[used] + 0.0)]
     F = first[F]
-    joined = _joined_cracks(V, F)
-    return joined, 0 if joined is F else len(distinct(F)) - len(distinct(joined))
+    edges = edges_of(F)
+    alone = edges.ends[edges.rim]
+    rim = np.unique(alone[alone[:, 0] != alone[:, 1]])
+    if len(rim) == 0:
+        return F, 0
+    width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
+    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
+    target = np.arange(len(V))
+    target[rim] = rim[np.unique(label, return_index=True)[1]][label]
+    # a needle is as thin as a crack, but no crack
+    lost = collapsed(target[F]) & ~collapsed(F)
+    length = np.linalg.norm(V[F[lost]] - V[np.roll(F[lost], 1, axis=1)], axis=-1).max(axis=1)
+    needles = np.isin(target, target[F[lost][length > _NEEDLE * width]])
+    joined = np.where(needles, np.arange(len(V)), target)[F]
+    return joined, len(distinct(F)) - len(distinct(joined))
 
 
 def distinct_triangles(F: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -120,27 +136,6 @@ def _first_equal(rows: NDArray) -> NDArray[np.int64]:
     return first
 
 
-def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles with boundary vertices joined that lie within round-off of each other.
-
-    Closed surfaces never change: only boundaries are examined.
-    """
-    edge, counts = np.unique(undirected(F)[0], return_counts=True)
-    low, high = np.divmod(edge[counts == 1], F.max() + 1)
-    rim = np.union1d(low[low != high], high[low != high])
-    if len(rim) == 0:
-        return F
-    width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
-    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
-    target = np.arange(len(V))
-    target[rim] = rim[np.unique(label, return_index=True)[1]][label]
-    # a needle is as thin as a crack, but no crack
-    lost = collapsed(target[F]) & ~collapsed(F)
-    length = np.linalg.norm(V[F[lost]] - V[np.roll(F[lost], 1, axis=1)], axis=-1).max(axis=1)
-    needles = np.isin(target, target[F[lost][length > _NEEDLE * width]])
-    return np.where(needles, np.arange(len(V)), target)[F]
-
-
 # Height over longest side below which three corners lie on a line: a little above the round-off of float64.
 _FLAT = 1e-12
 _ROUNDS = 64
@@ -151,13 +146,13 @@ def without_slivers(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, 
 
     What bordered on the longest side of one gets the middle corner.
     """
-    flat = _flat(V, corners.F)[0]
+    flat, length = _flat(V, corners.F)
     before = int(flat.sum())
     for _ in range(_ROUNDS):
         if not flat.any():
             return corners, before
-        corners = _round(V, corners)
-        flat = _flat(V, corners.F)[0]
+        corners = _without_longest(V, corners, flat, length)
+        flat, length = _flat(V, corners.F)
     return corners.kept(~flat), before
 
 
@@ -169,16 +164,15 @@ def _flat(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.bool
     return twice_area <= _FLAT * length.max(axis=1) ** 2, length
 
 
-def _round(V: NDArray[np.float64], corners: Corners) -> Corners:
-    """Take out slivers of which no two are neighbours, the longest first."""
-    F = corners.F
-    flat, length = _flat(V, F)
-    longest = length.argmax(axis=1)
+def _without_longest(
+    V: NDArray[np.float64], corners: Corners, flat: NDArray[np.bool_], length: NDArray[np.float64]
+) -> Corners:
+    """Take out slivers of which no two are neighbours, the longest first; of the two arrays see `_flat`."""
+    F, longest = corners.F, length.argmax(axis=1)
     rank = np.full(len(F), -1)
     rank[np.lexsort((length.max(axis=1), flat))] = np.arange(len(F))
     rank[~flat] = -1
-    key = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=-1), axis=-1) @ [len(V), 1]
-    edge = np.unique(key, return_inverse=True)[1].reshape(-1, 3)
+    edge = edges_of(F).of
     highest = np.full(edge.max() + 1, -1)
     np.maximum.at(highest, edge, np.repeat(rank[:, None], 3, axis=1))
     out = flat & (highest[edge] == rank[:, None]).all(axis=1)

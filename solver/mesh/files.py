@@ -64,10 +64,8 @@ def repaired(soup: Soup, name: str) -> Mesh:
     if not finite.all():
         dropped = f"{counted(int((~finite).sum()), 'triangle')} with vertices that are NaN or infinite dropped"
         mesh = dataclasses.replace(mesh, notes=(dropped, *mesh.notes))
-    return mesh if mesh.closed else _closed(mesh)
-
-
-def _closed(mesh: Mesh) -> Mesh:
+    if mesh.closed:
+        return mesh
     if importlib.util.find_spec("pymeshfix") is None:
         holes = f"{counted(sum(map(len, mesh.rims)), 'boundary edge')} round {counted(len(mesh.rims), 'hole')}"
         raise MeshError(f"{mesh.name} is open: {holes}; for --repair, run {_INSTALL}")
@@ -80,10 +78,10 @@ def _closed(mesh: Mesh) -> Mesh:
         raise MeshError(f"{mesh.name}: pymeshfix cannot repair it ({error})") from error
     lids = np.append(vertices, len(mesh.V) + np.arange(len(new_V)))[lids]
     V = np.vstack([mesh.V, new_V])
-    uv = None
-    if mesh.uv is not None and mesh.corner_uv is not None:
+    uv = mesh.corner_uv
+    if uv is not None and mesh.uv is not None:
         rim = np.concatenate(mesh.rims)
-        uv = np.concatenate([mesh.corner_uv, mesh.uv[rim[cKDTree(V[rim]).query(V[lids])[1]]]])
+        uv = np.concatenate([uv, mesh.uv[rim[cKDTree(V[rim]).query(V[lids])[1]]]])
     result = Mesh.from_arrays(V, np.vstack([mesh.F, lids]), uv, mesh.name)
     return dataclasses.replace(result, notes=(*mesh.notes, *_told(mesh, result), *result.notes))
 

@@ -24,7 +24,16 @@ from .clean import (
     without_slivers,
 )
 from .sheets import cut_apart
-from .topology import corner_angles, distinct, labels, sides_of, triangle_areas, triangles_beside
+from .topology import (
+    corner_angles,
+    distinct,
+    labels,
+    normalized,
+    sides_of,
+    triangle_areas,
+    triangle_normals,
+    triangles_beside,
+)
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
 _STEPS = 300
@@ -36,12 +45,12 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     At tips and knife edges that mean may point into a triangle. There the direction is taken that is nearest to the
     farthest of the triangles' normals (Aubry and Loehner 2008), if it is better.
     """
-    normal = _unit(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
+    normal = triangle_normals(V, F)
     total = np.zeros_like(V)
     for k, angle in enumerate(corner_angles(V, F).T):
         for axis in range(3):
             total[:, axis] += np.bincount(F[:, k], weights=angle * normal[:, axis], minlength=len(V))
-    mean = np.where(np.linalg.norm(total, axis=1, keepdims=True) > 0, _unit(total), [0.0, 0.0, 1.0])
+    mean = np.where(np.linalg.norm(total, axis=1, keepdims=True) > 0, normalized(total), [0.0, 0.0, 1.0])
     vertex, triangle = F.ravel(), np.repeat(np.arange(len(F)), 3)
     steep = np.flatnonzero(_worst(mean, vertex, normal[triangle]) < _STEEP)
     if not len(steep):
@@ -54,7 +63,7 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
         order = np.lexsort((np.einsum("ij,ij->i", middle[vertex], beside), vertex))
         farthest = order[np.searchsorted(vertex[order], np.arange(len(middle)))]
         middle += (beside[farthest] - middle) / (i + 1)
-    middle = _unit(middle)
+    middle = normalized(middle)
     better = _worst(middle, vertex, beside) > _worst(mean[steep], vertex, beside)
     mean[steep[better]] = middle[better]
     return mean
@@ -65,12 +74,6 @@ def _worst(normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArr
     worst = np.full(len(normal), np.inf)
     np.minimum.at(worst, vertex, np.einsum("ij,ij->i", normal[vertex], beside))
     return worst
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vectors [n, 3] scaled to length 1; those without length stay as they are."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(length > 0, length, 1)
 
 
 # Lengths whose squares and cubes are far from the limits of float64, in either direction.
@@ -269,7 +272,12 @@ def _cleaned(
     first_given = distinct(corners.F)
     compact = np.searchsorted(first_given, corners.F)
     points, corners, cuts = cut_apart(V[first_given], Corners(compact, corners.given, corners.uv), first_given)
-    merges, splits = _changes(corners)
+    # how many vertices became one with others, and how many came to be by cutting
+    vertices, given = corners.F.max() + 1, corners.given.ravel()
+    old = given >= 0
+    pairs = distinct(given[old] * vertices + corners.F.ravel()[old])
+    kept = len(distinct(pairs % vertices))
+    merges, splits = len(pairs) - kept, len(pairs) - len(distinct(given[old])) + int(vertices) - kept
     turned, turns = oriented(points, corners)
     said = {
         f"{counted(merges - joined, 'duplicate vertex')} merged": merges > joined,
@@ -282,15 +290,6 @@ def _cleaned(
     # of a surface that was cut before, equal positions are merged and cut again, which nobody needs to know
     notes += cuts if merges or splits else []
     return points, turned, (*notes, *turns)
-
-
-def _changes(corners: Corners) -> tuple[int, int]:
-    """How many vertices became one with others, and how many came to be by cutting."""
-    vertices, given = corners.F.max() + 1, corners.given.ravel()
-    old = given >= 0
-    pairs = distinct(given[old] * vertices + corners.F.ravel()[old])
-    kept = len(distinct(pairs % vertices))
-    return len(pairs) - kept, len(pairs) - len(distinct(given[old])) + int(vertices) - kept
 
 
 # A surface that encloses less, relative to the cube of its size, has no inside.

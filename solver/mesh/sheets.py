@@ -39,8 +39,6 @@ def matched(
     -------
     int64 [pair_count, 2]
     """
-    if len(sides) == 0:
-        return np.empty((0, 2), dtype=np.int64)
     key, forward = undirected(F)
     forward = forward ^ np.repeat(flip, 3)
     sides = sides[np.argsort(key[sides], kind="stable")]
@@ -155,7 +153,13 @@ def join_sides(
     order = np.argsort(key, kind="stable")
     first, size = _runs(key[order])
     of_crowded = order[np.repeat(size > 2, size)]
-    firm, cost = _firm(order, first[size == 2], of_crowded, undirected(corners.given)[0])
+    # pairs that belong together without a choice, and what it costs to join them
+    firm, given = order[first[size == 2][:, None] + [0, 1]], undirected(corners.given)[0]
+    cost = np.where(given[firm[:, 0]] == given[firm[:, 1]], 0.0, _APART)
+    by_given = of_crowded[np.argsort(given[of_crowded], kind="stable")]
+    begins, length = _runs(given[by_given])
+    shared = by_given[begins[length == 2][:, None] + [0, 1]]
+    firm, cost = np.vstack([firm, shared]), np.append(cost, np.zeros(len(shared)))
     middle = V[corners.F].mean(axis=1)
     cost = cost + np.linalg.norm(np.diff(middle[firm // 3], axis=1)[:, 0], axis=1) / np.ptp(V, axis=0).max()
     against = forward[firm[:, 0]] == forward[firm[:, 1]]
@@ -171,24 +175,6 @@ def join_sides(
         flip ^= (2 * np.bincount(sheet, weights=flip) > np.bincount(sheet))[sheet]
         pairs = np.vstack([pairs, matched(V, corners.F, of_crowded[free[of_crowded]], sheet, flip)])
     return pairs, order[first[size > 2]], firm[apart][:, 0]
-
-
-def _firm(
-    order: NDArray[np.int64], twos: NDArray[np.int64], of_crowded: NDArray[np.int64], given: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Pairs that belong together without a choice, and what it costs to join them.
-
-    Sides are in order of their edges, `twos` the first of those that lie by twos; `given` are the edges as given.
-    """
-    pairs = order[np.stack([twos, twos + 1], axis=1)]
-    cost = np.where(given[pairs[:, 0]] == given[pairs[:, 1]], 0.0, _APART)
-    if len(of_crowded) == 0:
-        return pairs, cost
-    by_given = of_crowded[np.argsort(given[of_crowded], kind="stable")]
-    first, size = _runs(given[by_given])
-    first = first[size == 2]
-    shared = by_given[np.stack([first, first + 1], axis=1)]
-    return np.vstack([pairs, shared]), np.append(cost, np.zeros(len(shared)))
 
 
 # Where a vertex is put into an edge, counted from the lower one: not in the middle, where another may lie already.
@@ -214,9 +200,15 @@ def cut_apart(
         What was cut.
     """
     pairs, crowded, one_sided = join_sides(V, corners)
-    fan = _fans(corners.F, pairs)
+    # the fan of triangles to which each corner belongs: corners are linked over joined sides
+    start, end = corners.F.ravel(), np.roll(corners.F, -1, axis=1).ravel()
+    following = np.roll(np.arange(len(start)).reshape(-1, 3), -1, axis=1).ravel()
+    (one, two), (one_end, two_end) = pairs.T, following[pairs.T]
+    same_way = start[one] == start[two]
+    ends = np.where(same_way, two, two_end), np.where(same_way, two_end, two)
+    fan = labels(np.hstack([(one, ends[0]), (one_end, ends[1])]).T, len(start))
     vertex = np.empty(fan.max() + 1, dtype=np.int64)
-    vertex[fan] = corners.F.ravel()
+    vertex[fan] = start
     whole = np.bincount(vertex, minlength=len(V))[vertex] == 1
     lowest = np.full(len(vertex), corners.given.max() + 1)
     np.minimum.at(lowest, fan, corners.given.ravel())
@@ -230,22 +222,11 @@ def cut_apart(
         notes.append(f"cut apart along {counted(len(crowded), 'edge')} where more than two triangles met")
     if len(one_sided):
         notes.append(f"cut open along {counted(len(one_sided), 'edge')}: one-sided, like a Moebius band")
-    start, end, touched = corners.F.ravel(), np.roll(corners.F, -1, axis=1).ravel(), np.append(crowded, one_sided)
+    touched = np.append(crowded, one_sided)
     pinched = np.setdiff1d(vertex[~whole], np.append(start[touched], end[touched]))
     if len(pinched):
         notes.append(f"cut apart at {counted(len(pinched), 'vertex')} where the surface touched itself")
     return V, cut, notes
-
-
-def _fans(F: NDArray[np.int64], pairs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Fan of triangles to which each corner belongs, numbered by first occurrence: corners linked over joined sides."""
-    start = F.ravel()
-    next_corner = np.arange(len(start)).reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    one, two = pairs.T
-    same_way = start[one] == start[two]
-    ends = np.where(same_way, two, next_corner[two]), np.where(same_way, next_corner[two], two)
-    links = np.concatenate([np.stack([one, ends[0]], axis=1), np.stack([next_corner[one], ends[1]], axis=1)])
-    return labels(links, len(start))
 
 
 def _without_double_edges(
@@ -256,8 +237,7 @@ def _without_double_edges(
     mate = np.arange(F.size)
     mate[pairs[:, 0]], mate[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
     leader = np.minimum(np.arange(F.size), mate)
-    a, b = F.ravel(), np.roll(F, -1, axis=1).ravel()
-    key = np.minimum(a, b) * len(V) + np.maximum(a, b)
+    key, forward = undirected(F)
     order = np.lexsort((leader, key))
     lead = leader[order]
     again = order[lead != lead[np.repeat(*_runs(key[order]))]]
@@ -266,7 +246,7 @@ def _without_double_edges(
     leaders, number = np.unique(leader[again], return_inverse=True)
     point, given = np.full((2, *F.shape), -1)
     point.flat[again] = len(V) + number
-    low, high = np.minimum(a, b)[leaders], np.maximum(a, b)[leaders]
+    low, high = np.divmod(key[leaders], F.max() + 1)
     between = (1 - _BETWEEN) * V[low] + _BETWEEN * V[high]
-    share = np.where(a < b, _BETWEEN, 1 - _BETWEEN).reshape(F.shape)
+    share = np.where(forward, _BETWEEN, 1 - _BETWEEN).reshape(F.shape)
     return np.vstack([V, between]), corners.split(point, given, share)

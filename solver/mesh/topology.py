@@ -59,6 +59,17 @@ def triangle_areas(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
+def triangle_normals(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Unit normals of triangles, shape [m, 3]; zero where a triangle has no area."""
+    return normalized(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
+
+
+def normalized(vectors: NDArray) -> NDArray[np.float64]:
+    """Unit vectors of vectors [..., k]; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1.0)
+
+
 def corner_angles(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
     """Angles of triangles at their corners [rad], [m, 3]."""
     corners, angles = V[F], np.empty(F.shape)
@@ -78,19 +89,15 @@ def counting_sort(key: Ints, order: Ints, size: int) -> tuple[Ints, Ints]:
     return rows.indptr.astype(np.int64), rows.data
 
 
-def _turned_pattern(pattern: list[list[int]], k: int) -> list[list[int]]:
-    """The pattern for a triangle that is turned by k corners."""
-    return [[(x + k) % 3 + 3 * (x >= 3) for x in piece] for piece in pattern]
-
-
-_ONE = [[0, 3, 2], [3, 1, 2]]  # side 0 is cut
-_TWO = [[3, 1, 4], [0, 3, 4], [0, 4, 2]]  # sides 0 and 1
-
 # For each set of cut sides of a triangle (1 for side 0, 2 for side 1, 4 for side 2, added up) the triangles that take
 # its place: 0 to 2 are its corners, 3 to 5 the points on its sides.
 SPLITS = {
-    **{1 << k: _turned_pattern(_ONE, k) for k in range(3)},
-    **{(1 << k) + (1 << (k + 1) % 3): _turned_pattern(_TWO, k) for k in range(3)},
+    1: [[0, 3, 2], [3, 1, 2]],
+    2: [[1, 4, 0], [4, 2, 0]],
+    4: [[2, 5, 1], [5, 0, 1]],
+    3: [[3, 1, 4], [0, 3, 4], [0, 4, 2]],
+    6: [[4, 2, 5], [1, 4, 5], [1, 5, 0]],
+    5: [[5, 0, 3], [2, 5, 3], [2, 3, 1]],
     7: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
 }
 

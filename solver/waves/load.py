@@ -116,18 +116,17 @@ class HeldLoad:
     """
 
     def __init__(self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance) -> None:
-        self._backend, self._balance = backend, balance
-        self._shape, self._size, self._share = share.shape, share.size, share.reshape(-1)
+        self._backend, self._balance, self._share = backend, balance, share
         self.load = self._uploaded = Load.none()
 
     def forces(self) -> NDArray[np.float64]:
         """Forces held at every texel [N], positive inwards, [C, n, n]."""
-        forces = np.bincount(self.load.texels, self.load.forces, self._size).astype(np.float64, copy=False)
-        return forces.reshape(self._shape)
+        forces = np.bincount(self.load.texels, self.load.forces, self._share.size)
+        return forces.astype(np.float64, copy=False).reshape(self._share.shape)
 
     def add(self, load: Load) -> None:
         """Hold a load beside what is held."""
-        self.load = Load.together([self.load, load]).merged(self._size)
+        self.load = Load.together([self.load, load]).merged(self._share.size)
 
     def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
         """What balances the momenta of a source on some texels, or forces, outwards, where volume is conserved."""
@@ -149,8 +148,8 @@ class HeldLoad:
         load = self.load if extra is None else Load.together([self.load, extra])
         if load is self._uploaded or not (len(load.texels) or len(self._uploaded.texels)):
             return None
-        once = load.merged(self._size)
-        forces = -once.forces * self._share[once.texels]
+        once = load.merged(self._share.size)
+        forces = -once.forces * self._share.reshape(-1)[once.texels]
         total = -float(forces.sum())
         if not np.isfinite(total):
             raise SolverError(f"the forces of a load add up to {total!r} N; valid are finite numbers")

@@ -70,7 +70,18 @@ class Motion:
         self._squares = squares  # another array: copies have the one before
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
         self.__dict__.pop("areas", None)
-        self._warn_of_folds()
+        self._looks += 1
+        if self._warned or self._looks % _EVERY != 1:
+            return self._now
+        count = self._folds.count(self.V)
+        if count:
+            self._warned = True
+            warnings.warn(
+                f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over or without area; "
+                "waves there are wrong: move the vertices less, or use a stiffer body",
+                RippleWarning,
+                stacklevel=3,
+            )
         return self._now
 
     @functools.cached_property
@@ -104,20 +115,6 @@ class Motion:
         if not np.isfinite(V).all():
             raise SolverError(f"{(~np.isfinite(V)).sum()} numbers of the vertices are not finite; valid are metres")
         return V
-
-    def _warn_of_folds(self) -> None:
-        self._looks += 1
-        if self._warned or self._looks % _EVERY != 1:
-            return
-        count = self._folds.count(self.V)
-        if count:
-            self._warned = True
-            warnings.warn(
-                f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over or without area; "
-                "waves there are wrong: move the vertices less, or use a stiffer body",
-                RippleWarning,
-                stacklevel=4,
-            )
 
 
 @kernel

@@ -194,7 +194,19 @@ class Sensor:
         until = int(np.floor((self._latest - self.latency - self._start) * self.rate * (1 + 1e-12)))
         if until < self._next:
             return
-        times, spans, values = self._understood()
+        # all that is kept and was heard: times, their spans, and values
+        spans = np.concatenate([np.full(len(sums), dt) for _, dt, sums in self._heard])
+        times = np.concatenate([time + dt * np.arange(1, len(sums) + 1) for time, dt, sums in self._heard])
+        values = np.concatenate([sums for *_, sums in self._heard]).astype(np.float64)
+        self._heard.clear()
+        last, self._last = self._last, values[-1]
+        if self.kind == "acceleration":  # they lie between two substeps
+            times, values = times - spans / 2, np.diff(values, axis=0, prepend=last[None]) / spans[:, None]
+        elif self._next == 0:
+            times, spans = np.append(self._start, times), np.append(spans[:1], spans)
+            values = np.concatenate([last[None], values])
+        known = zip(self._kept, (times, spans, values), strict=True)
+        times, spans, values = (np.concatenate(each) for each in known)
         at = self._start + np.arange(self._next, until + 1) / self.rate
         blocks = [at[i : i + _TOGETHER] for i in range(0, len(at), _TOGETHER)]
         made = [filtered(times, spans, values, block, self._base).astype(np.float32) for block in blocks]
@@ -202,21 +214,6 @@ class Sensor:
         self._next = until + 1
         kept = np.searchsorted(times, self._start + self._next / self.rate - self.latency)
         self._kept = times[kept:], spans[kept:], values[kept:]
-
-    def _understood(self) -> tuple[NDArray, NDArray, NDArray]:
-        """All that is kept and was heard: times, their spans, and values; accelerations lie between two substeps."""
-        steps = [np.full(len(sums), dt) for _, dt, sums in self._heard]
-        times = np.concatenate([time + dt * np.arange(1, len(sums) + 1) for time, dt, sums in self._heard])
-        spans, values = np.concatenate(steps), np.concatenate([sums for *_, sums in self._heard]).astype(np.float64)
-        self._heard.clear()
-        last, self._last = self._last, values[-1]
-        if self.kind == "acceleration":
-            times, values = times - spans / 2, np.diff(values, axis=0, prepend=last[None]) / spans[:, None]
-        elif self._next == 0:
-            times, spans = np.append(self._start, times), np.append(spans[:1], spans)
-            values = np.concatenate([last[None], values])
-        before = self._kept
-        return np.append(before[0], times), np.append(before[1], spans), np.concatenate([before[2], values])
 
 
 def filtered(times: NDArray, spans: NDArray, values: NDArray, at: NDArray, rate: float) -> NDArray[np.float64]:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ripple_sim.solver.mesh.queries import RayScene
-from ripple_sim.solver.mesh.topology import edges_of, undirected
+from ripple_sim.solver.mesh.topology import edges_of, labels, normalized, triangle_normals, undirected
 
 _ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex
 
@@ -65,8 +63,7 @@ def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[n
     # a triangle without area bends nowhere
     even = (np.einsum("ij,ij->i", a, b) >= np.cos(np.radians(crease)) - 1e-9) | ~a.any(axis=1) | ~b.any(axis=1)
     pairs = np.stack([corners[one[even]], corners[other[even]]], axis=1).reshape(-1, 2, 2)
-    i, j = pairs[:, 0].ravel(), pairs[:, 1].ravel()
-    return connected_components(coo_array((np.ones(len(i)), (i, j)), shape=(F.size, F.size)), directed=False)[1]
+    return labels(pairs.swapaxes(1, 2).reshape(-1, 2), F.size)
 
 
 def _weighted(V: NDArray, F: NDArray) -> NDArray[np.float64]:
@@ -79,17 +76,6 @@ def _weighted(V: NDArray, F: NDArray) -> NDArray[np.float64]:
 def _sums(weighted: NDArray[np.float64], group: NDArray, count: int) -> NDArray[np.float64]:
     """Unit sums of vectors [k, 3] that belong to the same of `count` groups [k]."""
     return normalized(np.stack([np.bincount(group, column, count) for column in weighted.T], axis=1))
-
-
-def triangle_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:
-    """Unit normals of triangles, shape [m, 3]; zero where a triangle has no area."""
-    return normalized(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
-
-
-def normalized(vectors: NDArray) -> NDArray[np.float64]:
-    """Unit vectors of vectors [..., k]; zero stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(length > 0, length, 1.0)
 
 
 _RAYS = 1_000_000

@@ -5,7 +5,7 @@ import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, WaveSolver, build_atlas, sphere_atlas, texel_atlas
-from ripple_sim.solver.backends import Dispatch, FieldLayout, TexelList, bind_buffers
+from ripple_sim.solver.backends import FieldLayout, TexelList, bind_buffers
 from ripple_sim.solver.gl import GLContext, shared_context
 
 pytestmark = pytest.mark.usefixtures("opengl")
@@ -25,16 +25,15 @@ def field(texels: TexelMesh, seed: int) -> np.ndarray:
 def test_a_list_is_run_to_its_last_entry_and_not_beyond(count: int) -> None:
     gl, texels = shared_context(), square(15)
     layout = FieldLayout(gl, texels.topology)
-    dispatch = Dispatch(gl, layout)
     h, v = field(texels, 3), field(texels, 4)
     kicks = np.random.default_rng(5).standard_normal(225).astype(np.float32)
     with gl as ctx:
         height, velocity = layout.upload(h), layout.upload(v)
         places = ctx.buffer(layout.texels.astype(np.int32).tobytes())
-        shader = dispatch.shader("kick")
+        shader = layout.shader("kick")
         shader["dt"] = 0.5
         bind_buffers(height, velocity, places, ctx.buffer(kicks.tobytes()))
-        dispatch.run_list(shader, count)
+        layout.run_list(shader, count)
     kicks[count:] = 0
     np.testing.assert_allclose(layout.read(velocity).ravel(), v.ravel() + kicks, rtol=1e-6)
     np.testing.assert_allclose(layout.read(height).ravel(), h.ravel() + 0.5 * kicks, rtol=1e-5, atol=1e-6)
