@@ -52,7 +52,7 @@ class Exporter:
     tessellation : str
         "refined": surfaces with triangles as fine as their texels, or "own": the object's own.
     triangles : int
-        About how many a refined surface may have.
+        About how many a refined surface may have; in a page at most 16,000.
     size : (width, height)
         Of the frames that the camera is meant for [pixels].
     limit : bool

@@ -30,7 +30,7 @@ class ExportOptions(SceneOptions):
     tessellation: Literal["refined", "own"] = "refined"
     """Triangles of rippling surfaces: as fine as their texels, or the object's own."""
     triangles: int = MOST_TRIANGLES
-    """About how many triangles a refined surface may have."""
+    """About how many triangles a refined surface may have; a page has at most 16,000."""
     signals: bool = False
     """Write the samples of the scene's sensors, in place of impulses (.csv, .parquet)."""
     sound: bool = False

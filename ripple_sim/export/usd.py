@@ -6,6 +6,7 @@ a root layer joins. Metadata tell a file made here from others.
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from collections.abc import Callable, Sequence
@@ -149,6 +150,7 @@ class Chunks:
 _SENSOR = 0.024  # height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
 _TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
 _NEAR, _FAR = 0.01, 1000.0  # of the camera's distance
+_PACKED = 315_619_200  # time of the files in a .usdz, 1980-01-02, so that the same run gives the same bytes
 _KEPT = 8  # so many frames are kept in memory, and then appended to the file
 
 
@@ -222,6 +224,8 @@ class UsdWriter:
             case ".usda":
                 succeed(self._stage.GetRootLayer().Export, str(self._path))
             case ".usdz":
+                for packed in (self._binary, *self._images.glob("*")):
+                    os.utime(packed, (_PACKED, _PACKED))
                 succeed(UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path))
                 shutil.rmtree(self._images, ignore_errors=True)  # they are in the package now
         if self._binary != self._path:

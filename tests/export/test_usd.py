@@ -2,6 +2,7 @@
 
 import math
 import subprocess
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,9 @@ def test_stage_is_valid_in_metres_with_z_up_and_a_time_code_a_frame(run: Any) ->
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, FRAMES - 1)
     assert stage.GetTimeCodesPerSecond() == stage.GetFramesPerSecond() == FPS
     assert stage.GetDefaultPrim().GetPath() == "/World"
+    path = stage.GetRootLayer().realPath
+    packed = zipfile.ZipFile(path).infolist() if path.endswith(".usdz") else []
+    assert all(file.date_time[0] == 1980 for file in packed)  # the same bytes whenever it is written
 
 
 def test_points_and_velocities_are_ours_at_every_frame_to_a_millionth(run: Any) -> None:
