@@ -277,6 +277,11 @@ def named_collision_geoms(
     found = {}
     for name, keys in by_name(model, contacts, "contacts").items():
         target = find_any(model, name)
+        if is_soft(model, target):
+            raise SceneError(
+                f"contacts names {name!r}, a flex or a skin, for which no geoms can be chosen: a flex takes the "
+                "contacts of its own vertices, a skin those of the bodies of its bones"
+            )
         if target not in rippling:
             raise SceneError(
                 f"contacts names geom {name!r}, which does not ripple; the rippling geoms are "

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv
 
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Load
 from ripple_sim.solver.errors import POSITIVE, shown
 from ripple_sim.solver.kernel import Floats, Ints
@@ -29,6 +28,7 @@ from .contacts import ColliderIds, Contacts, normal_rows
 from .energy import impedance
 from .geoms import ByGeom, find_any, for_each
 from .model import CoupledModel
+from .stepping import warn_caller
 
 PULSES = ("contact", "hertz")
 
@@ -260,10 +260,8 @@ class Hits:
                 self._told.add(radius)
                 names, owners = self._coupled.names, self._coupled.owners
                 hit, hits = names[owners[self._target]], names[owners[other]]
-                warnings.warn(
-                    f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {radius}",
-                    RippleWarning,
-                    stacklevel=7,
+                warn_caller(
+                    f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {radius}"
                 )
             return 0.0
         # how long two elastic bodies touch: Johnson, equation 11.24, whose factor is 2.87, with

@@ -7,19 +7,18 @@ itself. The contacts of flex colliders are loads by the sum of their whole force
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
 from .geoms import ENDLESS, find_collision_geoms, geom_name, rotation_in_body
 from .soft import SoftSurface, is_soft, soft_names
+from .stepping import warn_caller
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
 SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
@@ -321,12 +320,10 @@ class FlexContacts:
                 continue
             self._warned.add(target)
             name, share = self._names[target], self._amounts[target, 1] / self._amounts[target, 0]
-            warnings.warn(
+            warn_caller(
                 f"the impulses on geom {name!r} are wrong by about {share:.1%}: MuJoCo pushes sideways what touches "
                 "its flex, where a geom has sunk in or edges and corners meet; use a shorter time step, no override of "
-                f'contact margins, or make_collidable(spec, {name!r}, "sdf")',
-                RippleWarning,
-                stacklevel=8,
+                f'contact margins, or make_collidable(spec, {name!r}, "sdf")'
             )
 
 

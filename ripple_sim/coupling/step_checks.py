@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,10 +14,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
 from ripple_sim.solver.kernel import Floats, Ints
 
 from .model import SPECULATIVE, CoupledModel
+from .stepping import warn_caller
 
 _SAFE = 0.85
 # Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
@@ -82,7 +81,7 @@ class TunnellingCheck:
         if times.min(initial=np.inf) < self._told / _WORSE:
             worst = int(times.argmin())
             self._told = float(times[worst])
-            warnings.warn(self._message(int(rows[worst]), float(speeds[worst])), RippleWarning, stacklevel=4)
+            warn_caller(self._message(int(rows[worst]), float(speeds[worst])))
 
     def _message(self, i: int, speed: float) -> str:
         model, names, timestep = self._model, self._names, self._model.opt.timestep
@@ -221,13 +220,11 @@ class SolverBalance:
             return
         self._warned.add(target)
         option = self._model.opt
-        warnings.warn(
+        warn_caller(
             f"the impulses on geom {self._names[target]!r} are wrong by about {missing / whole:.1%}: MuJoCo's solver "
             f"stopped before contact forces and accelerations agreed, as happens where masses differ by many orders; "
             f"set option tolerance to 1e-14 or less (it is {option.tolerance:.2g}) and iterations to 1000 (it is "
-            f"{option.iterations})",
-            RippleWarning,
-            stacklevel=6,
+            f"{option.iterations})"
         )
 
 
@@ -262,10 +259,8 @@ class WrapCheck:
                 if steps >= _TOUCHED and whole > _WRAPPED * moving:
                     self._flexes.discard(target)
                     flex, other = (repr(self._names[each]) for each in (self._owners[target], owner))
-                    warnings.warn(
+                    warn_caller(
                         f"flex {flex} wraps round {other}: its impulses are {whole / moving:.2f} times what that "
-                        "loses, for forces on its slopes press it, but cancel as vectors; mj_contactForce has these",
-                        RippleWarning,
-                        stacklevel=5,
+                        "loses, for forces on its slopes press it, but cancel as vectors; mj_contactForce has these"
                     )
                     break

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import inspect
 import random
 import re
 import threading
@@ -195,6 +196,14 @@ def _count(nstep: int = 1) -> int:
     return nstep
 
 
+def warn_caller(message: str) -> None:
+    """Give a `RippleWarning` with the line of the user's that led here, through however many of this package's."""
+    frame, level = inspect.currentframe(), 1
+    while frame and frame.f_globals.get("__name__", "").split(".")[0] in ("ripple_sim", "contextlib"):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, RippleWarning, stacklevel=level)
+
+
 def adopt_warnings() -> None:
     """Have MuJoCo's warnings given as `RippleWarning`, from now on, each once.
 
@@ -218,7 +227,7 @@ def _tell(message: str) -> None:
         return
     _said.add(kind)
     with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
-        warnings.warn(f"MuJoCo: {text}", RippleWarning, stacklevel=2)
+        warn_caller(f"MuJoCo: {text}")
 
 
 @contextlib.contextmanager

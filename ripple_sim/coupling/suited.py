@@ -7,7 +7,6 @@ are fine enough for what touches it and coarse enough for the time step.
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -15,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.operator.presets import (
     BOUNCE,
@@ -30,6 +29,7 @@ from ripple_sim.solver.texels.thickness import half_thickness_at
 from .geoms import find_target
 from .model import CoupledModel
 from .soft import SoftSurface, is_soft
+from .stepping import warn_caller
 from .target_mesh import target_mesh
 
 # Waves cross the target in the first time and fall to a tenth in the second [s].
@@ -300,12 +300,10 @@ def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent) -> None:
     reduced = _reduced_masses(coupled, geom)
     heavy, light = max(_resting(coupled, geom), float(reduced.max())), float(reduced[reduced > 0].min(initial=np.inf))
     if heavy > _HEAVY * light:
-        warnings.warn(
+        warn_caller(
             f"the surface of geom {coupled.names[geom]!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
             f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is "
-            "suited to them",
-            RippleWarning,
-            stacklevel=7,
+            "suited to them"
         )
 
 

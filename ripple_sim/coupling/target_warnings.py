@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 
 import igl
@@ -17,13 +16,13 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Atlas, Material, WaveSolver
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.texels.thickness import half_thickness
 
 from .geoms import TARGET_TYPES
 from .model import CoupledModel, flex_thickness
+from .stepping import warn_caller
 from .suited import Extent, bearing_density
 from .target_mesh import mesh_arrays, primitive_triangles
 
@@ -286,11 +285,9 @@ class AmplitudeCheck:
 
     def _warn(self, geom: int) -> None:
         watch = self._watched.pop(geom)
-        warnings.warn(
+        warn_caller(
             f"the waves on geom {self._coupled.names[geom]!r} are {watch.what}; pictures show them limited. "
-            + self._advice(geom, watch.waves, _MARGIN * watch.needed),
-            RippleWarning,
-            stacklevel=5,
+            + self._advice(geom, watch.waves, _MARGIN * watch.needed)
         )
 
     def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:
