@@ -6,6 +6,7 @@ handed to it, at places on its surface.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -45,10 +46,10 @@ class Contacts(NamedTuple):
         """Some of the contacts."""
         return Contacts(self.others[which], self.points[which], self.forces[which], self.normals[which])
 
-    def by_other(self) -> list[Contacts]:
-        """The contacts with each geom."""
-        starts = first_rows(self.others).tolist()
-        return [self.rows(slice(a, b)) for a, b in zip(starts, [*starts[1:], None], strict=True)]
+    def split(self, ids: Ints) -> dict[int, Contacts]:
+        """The contacts of each id, from the ids of all, [k], ascending."""
+        bounds = [*first_rows(ids).tolist(), len(ids)]
+        return {int(ids[a]): self.rows(slice(a, b)) for a, b in itertools.pairwise(bounds)}
 
     @classmethod
     def together(cls, parts: Sequence[Contacts]) -> Contacts:
@@ -64,15 +65,6 @@ def first_rows(*sorted_ids: NDArray) -> Ints:
     for ids in sorted_ids:
         begins[1:] |= ids[1:] != ids[:-1]
     return begins.nonzero()[0]
-
-
-def by_target(targets: Ints, contacts: Contacts) -> dict[int, Contacts]:
-    """Contacts by target, from those on all targets, [k], sorted by these."""
-    if len(targets) and targets[0] == targets[-1]:
-        return {int(targets[0]): contacts}
-    starts = first_rows(targets)
-    bounds = [*starts.tolist(), len(targets)]
-    return {target: contacts.rows(slice(*bounds[i : i + 2])) for i, target in enumerate(targets[starts].tolist())}
 
 
 def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) -> tuple[Ints, Ints, Ints, Ints]:
@@ -213,23 +205,20 @@ class ColliderIds:
         found = np.where(geom >= 0, self._of_geom[geom], self._of_flex[flex])
         contact, side = np.nonzero((geom < 0) & (found < 0))
         if len(contact):
-            flex, vertex = flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
-            of_element = vertex < 0
-            vertex[of_element] = self._nearest_vertices(data, contact[of_element], side[of_element])
-            found[contact, side] = self._model.ngeom + self._model.flex_vertadr[flex] + vertex
+            model, flex, vertex = self._model, flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
+            of_element = np.flatnonzero(vertex < 0)
+            elements, first = data.contact.elem[contact, side][of_element], model.flex_vertadr[flex]
+            dim = model.flex_dim[flex[of_element]]
+            # the last corner of an element stands for those that it has not
+            corner = np.minimum(np.arange(4), dim[:, None])
+            begins = model.flex_elemdataadr[flex[of_element]] + (dim + 1) * elements
+            vertices = model.flex_elem[begins[:, None] + corner]
+            places = data.flexvert_xpos[first[of_element, None] + vertices]
+            distances = np.linalg.norm(places - data.contact.pos[contact[of_element], None], axis=2)
+            vertex[of_element] = vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
+            found[contact, side] = model.ngeom + first + vertex
         found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
         return found
-
-    def _nearest_vertices(self, data: mujoco.MjData, contact: Ints, side: Ints) -> Ints:
-        """Vertices of the contacts' elements, counted from the first of their flex, that are nearest to them, [k]."""
-        model, flex, element = self._model, data.contact.flex[contact, side], data.contact.elem[contact, side]
-        dim = model.flex_dim[flex]
-        # the last corner of an element stands for those that it has not
-        corner = np.minimum(np.arange(4), dim[:, None])
-        vertices = model.flex_elem[(model.flex_elemdataadr[flex] + (dim + 1) * element)[:, None] + corner]
-        places = data.flexvert_xpos[model.flex_vertadr[flex, None] + vertices]
-        distances = np.linalg.norm(places - data.contact.pos[contact, None], axis=2)
-        return vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
 
 
 # Cosine between the normals of a contact and of the surface, above which the surface faces the contact.
@@ -356,7 +345,7 @@ class ContactReader:
             factors = np.repeat(factors, np.diff(np.append(starts, len(forces))))
             found = found._replace(forces=factors * forces).rows(factors != 0)
             targets = targets[factors != 0]
-        return by_target(targets, found)
+        return found.split(targets)
 
     def _flex_contacts(
         self, flexes: FlexContacts, data: mujoco.MjData, colliders: NDArray[np.integer]
@@ -369,7 +358,7 @@ class ContactReader:
         normal, friction = (read(model, data, contacts) for read in (normal_forces, friction_forces))
         forces = np.column_stack([normal - data.contact.adhesion[contacts], friction])
         kept, *loads = flexes.loads(data, *rows, first_rows(targets, others), forces)
-        return by_target(targets[kept], Contacts(others[kept], *loads))
+        return Contacts(others[kept], *loads).split(targets[kept])
 
     def _hand_over(self, data: mujoco.MjData, found: dict[int, Contacts]) -> None:
         """Hand every contact of a collision geom to one target: where several share the geom, to the nearest."""

@@ -171,24 +171,23 @@ class CoupledModel:
         """Geoms whose contacts are those of this one: itself, or of a target those that collide for it."""
         return self._collision_geoms.get(geom, (geom,))
 
-    def masks_match(self, geom: int) -> NDArray[np.bool_]:
-        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it, also as a pair."""
-        model, types, affinities = self.model, self._contype, self._conaffinity
-        found, pairs = np.zeros(model.ngeom, dtype=np.bool_), (model.pair_geom1, model.pair_geom2)
-        for each in self.collision_geoms(geom):
-            found |= (types[each] & affinities | types & affinities[each]) != 0
-            for one, two in (pairs, pairs[::-1]):
-                found[two[one == each]] = True
-        return found
-
     def are_still(self, data: mujoco.MjData, colliders: Sequence[int]) -> bool:
         """Whether all sleep or are static, so that they press as before; vertices between bodies never sleep."""
         bodies = self.bodies[list(colliders)]
         return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
 
     def can_collide(self, geom: int) -> NDArray[np.bool_]:
-        """The same on bodies that are not welded to that of this geom."""
-        return self.masks_match(geom) & self._apart(geom)
+        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it, also as a pair.
+
+        They are on bodies that are not welded to that of this geom.
+        """
+        model, types, affinities = self.model, self._contype, self._conaffinity
+        found, pairs = np.zeros(model.ngeom, dtype=np.bool_), (model.pair_geom1, model.pair_geom2)
+        for each in self.collision_geoms(geom):
+            found |= (types[each] & affinities | types & affinities[each]) != 0
+            for one, two in (pairs, pairs[::-1]):
+                found[two[one == each]] = True
+        return found & self._apart(geom)
 
     def out_of_touch(self, geom: int) -> bool:
         """Whether there are geoms or flexes that collide, but none that meets those that collide for this geom."""
@@ -237,18 +236,28 @@ class FlexContacts:
     """
 
     def __init__(self, coupled: CoupledModel, meshes: Mapping[int, Mesh]) -> None:
-        model, flexes, count = coupled.model, coupled.flex_colliders, len(coupled.owners)
-        self.is_target, self._is_sheet = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        model, flexes, ids = coupled.model, coupled.flex_colliders, len(coupled.owners)
+        self.is_target, self._is_sheet = np.zeros((2, ids), dtype=np.bool_)
         self._extents, self._names = coupled.extents, coupled.names
         # outward unit normals of all triangles, in the frames of the geoms, and the row of a target's first one
-        self._normals, self._first = np.zeros((model.nflexelem, 3)), np.full(count, -1)
+        self._normals, self._first = np.zeros((model.nflexelem, 3)), np.full(ids, -1)
         for geom in flexes.keys() & meshes.keys():
-            first = model.flex_elemadr[flexes[geom]]
-            normals = _outward_normals(model, geom, flexes[geom], meshes[geom])
-            self._normals[first : first + len(normals)] = normals
-            self._first[geom], self.is_target[geom], self._is_sheet[geom] = first, True, not meshes[geom].closed
+            flex, mesh = flexes[geom], meshes[geom]
+            first, begin, count = model.flex_elemadr[flex], model.flex_elemdataadr[flex], model.flex_elemnum[flex]
+            F, V = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3), mesh.V
+            if not np.array_equal(F, mesh.F):
+                # a flex not made by `make_collidable`
+                own = model.flex_vert[model.flex_vertadr[flex] :][: model.flex_vertnum[flex]]
+                V = own @ rotation_in_body(model, geom)
+            corners = V[F]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            # they point outwards where the volume that they enclose is positive
+            outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0])) if mesh.closed else 1.0
+            normals = outward * normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+            self._normals[first : first + count] = normals
+            self._first[geom], self.is_target[geom], self._is_sheet[geom] = first, True, not mesh.closed
         # amounts of the sums of forces [N], and the part of them that neither a normal force nor friction explains
-        self._amounts, self._warned = np.zeros((count, 2)), set[int]()
+        self._amounts, self._warned = np.zeros((ids, 2)), set[int]()
 
     def loads(
         self, data: mujoco.MjData, contacts: Ints, sides: Ints, targets: Ints, others: Ints, starts: Ints, along: Floats
@@ -325,17 +334,3 @@ class FlexContacts:
                 "its flex, where a geom has sunk in or edges and corners meet; use a shorter time step, no override of "
                 f'contact margins, or make_collidable(spec, {name!r}, "sdf")'
             )
-
-
-def _outward_normals(model: mujoco.MjModel, geom: int, flex: int, mesh: Mesh) -> NDArray[np.float64]:
-    """Outward unit normals of a surface at the triangles of its flex, in the geom's frame, [element_count, 3]."""
-    first, count = model.flex_elemdataadr[flex], model.flex_elemnum[flex]
-    F, V = model.flex_elem[first : first + 3 * count].reshape(-1, 3), mesh.V
-    if not np.array_equal(F, mesh.F):
-        # a flex not made by `make_collidable`
-        V = model.flex_vert[model.flex_vertadr[flex] :][: model.flex_vertnum[flex]] @ rotation_in_body(model, geom)
-    corners = V[F]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # they point outwards where the volume that they enclose is positive
-    outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0])) if mesh.closed else 1.0
-    return outward * normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
