@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -34,7 +35,7 @@ from .stepping import (
     warn_caller,
 )
 from .target_warnings import AmplitudeCheck, collision_warnings
-from .targets import Target, Targets
+from .targets import Targets
 from .two_way import TwoWay
 
 __all__ = ["Impulse", "Ripples"]
@@ -283,8 +284,9 @@ class Ripples(Targets):
             self._two_way.settle()
         self._check_amplitude()
 
-    def _waves_changed(self, target: Target) -> None:
-        super()._waves_changed(target)
+    def _change(self, name: GeomKey, **changes: Any) -> None:
+        super()._change(name, **changes)
+        target = self._target(name)
         self._loads.waves_changed(target.geom)
         self._check_amplitude.waves_changed(target.geom, target.waves)
         if target.geom in self._high_pass:

@@ -78,14 +78,12 @@ class TunnellingCheck:
             return
         rows, speeds = too_fast(self._pairs, self._model, data, _EVERY)
         times = self._pairs["limit"][rows] / speeds
-        if times.min(initial=np.inf) < self._told / _WORSE:
-            worst = int(times.argmin())
-            self._told = float(times[worst])
-            warn_caller(self._message(int(rows[worst]), float(speeds[worst])))
-
-    def _message(self, i: int, speed: float) -> str:
+        if not times.min(initial=np.inf) < self._told / _WORSE:
+            return
+        worst = int(times.argmin())
+        self._told, speed = float(times[worst]), float(speeds[worst])
         model, names, timestep = self._model, self._names, self._model.opt.timestep
-        target, other, limit, _, stopping_time = self._pairs[i].item()
+        target, other, limit, _, stopping_time = self._pairs[rows[worst]].item()
         body = model.body(int(model.geom_bodyid[other])).name or names[other]
         needed = limit / speed - stopping_time
         # MuJoCo keeps a contact's time constant at two time steps or more
@@ -96,7 +94,7 @@ class TunnellingCheck:
             advice = f"use a time step of {shortest:.2g} s or less, and a solref of twice that"
         else:
             advice = f'use a solref of "{np.e * (limit / speed - timestep):.2g} 1" or less for both'
-        return (
+        warn_caller(
             f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through it, get stuck or "
             f"give a wrong impulse: with a time step of {timestep:.2g} s it sinks in by "
             f"{speed * (timestep + stopping_time):.2g} m, of which {limit:.2g} m are safe; {advice}"

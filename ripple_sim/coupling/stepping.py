@@ -77,7 +77,13 @@ class StepClock:
         """What happened since the last look."""
         time, timestep = float(data.time), float(model.opt.timestep)
         before, longest = self._time, max(timestep, self._timestep)
-        reset = not self._mark_stands(model, data) or (before is not None and time < before)
+        reset = before is not None and time < before
+        if not model.opt.enableflags & _FWDINV:
+            found = float(data.solver_fwdinv[0])
+            if not found < 0:  # a mark is made where there is none, and one that others made is taken over
+                found = data.solver_fwdinv[0] = -1.0 - _random.random()
+            reset = reset or self._mark not in (None, found)
+            self._mark = found
         self._time, self._timestep = time, timestep
         if before is None or reset:
             return Passed(timestep if time else 0.0, reset=reset)
@@ -88,18 +94,6 @@ class StepClock:
         steps = round(elapsed / timestep)
         elapsed = steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
         return Passed(elapsed, max(round(elapsed / longest) - 1, 0))
-
-    def _mark_stands(self, model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-        """Whether the mark is still there. Makes one where there is none, and takes over one that others made."""
-        if model.opt.enableflags & _FWDINV:
-            return True
-        found = float(data.solver_fwdinv[0])
-        if not found < 0:
-            found = -1.0 - _random.random()
-            data.solver_fwdinv[0] = found
-        stands = self._mark is None or found == self._mark
-        self._mark = found
-        return stands
 
 
 def missed_warning(missed: int) -> str | None:

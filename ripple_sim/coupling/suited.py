@@ -275,37 +275,20 @@ def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material
     _, footprint = heaviest(coupled, geom)
     resolved = _TEXELS * spacing / footprint if 0 < footprint < np.inf else 0.0
     n = int(np.clip(_STEP * np.ceil(resolved / _STEP), USUAL, MOST))
-    while n > LEAST and _substeps(material, spacing / n, coupled.model.opt.timestep) > _SUBSTEPS:
+    speed, bending, viscosity, stiffness = (
+        float(np.max(getattr(material, name))) for name in ("speed", "bending", "viscosity", "stiffness")
+    )
+    while n > LEAST:
+        eigenvalue = (2 / (_STABLE * (spacing / n))) ** 2
+        wave, viscous = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness, viscosity * eigenvalue
+        if coupled.model.opt.timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4 <= _SUBSTEPS:
+            break
         n -= _STEP
     return n
 
 
-def _substeps(material: Material, spacing: float, timestep: float) -> float:
-    """Substeps of a physics step at a spacing of the texels [m]."""
-    speed, bending, viscosity, stiffness = (
-        float(np.max(getattr(material, name))) for name in ("speed", "bending", "viscosity", "stiffness")
-    )
-    eigenvalue = (2 / (_STABLE * spacing)) ** 2
-    wave = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness
-    viscous = viscosity * eigenvalue
-    return timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
-
-
 # Rings of a body so many times as light as what the surface is to bear are not seen.
 _HEAVY = 100.0
-
-
-def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent) -> None:
-    """Warn of a target that is made so heavy for a heavy body that hits of a light one will not be seen."""
-    reduced = _reduced_masses(coupled, geom)
-    heavy, light = max(_resting(coupled, geom), float(reduced.max())), float(reduced[reduced > 0].min(initial=np.inf))
-    if heavy > _HEAVY * light:
-        warn_caller(
-            f"the surface of geom {coupled.names[geom]!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
-            f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is "
-            "suited to them"
-        )
-
 
 _SOFT = 64  # resolution of flexes and skins
 
@@ -336,8 +319,16 @@ def suited_targets(
     for name in left:
         extent = Extent.of(target_mesh(model, geoms[name]))
         suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
-        if "density" in materials[name].unset:
-            _tell_heavy(coupled, geoms[name], extent)
+        if "density" in materials[name].unset:  # it may be made so heavy that hits of a light body will not be seen
+            reduced = _reduced_masses(coupled, geoms[name])
+            heavy = max(_resting(coupled, geoms[name]), float(reduced.max()))
+            light = float(reduced[reduced > 0].min(initial=np.inf))
+            if heavy > _HEAVY * light:
+                warn_caller(
+                    f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as {light:.2g} "
+                    f"kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is suited "
+                    "to them"
+                )
         if name not in texels:
             texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
     return suited, texels

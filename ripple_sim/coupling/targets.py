@@ -275,8 +275,4 @@ class Targets:
         """Change a target's material, options or what is held, see `Target`; if that fails, nothing has changed."""
         target = self._target(name).rebuilt(**changes)
         self._targets[target_name(self.model, target.geom)] = target
-        self._waves_changed(target)
-
-    def _waves_changed(self, target: Target) -> None:
-        """Hand a target's new waves to everybody."""
         self._waves[target.geom] = target.waves

@@ -166,6 +166,7 @@ class TwoWay:
                 self._targets_of.setdefault(geom, []).append(target)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[list(self._targets_of)] = True
+        # the waves of each target, and two solvers to try things on
         self._trials: dict[int, tuple[WaveSolver, WaveSolver, WaveSolver]] = {}
         self.clear()
 
@@ -218,7 +219,7 @@ class TwoWay:
         for key, point, normal in reached:
             forces[key] = self._push(data, solved, pairs[key], point, normal, dt, pending=pending)
         self._forces = forces
-        self._velocity_change.note(data)
+        self._velocity_change.latest = data.qvel.copy()
         self._before = self._heights
         loads: dict[int, list[Load]] = {}
         for key, force in forces.items():
@@ -306,7 +307,15 @@ class TwoWay:
         for target in dict.fromkeys(target for target, _ in self._places):
             places = {key: place for key, place in self._places.items() if key[0] == target}
             held = {key: self._forces.get(key, 0.0) for key in places}
-            waves, trial, rest = self._with_trials(target)
+            waves = self._waves[target]
+            of, *trials = self._trials.get(target, (None,))
+            # what moves gets another operator
+            if of is not waves or trials[0].operator is not waves.operator:
+                trials = [copy.copy(waves), copy.copy(waves)]
+                self._trials[target], self._mobilities = (waves, *trials), {}
+            for each in trials:
+                each.conserve_volume = waves.conserve_volume
+            trial, rest = trials
             trial.state = waves.state
             loads = [Load(place.load.texels, held[key] * place.load.forces) for key, place in places.items()]
             trial.step(dt, load=Load.together(loads))
@@ -337,18 +346,6 @@ class TwoWay:
                 found = -place.mean(velocity) / dt, max(-place.mean(height) / dt**2, 0.0)
                 self._mobilities[key] = these, found
         return {key: self._mobilities[key][1] for key in places}
-
-    def _with_trials(self, target: int) -> tuple[WaveSolver, WaveSolver, WaveSolver]:
-        """A target's waves, and two solvers to try things on."""
-        waves = self._waves[target]
-        of, *trials = self._trials.get(target, (None,))
-        # what moves gets another operator
-        if of is not waves or trials[0].operator is not waves.operator:
-            self._trials[target] = waves, copy.copy(waves), copy.copy(waves)
-            self._mobilities = {}
-        for trial in self._trials[target][1:]:
-            trial.conserve_volume = waves.conserve_volume
-        return self._trials[target]
 
     # What happens to the bodies
 
