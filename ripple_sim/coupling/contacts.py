@@ -178,49 +178,6 @@ def adhesion(model: mujoco.MjModel, data: mujoco.MjData) -> Floats | None:
     return pulls
 
 
-class ColliderIds:
-    """Collider ids of the two sides of every contact, see `CoupledModel`."""
-
-    def __init__(self, coupled: CoupledModel) -> None:
-        self._model = model = coupled.model
-        self._plain = not (model.nflex or coupled.convex_colliders or coupled.soft)
-        self._of_geom = np.arange(model.ngeom)
-        # geom that a flex collides for, or itself where it is a target; -1 for none, and after the last flex
-        self._of_flex = np.full(model.nflex + 1, -1)
-        for geom, parts in coupled.convex_colliders.items():
-            self._of_geom[parts] = geom
-        for geom, flex in coupled.flex_colliders.items():
-            self._of_flex[flex] = geom
-        for target, surface in coupled.soft.items():
-            self._of_geom[surface.geoms] = target
-            if surface.flex >= 0:
-                self._of_flex[surface.flex] = target
-
-    def __call__(self, data: mujoco.MjData) -> NDArray[np.integer]:
-        """Collider ids, [ncon, 2]; of a contact with an element of a flex, of the vertex nearest to the contact."""
-        geom = data.contact.geom
-        if self._plain:
-            return geom
-        flex = data.contact.flex
-        found = np.where(geom >= 0, self._of_geom[geom], self._of_flex[flex])
-        contact, side = np.nonzero((geom < 0) & (found < 0))
-        if len(contact):
-            model, flex, vertex = self._model, flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
-            of_element = np.flatnonzero(vertex < 0)
-            elements, first = data.contact.elem[contact, side][of_element], model.flex_vertadr[flex]
-            dim = model.flex_dim[flex[of_element]]
-            # the last corner of an element stands for those that it has not
-            corner = np.minimum(np.arange(4), dim[:, None])
-            begins = model.flex_elemdataadr[flex[of_element]] + (dim + 1) * elements
-            vertices = model.flex_elem[begins[:, None] + corner]
-            places = data.flexvert_xpos[first[of_element, None] + vertices]
-            distances = np.linalg.norm(places - data.contact.pos[contact[of_element], None], axis=2)
-            vertex[of_element] = vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
-            found[contact, side] = model.ngeom + first + vertex
-        found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
-        return found
-
-
 # Cosine between the normals of a contact and of the surface, above which the surface faces the contact.
 _FACING = 0.25
 
@@ -286,7 +243,6 @@ class ContactReader:
         meshes = {target: atlas.mesh for target, atlas in self._atlases.items()}
         for geom in coupled.flex_colliders.keys() & self._targets_of.keys():
             meshes[geom] = target_mesh(coupled.model, geom)
-        self._colliders = ColliderIds(coupled)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._targets_of, *coupled.soft]] = True
         self._check_solver, self._check_wraps = SolverBalance(coupled), WrapCheck(coupled)
@@ -302,10 +258,8 @@ class ContactReader:
         """
         found: dict[int, Contacts] = {}
         if data.ncon:
-            colliders = self._colliders(data)
-            found = self._geom_contacts(data, colliders)
-            if self._flexes is not None:
-                found |= self._flex_contacts(self._flexes, data, colliders)
+            colliders = self._coupled.colliders(data)
+            found = self._geom_contacts(data, colliders) | self._flex_contacts(data, colliders)
             if self._targets_of.keys() & found.keys():
                 self._hand_over(data, found)
         self._check_solver(data, found)
@@ -347,11 +301,11 @@ class ContactReader:
             targets = targets[factors != 0]
         return found.split(targets)
 
-    def _flex_contacts(
-        self, flexes: FlexContacts, data: mujoco.MjData, colliders: NDArray[np.integer]
-    ) -> dict[int, Contacts]:
+    def _flex_contacts(self, data: mujoco.MjData, colliders: NDArray[np.integer]) -> dict[int, Contacts]:
         """The same of targets with a flex collider, by theirs."""
-        model = self._coupled.model
+        model, flexes = self._coupled.model, self._flexes
+        if flexes is None:
+            return {}
         rows = contacts, _, targets, others = pair_rows(colliders, data.contact.efc_address >= 0, flexes.is_target)
         if not len(contacts):
             return {}
@@ -372,6 +326,5 @@ class ContactReader:
             nearest = np.linalg.norm(np.array(placed) - contacts.points, axis=2).argmin(axis=0)
             for i, target in enumerate(self._targets_of[geom]):
                 if (nearest == i).any():
-                    own = [found[target]] if target in found else []
                     mine = contacts._replace(points=placed[i]).rows(nearest == i)
-                    found[target] = Contacts.together([*own, mine])
+                    found[target] = Contacts.together([found[target], mine]) if target in found else mine

@@ -84,9 +84,7 @@ def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
     Raises `SceneError` if there is nothing of that name, or a geom's type has no closed surface.
     """
     geom = find_any(model, key)
-    if is_soft(model, geom):
-        return geom
-    if int(model.geom_type[geom]) not in TARGET_TYPES:
+    if not is_soft(model, geom) and int(model.geom_type[geom]) not in TARGET_TYPES:
         kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
         raise SceneError(f"geom {key!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}")
     return geom

@@ -24,7 +24,7 @@ from ripple_sim.solver import Atlas, Load
 from ripple_sim.solver.errors import POSITIVE, shown
 from ripple_sim.solver.kernel import Floats, Ints
 
-from .contacts import ColliderIds, Contacts, normal_rows
+from .contacts import Contacts, normal_rows
 from .energy import impedance
 from .geoms import ByGeom, find_any, for_each
 from .model import CoupledModel
@@ -205,7 +205,6 @@ class Hits:
 
     def __init__(self, coupled: CoupledModel, target: int, modulus: float) -> None:
         self._coupled, self._target, self._modulus = coupled, target, modulus
-        self._colliders = ColliderIds(coupled)
         self._pulses: list[Pulse] = []
         self._told: set[str] = set()
 
@@ -232,7 +231,7 @@ class Hits:
         float
             Impulse that the target gets by the pulse [N s], positive inwards.
         """
-        other, colliders = int(pair.others[0]), self._colliders(data)
+        other, colliders = int(pair.others[0]), self._coupled.colliders(data)
         ours = np.isin(colliders, [self._target, *self._coupled.collision_geoms(self._target)])
         touching = (ours[:, ::-1] & (colliders == other)).any(axis=1) & (data.contact.efc_address >= 0)
         hit = foreseen(self._coupled.model, data, touching.nonzero()[0])

@@ -82,7 +82,7 @@ class SleepingContacts:
                 continue
             if self._coupled.are_still(data, key):
                 mean = pair._replace(forces=pair.forces * (sum(sums) / len(sums) / pair.forces.sum()))
-                found[key[0]] = Contacts.together([*([found[key[0]]] if key[0] in found else []), mean])
+                found[key[0]] = Contacts.together([found[key[0]], mean]) if key[0] in found else mean
             else:
                 sums.append(0.0)
                 if not any(sums):

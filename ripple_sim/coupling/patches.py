@@ -184,9 +184,8 @@ class Footprints:
     def __init__(self, atlas: Atlas, movable: NDArray[np.bool_]) -> None:
         self._movable = movable
         self._place_on(atlas)
-        self._geoms, self._points = np.zeros(0, np.int64), np.zeros((0, 3))
-        # radii as they were asked for, and how far point and radius may move before a footprint is made anew [m]
-        self._radii, self._tolerances = np.zeros(0), np.zeros(0)
+        # geoms, points, radii as they were asked for, and how far these two may move before one is made anew [m]
+        self._made: tuple[NDArray, ...] = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
         # of each, as `under` gives them
         self._under: list[tuple[Ints, Floats]] = []
 
@@ -194,7 +193,8 @@ class Footprints:
         """Go on where the surface is now: footprints ride on their texels."""
         first, before = [texels[0] for texels, _ in self._under], self._grid.positions
         self._place_on(atlas)
-        self._points = self._points + self._grid.positions[first] - before[first]
+        geoms, points, *sizes = self._made
+        self._made = geoms, points + self._grid.positions[first] - before[first], *sizes
 
     def _place_on(self, atlas: Atlas) -> None:
         self._atlas, self._grid = atlas, atlas.texels.grid
@@ -214,11 +214,10 @@ class Footprints:
         active : bool [c]
             Geoms that touch, have lost touch only now, or have yet to give an impulse: their footprints are kept.
         """
-        made = self._geoms, self._points, self._radii, self._tolerances
-        rows, touching = np.full(len(geoms) + len(self._geoms), -1), np.zeros(len(active), np.bool_)
-        rows = rows[: _serving(geoms, points, radii, *made, active, touching, rows)]
+        rows, touching = np.full(len(geoms) + len(self._under), -1), np.zeros(len(active), np.bool_)
+        rows = rows[: _serving(geoms, points, radii, *self._made, active, touching, rows)]
         new = (rows < 0).nonzero()[0]
-        rows[new] = len(self._geoms) + np.arange(len(new))
+        rows[new] = len(self._under) + np.arange(len(new))
         under, tolerances = self._under, np.zeros(0)
         if len(new):
             grid = self._grid
@@ -229,10 +228,8 @@ class Footprints:
             under = [*under, *((texels[first:last], shares[first:last]) for first, last in ends)]
             tolerances = SAME_PLACE * np.sqrt(grid.areas[centres])
         self._under = [under[row] for row in rows.tolist()]
-        self._geoms = np.concatenate([self._geoms, geoms[new]])[rows]
-        self._points = np.concatenate([self._points, points[new]])[rows]
-        self._radii = np.concatenate([self._radii, radii[new]])[rows]
-        self._tolerances = np.concatenate([self._tolerances, tolerances])[rows]
+        added = geoms[new], points[new], radii[new], tolerances
+        self._made = tuple(np.concatenate(each)[rows] for each in zip(self._made, added, strict=True))
         return self._under[: len(geoms)]
 
 

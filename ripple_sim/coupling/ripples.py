@@ -147,8 +147,7 @@ class Ripples(Targets):
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
                 'impulses are off by some per cent; use integrator="implicitfast", or a short time step'
             )
-        hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in moduli.items()}
-        self._loads = ContactLoads(coupled, self._waves, hits)
+        self._loads = ContactLoads(coupled, self._waves, {geom: Hits(coupled, geom, e) for geom, e in moduli.items()})
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._two_way = TwoWay(coupled, self._waves) if two_way else None

@@ -104,10 +104,8 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     if not material.unset:
         return material
     speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    if "stiffness" in material.unset:
-        stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(coupled.model))
-    else:
-        stiffness = float(np.min(material.stiffness))
+    narrow = "stiffness" in material.unset
+    stiffness = _stiffness(coupled.model, extent, speed) if narrow else float(np.min(material.stiffness))
     density = _density_under(coupled, geom, extent, speed, stiffness)
     if density == 0:
         density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
@@ -161,9 +159,9 @@ def _density_under(
     )
 
 
-def _stiffest(model: mujoco.MjModel) -> float:
-    """Greatest stiffness that the time step resolves [1/s^2]."""
-    return float(min((_STIFFEST / model.opt.timestep) ** 2, 1e12))
+def _stiffness(model: mujoco.MjModel, extent: Extent, speed: float) -> float:
+    """With which dents are narrow, but no more than the time step resolves [1/s^2]."""
+    return float(min(narrow_stiffness(extent.size, speed), (_STIFFEST / model.opt.timestep) ** 2, 1e12))
 
 
 def _density(mass: float, extent: Extent) -> float:
@@ -309,8 +307,8 @@ def suited_targets(
             if materials[name].unset:
                 # by its size and the mass of its bodies: what may hit it is not looked at
                 speed, mass = _speed(model, extent), float(model.body_mass[surface.bodies].sum())
-                stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(model))
-                suited[name] = _filled_in(materials[name], speed, stiffness, _density(mass, extent))
+                stiffness, density = _stiffness(model, extent, speed), _density(mass, extent)
+                suited[name] = _filled_in(materials[name], speed, stiffness, density)
             texels.setdefault(name, _SOFT)
     left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:

@@ -22,7 +22,7 @@ from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
-from .contacts import ColliderIds, pair_rows, places_facing, points_outside
+from .contacts import pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
 from .geoms import ENDLESS, TARGET_TYPES
 from .model import CoupledModel
@@ -154,7 +154,7 @@ class TwoWay:
 
     def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
         self._coupled, self._waves = coupled, waves
-        self._colliders, model = ColliderIds(coupled), coupled.model
+        model = coupled.model
         # geoms that may come within reach of each target, and the targets that each geom collides for
         self._reachable: dict[int, list[int]] = {}
         self._targets_of: dict[int, list[int]] = {}
@@ -167,14 +167,14 @@ class TwoWay:
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[list(self._targets_of)] = True
         # the waves of each target, and two solvers to try things on
-        self._trials: dict[int, tuple[WaveSolver, WaveSolver, WaveSolver]] = {}
+        self._trials: dict[int, tuple[WaveSolver, ...]] = {}
         self.clear()
 
     def clear(self) -> None:
         """Forget all contacts."""
         self._velocity_change = VelocityChange(self._coupled.model)
         self._places: dict[Key, _Place] = {}
-        self._mobilities: dict[Key, tuple[tuple[_Place, ...], tuple[float, float]]] = {}
+        self._mobilities: dict[int, tuple[tuple[_Place, ...], dict[Key, tuple[float, float]]]] = {}
         self._forces: dict[Key, float] = {}
         self._paid: dict[Key, float] = {}
         self._before: dict[int, NDArray[np.float32]] = {}
@@ -243,7 +243,7 @@ class TwoWay:
         if not data.ncon:
             return found
         bears = data.contact.efc_address >= 0
-        rows = contacts, _, geoms, others = pair_rows(self._colliders(data), bears, self._is_read)
+        rows = contacts, _, geoms, others = pair_rows(self._coupled.colliders(data), bears, self._is_read)
         points, normals = points_outside(data, *rows, self._coupled.extents)
         ids = zip(contacts.tolist(), geoms.tolist(), others.tolist(), strict=True)
         for (i, geom, other), at, normal in zip(ids, points, normals, strict=True):
@@ -319,33 +319,27 @@ class TwoWay:
             trial.state = waves.state
             loads = [Load(place.load.texels, held[key] * place.load.forces) for key, place in places.items()]
             trial.step(dt, load=Load.together(loads))
-            mobilities = self._mobilities_of(places, rest, dt)
+            # velocity under each place, at the end of a step and its mean, over the step, that unit forces give
+            these, mobilities = self._mobilities.get(target, ((), {}))
+            if len(these) != len(places) or any(a is not b for a, b in zip(these, places.values(), strict=True)):
+                rest.reset()
+                rest.step(dt, load=Load.together([place.load for place in places.values()]))
+                height, velocity = rest.height, rest.velocity
+                mobilities = {
+                    key: (-place.mean(velocity) / dt, max(-place.mean(height) / dt**2, 0.0))
+                    for key, place in places.items()
+                }
+                self._mobilities[target] = tuple(places.values()), mobilities
             now, before, after = self._heights[target], self._before.get(target, self._heights[target]), trial.height
             velocity, end = waves.velocity, trial.velocity
             for key, place in places.items():
-                mobility, mean_mobility = mobilities[key]
-                height, mean = place.mean(now), place.mean(after - now) / dt
+                (mobility, mean_mobility), mean = mobilities[key], place.mean(after - now) / dt
                 start, free = place.mean(velocity), place.mean(end)
                 if mobility < mean_mobility:
                     # the surface swings back within the step, and its velocity at the end says little
                     start, free, mobility = place.mean(now - before) / dt, mean, mean_mobility
-                pairs[key] = Pair(key, height, held[key], start, free, mobility, mean, mean_mobility)
+                pairs[key] = Pair(key, place.mean(now), held[key], start, free, mobility, mean, mean_mobility)
         return pairs
-
-    def _mobilities_of(
-        self, places: Mapping[Key, _Place], rest: WaveSolver, dt: float
-    ) -> dict[Key, tuple[float, float]]:
-        """Velocity under each place, at the end of a step and its mean, over the step, that unit forces give."""
-        these = tuple(places.values())
-        known = [self._mobilities.get(key, ((), None))[0] for key in places]
-        if not all(len(each) == len(these) and all(map(lambda a, b: a is b, each, these)) for each in known):
-            rest.reset()
-            rest.step(dt, load=Load.together([place.load for place in these]))
-            height, velocity = rest.height, rest.velocity
-            for key, place in places.items():
-                found = -place.mean(velocity) / dt, max(-place.mean(height) / dt**2, 0.0)
-                self._mobilities[key] = these, found
-        return {key: self._mobilities[key][1] for key in places}
 
     # What happens to the bodies
 
