@@ -178,6 +178,31 @@ def adhesion(model: mujoco.MjModel, data: mujoco.MjData) -> Floats | None:
     return pulls
 
 
+def collider_ids(coupled: CoupledModel, data: mujoco.MjData) -> NDArray[np.integer]:
+    """Collider ids of the two sides of every contact, [ncon, 2]; of an element of a flex, of the vertex nearest."""
+    model, geom = coupled.model, data.contact.geom
+    if not (model.nflex or coupled.convex_colliders or coupled.soft):
+        return geom
+    flex = data.contact.flex
+    found = np.where(geom >= 0, coupled.of_geom[geom], coupled.of_flex[flex])
+    contact, side = np.nonzero((geom < 0) & (found < 0))
+    if len(contact):
+        flex, vertex = flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
+        of_element = np.flatnonzero(vertex < 0)
+        elements, first = data.contact.elem[contact, side][of_element], model.flex_vertadr[flex]
+        dim = model.flex_dim[flex[of_element]]
+        # the last corner of an element stands for those that it has not
+        corner = np.minimum(np.arange(4), dim[:, None])
+        begins = model.flex_elemdataadr[flex[of_element]] + (dim + 1) * elements
+        vertices = model.flex_elem[begins[:, None] + corner]
+        places = data.flexvert_xpos[first[of_element, None] + vertices]
+        distances = np.linalg.norm(places - data.contact.pos[contact[of_element], None], axis=2)
+        vertex[of_element] = vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
+        found[contact, side] = model.ngeom + first + vertex
+    found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
+    return found
+
+
 # Cosine between the normals of a contact and of the surface, above which the surface faces the contact.
 _FACING = 0.25
 
@@ -258,7 +283,7 @@ class ContactReader:
         """
         found: dict[int, Contacts] = {}
         if data.ncon:
-            colliders = self._coupled.colliders(data)
+            colliders = collider_ids(self._coupled, data)
             found = self._geom_contacts(data, colliders) | self._flex_contacts(data, colliders)
             if self._targets_of.keys() & found.keys():
                 self._hand_over(data, found)

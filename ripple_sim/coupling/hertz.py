@@ -24,7 +24,7 @@ from ripple_sim.solver import Atlas, Load
 from ripple_sim.solver.errors import POSITIVE, shown
 from ripple_sim.solver.kernel import Floats, Ints
 
-from .contacts import Contacts, normal_rows
+from .contacts import Contacts, collider_ids, normal_rows
 from .energy import impedance
 from .geoms import ByGeom, find_any, for_each
 from .model import CoupledModel
@@ -231,7 +231,7 @@ class Hits:
         float
             Impulse that the target gets by the pulse [N s], positive inwards.
         """
-        other, colliders = int(pair.others[0]), self._coupled.colliders(data)
+        other, colliders = int(pair.others[0]), collider_ids(self._coupled, data)
         ours = np.isin(colliders, [self._target, *self._coupled.collision_geoms(self._target)])
         touching = (ours[:, ::-1] & (colliders == other)).any(axis=1) & (data.contact.efc_address >= 0)
         hit = foreseen(self._coupled.model, data, touching.nonzero()[0])

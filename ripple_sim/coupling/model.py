@@ -119,6 +119,10 @@ class CoupledModel:
         Whether what touches at two points touches between them too.
     soft : dict of int to SoftSurface
         The soft targets.
+    of_geom : int64 [ngeom]
+        Collider id of each geom: its own, or of what it collides for.
+    of_flex : int64 [nflex + 1]
+        Geom that a flex collides for, or itself where it is a target; -1 for none, and after the last flex.
     """
 
     def __init__(
@@ -166,42 +170,15 @@ class CoupledModel:
             self.footprint_radii[target] = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean()
         geoms_alone = [each for each in targets if each not in self.soft]
         self._collision_geoms = find_collision_geoms(model, self._collides, geoms_alone, named or {})
-        self._is_plain = not (model.nflex or self.convex_colliders or self.soft)
-        self._of_geom = np.arange(model.ngeom)
-        # geom that a flex collides for, or itself where it is a target; -1 for none, and after the last flex
-        self._of_flex = np.full(model.nflex + 1, -1)
+        self.of_geom, self.of_flex = np.arange(model.ngeom), np.full(model.nflex + 1, -1)
         for geom, parts in self.convex_colliders.items():
-            self._of_geom[parts] = geom
+            self.of_geom[parts] = geom
         for geom, flex in self.flex_colliders.items():
-            self._of_flex[flex] = geom
+            self.of_flex[flex] = geom
         for target, surface in self.soft.items():
-            self._of_geom[surface.geoms] = target
+            self.of_geom[surface.geoms] = target
             if surface.flex >= 0:
-                self._of_flex[surface.flex] = target
-
-    def colliders(self, data: mujoco.MjData) -> NDArray[np.integer]:
-        """Collider ids of the two sides of every contact, [ncon, 2]; of an element of a flex, of the vertex nearest."""
-        geom = data.contact.geom
-        if self._is_plain:
-            return geom
-        flex = data.contact.flex
-        found = np.where(geom >= 0, self._of_geom[geom], self._of_flex[flex])
-        contact, side = np.nonzero((geom < 0) & (found < 0))
-        if len(contact):
-            model, flex, vertex = self.model, flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
-            of_element = np.flatnonzero(vertex < 0)
-            elements, first = data.contact.elem[contact, side][of_element], model.flex_vertadr[flex]
-            dim = model.flex_dim[flex[of_element]]
-            # the last corner of an element stands for those that it has not
-            corner = np.minimum(np.arange(4), dim[:, None])
-            begins = model.flex_elemdataadr[flex[of_element]] + (dim + 1) * elements
-            vertices = model.flex_elem[begins[:, None] + corner]
-            places = data.flexvert_xpos[first[of_element, None] + vertices]
-            distances = np.linalg.norm(places - data.contact.pos[contact[of_element], None], axis=2)
-            vertex[of_element] = vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
-            found[contact, side] = model.ngeom + first + vertex
-        found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
-        return found
+                self.of_flex[surface.flex] = target
 
     def collision_geoms(self, geom: int) -> tuple[int, ...]:
         """Geoms whose contacts are those of this one: itself, or of a target those that collide for it."""

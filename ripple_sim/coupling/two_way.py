@@ -22,7 +22,7 @@ from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
-from .contacts import pair_rows, places_facing, points_outside
+from .contacts import collider_ids, pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
 from .geoms import ENDLESS, TARGET_TYPES
 from .model import CoupledModel
@@ -243,7 +243,7 @@ class TwoWay:
         if not data.ncon:
             return found
         bears = data.contact.efc_address >= 0
-        rows = contacts, _, geoms, others = pair_rows(self._coupled.colliders(data), bears, self._is_read)
+        rows = contacts, _, geoms, others = pair_rows(collider_ids(self._coupled, data), bears, self._is_read)
         points, normals = points_outside(data, *rows, self._coupled.extents)
         ids = zip(contacts.tolist(), geoms.tolist(), others.tolist(), strict=True)
         for (i, geom, other), at, normal in zip(ids, points, normals, strict=True):
