@@ -6,6 +6,7 @@ handed to it, at places on its surface.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -45,10 +46,10 @@ class Contacts(NamedTuple):
         """Some of the contacts."""
         return Contacts(self.others[which], self.points[which], self.forces[which], self.normals[which])
 
-    def by_other(self) -> list[Contacts]:
-        """The contacts with each geom."""
-        starts = first_rows(self.others).tolist()
-        return [self.rows(slice(a, b)) for a, b in zip(starts, [*starts[1:], None], strict=True)]
+    def split(self, ids: Ints) -> dict[int, Contacts]:
+        """The contacts of each id, from the ids of all, [k], ascending."""
+        bounds = [*first_rows(ids).tolist(), len(ids)]
+        return {int(ids[a]): self.rows(slice(a, b)) for a, b in itertools.pairwise(bounds)}
 
     @classmethod
     def together(cls, parts: Sequence[Contacts]) -> Contacts:
@@ -64,15 +65,6 @@ def first_rows(*sorted_ids: NDArray) -> Ints:
     for ids in sorted_ids:
         begins[1:] |= ids[1:] != ids[:-1]
     return begins.nonzero()[0]
-
-
-def by_target(targets: Ints, contacts: Contacts) -> dict[int, Contacts]:
-    """Contacts by target, from those on all targets, [k], sorted by these."""
-    if len(targets) and targets[0] == targets[-1]:
-        return {int(targets[0]): contacts}
-    starts = first_rows(targets)
-    bounds = [*starts.tolist(), len(targets)]
-    return {target: contacts.rows(slice(*bounds[i : i + 2])) for i, target in enumerate(targets[starts].tolist())}
 
 
 def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) -> tuple[Ints, Ints, Ints, Ints]:
@@ -186,50 +178,29 @@ def adhesion(model: mujoco.MjModel, data: mujoco.MjData) -> Floats | None:
     return pulls
 
 
-class ColliderIds:
-    """Collider ids of the two sides of every contact, see `CoupledModel`."""
-
-    def __init__(self, coupled: CoupledModel) -> None:
-        self._model = model = coupled.model
-        self._plain = not (model.nflex or coupled.convex_colliders or coupled.soft)
-        self._of_geom = np.arange(model.ngeom)
-        # geom that a flex collides for, or itself where it is a target; -1 for none, and after the last flex
-        self._of_flex = np.full(model.nflex + 1, -1)
-        for geom, parts in coupled.convex_colliders.items():
-            self._of_geom[parts] = geom
-        for geom, flex in coupled.flex_colliders.items():
-            self._of_flex[flex] = geom
-        for target, surface in coupled.soft.items():
-            self._of_geom[surface.geoms] = target
-            if surface.flex >= 0:
-                self._of_flex[surface.flex] = target
-
-    def __call__(self, data: mujoco.MjData) -> NDArray[np.integer]:
-        """Collider ids, [ncon, 2]; of a contact with an element of a flex, of the vertex nearest to the contact."""
-        geom = data.contact.geom
-        if self._plain:
-            return geom
-        flex = data.contact.flex
-        found = np.where(geom >= 0, self._of_geom[geom], self._of_flex[flex])
-        contact, side = np.nonzero((geom < 0) & (found < 0))
-        if len(contact):
-            flex, vertex = flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
-            of_element = vertex < 0
-            vertex[of_element] = self._nearest_vertices(data, contact[of_element], side[of_element])
-            found[contact, side] = self._model.ngeom + self._model.flex_vertadr[flex] + vertex
-        found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
-        return found
-
-    def _nearest_vertices(self, data: mujoco.MjData, contact: Ints, side: Ints) -> Ints:
-        """Vertices of the contacts' elements, counted from the first of their flex, that are nearest to them, [k]."""
-        model, flex, element = self._model, data.contact.flex[contact, side], data.contact.elem[contact, side]
-        dim = model.flex_dim[flex]
+def collider_ids(coupled: CoupledModel, data: mujoco.MjData) -> NDArray[np.integer]:
+    """Collider ids of the two sides of every contact, [ncon, 2]; of an element of a flex, of the vertex nearest."""
+    model, geom = coupled.model, data.contact.geom
+    if not (model.nflex or coupled.convex_colliders or coupled.soft):
+        return geom
+    flex = data.contact.flex
+    found = np.where(geom >= 0, coupled.of_geom[geom], coupled.of_flex[flex])
+    contact, side = np.nonzero((geom < 0) & (found < 0))
+    if len(contact):
+        flex, vertex = flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
+        of_element = np.flatnonzero(vertex < 0)
+        elements, first = data.contact.elem[contact, side][of_element], model.flex_vertadr[flex]
+        dim = model.flex_dim[flex[of_element]]
         # the last corner of an element stands for those that it has not
         corner = np.minimum(np.arange(4), dim[:, None])
-        vertices = model.flex_elem[(model.flex_elemdataadr[flex] + (dim + 1) * element)[:, None] + corner]
-        places = data.flexvert_xpos[model.flex_vertadr[flex, None] + vertices]
-        distances = np.linalg.norm(places - data.contact.pos[contact, None], axis=2)
-        return vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
+        begins = model.flex_elemdataadr[flex[of_element]] + (dim + 1) * elements
+        vertices = model.flex_elem[begins[:, None] + corner]
+        places = data.flexvert_xpos[first[of_element, None] + vertices]
+        distances = np.linalg.norm(places - data.contact.pos[contact[of_element], None], axis=2)
+        vertex[of_element] = vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
+        found[contact, side] = model.ngeom + first + vertex
+    found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
+    return found
 
 
 # Cosine between the normals of a contact and of the surface, above which the surface faces the contact.
@@ -297,7 +268,6 @@ class ContactReader:
         meshes = {target: atlas.mesh for target, atlas in self._atlases.items()}
         for geom in coupled.flex_colliders.keys() & self._targets_of.keys():
             meshes[geom] = target_mesh(coupled.model, geom)
-        self._colliders = ColliderIds(coupled)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._targets_of, *coupled.soft]] = True
         self._check_solver, self._check_wraps = SolverBalance(coupled), WrapCheck(coupled)
@@ -313,10 +283,8 @@ class ContactReader:
         """
         found: dict[int, Contacts] = {}
         if data.ncon:
-            colliders = self._colliders(data)
-            found = self._geom_contacts(data, colliders)
-            if self._flexes is not None:
-                found |= self._flex_contacts(self._flexes, data, colliders)
+            colliders = collider_ids(self._coupled, data)
+            found = self._geom_contacts(data, colliders) | self._flex_contacts(data, colliders)
             if self._targets_of.keys() & found.keys():
                 self._hand_over(data, found)
         self._check_solver(data, found)
@@ -356,20 +324,20 @@ class ContactReader:
             factors = np.repeat(factors, np.diff(np.append(starts, len(forces))))
             found = found._replace(forces=factors * forces).rows(factors != 0)
             targets = targets[factors != 0]
-        return by_target(targets, found)
+        return found.split(targets)
 
-    def _flex_contacts(
-        self, flexes: FlexContacts, data: mujoco.MjData, colliders: NDArray[np.integer]
-    ) -> dict[int, Contacts]:
+    def _flex_contacts(self, data: mujoco.MjData, colliders: NDArray[np.integer]) -> dict[int, Contacts]:
         """The same of targets with a flex collider, by theirs."""
-        model = self._coupled.model
+        model, flexes = self._coupled.model, self._flexes
+        if flexes is None:
+            return {}
         rows = contacts, _, targets, others = pair_rows(colliders, data.contact.efc_address >= 0, flexes.is_target)
         if not len(contacts):
             return {}
         normal, friction = (read(model, data, contacts) for read in (normal_forces, friction_forces))
         forces = np.column_stack([normal - data.contact.adhesion[contacts], friction])
         kept, *loads = flexes.loads(data, *rows, first_rows(targets, others), forces)
-        return by_target(targets[kept], Contacts(others[kept], *loads))
+        return Contacts(others[kept], *loads).split(targets[kept])
 
     def _hand_over(self, data: mujoco.MjData, found: dict[int, Contacts]) -> None:
         """Hand every contact of a collision geom to one target: where several share the geom, to the nearest."""
@@ -383,6 +351,5 @@ class ContactReader:
             nearest = np.linalg.norm(np.array(placed) - contacts.points, axis=2).argmin(axis=0)
             for i, target in enumerate(self._targets_of[geom]):
                 if (nearest == i).any():
-                    own = [found[target]] if target in found else []
                     mine = contacts._replace(points=placed[i]).rows(nearest == i)
-                    found[target] = Contacts.together([*own, mine])
+                    found[target] = Contacts.together([found[target], mine]) if target in found else mine

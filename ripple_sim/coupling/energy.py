@@ -81,11 +81,8 @@ class VelocityChange:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._scratch: mujoco.MjData | None = None
-        self._latest: Floats | None = None
-
-    def note(self, data: mujoco.MjData) -> None:
-        """Take the velocities with which the next step begins, unless somebody changes them."""
-        self._latest = data.qvel.copy()
+        # the velocities with which the next step begins, unless somebody changes them
+        self.latest: Floats | None = None
 
     def __call__(self, data: mujoco.MjData, qacc: Floats, force: Floats, *, pending: bool) -> Floats:
         """Change of velocities [nv].
@@ -116,7 +113,7 @@ class VelocityChange:
             integrate(self._model, scratch)
             return scratch.qvel.copy()
 
-        start = data.qvel if pending else self._latest if self._latest is not None else data.qvel - dt * qacc
+        start = data.qvel if pending else self.latest if self.latest is not None else data.qvel - dt * qacc
         old = end(start, qacc, force)
         for _ in range(0 if pending else _START_ROUNDS):
             if np.array_equal(old, data.qvel):

@@ -84,9 +84,7 @@ def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
     Raises `SceneError` if there is nothing of that name, or a geom's type has no closed surface.
     """
     geom = find_any(model, key)
-    if is_soft(model, geom):
-        return geom
-    if int(model.geom_type[geom]) not in TARGET_TYPES:
+    if not is_soft(model, geom) and int(model.geom_type[geom]) not in TARGET_TYPES:
         kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
         raise SceneError(f"geom {key!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}")
     return geom
@@ -277,6 +275,11 @@ def named_collision_geoms(
     found = {}
     for name, keys in by_name(model, contacts, "contacts").items():
         target = find_any(model, name)
+        if is_soft(model, target):
+            raise SceneError(
+                f"contacts names {name!r}, a flex or a skin, for which no geoms can be chosen: a flex takes the "
+                "contacts of its own vertices, a skin those of the bodies of its bones"
+            )
         if target not in rippling:
             raise SceneError(
                 f"contacts names geom {name!r}, which does not ripple; the rippling geoms are "
@@ -321,33 +324,25 @@ def find_collision_geoms(
     named : mapping
         Of some targets' ids to the ids that they name.
     """
-    targets = list(targets)
+    targets, weld = list(targets), model.body_weldid[model.geom_bodyid]
     free = collides & ~np.isin(model.geom_type, ENDLESS)
     free[[*targets, *(geom for geoms in named.values() for geom in geoms)]] = False
     found = {}
     for target in targets:
         own = (target,) if collides[target] else ()
-        if target in named:
-            found[target] = tuple(dict.fromkeys((*own, *named[target])))
-        else:
-            found[target] = own or tuple(np.flatnonzero(free & _kin(model, target, free)).tolist())
+        if own or target in named:
+            found[target] = tuple(dict.fromkeys((*own, *named.get(target, ()))))
+            continue
+        body = model.geom_bodyid[target]
+        kin = free & (model.geom_bodyid == body)
+        if not (body and kin.any()):
+            kin = free & (weld == weld[target])
+            if not weld[target]:
+                data = mujoco.MjData(model)
+                mujoco.mj_kinematics(model, data)
+                rotation, box = data.geom_xmat.reshape(-1, 3, 3), model.geom_aabb
+                middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
+                away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
+                kin &= (np.abs(away) <= box[target, 3:]).all(axis=1)
+        found[target] = tuple(np.flatnonzero(kin).tolist())
     return found
-
-
-def _kin(model: mujoco.MjModel, target: int, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Geoms that may collide for a target, [ngeom]: on its body, or on bodies welded to it."""
-    body = model.geom_bodyid[target]
-    same_body = model.geom_bodyid == body
-    if body and (same_body & free).any():
-        return same_body
-    weld = model.body_weldid[model.geom_bodyid]
-    kin = weld == weld[target]
-    if weld[target]:
-        return kin
-    # of static geoms those whose middle lies in the box around the target
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    rotation, box = data.geom_xmat.reshape(-1, 3, 3), model.geom_aabb
-    middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
-    away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
-    return np.asarray(kin & (np.abs(away) <= box[target, 3:]).all(axis=1))

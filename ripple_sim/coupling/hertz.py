@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -20,15 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv
 
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Load
 from ripple_sim.solver.errors import POSITIVE, shown
 from ripple_sim.solver.kernel import Floats, Ints
 
-from .contacts import ColliderIds, Contacts, normal_rows
+from .contacts import Contacts, collider_ids, normal_rows
 from .energy import impedance
 from .geoms import ByGeom, find_any, for_each
 from .model import CoupledModel
+from .stepping import warn_caller
 
 PULSES = ("contact", "hertz")
 
@@ -116,53 +116,38 @@ class PulsedLoad(Load):
             yield substeps - last, held
 
 
-class Approach(NamedTuple):
-    """How two bodies meet: effective mass [kg], speed [m/s], what pulls them together [m/s^2], and MuJoCo's contact.
+def foreseen(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> tuple[float, float, float] | None:
+    """How a pair hits at the beginning of a step: effective mass [kg], speed [m/s], and the impulse to come [N s].
 
-    That is a spring [1/s^2] and a damper [1/s] at a depth [m], and `solimp`, see `impedance`.
+    None where nothing pushes, or not against a mass, or a body is put down. The mass is the contacts' force over the
+    acceleration that all constraints give the pair: where a body hits at several places at once, each has its share.
+    The impulse is what it takes to turn the bodies round as MuJoCo's contact does in its steps, but for what pulls.
     """
-
-    mass: float
-    speed: float
-    pull: float
-    stiffness: float
-    damping: float
-    depth: float
-    solimp: Floats
-
-    @classmethod
-    def of(cls, model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Approach | None:
-        """That of a pair at the beginning of a step; None where nothing pushes, or not against a mass.
-
-        The mass is the contacts' force over the acceleration that all constraints give the pair: where a body hits at
-        several places at once, each has its share.
-        """
-        rows, of = normal_rows(model, data, contacts)
-        force = float(data.efc_force[rows].sum())
-        if not force > 0:
-            return None
-        # what is across the normal cancels in a mean over the edges of a pyramid, whatever their forces
-        shares, along = (np.bincount(of, data.efc_force[rows]) / np.bincount(of))[of] / force, np.zeros((2, data.nefc))
-        mujoco.mj_mulJacVec(model, data, along[0], data.qacc_smooth)
-        mujoco.mj_mulJacVec(model, data, along[1], data.qacc)
-        free, solved = along[:, rows] @ shares
-        if not solved > free:
-            return None
-        spring, damper, *_ = shares @ data.efc_KBIP[rows]
-        depth, solimp = shares @ (data.efc_margin - data.efc_pos)[rows], data.contact.solimp[contacts[0]]
-        return cls(force / (solved - free), -shares @ data.efc_vel[rows], -free, spring, damper, depth, solimp)
-
-    def impulse(self, dt: float) -> float:
-        """What it takes to turn the bodies round as MuJoCo's contact does in steps of dt [s], but for what pulls."""
-        speed, depth = self.speed, self.depth
-        for _ in range(_STEPS):
-            decides = impedance(self.solimp, max(depth, 0.0))
-            push = decides * (self.damping * speed + self.stiffness * decides * depth + self.pull)
-            if push <= max(self.pull, 0.0):
-                break
-            speed -= (push - self.pull) * dt
-            depth += speed * dt
-        return self.mass * (self.speed + max(-speed, 0.0))
+    rows, of = normal_rows(model, data, contacts)
+    force = float(data.efc_force[rows].sum())
+    if not force > 0:
+        return None
+    # what is across the normal cancels in a mean over the edges of a pyramid, whatever their forces
+    shares, along = (np.bincount(of, data.efc_force[rows]) / np.bincount(of))[of] / force, np.zeros((2, data.nefc))
+    mujoco.mj_mulJacVec(model, data, along[0], data.qacc_smooth)
+    mujoco.mj_mulJacVec(model, data, along[1], data.qacc)
+    free, solved = along[:, rows] @ shares
+    pull = -free  # together [m/s^2]
+    start = speed = -shares @ data.efc_vel[rows]
+    if not solved > free or speed <= max(pull, 0.0) * _PUT_DOWN:
+        return None
+    # MuJoCo's contact: a spring [1/s^2] and a damper [1/s] at a depth [m]
+    spring, damper, *_ = shares @ data.efc_KBIP[rows]
+    depth, solimp = shares @ (data.efc_margin - data.efc_pos)[rows], data.contact.solimp[contacts[0]]
+    for _ in range(_STEPS):
+        decides = impedance(solimp, max(depth, 0.0))
+        push = decides * (damper * speed + spring * decides * depth + pull)
+        if push <= max(pull, 0.0):
+            break
+        speed -= (push - pull) * model.opt.timestep
+        depth += speed * model.opt.timestep
+    mass = force / (solved - free)
+    return mass, start, mass * (start + max(-speed, 0.0))
 
 
 def surface_bend(model: mujoco.MjModel, geom: int, normal: Floats) -> NDArray[np.float64] | None:
@@ -220,7 +205,6 @@ class Hits:
 
     def __init__(self, coupled: CoupledModel, target: int, modulus: float) -> None:
         self._coupled, self._target, self._modulus = coupled, target, modulus
-        self._colliders = ColliderIds(coupled)
         self._pulses: list[Pulse] = []
         self._told: set[str] = set()
 
@@ -247,29 +231,27 @@ class Hits:
         float
             Impulse that the target gets by the pulse [N s], positive inwards.
         """
-        model, other = self._coupled.model, int(pair.others[0])
-        colliders = self._colliders(data)
+        other, colliders = int(pair.others[0]), collider_ids(self._coupled, data)
         ours = np.isin(colliders, [self._target, *self._coupled.collision_geoms(self._target)])
         touching = (ours[:, ::-1] & (colliders == other)).any(axis=1) & (data.contact.efc_address >= 0)
-        meet = Approach.of(model, data, touching.nonzero()[0])
-        if meet is None or not shares.any() or meet.speed <= max(meet.pull, 0.0) * _PUT_DOWN:
+        hit = foreseen(self._coupled.model, data, touching.nonzero()[0])
+        if hit is None or not shares.any():
             return 0.0
         radius = self._radius(data, atlas, pair, texels, other)
         if isinstance(radius, str):
             if radius not in self._told:
                 self._told.add(radius)
                 names, owners = self._coupled.names, self._coupled.owners
-                hit, hits = names[owners[self._target]], names[owners[other]]
-                warnings.warn(
-                    f"the hit of {hits!r} on {hit!r} keeps MuJoCo's contact pulse, and so do others like it: {radius}",
-                    RippleWarning,
-                    stacklevel=7,
+                own, others = names[owners[self._target]], names[owners[other]]
+                warn_caller(
+                    f"the hit of {others!r} on {own!r} keeps MuJoCo's contact pulse, and so do others like it: {radius}"
                 )
             return 0.0
         # how long two elastic bodies touch: Johnson, equation 11.24, whose factor is 2.87, with
         # 1 / m = 1 / m1 + 1 / m2 and 1 / R = 1 / R1 + 1 / R2
-        duration = 2.868 * (meet.mass**2 / (radius * self._modulus**2 * meet.speed)) ** 0.2
-        impulses = meet.impulse(model.opt.timestep) * shares
+        mass, speed, impulse = hit
+        duration = 2.868 * (mass**2 / (radius * self._modulus**2 * speed)) ** 0.2
+        impulses = impulse * shares
         self._pulses.append(Pulse(texels, impulses, duration, 0.0))
         return float(impulses.sum())
 

@@ -75,14 +75,14 @@ class SleepingContacts:
 
     def add(self, data: mujoco.MjData, contacts: Mapping[int, Contacts]) -> dict[int, Contacts]:
         """Contacts of each target, by geom id, with those of sleeping bodies."""
-        present = {(target, int(pair.others[0])): pair for target, each in contacts.items() for pair in each.by_other()}
+        present = {(t, other): pair for t, each in contacts.items() for other, pair in each.split(each.others).items()}
         found = dict(contacts)
         for key, (pair, sums) in list(self._pairs.items()):
             if key in present:
                 continue
             if self._coupled.are_still(data, key):
                 mean = pair._replace(forces=pair.forces * (sum(sums) / len(sums) / pair.forces.sum()))
-                found[key[0]] = Contacts.together([*([found[key[0]]] if key[0] in found else []), mean])
+                found[key[0]] = Contacts.together([found[key[0]], mean]) if key[0] in found else mean
             else:
                 sums.append(0.0)
                 if not any(sums):
@@ -225,15 +225,9 @@ class TargetLoad:
 
     def set_waves(self, waves: WaveSolver) -> None:
         """Go on with new waves on the same atlas; impulses that are yet to be given stay."""
-        self._atlas = waves.atlas
+        self._waves, self._atlas = waves, waves.atlas
         self._footprints = Footprints(waves.atlas, waves.operator.movable.reshape(-1))
         self._filter.forget_places()
-
-    def follow(self, atlas: Atlas) -> None:
-        """Go on where the surface is now, if it has moved."""
-        if atlas is not self._atlas:
-            self._atlas = atlas
-            self._footprints.follow(atlas)
 
     def touched(
         self, contacts: Contacts, pose: tuple[Floats, Floats], timestep: float, elapsed: float,
@@ -251,6 +245,9 @@ class TargetLoad:
         data : mujoco.MjData, optional
             Whose contacts they are, for hits.
         """
+        if self._waves.atlas is not self._atlas:  # the surface has moved
+            self._atlas = self._waves.atlas
+            self._footprints.follow(self._atlas)
         starts, (position, rotation) = first_rows(contacts.others), pose
         geoms, points = contacts.others[starts], (contacts.points - position) @ rotation
         forces = np.add.reduceat(contacts.forces, starts)
@@ -280,28 +277,15 @@ class TargetLoad:
                 mine = slice(begins[row], begins[row + 1])
                 # what a unit of the contact's impulse gives each texel
                 shares = on_texels.forces[mine] * (elapsed / (timestep * forces[row]))
-                prepaid = self._hits.begin(data, self._atlas, contacts.by_other()[row], texels[mine], shares)
+                pair = contacts.rows(contacts.others == geoms[row])
+                prepaid = self._hits.begin(data, self._atlas, pair, texels[mine], shares)
                 self._filter.prepay(int(geoms[row]), prepaid)
-        return self._over(self._filter(on_texels, elapsed), elapsed), done
+        return self.given(elapsed, on_texels), done
 
-    def untouched(self, elapsed: float) -> Load:
-        """Load over a time [s] in which no geom touches."""
-        return self._over(self._filter(NO_FORCES, elapsed), elapsed)
-
-    def _over(self, load: Load, elapsed: float) -> Load:
-        """A load with the pulses of hits over a time [s]."""
+    def given(self, elapsed: float, present: TexelForces = NO_FORCES) -> Load:
+        """Load over a time [s] in which these forces act, or in which no geom touches, with the pulses of hits."""
+        load = self._filter(present, elapsed)
         return load if self._hits is None else self._hits.over(load, elapsed)
-
-
-def time_constant(coupled: CoupledModel, target: int) -> float:
-    """Time constant of a target's contacts [s]; 1 / omega of a spring that has none."""
-    surface = coupled.soft.get(target)
-    if surface is None:
-        constant = float(coupled.solref[target, 0])
-    else:
-        constant = float(coupled.model.flex_solref[surface.flex, 0]) if surface.flex >= 0 else DEFAULT_TIME_CONSTANT
-    # of a pair that is not positive this is -omega^2
-    return constant if constant > 0 else 1 / float(np.sqrt(max(-constant, _TINY)))
 
 
 class ContactLoads:
@@ -333,9 +317,15 @@ class ContactLoads:
         self._sleeping: SleepingContacts | None = None
         coupled, self._targets = self._coupled, dict[int, TargetLoad]()
         for geom, waves in self._waves.items():
+            surface, hits, constant = coupled.soft.get(geom), self._hits.get(geom), DEFAULT_TIME_CONSTANT
+            if surface is None:
+                constant = float(coupled.solref[geom, 0])
+            elif surface.flex >= 0:
+                constant = float(coupled.model.flex_solref[surface.flex, 0])
+            if constant <= 0:  # -omega^2 of a spring: 1 / omega stands for a time constant
+                constant = 1 / float(np.sqrt(max(-constant, _TINY)))
             # a flex has a contact at each of its vertices: nothing touches between them
-            convex, constant = coupled.convex & (geom not in coupled.soft), time_constant(coupled, geom)
-            hits = self._hits.get(geom)
+            convex = coupled.convex & (surface is None)
             self._targets[geom] = TargetLoad(waves, geom, coupled.footprint_radii, convex, constant, hits)
             if hits is not None:
                 hits.clear()
@@ -368,12 +358,11 @@ class ContactLoads:
             contacts = self._sleeping.add(data, contacts)
         for geom, target in self._targets.items():
             if geom in contacts:
-                target.follow(self._waves[geom].atlas)
                 pose = target_pose(data, geom)
                 loads[geom], done = target.touched(contacts[geom], pose, self._timestep, elapsed, data)
                 self.since_skip.append(done)
             else:
-                loads[geom] = target.untouched(elapsed)
+                loads[geom] = target.given(elapsed)
         return loads
 
     @property

@@ -7,19 +7,18 @@ itself. The contacts of flex colliders are loads by the sum of their whole force
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
 from .geoms import ENDLESS, find_collision_geoms, geom_name, rotation_in_body
 from .soft import SoftSurface, is_soft, soft_names
+from .stepping import warn_caller
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
 SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
@@ -120,6 +119,10 @@ class CoupledModel:
         Whether what touches at two points touches between them too.
     soft : dict of int to SoftSurface
         The soft targets.
+    of_geom : int64 [ngeom]
+        Collider id of each geom: its own, or of what it collides for.
+    of_flex : int64 [nflex + 1]
+        Geom that a flex collides for, or itself where it is a target; -1 for none, and after the last flex.
     """
 
     def __init__(
@@ -167,20 +170,19 @@ class CoupledModel:
             self.footprint_radii[target] = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean()
         geoms_alone = [each for each in targets if each not in self.soft]
         self._collision_geoms = find_collision_geoms(model, self._collides, geoms_alone, named or {})
+        self.of_geom, self.of_flex = np.arange(model.ngeom), np.full(model.nflex + 1, -1)
+        for geom, parts in self.convex_colliders.items():
+            self.of_geom[parts] = geom
+        for geom, flex in self.flex_colliders.items():
+            self.of_flex[flex] = geom
+        for target, surface in self.soft.items():
+            self.of_geom[surface.geoms] = target
+            if surface.flex >= 0:
+                self.of_flex[surface.flex] = target
 
     def collision_geoms(self, geom: int) -> tuple[int, ...]:
         """Geoms whose contacts are those of this one: itself, or of a target those that collide for it."""
         return self._collision_geoms.get(geom, (geom,))
-
-    def masks_match(self, geom: int) -> NDArray[np.bool_]:
-        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it, also as a pair."""
-        model, types, affinities = self.model, self._contype, self._conaffinity
-        found, pairs = np.zeros(model.ngeom, dtype=np.bool_), (model.pair_geom1, model.pair_geom2)
-        for each in self.collision_geoms(geom):
-            found |= (types[each] & affinities | types & affinities[each]) != 0
-            for one, two in (pairs, pairs[::-1]):
-                found[two[one == each]] = True
-        return found
 
     def are_still(self, data: mujoco.MjData, colliders: Sequence[int]) -> bool:
         """Whether all sleep or are static, so that they press as before; vertices between bodies never sleep."""
@@ -188,8 +190,17 @@ class CoupledModel:
         return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
 
     def can_collide(self, geom: int) -> NDArray[np.bool_]:
-        """The same on bodies that are not welded to that of this geom."""
-        return self.masks_match(geom) & self._apart(geom)
+        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it, also as a pair.
+
+        They are on bodies that are not welded to that of this geom.
+        """
+        model, types, affinities = self.model, self._contype, self._conaffinity
+        found, pairs = np.zeros(model.ngeom, dtype=np.bool_), (model.pair_geom1, model.pair_geom2)
+        for each in self.collision_geoms(geom):
+            found |= (types[each] & affinities | types & affinities[each]) != 0
+            for one, two in (pairs, pairs[::-1]):
+                found[two[one == each]] = True
+        return found & self._apart(geom)
 
     def out_of_touch(self, geom: int) -> bool:
         """Whether there are geoms or flexes that collide, but none that meets those that collide for this geom."""
@@ -238,18 +249,28 @@ class FlexContacts:
     """
 
     def __init__(self, coupled: CoupledModel, meshes: Mapping[int, Mesh]) -> None:
-        model, flexes, count = coupled.model, coupled.flex_colliders, len(coupled.owners)
-        self.is_target, self._is_sheet = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        model, flexes, ids = coupled.model, coupled.flex_colliders, len(coupled.owners)
+        self.is_target, self._is_sheet = np.zeros((2, ids), dtype=np.bool_)
         self._extents, self._names = coupled.extents, coupled.names
         # outward unit normals of all triangles, in the frames of the geoms, and the row of a target's first one
-        self._normals, self._first = np.zeros((model.nflexelem, 3)), np.full(count, -1)
+        self._normals, self._first = np.zeros((model.nflexelem, 3)), np.full(ids, -1)
         for geom in flexes.keys() & meshes.keys():
-            first = model.flex_elemadr[flexes[geom]]
-            normals = _outward_normals(model, geom, flexes[geom], meshes[geom])
-            self._normals[first : first + len(normals)] = normals
-            self._first[geom], self.is_target[geom], self._is_sheet[geom] = first, True, not meshes[geom].closed
+            flex, mesh = flexes[geom], meshes[geom]
+            first, begin, count = model.flex_elemadr[flex], model.flex_elemdataadr[flex], model.flex_elemnum[flex]
+            F, V = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3), mesh.V
+            if not np.array_equal(F, mesh.F):
+                # a flex not made by `make_collidable`
+                own = model.flex_vert[model.flex_vertadr[flex] :][: model.flex_vertnum[flex]]
+                V = own @ rotation_in_body(model, geom)
+            corners = V[F]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            # they point outwards where the volume that they enclose is positive
+            outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0])) if mesh.closed else 1.0
+            normals = outward * normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+            self._normals[first : first + count] = normals
+            self._first[geom], self.is_target[geom], self._is_sheet[geom] = first, True, not mesh.closed
         # amounts of the sums of forces [N], and the part of them that neither a normal force nor friction explains
-        self._amounts, self._warned = np.zeros((count, 2)), set[int]()
+        self._amounts, self._warned = np.zeros((ids, 2)), set[int]()
 
     def loads(
         self, data: mujoco.MjData, contacts: Ints, sides: Ints, targets: Ints, others: Ints, starts: Ints, along: Floats
@@ -321,24 +342,8 @@ class FlexContacts:
                 continue
             self._warned.add(target)
             name, share = self._names[target], self._amounts[target, 1] / self._amounts[target, 0]
-            warnings.warn(
+            warn_caller(
                 f"the impulses on geom {name!r} are wrong by about {share:.1%}: MuJoCo pushes sideways what touches "
                 "its flex, where a geom has sunk in or edges and corners meet; use a shorter time step, no override of "
-                f'contact margins, or make_collidable(spec, {name!r}, "sdf")',
-                RippleWarning,
-                stacklevel=8,
+                f'contact margins, or make_collidable(spec, {name!r}, "sdf")'
             )
-
-
-def _outward_normals(model: mujoco.MjModel, geom: int, flex: int, mesh: Mesh) -> NDArray[np.float64]:
-    """Outward unit normals of a surface at the triangles of its flex, in the geom's frame, [element_count, 3]."""
-    first, count = model.flex_elemdataadr[flex], model.flex_elemnum[flex]
-    F, V = model.flex_elem[first : first + 3 * count].reshape(-1, 3), mesh.V
-    if not np.array_equal(F, mesh.F):
-        # a flex not made by `make_collidable`
-        V = model.flex_vert[model.flex_vertadr[flex] :][: model.flex_vertnum[flex]] @ rotation_in_body(model, geom)
-    corners = V[F]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # they point outwards where the volume that they enclose is positive
-    outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0])) if mesh.closed else 1.0
-    return outward * normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)

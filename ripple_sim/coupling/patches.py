@@ -68,66 +68,36 @@ def load_points(
     later = np.where(convex[patches], np.searchsorted(patches, patches, "right") - row - 1, 0)
     first = np.repeat(row, later)
     second = first + 1 + np.arange(len(first)) - np.repeat(later.cumsum() - later, later)
-    pairs = np.column_stack([first, second])
+    pairs, of_pair = np.column_stack([first, second]), patches[first]
     if not len(pairs):
         return patches, points, forces, radii[patches]
-    probes = np.concatenate([points, points[pairs].sum(axis=1) / 2])
+    probes = np.concatenate([points, (points[first] + points[second]) / 2])
     # contact points lie a little outside the surface, by up to their depth: so may the midpoints
     off = closest(probes) - probes
     away = np.sqrt(np.einsum("ij,ij->i", off, off))
-    patches, points, forces, near, radii = _spread(patches, forces, radii, pairs, probes, away)
-    patches, points, forces = _joined(patches, points, forces, near, len(forces))
-    return patches, points, forces, radii[patches]
-
-
-def _spread(
-    patches: Ints, forces: Floats, radii: Floats, pairs: Ints, probes: Floats, away: Floats
-) -> tuple[Ints, Floats, Floats, Floats, Floats]:
-    """Share the forces at the corners of patches among these and the midpoints of pairs: points that carry a force.
-
-    Parameters
-    ----------
-    patches, forces, radii
-        Of the corners; radii of the patches.
-    pairs : int64 [m, 2]
-    probes : float64 [k + m, 3]
-        The corners, and then the pairs' midpoints [m].
-    away : float64 [k + m]
-        Distances of the probes from the surface [m].
-
-    Returns
-    -------
-    patches, points, forces
-        As `load_points` returns them, but for points of a lattice that have yet to be joined: of each patch its
-        corners, then the midpoints.
-    near, radii : float64 [p]
-        Of the patches: within which distance their points are to be joined, and footprint radii [m].
-    """
-    corner_count, patch_count, of_pair = len(patches), len(radii), patches[pairs[:, 0]]
-    total, limit = np.bincount(patches, forces), np.zeros(patch_count)
-    np.maximum.at(limit, patches, away[:corner_count])
-    weighted = forces[:, None] * probes[:corner_count]
-    middles = np.column_stack([np.bincount(patches, each) for each in weighted.T]) / total[:, None]
-    size = np.zeros(patch_count)
-    np.maximum.at(size, of_pair, np.sqrt(((probes[pairs[:, 0]] - probes[pairs[:, 1]]) ** 2).sum(axis=1)))
+    # the forces at the corners are shared among these and the midpoints
+    total, (limit, size) = np.bincount(patches, forces), np.zeros((2, len(radii)))
+    np.maximum.at(limit, patches, away[: len(points)])
+    middles = np.column_stack([np.bincount(patches, forces * each) for each in points.T]) / total[:, None]
+    np.maximum.at(size, of_pair, np.sqrt(((points[first] - points[second]) ** 2).sum(axis=1)))
     # where there is no touch between two corners, they keep their shares
-    touch = away[corner_count:] <= (limit + radii / 10)[of_pair]
-    filled = np.zeros(patch_count, np.bool_)
+    touch = away[len(points) :] <= (limit + radii / 10)[of_pair]
+    filled = np.zeros(len(radii), np.bool_)
     filled[of_pair] = True
     filled[of_pair[~touch]] = False
-    share = forces[pairs[:, 0]] * forces[pairs[:, 1]] / total[of_pair]
+    share = forces[first] * forces[second] / total[of_pair]
     shares = np.concatenate([forces, np.where(touch, 2 * share, 0.0)])
-    paired = pairs.ravel()
-    shares[paired] = forces[paired] ** 2 / total[patches[paired]]
+    shares[pairs] = forces[pairs] ** 2 / total[patches[pairs]]
     np.add.at(shares, pairs[~touch].ravel(), np.repeat(share[~touch], 2))
-    kept = shares.nonzero()[0]
-    of = np.concatenate([patches, of_pair])
+    # what carries a force: of each patch its corners, then the midpoints
+    kept, of = shares.nonzero()[0], np.concatenate([patches, of_pair])
     kept = kept[of[kept].argsort(kind="stable")]
     of = of[kept]
-    # the points of a patch that is filled stand for the cells of a lattice
-    inset = np.where(filled, _INSET, 1.0)[of, None]
-    near, wide = np.where(filled, size / 8, 0.0), np.where(filled, np.maximum(radii, _OVERLAP * size), radii)
-    return of, inset * probes[kept] + (1 - inset) * middles[of], shares[kept], near, wide
+    # the points of a patch that is filled stand for the cells of a lattice, and are joined where they are near
+    inset, near = np.where(filled, _INSET, 1.0)[of, None], np.where(filled, size / 8, 0.0)
+    lattice = inset * probes[kept] + (1 - inset) * middles[of]
+    patches, points, forces = _joined(of, lattice, shares[kept], near, len(kept))
+    return patches, points, forces, np.where(filled, np.maximum(radii, _OVERLAP * size), radii)[patches]
 
 
 def corners(patches: Ints, points: Floats, forces: Floats, radii: Floats) -> tuple[Ints, Floats, Floats]:
@@ -214,9 +184,8 @@ class Footprints:
     def __init__(self, atlas: Atlas, movable: NDArray[np.bool_]) -> None:
         self._movable = movable
         self._place_on(atlas)
-        self._geoms, self._points = np.zeros(0, np.int64), np.zeros((0, 3))
-        # radii as they were asked for, and how far point and radius may move before a footprint is made anew [m]
-        self._radii, self._tolerances = np.zeros(0), np.zeros(0)
+        # geoms, points, radii as they were asked for, and how far these two may move before one is made anew [m]
+        self._made: tuple[NDArray, ...] = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
         # of each, as `under` gives them
         self._under: list[tuple[Ints, Floats]] = []
 
@@ -224,7 +193,8 @@ class Footprints:
         """Go on where the surface is now: footprints ride on their texels."""
         first, before = [texels[0] for texels, _ in self._under], self._grid.positions
         self._place_on(atlas)
-        self._points = self._points + self._grid.positions[first] - before[first]
+        geoms, points, *sizes = self._made
+        self._made = geoms, points + self._grid.positions[first] - before[first], *sizes
 
     def _place_on(self, atlas: Atlas) -> None:
         self._atlas, self._grid = atlas, atlas.texels.grid
@@ -244,11 +214,10 @@ class Footprints:
         active : bool [c]
             Geoms that touch, have lost touch only now, or have yet to give an impulse: their footprints are kept.
         """
-        made = self._geoms, self._points, self._radii, self._tolerances
-        rows, touching = np.full(len(geoms) + len(self._geoms), -1), np.zeros(len(active), np.bool_)
-        rows = rows[: _serving(geoms, points, radii, *made, active, touching, rows)]
+        rows, touching = np.full(len(geoms) + len(self._under), -1), np.zeros(len(active), np.bool_)
+        rows = rows[: _serving(geoms, points, radii, *self._made, active, touching, rows)]
         new = (rows < 0).nonzero()[0]
-        rows[new] = len(self._geoms) + np.arange(len(new))
+        rows[new] = len(self._under) + np.arange(len(new))
         under, tolerances = self._under, np.zeros(0)
         if len(new):
             grid = self._grid
@@ -259,10 +228,8 @@ class Footprints:
             under = [*under, *((texels[first:last], shares[first:last]) for first, last in ends)]
             tolerances = SAME_PLACE * np.sqrt(grid.areas[centres])
         self._under = [under[row] for row in rows.tolist()]
-        self._geoms = np.concatenate([self._geoms, geoms[new]])[rows]
-        self._points = np.concatenate([self._points, points[new]])[rows]
-        self._radii = np.concatenate([self._radii, radii[new]])[rows]
-        self._tolerances = np.concatenate([self._tolerances, tolerances])[rows]
+        added = geoms[new], points[new], radii[new], tolerances
+        self._made = tuple(np.concatenate(each)[rows] for each in zip(self._made, added, strict=True))
         return self._under[: len(geoms)]
 
 

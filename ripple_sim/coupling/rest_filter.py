@@ -292,7 +292,19 @@ def _touch(state: Any, force: float, middle: Floats, place_radius: float, dt: fl
     state.memory = min(state.memory + _GROWTH * dt, _LONGEST_MEMORY) * min(max(unchanged, 0.0), 1.0)
     now = state.level if state.chatters else force
     state.mean_force += dt / (dt + state.memory) * (now - state.mean_force)
-    _follow_place(state, middle, place_radius, dt)
+    # the mean place follows, too; where the latest one leaves it, the memory becomes shorter
+    jump2 = lag2 = 0.0
+    for k in range(3):
+        jump2 += (middle[k] - state.place[k]) ** 2
+        state.place[k] += dt / (dt + _PLACE_MEMORY) * (middle[k] - state.place[k])
+        state.mean_place[k] += dt / (dt + max(2 * _PLACE_MEMORY, state.memory)) * (middle[k] - state.mean_place[k])
+        lag2 += (state.place[k] - state.mean_place[k]) ** 2
+    state.jitter += dt / (dt + _JITTER_MEMORY) * (np.sqrt(jump2) - state.jitter)
+    stays_within = _MOST_MOVE * place_radius
+    if not state.springy:
+        stays_within = min(max(_JITTERS * state.jitter, _LEAST_MOVE * place_radius), stays_within)
+    if lag2 > stays_within**2:
+        state.memory *= 1 - min(1.0, dt / _FOLLOWS_WITHIN) * (1 - stays_within / np.sqrt(lag2))
     return _given(state, force, hit, dt)
 
 
@@ -331,20 +343,3 @@ def _given(state: Any, force: float, hit: float, dt: float) -> float:
         state.deficit -= paid
         given += paid / dt
     return given
-
-
-@kernel(no_cpython_wrapper=True)
-def _follow_place(state: Any, middle: Floats, place_radius: float, dt: float) -> None:
-    """Let the mean place follow; where the latest one leaves it, the memory becomes shorter."""
-    jump2 = lag2 = 0.0
-    for k in range(3):
-        jump2 += (middle[k] - state.place[k]) ** 2
-        state.place[k] += dt / (dt + _PLACE_MEMORY) * (middle[k] - state.place[k])
-        state.mean_place[k] += dt / (dt + max(2 * _PLACE_MEMORY, state.memory)) * (middle[k] - state.mean_place[k])
-        lag2 += (state.place[k] - state.mean_place[k]) ** 2
-    state.jitter += dt / (dt + _JITTER_MEMORY) * (np.sqrt(jump2) - state.jitter)
-    stays_within = _MOST_MOVE * place_radius
-    if not state.springy:
-        stays_within = min(max(_JITTERS * state.jitter, _LEAST_MOVE * place_radius), stays_within)
-    if lag2 > stays_within**2:
-        state.memory *= 1 - min(1.0, dt / _FOLLOWS_WITHIN) * (1 - stays_within / np.sqrt(lag2))

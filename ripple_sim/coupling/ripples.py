@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import warnings
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
 from ripple_sim.solver.errors import checked, whole
 from ripple_sim.solver.operator.plate_rim import Rim
@@ -32,9 +32,10 @@ from .stepping import (
     followed,
     missed_warning,
     physics_errors,
+    warn_caller,
 )
 from .target_warnings import AmplitudeCheck, collision_warnings
-from .targets import Target, Targets
+from .targets import Targets
 from .two_way import TwoWay
 
 __all__ = ["Impulse", "Ripples"]
@@ -123,7 +124,7 @@ class Ripples(Targets):
         rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
         for geom, waves in rigid.items():
             for message in collision_warnings(coupled, geom, waves.atlas):
-                warnings.warn(message, RippleWarning, stacklevel=2)
+                warn_caller(message)
         moduli = hertz_moduli(self.model, self, pulse, modulus)
         if two_way and moduli:
             raise SceneError(
@@ -142,14 +143,11 @@ class Ripples(Targets):
             if surface.flex >= 0 and fine[target_name(self.model, target)]
         }
         if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-            warnings.warn(
+            warn_caller(
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
-                'impulses are off by some per cent; use integrator="implicitfast", or a short time step',
-                RippleWarning,
-                stacklevel=2,
+                'impulses are off by some per cent; use integrator="implicitfast", or a short time step'
             )
-        hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in moduli.items()}
-        self._loads = ContactLoads(coupled, self._waves, hits)
+        self._loads = ContactLoads(coupled, self._waves, {geom: Hits(coupled, geom, e) for geom, e in moduli.items()})
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._two_way = TwoWay(coupled, self._waves) if two_way else None
@@ -285,8 +283,9 @@ class Ripples(Targets):
             self._two_way.settle()
         self._check_amplitude()
 
-    def _waves_changed(self, target: Target) -> None:
-        super()._waves_changed(target)
+    def _change(self, name: GeomKey, **changes: Any) -> None:
+        super()._change(name, **changes)
+        target = self._target(name)
         self._loads.waves_changed(target.geom)
         self._check_amplitude.waves_changed(target.geom, target.waves)
         if target.geom in self._high_pass:
@@ -303,4 +302,4 @@ class Ripples(Targets):
     def _warn_once(self, kind: str, message: str | None) -> None:
         if message is not None and kind not in self._warned:
             self._warned.add(kind)
-            warnings.warn(message, RippleWarning, stacklevel=4)
+            warn_caller(message)

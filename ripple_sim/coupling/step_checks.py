@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,10 +14,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
 from ripple_sim.solver.kernel import Floats, Ints
 
 from .model import SPECULATIVE, CoupledModel
+from .stepping import warn_caller
 
 _SAFE = 0.85
 # Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
@@ -79,14 +78,12 @@ class TunnellingCheck:
             return
         rows, speeds = too_fast(self._pairs, self._model, data, _EVERY)
         times = self._pairs["limit"][rows] / speeds
-        if times.min(initial=np.inf) < self._told / _WORSE:
-            worst = int(times.argmin())
-            self._told = float(times[worst])
-            warnings.warn(self._message(int(rows[worst]), float(speeds[worst])), RippleWarning, stacklevel=4)
-
-    def _message(self, i: int, speed: float) -> str:
+        if not times.min(initial=np.inf) < self._told / _WORSE:
+            return
+        worst = int(times.argmin())
+        self._told, speed = float(times[worst]), float(speeds[worst])
         model, names, timestep = self._model, self._names, self._model.opt.timestep
-        target, other, limit, _, stopping_time = self._pairs[i].item()
+        target, other, limit, _, stopping_time = self._pairs[rows[worst]].item()
         body = model.body(int(model.geom_bodyid[other])).name or names[other]
         needed = limit / speed - stopping_time
         # MuJoCo keeps a contact's time constant at two time steps or more
@@ -97,7 +94,7 @@ class TunnellingCheck:
             advice = f"use a time step of {shortest:.2g} s or less, and a solref of twice that"
         else:
             advice = f'use a solref of "{np.e * (limit / speed - timestep):.2g} 1" or less for both'
-        return (
+        warn_caller(
             f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through it, get stuck or "
             f"give a wrong impulse: with a time step of {timestep:.2g} s it sinks in by "
             f"{speed * (timestep + stopping_time):.2g} m, of which {limit:.2g} m are safe; {advice}"
@@ -221,13 +218,11 @@ class SolverBalance:
             return
         self._warned.add(target)
         option = self._model.opt
-        warnings.warn(
+        warn_caller(
             f"the impulses on geom {self._names[target]!r} are wrong by about {missing / whole:.1%}: MuJoCo's solver "
             f"stopped before contact forces and accelerations agreed, as happens where masses differ by many orders; "
             f"set option tolerance to 1e-14 or less (it is {option.tolerance:.2g}) and iterations to 1000 (it is "
-            f"{option.iterations})",
-            RippleWarning,
-            stacklevel=6,
+            f"{option.iterations})"
         )
 
 
@@ -262,10 +257,8 @@ class WrapCheck:
                 if steps >= _TOUCHED and whole > _WRAPPED * moving:
                     self._flexes.discard(target)
                     flex, other = (repr(self._names[each]) for each in (self._owners[target], owner))
-                    warnings.warn(
+                    warn_caller(
                         f"flex {flex} wraps round {other}: its impulses are {whole / moving:.2f} times what that "
-                        "loses, for forces on its slopes press it, but cancel as vectors; mj_contactForce has these",
-                        RippleWarning,
-                        stacklevel=5,
+                        "loses, for forces on its slopes press it, but cancel as vectors; mj_contactForce has these"
                     )
                     break

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import inspect
 import random
 import re
 import threading
@@ -76,7 +77,13 @@ class StepClock:
         """What happened since the last look."""
         time, timestep = float(data.time), float(model.opt.timestep)
         before, longest = self._time, max(timestep, self._timestep)
-        reset = not self._mark_stands(model, data) or (before is not None and time < before)
+        reset = before is not None and time < before
+        if not model.opt.enableflags & _FWDINV:
+            found = float(data.solver_fwdinv[0])
+            if not found < 0:  # a mark is made where there is none, and one that others made is taken over
+                found = data.solver_fwdinv[0] = -1.0 - _random.random()
+            reset = reset or self._mark not in (None, found)
+            self._mark = found
         self._time, self._timestep = time, timestep
         if before is None or reset:
             return Passed(timestep if time else 0.0, reset=reset)
@@ -87,18 +94,6 @@ class StepClock:
         steps = round(elapsed / timestep)
         elapsed = steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
         return Passed(elapsed, max(round(elapsed / longest) - 1, 0))
-
-    def _mark_stands(self, model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-        """Whether the mark is still there. Makes one where there is none, and takes over one that others made."""
-        if model.opt.enableflags & _FWDINV:
-            return True
-        found = float(data.solver_fwdinv[0])
-        if not found < 0:
-            found = -1.0 - _random.random()
-            data.solver_fwdinv[0] = found
-        stands = self._mark is None or found == self._mark
-        self._mark = found
-        return stands
 
 
 def missed_warning(missed: int) -> str | None:
@@ -195,6 +190,14 @@ def _count(nstep: int = 1) -> int:
     return nstep
 
 
+def warn_caller(message: str) -> None:
+    """Give a `RippleWarning` with the line of the user's that led here, through however many of this package's."""
+    frame, level = inspect.currentframe(), 1
+    while frame and frame.f_globals.get("__name__", "").split(".")[0] in ("ripple_sim", "contextlib"):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, RippleWarning, stacklevel=level)
+
+
 def adopt_warnings() -> None:
     """Have MuJoCo's warnings given as `RippleWarning`, from now on, each once.
 
@@ -218,7 +221,7 @@ def _tell(message: str) -> None:
         return
     _said.add(kind)
     with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
-        warnings.warn(f"MuJoCo: {text}", RippleWarning, stacklevel=2)
+        warn_caller(f"MuJoCo: {text}")
 
 
 @contextlib.contextmanager

@@ -7,7 +7,6 @@ are fine enough for what touches it and coarse enough for the time step.
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -15,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.operator.presets import (
     BOUNCE,
@@ -30,6 +29,7 @@ from ripple_sim.solver.texels.thickness import half_thickness_at
 from .geoms import find_target
 from .model import CoupledModel
 from .soft import SoftSurface, is_soft
+from .stepping import warn_caller
 from .target_mesh import target_mesh
 
 # Waves cross the target in the first time and fall to a tenth in the second [s].
@@ -104,10 +104,8 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     if not material.unset:
         return material
     speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    if "stiffness" in material.unset:
-        stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(coupled.model))
-    else:
-        stiffness = float(np.min(material.stiffness))
+    narrow = "stiffness" in material.unset
+    stiffness = _stiffness(coupled.model, extent, speed) if narrow else float(np.min(material.stiffness))
     density = _density_under(coupled, geom, extent, speed, stiffness)
     if density == 0:
         density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
@@ -161,9 +159,9 @@ def _density_under(
     )
 
 
-def _stiffest(model: mujoco.MjModel) -> float:
-    """Greatest stiffness that the time step resolves [1/s^2]."""
-    return float(min((_STIFFEST / model.opt.timestep) ** 2, 1e12))
+def _stiffness(model: mujoco.MjModel, extent: Extent, speed: float) -> float:
+    """With which dents are narrow, but no more than the time step resolves [1/s^2]."""
+    return float(min(narrow_stiffness(extent.size, speed), (_STIFFEST / model.opt.timestep) ** 2, 1e12))
 
 
 def _density(mass: float, extent: Extent) -> float:
@@ -275,39 +273,20 @@ def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material
     _, footprint = heaviest(coupled, geom)
     resolved = _TEXELS * spacing / footprint if 0 < footprint < np.inf else 0.0
     n = int(np.clip(_STEP * np.ceil(resolved / _STEP), USUAL, MOST))
-    while n > LEAST and _substeps(material, spacing / n, coupled.model.opt.timestep) > _SUBSTEPS:
+    speed, bending, viscosity, stiffness = (
+        float(np.max(getattr(material, name))) for name in ("speed", "bending", "viscosity", "stiffness")
+    )
+    while n > LEAST:
+        eigenvalue = (2 / (_STABLE * (spacing / n))) ** 2
+        wave, viscous = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness, viscosity * eigenvalue
+        if coupled.model.opt.timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4 <= _SUBSTEPS:
+            break
         n -= _STEP
     return n
 
 
-def _substeps(material: Material, spacing: float, timestep: float) -> float:
-    """Substeps of a physics step at a spacing of the texels [m]."""
-    speed, bending, viscosity, stiffness = (
-        float(np.max(getattr(material, name))) for name in ("speed", "bending", "viscosity", "stiffness")
-    )
-    eigenvalue = (2 / (_STABLE * spacing)) ** 2
-    wave = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness
-    viscous = viscosity * eigenvalue
-    return timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
-
-
 # Rings of a body so many times as light as what the surface is to bear are not seen.
 _HEAVY = 100.0
-
-
-def _tell_heavy(coupled: CoupledModel, geom: int, extent: Extent) -> None:
-    """Warn of a target that is made so heavy for a heavy body that hits of a light one will not be seen."""
-    reduced = _reduced_masses(coupled, geom)
-    heavy, light = max(_resting(coupled, geom), float(reduced.max())), float(reduced[reduced > 0].min(initial=np.inf))
-    if heavy > _HEAVY * light:
-        warnings.warn(
-            f"the surface of geom {coupled.names[geom]!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
-            f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is "
-            "suited to them",
-            RippleWarning,
-            stacklevel=7,
-        )
-
 
 _SOFT = 64  # resolution of flexes and skins
 
@@ -328,8 +307,8 @@ def suited_targets(
             if materials[name].unset:
                 # by its size and the mass of its bodies: what may hit it is not looked at
                 speed, mass = _speed(model, extent), float(model.body_mass[surface.bodies].sum())
-                stiffness = min(narrow_stiffness(extent.size, speed), _stiffest(model))
-                suited[name] = _filled_in(materials[name], speed, stiffness, _density(mass, extent))
+                stiffness, density = _stiffness(model, extent, speed), _density(mass, extent)
+                suited[name] = _filled_in(materials[name], speed, stiffness, density)
             texels.setdefault(name, _SOFT)
     left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:
@@ -338,8 +317,16 @@ def suited_targets(
     for name in left:
         extent = Extent.of(target_mesh(model, geoms[name]))
         suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
-        if "density" in materials[name].unset:
-            _tell_heavy(coupled, geoms[name], extent)
+        if "density" in materials[name].unset:  # it may be made so heavy that hits of a light body will not be seen
+            reduced = _reduced_masses(coupled, geoms[name])
+            heavy = max(_resting(coupled, geoms[name]), float(reduced.max()))
+            light = float(reduced[reduced > 0].min(initial=np.inf))
+            if heavy > _HEAVY * light:
+                warn_caller(
+                    f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as {light:.2g} "
+                    f"kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is suited "
+                    "to them"
+                )
         if name not in texels:
             texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
     return suited, texels

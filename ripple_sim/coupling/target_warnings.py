@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 
 import igl
@@ -17,13 +16,13 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Atlas, Material, WaveSolver
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.texels.thickness import half_thickness
 
 from .geoms import TARGET_TYPES
 from .model import CoupledModel, flex_thickness
+from .stepping import warn_caller
 from .suited import Extent, bearing_density
 from .target_mesh import mesh_arrays, primitive_triangles
 
@@ -86,15 +85,24 @@ GAP_TOLERANCE, COARSE_TOLERANCE = 0.02, 0.1
 
 def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
     """What to warn of where nothing touches a target, it collides off its surface, or contacts tell no forces."""
-    model, name = coupled.model, coupled.names[geom]
+    model, name, size = coupled.model, coupled.names[geom], float(np.ptp(atlas.mesh.V, axis=0).max())
+    solids = coupled.collision_geoms(geom)
     if coupled.out_of_touch(geom):
         yield _touch_warning(coupled, geom)
-    elif geom in coupled.convex_colliders or any(each != geom for each in coupled.collision_geoms(geom)):
-        yield from _gap_warning(coupled, geom, atlas)
+    elif geom in coupled.convex_colliders or any(each != geom for each in solids):
+        colliders = [part for each in solids for part in coupled.convex_colliders.get(each, [each])]
+        gap = collision_gap(coupled, geom, atlas, colliders)
+        if gap > COARSE_TOLERANCE * size:
+            names = ", ".join(repr(coupled.names[each]) for each in colliders)
+            yield (
+                f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface "
+                f"that ripples: contacts load it where it is nearest to them; name other geoms in contacts=, or call "
+                f"make_collidable(spec, {name!r})"
+            )
     elif coupled.has_flex[geom]:
         yield from _flex_warning(coupled, geom)
     elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
-        gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
+        gap = hull_gap(atlas)
         if gap > GAP_TOLERANCE * size:
             yield (
                 f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the "
@@ -132,26 +140,19 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
     return f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not welded to its own"
 
 
-def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
-    """Warning of collision geoms that are visibly off the surface."""
-    name, solids = coupled.names[geom], coupled.collision_geoms(geom)
-    colliders = [part for each in solids for part in coupled.convex_colliders.get(each, [each])]
-    gap, size = collision_gap(coupled, geom, atlas, colliders), float(np.ptp(atlas.mesh.V, axis=0).max())
-    if gap > COARSE_TOLERANCE * size:
-        names = ", ".join(repr(coupled.names[each]) for each in colliders)
-        yield (
-            f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface that "
-            f"ripples: contacts load it where it is nearest to them; name other geoms in contacts=, or call "
-            f"make_collidable(spec, {name!r})"
-        )
-
-
 def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
     """Warning of geoms that a flex collider meets badly, or not at all."""
     model, name, meets = coupled.model, coupled.names[geom], coupled.can_collide(geom)
     thickness = flex_thickness(model, coupled.flex_colliders[geom])
     boxes, distances = model.geom_type == _GEOM.mjGEOM_BOX, model.geom_type == _GEOM.mjGEOM_SDF
-    apart = np.isin(model.geom_bodyid, _kept_apart(model, int(model.geom_bodyid[geom])))
+    # MuJoCo lets bodies pass through one another that are joined, or excluded by name
+    body, weld = int(model.geom_bodyid[geom]), model.body_weldid
+    above = weld[model.body_parentid[weld]]
+    joined = (weld != weld[body]) & (weld != 0) & ((above == weld[body]) | (above[body] == weld)) & bool(weld[body])
+    joined &= not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    excluded = np.column_stack([model.exclude_signature >> 16, model.exclude_signature & 0xFFFF])
+    joined[excluded[(excluded == body).any(axis=1)]] = True
+    apart = joined[model.geom_bodyid] & (model.geom_bodyid != body)
     reasons = (
         (boxes, "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped meshes"),
         (distances, f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out"),
@@ -164,18 +165,6 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
             f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), '
             "or choose contype and conaffinity so that they do not meet"
         )
-
-
-def _kept_apart(model: mujoco.MjModel, body: int) -> list[int]:
-    """Bodies whose geoms MuJoCo lets pass through those of a body: joined to it, or excluded by name."""
-    weld = model.body_weldid
-    above = weld[model.body_parentid[weld]]
-    joined = (weld != weld[body]) & (weld != 0) & ((above == weld[body]) | (above[body] == weld)) & bool(weld[body])
-    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
-        joined[:] = False
-    pairs = [(int(signature) >> 16, int(signature) & 0xFFFF) for signature in model.exclude_signature]
-    excluded = {b for pair in pairs if body in pair for b in pair if b != body}
-    return sorted(excluded.union(np.flatnonzero(joined).tolist()))
 
 
 # The height allowed over the local radius.
@@ -286,11 +275,9 @@ class AmplitudeCheck:
 
     def _warn(self, geom: int) -> None:
         watch = self._watched.pop(geom)
-        warnings.warn(
+        warn_caller(
             f"the waves on geom {self._coupled.names[geom]!r} are {watch.what}; pictures show them limited. "
-            + self._advice(geom, watch.waves, _MARGIN * watch.needed),
-            RippleWarning,
-            stacklevel=5,
+            + self._advice(geom, watch.waves, _MARGIN * watch.needed)
         )
 
     def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:

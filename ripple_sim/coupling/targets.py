@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -12,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.assembly import hold
 from ripple_sim.solver.operator.plate_rim import Rim
@@ -21,6 +20,7 @@ from ripple_sim.solver.waves.footprint import Footprint, footprint
 
 from .geoms import ByGeom, GeomKey, by_name, find_any, find_target, for_each, rotation_in_body, target_name
 from .soft import is_soft, target_pose
+from .stepping import warn_caller
 from .suited import suited_targets
 from .target_mesh import target_atlas
 
@@ -194,11 +194,9 @@ class Targets:
         where = waves.add_impulse(place, impulse, radius)
         off, size = float(np.linalg.norm(place - where.point)), float(np.ptp(waves.atlas.mesh.V, axis=0).max())
         if off > _FAR * size:
-            warnings.warn(
+            warn_caller(
                 f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its size); the nearest point "
-                f"is poked. Points are in the frame of the geom's body [m]",
-                RippleWarning,
-                stacklevel=2,
+                f"is poked. Points are in the frame of the geom's body [m]"
             )
         return where
 
@@ -277,8 +275,4 @@ class Targets:
         """Change a target's material, options or what is held, see `Target`; if that fails, nothing has changed."""
         target = self._target(name).rebuilt(**changes)
         self._targets[target_name(self.model, target.geom)] = target
-        self._waves_changed(target)
-
-    def _waves_changed(self, target: Target) -> None:
-        """Hand a target's new waves to everybody."""
         self._waves[target.geom] = target.waves

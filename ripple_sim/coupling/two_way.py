@@ -22,7 +22,7 @@ from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
-from .contacts import ColliderIds, pair_rows, places_facing, points_outside
+from .contacts import collider_ids, pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
 from .geoms import ENDLESS, TARGET_TYPES
 from .model import CoupledModel
@@ -154,7 +154,7 @@ class TwoWay:
 
     def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
         self._coupled, self._waves = coupled, waves
-        self._colliders, model = ColliderIds(coupled), coupled.model
+        model = coupled.model
         # geoms that may come within reach of each target, and the targets that each geom collides for
         self._reachable: dict[int, list[int]] = {}
         self._targets_of: dict[int, list[int]] = {}
@@ -166,14 +166,15 @@ class TwoWay:
                 self._targets_of.setdefault(geom, []).append(target)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[list(self._targets_of)] = True
-        self._trials: dict[int, tuple[WaveSolver, WaveSolver, WaveSolver]] = {}
+        # the waves of each target, and two solvers to try things on
+        self._trials: dict[int, tuple[WaveSolver, ...]] = {}
         self.clear()
 
     def clear(self) -> None:
         """Forget all contacts."""
         self._velocity_change = VelocityChange(self._coupled.model)
         self._places: dict[Key, _Place] = {}
-        self._mobilities: dict[Key, tuple[tuple[_Place, ...], tuple[float, float]]] = {}
+        self._mobilities: dict[int, tuple[tuple[_Place, ...], dict[Key, tuple[float, float]]]] = {}
         self._forces: dict[Key, float] = {}
         self._paid: dict[Key, float] = {}
         self._before: dict[int, NDArray[np.float32]] = {}
@@ -218,7 +219,7 @@ class TwoWay:
         for key, point, normal in reached:
             forces[key] = self._push(data, solved, pairs[key], point, normal, dt, pending=pending)
         self._forces = forces
-        self._velocity_change.note(data)
+        self._velocity_change.latest = data.qvel.copy()
         self._before = self._heights
         loads: dict[int, list[Load]] = {}
         for key, force in forces.items():
@@ -242,7 +243,7 @@ class TwoWay:
         if not data.ncon:
             return found
         bears = data.contact.efc_address >= 0
-        rows = contacts, _, geoms, others = pair_rows(self._colliders(data), bears, self._is_read)
+        rows = contacts, _, geoms, others = pair_rows(collider_ids(self._coupled, data), bears, self._is_read)
         points, normals = points_outside(data, *rows, self._coupled.extents)
         ids = zip(contacts.tolist(), geoms.tolist(), others.tolist(), strict=True)
         for (i, geom, other), at, normal in zip(ids, points, normals, strict=True):
@@ -306,49 +307,39 @@ class TwoWay:
         for target in dict.fromkeys(target for target, _ in self._places):
             places = {key: place for key, place in self._places.items() if key[0] == target}
             held = {key: self._forces.get(key, 0.0) for key in places}
-            waves, trial, rest = self._with_trials(target)
+            waves = self._waves[target]
+            of, *trials = self._trials.get(target, (None,))
+            # what moves gets another operator
+            if of is not waves or trials[0].operator is not waves.operator:
+                trials = [copy.copy(waves), copy.copy(waves)]
+                self._trials[target], self._mobilities = (waves, *trials), {}
+            for each in trials:
+                each.conserve_volume = waves.conserve_volume
+            trial, rest = trials
             trial.state = waves.state
             loads = [Load(place.load.texels, held[key] * place.load.forces) for key, place in places.items()]
             trial.step(dt, load=Load.together(loads))
-            mobilities = self._mobilities_of(places, rest, dt)
+            # velocity under each place, at the end of a step and its mean, over the step, that unit forces give
+            these, mobilities = self._mobilities.get(target, ((), {}))
+            if len(these) != len(places) or any(a is not b for a, b in zip(these, places.values(), strict=True)):
+                rest.reset()
+                rest.step(dt, load=Load.together([place.load for place in places.values()]))
+                height, velocity = rest.height, rest.velocity
+                mobilities = {
+                    key: (-place.mean(velocity) / dt, max(-place.mean(height) / dt**2, 0.0))
+                    for key, place in places.items()
+                }
+                self._mobilities[target] = tuple(places.values()), mobilities
             now, before, after = self._heights[target], self._before.get(target, self._heights[target]), trial.height
             velocity, end = waves.velocity, trial.velocity
             for key, place in places.items():
-                mobility, mean_mobility = mobilities[key]
-                height, mean = place.mean(now), place.mean(after - now) / dt
+                (mobility, mean_mobility), mean = mobilities[key], place.mean(after - now) / dt
                 start, free = place.mean(velocity), place.mean(end)
                 if mobility < mean_mobility:
                     # the surface swings back within the step, and its velocity at the end says little
                     start, free, mobility = place.mean(now - before) / dt, mean, mean_mobility
-                pairs[key] = Pair(key, height, held[key], start, free, mobility, mean, mean_mobility)
+                pairs[key] = Pair(key, place.mean(now), held[key], start, free, mobility, mean, mean_mobility)
         return pairs
-
-    def _mobilities_of(
-        self, places: Mapping[Key, _Place], rest: WaveSolver, dt: float
-    ) -> dict[Key, tuple[float, float]]:
-        """Velocity under each place, at the end of a step and its mean, over the step, that unit forces give."""
-        these = tuple(places.values())
-        known = [self._mobilities.get(key, ((), None))[0] for key in places]
-        if not all(len(each) == len(these) and all(map(lambda a, b: a is b, each, these)) for each in known):
-            rest.reset()
-            rest.step(dt, load=Load.together([place.load for place in these]))
-            height, velocity = rest.height, rest.velocity
-            for key, place in places.items():
-                found = -place.mean(velocity) / dt, max(-place.mean(height) / dt**2, 0.0)
-                self._mobilities[key] = these, found
-        return {key: self._mobilities[key][1] for key in places}
-
-    def _with_trials(self, target: int) -> tuple[WaveSolver, WaveSolver, WaveSolver]:
-        """A target's waves, and two solvers to try things on."""
-        waves = self._waves[target]
-        of, *trials = self._trials.get(target, (None,))
-        # what moves gets another operator
-        if of is not waves or trials[0].operator is not waves.operator:
-            self._trials[target] = waves, copy.copy(waves), copy.copy(waves)
-            self._mobilities = {}
-        for trial in self._trials[target][1:]:
-            trial.conserve_volume = waves.conserve_volume
-        return self._trials[target]
 
     # What happens to the bodies
 

@@ -218,6 +218,16 @@ def test_a_simulation_that_diverges_takes_the_waves_along_and_says_so(in_tmp_pat
     assert len(told) == 1
 
 
+@pytest.mark.parametrize("loop", [plain, own_steps, followed])
+def test_a_warning_names_the_line_that_steps(loop: Loop, in_tmp_path: None) -> None:
+    ripples, model, data = bounce()
+    plain(ripples, model, data)
+    data.qvel[0] = 1e12
+    with pytest.warns(RippleWarning, match="diverged") as told:
+        loop(ripples, model, data)
+    assert [each.filename for each in told] == [__file__]
+
+
 @pytest.mark.parametrize("two_way", [False, True])
 def test_a_broken_state_makes_no_waves_where_mujoco_goes_on_with_it(two_way: bool, in_tmp_path: None) -> None:
     """With its automatic reset disabled: NaN positions once ended in an error about points."""

@@ -1,5 +1,7 @@
 """Flexes and skins as targets: where their texels are, what contacts give them, and what the high-pass leaves of it."""
 
+import inspect
+
 import mujoco
 import numpy as np
 import pytest
@@ -94,8 +96,9 @@ def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses(
     assert_allclose(whole, 0.1 * data.qvel[dof : dof + 3] + gained, atol=1e-6)
     assert run.given() == pytest.approx(amounts, rel=1e-6)
     assert run.given() > 1.1 * np.linalg.norm(whole)
-    told = [str(each.message) for each in recwarn if "wraps" in str(each.message)]
-    assert [each[:32] for each in told] == ["flex 'cloth' wraps round 'ball':"]
+    told = [each for each in recwarn if "wraps" in str(each.message)]
+    assert [str(each.message)[:32] for each in told] == ["flex 'cloth' wraps round 'ball':"]
+    assert told[0].filename == inspect.getfile(Run), "the caller of step"
 
 
 def test_texels_lie_where_the_flex_is():
@@ -122,6 +125,10 @@ def test_names_that_no_surface_has_are_refused():
         Ripples(model, {"jam": SOFT})
     with pytest.raises(SceneError, match="cannot push back: their waves have the masses"):
         Ripples(model, {"jelly": SOFT}, resolution=8, two_way=True)
+    with pytest.raises(
+        SceneError, match=r"^contacts names 'cloth', a flex or a skin, for which no geoms can be chosen"
+    ):
+        Ripples(mujoco.MjModel.from_xml_string(HAMMOCK), {"cloth": SOFT}, contacts={"cloth": ["ball"]}, resolution=8)
 
 
 def test_what_a_material_leaves_open_is_chosen_by_the_model():

@@ -163,8 +163,11 @@ def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so()
     """As torsos of robots are, whose limbs may touch them: they bear the whole robot."""
     link = BOX.format(mass=3e4).replace('"target"', '"target" mass="1"').replace("<geom", "<body><freejoint/><geom", 1)
     model = mujoco.MjModel.from_xml_string(link.replace('0.25"/>', '0.25"/></body>', 1))
-    with pytest.warns(RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit=\(1, m/s"):
+    with pytest.warns(
+        RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit=\(1, m/s"
+    ) as told:
         Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
+    assert told[0].filename == __file__
     with warnings.catch_warnings(action="error"):
         Ripples(model, {"target": Material.suited(1.0, (1.0, 2.0))}, resolution=8, backend="cpu")
 
