@@ -8,7 +8,7 @@ import itertools
 import re
 import textwrap
 import typing
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import msgspec
@@ -17,7 +17,7 @@ from ripple_sim.batch.plan import Distribution, MeshesEntry, PlanFile, StoreEntr
 from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
 from ripple_sim.scene.bodies import BODY_SHAPES
-from ripple_sim.scene.material_entry import LAWS
+from ripple_sim.scene.material_entry import LAWS, MapEntry, MaterialChange, MaterialEntry, PresetEntry
 from ripple_sim.scene.scene import NAMES as OVERLAYS
 from ripple_sim.solver import Material
 from ripple_sim.solver.layouts.build import LAYOUTS
@@ -73,12 +73,21 @@ def plan_tables() -> str:
     )
 
 
+def tables(outer: type[msgspec.Struct], before: str = "") -> Iterator[tuple[str, type[msgspec.Struct]]]:
+    """The tables in a table, with their names in a scene file."""
+    for field in msgspec.structs.fields(outer):
+        entry = scene_file.table_of(field.type)
+        if entry is not None:
+            yield before + field.name, entry
+            yield from tables(entry, f"{before}{field.name}.")
+
+
 def scene_tables() -> str:
     """All tables, from the classes that scene files are read into."""
     parts = [_table("", scene_file.SceneFile)]
     seen = set()
-    for name, entry in scene_file._TABLES.items():
-        if entry is scene_file.MapEntry:
+    for name, entry in tables(scene_file.SceneFile):
+        if entry is MapEntry:
             name = "a map in [ripple.material]"
         if entry not in seen:
             parts.append(_table(name, entry))
@@ -107,11 +116,11 @@ def _table(name: str, entry: type[msgspec.Struct]) -> str:
 def key_texts(entry: type[msgspec.Struct]) -> dict[str, str]:
     """Text of each key: the string under the field, or what `Material` says of the coefficient or the parameter."""
     sources = {
-        scene_file.MaterialEntry: {"": Material},
-        scene_file.MaterialChange: {"": Material},
-        scene_file.PresetEntry: {f"`{preset}`: ": getattr(Material, preset) for preset in LAWS},
+        MaterialEntry: {"": Material},
+        MaterialChange: {"": Material},
+        PresetEntry: {f"`{preset}`: ": getattr(Material, preset) for preset in LAWS},
     }
-    texts: dict[str, list[str]] = {"name": ["The preset."]} if entry is scene_file.PresetEntry else {}
+    texts: dict[str, list[str]] = {"name": ["The preset."]} if entry is PresetEntry else {}
     for where, source in sources.get(entry, {}).items():
         for name, kind, text in re.findall(
             r"^(\w+) : (.*)(?:\n|$)((?:    .*(?:\n|$))*)", inspect.getdoc(source) or "", re.MULTILINE
@@ -131,7 +140,7 @@ def _own_texts(entry: type[msgspec.Struct]) -> dict[str, str]:
 
 
 def _values(entry: type[msgspec.Struct], field: msgspec.structs.FieldInfo) -> str:
-    words = _WORDS.get(field.name) if field.name != "name" or entry is scene_file.PresetEntry else None
+    words = _WORDS.get(field.name) if field.name != "name" or entry is PresetEntry else None
     if words is None:
         return _kind(field.type)
     listed = ", ".join(f"`{word}`" for word in words)

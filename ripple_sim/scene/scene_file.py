@@ -256,11 +256,11 @@ def _check_values(value: Any, place: str, what: str) -> None:
         raise SceneError(f"{what}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
 
 
-def _table_of(kind: Any) -> type[msgspec.Struct] | None:
+def table_of(kind: Any) -> type[msgspec.Struct] | None:
     """The table that a field of some type may be, or one of a list of tables."""
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         return kind
-    return next(filter(None, map(_table_of, typing.get_args(kind))), None)
+    return next(filter(None, map(table_of, typing.get_args(kind))), None)
 
 
 def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str = "") -> None:
@@ -272,7 +272,7 @@ def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str =
         if key not in fields:
             where = f" in [{place}]" if place else ""
             raise SceneError(f"{what}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
-        inner, inner_place = _table_of(fields[key]), f"{place}.{key}" if place else key
+        inner, inner_place = table_of(fields[key]), f"{place}.{key}" if place else key
         if inner is not None:
             if isinstance(value, dict) and typing.get_origin(fields[key]) is list:
                 raise SceneError(

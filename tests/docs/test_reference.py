@@ -15,10 +15,9 @@ import ripple_sim
 import ripple_sim.solver
 from ripple_sim.encode import MARK
 from ripple_sim.render import LOOKS
-from ripple_sim.scene import scene_file
+from ripple_sim.scene import SceneFile
 
 DOCS = Path(__file__).parents[2] / "docs"
-TABLES = [scene_file.SceneFile, *scene_file._TABLES.values()]
 
 
 def hook(name: str) -> ModuleType:
@@ -27,6 +26,9 @@ def hook(name: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+TABLES = dict(hook("scene_tables").tables(SceneFile))
 
 
 def objects() -> list[str]:
@@ -75,7 +77,7 @@ def test_parameters_that_share_a_line_share_a_default(path: str) -> None:
             assert len(defaults) <= 1, f"{path}: {line} have the defaults {', '.join(sorted(defaults))}"
 
 
-@pytest.mark.parametrize("entry", TABLES, ids=lambda entry: entry.__name__)
+@pytest.mark.parametrize("entry", {SceneFile, *TABLES.values()}, ids=lambda entry: entry.__name__)
 def test_every_key_of_a_scene_file_has_a_text(entry: type[msgspec.Struct]) -> None:
     texts = hook("scene_tables").key_texts(entry)
     assert not [field.name for field in msgspec.structs.fields(entry) if not texts.get(field.name)]
@@ -83,7 +85,7 @@ def test_every_key_of_a_scene_file_has_a_text(entry: type[msgspec.Struct]) -> No
 
 def test_the_page_on_scene_files_has_every_table_and_the_words_of_a_look() -> None:
     text = hook("scene_tables").scene_tables()
-    for name in scene_file._TABLES:
+    for name in TABLES:
         if not name.startswith("ripple.material."):
             assert f"`[{name}]`" in text
     assert ", ".join(f"`{look}`" for look in LOOKS) in text
