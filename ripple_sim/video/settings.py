@@ -29,8 +29,6 @@ from ripple_sim.solver.gl import GLContext
 
 from .options import Backend, SceneOptions, VideoOptions
 
-_PACKAGES = ("numpy", "numba", "moderngl", "av", "pillow")
-
 
 def origin(scene: Scene, options: SceneOptions) -> dict[str, str | int]:
     """What the options of a video or an export change of a scene's waves, its fingerprint, and versions of packages."""
@@ -51,7 +49,7 @@ def versions() -> dict[str, str]:
     return {
         "ripple-sim": __version__,
         "mujoco": mujoco.__version__,
-        **{package: version(package) for package in _PACKAGES},
+        **{package: version(package) for package in ("numpy", "numba", "moderngl", "av", "pillow")},
     }
 
 
@@ -66,11 +64,8 @@ def scene_digest(scene: Scene) -> str:
             hasher.update(Path(each.map).read_bytes())
         if entry.still_map is not None:
             hasher.update(Path(entry.still_map).read_bytes())
-    hasher.update(
-        msgspec.json.encode(
-            (scene.targets, scene.camera, scene.events, scene.two_way, *([scene.sensors] if scene.sensors else []))
-        )
-    )
+    sensors = [scene.sensors] if scene.sensors else []
+    hasher.update(msgspec.json.encode((scene.targets, scene.camera, scene.events, scene.two_way, *sensors)))
     return hasher.hexdigest()
 
 
@@ -84,22 +79,19 @@ def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
     Shutter, aperture, focus and exposures stay as they are: see `with_exposure`. Raises `VideoError` for an output of
     unknown format.
     """
+    fps = default_fps(output) if options.fps is None else options.fps  # first: it refuses an unknown format
+    backend = options.backend
+    if backend == "auto":  # the one that is meant for the largest target of known resolution
+        sides = [options.resolution or entry.resolution for entry in scene.targets]
+        known = [6 * n * n for n in sides if n is not None]
+        backend = cast(Backend, auto_backend(max(known)) if known else auto_backend())
     return dataclasses.replace(
         options,
-        fps=default_fps(output) if options.fps is None else options.fps,
+        fps=fps,
         duration=scene.duration if options.duration is None else options.duration,
         overlay=tuple(scene.overlay if options.overlay is None else options.overlay),
-        backend=_backend(options, scene),
+        backend=backend,
     )
-
-
-def _backend(options: VideoOptions, scene: Scene) -> Backend:
-    """The backend that is meant, for the largest target of known resolution."""
-    if options.backend != "auto":
-        return options.backend
-    sides = [options.resolution or entry.resolution for entry in scene.targets]
-    known = [6 * n * n for n in sides if n is not None]
-    return cast(Backend, auto_backend(max(known)) if known else auto_backend())
 
 
 def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> dict[str, str | int | float]:
