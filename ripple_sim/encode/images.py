@@ -34,7 +34,7 @@ from .clip import GIF, Clip, Stream
 from .replace import MARK, check_folder, made_here, mark_gif
 
 # ITU-R BT.709: x and y of red, green, blue and white
-_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+_BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
 def check_exr() -> None:
@@ -47,8 +47,7 @@ def check_exr() -> None:
 
 def write_exr(path: Path, frame: NDArray[np.float16], fps: int) -> None:
     """Write a frame, float16 [height, width, 3 or 4], with colours multiplied by opacity."""
-    channels = {"RGBA"[: frame.shape[2]]: np.ascontiguousarray(frame)}
-    _write_channels(path, channels, chromaticities=_CHROMATICITIES, framesPerSecond=Fraction(fps))
+    _write_channels(path, {"RGBA"[: frame.shape[2]]: frame}, chromaticities=_BT709, framesPerSecond=Fraction(fps))
 
 
 def _write_channels(path: Path, channels: Mapping[str, NDArray], **attributes: Any) -> None:
@@ -58,7 +57,7 @@ def _write_channels(path: Path, channels: Mapping[str, NDArray], **attributes: A
     header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, "software": MARK, **attributes}
     # through memory: the library does not notice a disk that fills up with the last bytes of a file
     file = io.BytesIO()
-    OpenEXR.File(header, dict(channels)).write(file)
+    OpenEXR.File(header, {name: np.ascontiguousarray(values) for name, values in channels.items()}).write(file)
     path.write_bytes(file.getbuffer())
 
 
@@ -249,9 +248,9 @@ def _write_exr(path: Path, passes: Mapping[str, NDArray]) -> None:
     channels = {}
     for name, values in passes.items():
         for index, axis in enumerate(_CHANNELS.get(name, "")):
-            channels[f"{name}.{axis}"] = np.ascontiguousarray(values[..., index])
+            channels[f"{name}.{axis}"] = values[..., index]
         if name not in _CHANNELS:
-            channels[name] = np.ascontiguousarray(values)
+            channels[name] = values
     _write_channels(path, channels)
 
 

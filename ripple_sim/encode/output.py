@@ -170,7 +170,17 @@ def check_output(
                 )
         if transparent and form not in _WITH_OPACITY:
             raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
-        _check_size(form, width, height)
+        check_size(width, height)
+        if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
+            raise VideoError(
+                f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at {_H264_BLOCKS} "
+                "blocks of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp or a folder of frames"
+            )
+        if form in _SUBSAMPLED and (width % 2 or height % 2):
+            raise VideoError(
+                f"frame size is {width}x{height}; {form} needs an even width and height, "
+                f"such as {width + width % 2}x{height + height % 2}"
+            )
         highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
         if not isinstance(fps, int) or not 1 <= fps <= highest:
             what = "a GIF's frame rate" if form == ".gif" else "frame rate"
@@ -188,20 +198,6 @@ def check_size(width: int, height: int) -> None:
     """
     if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
         raise VideoError(f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each side")
-
-
-def _check_size(form: str, width: int, height: int) -> None:
-    check_size(width, height)
-    if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
-        raise VideoError(
-            f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at {_H264_BLOCKS} blocks "
-            "of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp or a folder of frames"
-        )
-    if form in _SUBSAMPLED and (width % 2 or height % 2):
-        raise VideoError(
-            f"frame size is {width}x{height}; {form} needs an even width and height, "
-            f"such as {width + width % 2}x{height + height % 2}"
-        )
 
 
 def check_replaceable(path: Path, overwrite: bool) -> None:
