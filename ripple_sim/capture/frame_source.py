@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.soft import first_skin
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
-from ripple_sim.render.camera import Pose, Viewpoint
+from ripple_sim.render.camera import Pose
 from ripple_sim.render.resources import MovedHeightMap
 from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
 from ripple_sim.render.surfaces.moving import MovingVertices
@@ -95,21 +95,14 @@ class Sighting:
                 heights = spline_heights(height_map, *spline_samples(*places, page.resolution))
                 direction = image.smooth_normal[mask] @ rotation
                 still = local - image.height[mask, None] * direction
-                still, direction = _taken_along(self.meshes[geom], later.meshes[geom], still, direction)
+                mesh, V = self.meshes[geom], later.meshes[geom][0]
+                if not np.array_equal(mesh[0], V):  # the mesh has moved on, and takes points and directions along
+                    taken = MovingVertices(*mesh, still, direction, direction)(V)
+                    still, direction = (each.astype(np.float64) for each in taken[:2])
                 local = still + heights[:, None] * direction
             moved = local @ later.rotations[geom].T + later.positions[geom]
             flow[mask] = later.pixels(moved) - self.pixels(points)
         return flow
-
-
-def _taken_along(
-    mesh: tuple[NDArray, NDArray], later: tuple[NDArray, NDArray], points: NDArray, directions: NDArray
-) -> tuple[NDArray, NDArray]:
-    """Points of a mesh and the directions in which waves move them, both [k, 3], once the mesh has moved on."""
-    if np.array_equal(mesh[0], later[0]):
-        return points, directions
-    points, directions, _ = MovingVertices(*mesh, points, directions, directions)(later[0])
-    return points.astype(np.float64), directions.astype(np.float64)
 
 
 def passes_of(sighting: Sighting, later: Sighting | None, names: tuple[str, ...]) -> dict[str, NDArray]:
@@ -254,7 +247,12 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
         fixed = Camera.from_mjcf(model, data, entry.name)
         if tracked is not None:
             fixed = _aimed(fixed, tracked)
-        return fixed if not entry.orbit else _turned(fixed, np.radians(entry.orbit) * time)
+        if not entry.orbit:
+            return fixed
+        angle = np.radians(entry.orbit) * time  # around the vertical through its aim
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        focus = fixed.pose().focus
+        return FixedCamera(focus + turn @ (fixed.position - focus), turn @ fixed.rotation, fixed.distance, fixed.fovy)
     base = np.zeros(3) if tracked is not None else model.stat.center
     aim = base if entry.lookat is None else entry.lookat
     x, y, z = (float(value) for value in (aim if tracked is None else tracked + aim))
@@ -291,13 +289,6 @@ def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:
     right /= np.linalg.norm(right)
     back = back / distance
     return FixedCamera(camera.position, np.stack([right, np.cross(back, right), back], axis=1), distance, camera.fovy)
-
-
-def _turned(camera: FixedCamera, angle: float) -> FixedCamera:
-    """The camera turned by an angle [rad] around the vertical through its aim."""
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
-    focus = camera.pose().focus
-    return FixedCamera(focus + turn @ (camera.position - focus), turn @ camera.rotation, camera.distance, camera.fovy)
 
 
 class FrameSource:
@@ -364,15 +355,12 @@ class FrameSource:
     def submit(self, snapshot: Snapshot) -> None:
         """Draw a snapshot without waiting for it: `fetch` returns it, after those submitted before."""
         height_maps = {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}
-        camera: Viewpoint = self.camera(snapshot)
-        self.shown.look(snapshot.data, snapshot.heights, camera.pose())
-        lens = self._lens_points[snapshot.exposure]
+        pose, lens, sim = self.camera(snapshot).pose(), self._lens_points[snapshot.exposure], self._simulation
+        self.shown.look(snapshot.data, snapshot.heights, pose)
         if lens.any():
-            sim = self._simulation
-            pose = camera.pose()
             focus = focal_distance(sim.model, snapshot.data, sim.scene.camera, pose)
-            camera = dataclasses.replace(pose, lens=tuple(lens), focal_distance=focus)
-        self.renderer.submit(snapshot.data, height_maps, camera, snapshot.exposure)
+            pose = dataclasses.replace(pose, lens=tuple(lens), focal_distance=focus)
+        self.renderer.submit(snapshot.data, height_maps, pose, snapshot.exposure)
 
     def fetch(self) -> NDArray | None:
         """Wait for the earliest snapshot submitted, and return what `render` does."""

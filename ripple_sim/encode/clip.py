@@ -155,9 +155,8 @@ def join_clips(
         See `Stream`.
     """
     output = open_container(path, container)
-    track = None
+    track = target = None
     try:
-        target = None
         for clip, first in clips:
             with av.open(str(clip)) as source:
                 video = source.streams.video[0]

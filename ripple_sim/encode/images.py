@@ -9,13 +9,15 @@ still images: the container is RIFF, see "WebP Container Specification" by Googl
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import io
+import itertools
 import json
 import re
 import struct
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -32,7 +34,7 @@ from .clip import GIF, Clip, Stream
 from .replace import MARK, check_folder, made_here, mark_gif
 
 # ITU-R BT.709: x and y of red, green, blue and white
-_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+_BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
 def check_exr() -> None:
@@ -45,8 +47,7 @@ def check_exr() -> None:
 
 def write_exr(path: Path, frame: NDArray[np.float16], fps: int) -> None:
     """Write a frame, float16 [height, width, 3 or 4], with colours multiplied by opacity."""
-    channels = {"RGBA"[: frame.shape[2]]: np.ascontiguousarray(frame)}
-    _write_channels(path, channels, chromaticities=_CHROMATICITIES, framesPerSecond=Fraction(fps))
+    _write_channels(path, {"RGBA"[: frame.shape[2]]: frame}, chromaticities=_BT709, framesPerSecond=Fraction(fps))
 
 
 def _write_channels(path: Path, channels: Mapping[str, NDArray], **attributes: Any) -> None:
@@ -56,7 +57,7 @@ def _write_channels(path: Path, channels: Mapping[str, NDArray], **attributes: A
     header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, "software": MARK, **attributes}
     # through memory: the library does not notice a disk that fills up with the last bytes of a file
     file = io.BytesIO()
-    OpenEXR.File(header, dict(channels)).write(file)
+    OpenEXR.File(header, {name: np.ascontiguousarray(values) for name, values in channels.items()}).write(file)
     path.write_bytes(file.getbuffer())
 
 
@@ -66,16 +67,33 @@ _PALETTE_USE = "dither=bayer:bayer_scale=4:diff_mode=rectangle"
 
 def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> None:
     """Make an endlessly looping GIF of clips, given with the number of each one's first frame."""
-    palette = _choose_palette(clips, stream)
+    graph = Graph()
+    frames, sink = _source(graph, stream), graph.add("buffersink")
+    graph.link_nodes(frames, graph.add("palettegen"), sink).configure()
+    (palette,) = _filtered(_images(clips, stream.fps), frames, sink)
+    graph = Graph()
+    frames, colours = _source(graph, stream), graph.add_buffer(palette, time_base=Fraction(1, stream.fps))
+    draw, sink = graph.add("paletteuse", _PALETTE_USE), graph.add("buffersink")
+    frames.link_to(draw, 0, 0)
+    colours.link_to(draw, 0, 1)
+    draw.link_to(sink)
+    graph.configure()
+    colours.push(palette)
+    colours.push(None)
     gif = Clip(path, GIF, stream)
     try:
-        for image in _draw(clips, palette, stream):
+        for image in _filtered(_images(clips, stream.fps), frames, sink):
             gif.encode(image)
     except BaseException:
         gif.close()
         raise
     gif.finish()
     mark_gif(path)
+
+
+def _source(graph: Graph, stream: Stream) -> Any:
+    width, height, form = stream.width, stream.height, av.VideoFormat("rgb24")
+    return graph.add_buffer(width=width, height=height, format=form, time_base=Fraction(1, stream.fps))
 
 
 def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFrame]:
@@ -87,47 +105,13 @@ def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFra
                 yield image
 
 
-def _choose_palette(clips: Sequence[tuple[Path, int]], stream: Stream) -> av.VideoFrame:
-    graph = Graph()
-    frames = _source(graph, "rgb24", stream.width, stream.height, stream.fps)
-    sink = graph.add("buffersink")
-    graph.link_nodes(frames, graph.add("palettegen"), sink).configure()
-    for image in _images(clips, stream.fps):
-        frames.push(image)
-    frames.push(None)
-    return sink.pull()
-
-
-def _draw(clips: Sequence[tuple[Path, int]], palette: av.VideoFrame, stream: Stream) -> Iterator[av.VideoFrame]:
-    graph = Graph()
-    frames = _source(graph, "rgb24", stream.width, stream.height, stream.fps)
-    colours = _source(graph, palette.format.name, palette.width, palette.height, stream.fps)
-    draw, sink = graph.add("paletteuse", _PALETTE_USE), graph.add("buffersink")
-    frames.link_to(draw, 0, 0)
-    colours.link_to(draw, 0, 1)
-    draw.link_to(sink)
-    graph.configure()
-    colours.push(palette)
-    colours.push(None)
-    for image in _images(clips, stream.fps):
-        frames.push(image)
-        yield from _ready(sink)
-    frames.push(None)
-    yield from _ready(sink)
-
-
-def _source(graph: Graph, pixel_format: str, width: int, height: int, fps: int) -> Any:
-    return graph.add_buffer(
-        width=width, height=height, format=av.VideoFormat(pixel_format, width, height), time_base=Fraction(1, fps)
-    )
-
-
-def _ready(sink: Any) -> Iterator[av.VideoFrame]:
-    while True:
-        try:
-            yield sink.pull()
-        except (av.BlockingIOError, av.EOFError):
-            return
+def _filtered(images: Iterable[av.VideoFrame], source: Any, sink: Any) -> Iterator[av.VideoFrame]:
+    """What comes out of a graph's sink, taken at once, while images go in at its source."""
+    for image in itertools.chain(images, [None]):
+        source.push(image)
+        with contextlib.suppress(av.BlockingIOError, av.EOFError):  # until it wants the next image, or is done
+            while True:
+                yield sink.pull()
 
 
 PASSES = ("depth", "normal", "segmentation", "flow", "position", "height")
@@ -241,19 +225,14 @@ def _check_folder(video: Path, overwrite: bool) -> None:
         return _NAME.fullmatch(file.name.lstrip(".")) is not None and (unfinished or overwrite or made_here(file))
 
     check_folder(VideoError, "passes", folder, own)
-    owner = _owner(folder)
+    try:
+        owner = json.loads((folder / _CONTENTS).read_text()).get("video")
+    except (OSError, ValueError, AttributeError, RecursionError):  # also of brackets in brackets without end
+        owner = None  # the folder does not say whose it is
     if owner not in (None, final_path(video).name) and not overwrite:
         raise VideoError(
             f"cannot write passes to {folder}: they are those of {owner}; name another output, or add --overwrite"
         )
-
-
-def _owner(folder: Path) -> str | None:
-    """Name of the video that a folder's passes belong to, if it says so."""
-    try:
-        return json.loads((folder / _CONTENTS).read_text()).get("video")
-    except (OSError, ValueError, AttributeError, RecursionError):  # also of brackets in brackets without end
-        return None
 
 
 def _write_npz(path: Path, passes: Mapping[str, NDArray]) -> None:
@@ -269,9 +248,9 @@ def _write_exr(path: Path, passes: Mapping[str, NDArray]) -> None:
     channels = {}
     for name, values in passes.items():
         for index, axis in enumerate(_CHANNELS.get(name, "")):
-            channels[f"{name}.{axis}"] = np.ascontiguousarray(values[..., index])
+            channels[f"{name}.{axis}"] = values[..., index]
         if name not in _CHANNELS:
-            channels[name] = np.ascontiguousarray(values)
+            channels[name] = values
     _write_channels(path, channels)
 
 
@@ -282,6 +261,7 @@ _DO_NOT_BLEND = 0x02
 def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
     """Make an endlessly looping WebP of still ones, all of the stream's size."""
     flags = _ANIMATION | _METADATA
+    canvas = b"".join((side - 1).to_bytes(3, "little") for side in (stream.width, stream.height))
     with path.open("wb") as file:
         file.write(bytes(12 + 8 + 10))  # RIFF and VP8X, which come last: they hold the size and the flags
         file.write(riff_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
@@ -291,13 +271,13 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
             image = _image_chunks(still.read_bytes())
             if image.startswith(b"ALPH") or (image.startswith(b"VP8L") and image[12] & 0x10):
                 flags |= _OPACITY
-            header = bytes(6) + _canvas(stream) + struct.pack("<I", end - begin)[:3] + bytes([_DO_NOT_BLEND])
+            header = bytes(6) + canvas + (end - begin).to_bytes(3, "little") + bytes([_DO_NOT_BLEND])
             file.write(riff_chunk(b"ANMF", header + image))
         file.write(riff_chunk(b"XMP ", MARK.encode()))
         size = file.tell()
         file.seek(0)
         file.write(struct.pack("<4sI4s", b"RIFF", size - 8, b"WEBP"))
-        file.write(riff_chunk(b"VP8X", struct.pack("<I", flags) + _canvas(stream)))
+        file.write(riff_chunk(b"VP8X", struct.pack("<I", flags) + canvas))
 
 
 def _image_chunks(still: bytes) -> bytes:
@@ -310,11 +290,6 @@ def _image_chunks(still: bytes) -> bytes:
             kept += still[at:end]
         at = end
     return kept
-
-
-def _canvas(stream: Stream) -> bytes:
-    """Width and height minus one, three bytes each."""
-    return struct.pack("<I", stream.width - 1)[:3] + struct.pack("<I", stream.height - 1)[:3]
 
 
 def riff_chunk(name: bytes, content: bytes) -> bytes:

@@ -21,7 +21,7 @@ from ripple_sim.solver.files import NO_NAME, final_path
 
 from .clip import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips
 from .images import check_exr, join_gif, join_webp, write_exr
-from .replace import MARK, made_here, png_mark
+from .replace import MARK, is_plain, made_here, png_mark
 
 # As many frames may be lost when a render is killed; each clip begins with a key frame.
 FRAMES_IN_CLIP = 48
@@ -49,10 +49,10 @@ class Format:
     ----------
     suffix : str
         Ending of a segment's file.
-    length : int
-        Frames in a segment; the last one may have fewer.
     start : callable
         Begins a segment at a path.
+    length : int
+        Frames in a segment; the last one may have fewer.
     join : callable or None
         Makes the video of all segments, given with the number of each one's first frame. None: their folder is the
         video.
@@ -61,17 +61,17 @@ class Format:
     """
 
     suffix: str
-    length: int
     start: Callable[[Path, Stream], Segment]
-    join: Callable[[Segments, Path, Stream], None] | None
+    length: int = 1
+    join: Callable[[Segments, Path, Stream], None] | None = None
     linear: bool = False
 
 
 def _of_clips(suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream], None] | None = None) -> Format:
     return Format(
         suffix=suffix,
-        length=FRAMES_IN_CLIP,
         start=lambda path, stream: Clip(path, codec, stream),
+        length=FRAMES_IN_CLIP,
         join=join or (lambda clips, path, stream: join_clips(clips, path, codec.container, stream.fps, stream.sound)),
     )
 
@@ -83,22 +83,14 @@ FORMATS = {
     ".gif": _of_clips(".mkv", LOSSLESS, join_gif),
     ".webp": Format(
         suffix=".webp",
-        length=1,
         start=lambda path, stream: _by_pillow(path, format="WEBP", quality=88, method=3, xmp=MARK.encode()),
         join=lambda stills, path, stream: join_webp([still for still, _ in stills], path, stream),
     ),
     "png": Format(
-        suffix=".png",
-        length=1,
-        start=lambda path, stream: _by_pillow(path, format="PNG", compress_level=3, pnginfo=png_mark()),
-        join=None,
+        suffix=".png", start=lambda path, stream: _by_pillow(path, format="PNG", compress_level=3, pnginfo=png_mark())
     ),
     "exr": Format(
-        suffix=".exr",
-        length=1,
-        start=lambda path, stream: _still(lambda frame: write_exr(path, frame, stream.fps)),
-        join=None,
-        linear=True,
+        suffix=".exr", start=lambda path, stream: _still(lambda frame: write_exr(path, frame, stream.fps)), linear=True
     ),
 }
 
@@ -178,7 +170,17 @@ def check_output(
                 )
         if transparent and form not in _WITH_OPACITY:
             raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
-        _check_size(form, width, height)
+        check_size(width, height)
+        if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
+            raise VideoError(
+                f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at {_H264_BLOCKS} "
+                "blocks of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp or a folder of frames"
+            )
+        if form in _SUBSAMPLED and (width % 2 or height % 2):
+            raise VideoError(
+                f"frame size is {width}x{height}; {form} needs an even width and height, "
+                f"such as {width + width % 2}x{height + height % 2}"
+            )
         highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
         if not isinstance(fps, int) or not 1 <= fps <= highest:
             what = "a GIF's frame rate" if form == ".gif" else "frame rate"
@@ -198,20 +200,6 @@ def check_size(width: int, height: int) -> None:
         raise VideoError(f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each side")
 
 
-def _check_size(form: str, width: int, height: int) -> None:
-    check_size(width, height)
-    if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
-        raise VideoError(
-            f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at {_H264_BLOCKS} blocks "
-            "of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp or a folder of frames"
-        )
-    if form in _SUBSAMPLED and (width % 2 or height % 2):
-        raise VideoError(
-            f"frame size is {width}x{height}; {form} needs an even width and height, "
-            f"such as {width + width % 2}x{height + height % 2}"
-        )
-
-
 def check_replaceable(path: Path, overwrite: bool) -> None:
     """Make sure that a file was made here, or that a folder holds frames from here and nothing else.
 
@@ -226,11 +214,7 @@ def check_replaceable(path: Path, overwrite: bool) -> None:
                 f"cannot write {path}: it exists and was not {MARK}; name another file, or add --overwrite"
             )
         return
-    strangers = [
-        each.name
-        for each in path.iterdir()
-        if each.is_symlink() or not each.is_file() or not _FRAME_PATTERN.fullmatch(each.name)
-    ]
+    strangers = [each.name for each in path.iterdir() if not (is_plain(each) and _FRAME_PATTERN.fullmatch(each.name))]
     if strangers:
         raise VideoError(f"cannot write frames to {path}: it holds other files ({min(strangers)}); name a new folder")
     if not overwrite and (others := [each.name for each in path.iterdir() if not made_here(each)]):

@@ -12,13 +12,13 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from ripple_sim.errors import VideoError
 
 from .output import check_replaceable
-from .replace import MARK, made_here, move
+from .replace import MARK, is_plain, made_here, move
 
 SETTINGS, STATES = "settings.json", "states.txt"
 _FRAMES, _WHOLE = "frames", "whole"
@@ -184,32 +184,29 @@ class Part:
             raise VideoError(
                 f"another process is writing {self.video}; wait until it is done, or name another file"
             ) from error
-        strangers = sorted(name for entry in self.folder.iterdir() for name in self._strangers(entry))
-        if strangers:
+        if strangers := sorted(self._strangers()):
             raise VideoError(
                 f"cannot write {self.video}: its folder {self.folder.name} holds other files ({strangers[0]}); "
                 "move it away, or name another file"
             )
 
-    def _strangers(self, entry: Path) -> list[str]:
-        """Names of what no writer has put here, at and below an entry of the folder."""
-        if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():
-            return [f"{_FRAMES}/{each.name}" for each in entry.iterdir() if not self._is_segment(each)]
-        own = entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE) and entry.is_file() and not entry.is_symlink()
-        return [] if own and (entry.name != SETTINGS or self._settings_made_here()) else [entry.name]
-
-    def _is_segment(self, path: Path) -> bool:
-        if path.name.startswith(".unfinished."):
-            return path.is_file() and not path.is_symlink()
-        own = path.is_file() and not path.is_symlink() and (self._settings_made_here() or made_here(path))
-        return own and _SEGMENT.fullmatch(path.stem) is not None
-
-    def _settings_made_here(self) -> bool:
+    def _strangers(self) -> Iterator[str]:
+        """Names of what no writer has put here, in the folder and in that of the segments."""
+        settings = self.folder / SETTINGS
         try:
-            found = json.loads((self.folder / SETTINGS).read_text())
+            found = json.loads(settings.read_text()) if settings.is_file() else None
         except (OSError, ValueError, RecursionError):
-            return False
-        return isinstance(found, dict) and MARK in found
+            found = None
+        ours = isinstance(found, dict) and MARK in found
+        for entry in self.folder.iterdir():
+            own = is_plain(entry) and entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE)
+            if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():
+                for each in entry.iterdir():
+                    segment = _SEGMENT.fullmatch(each.stem) is not None and (ours or made_here(each))
+                    if not (is_plain(each) and (segment or each.name.startswith(".unfinished."))):
+                        yield f"{_FRAMES}/{each.name}"
+            elif not own or (entry.name == SETTINGS and not ours):
+                yield entry.name
 
     def _drop_unfinished(self) -> None:
         self.unfinished.unlink(missing_ok=True)

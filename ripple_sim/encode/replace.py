@@ -28,6 +28,11 @@ def made_here(path: Path) -> bool:
         return MARK.encode() in head + file.read()
 
 
+def is_plain(path: Path) -> bool:
+    """Whether a path is a file and no link."""
+    return path.is_file() and not path.is_symlink()
+
+
 def png_mark() -> PngInfo:
     """The mark as text of a PNG."""
     info = PngInfo()
@@ -48,7 +53,7 @@ def check_folder(kind: type[Exception], what: str, folder: Path, own: Callable[[
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise kind(f"cannot write {what} to {folder}: it is not a folder; name another output")
     for each in folder.iterdir() if folder.is_dir() else ():
-        if not (each.is_file() and not each.is_symlink() and own(each)):
+        if not (is_plain(each) and own(each)):
             raise kind(f"cannot write {what} to {folder}: it holds other files ({each.name}); name another output")
 
 

@@ -10,7 +10,7 @@ import dataclasses
 import queue
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -28,10 +28,6 @@ from .part import Part
 
 # Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or 44 MB of EXR.
 QUEUE_FRAMES = 8
-
-
-# Errors that would occur again when the render is resumed.
-_HOPELESS = (SimulationError, SolverError)
 
 
 class FrameWriter:
@@ -143,7 +139,8 @@ class FrameWriter:
 
     def _give_up(self, error: BaseException) -> None:
         """End the work on an exception, and add a note of what is kept."""
-        if not self._resumable or isinstance(error, _HOPELESS):
+        # these errors would occur again when the render is resumed
+        if not self._resumable or isinstance(error, (SimulationError, SolverError)):
             self.discard()
             return
         self._abandoned = True
@@ -154,8 +151,7 @@ class FrameWriter:
             )
 
     def _raise_error(self) -> None:
-        error = self._error
-        if error is not None:
+        if (error := self._error) is not None:
             reason = getattr(error, "strerror", None) or error
             raise EncodingError(f"cannot write the video {self.path}: {reason}") from error
 
@@ -166,9 +162,23 @@ class FrameWriter:
             self._thread.join()
 
     def _run(self) -> None:
-        while (frame := self._queue.get()) is not None:
-            self._timed(self._add, frame)
-        self._timed(self._finish)
+        """Encode the frames of the queue, and after the last, at None, finish the video.
+
+        An error is kept instead of ending the thread: it must go on taking frames from the queue, or `write` would wait
+        for ever.
+        """
+        ended = False
+        while not ended:
+            frame = self._queue.get()
+            ended = frame is None
+            if self._abandoned or self._error is not None:  # the work has become useless
+                continue
+            start = time.perf_counter()
+            try:
+                self._finish() if frame is None else self._add(frame)
+            except Exception as error:  # of any kind: it is raised in the caller's thread
+                self._error = error
+            self.encode_seconds += time.perf_counter() - start
         if self._segment is not None:
             with contextlib.suppress(Exception):  # the first error has been kept
                 self._segment.close()
@@ -195,20 +205,6 @@ class FrameWriter:
         if not self._abandoned:
             self._part.finish()
             self._finished = True
-
-    def _timed(self, work: Callable[..., None], *arguments: object) -> None:
-        """Do the work unless it has become useless, and keep an error instead of ending the thread.
-
-        The thread must go on taking frames from the queue, or `write` would wait for ever.
-        """
-        if self._abandoned or self._error is not None:
-            return
-        start = time.perf_counter()
-        try:
-            work(*arguments)
-        except Exception as error:  # of any kind: it is raised in the caller's thread
-            self._error = error
-        self.encode_seconds += time.perf_counter() - start
 
 
 def open_writer(

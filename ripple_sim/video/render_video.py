@@ -204,20 +204,17 @@ class Film:
         if shot.exposure == 0:
             self._marks = [self._placed_marks(run, shot) for run in range(len(self._sources))]
         halves = [half for source in self._sources if (half := source.fetch()) is not None]
-        frame = self._composed(halves, shot) if halves else None
+        frame = None
+        if halves:  # the runs' images side by side, under the overlays
+            for half, marks in zip(halves, self._marks, strict=True):
+                draw_marks(half, marks, self._layout)
+            frame = halves[0]
+            if len(halves) > 1:
+                frame = np.concatenate(halves, axis=1)
+                middle, seam = halves[0].shape[1], max(1, round(self._layout.em / 16))
+                frame[:, middle - seam : middle + seam] = 255
+            self._painter.paint(frame, shot.notes)
         self.seconds += work_clock() - start
-        return frame
-
-    def _composed(self, halves: list[NDArray], shot: Shot) -> NDArray:
-        """The runs' images side by side, under the overlays."""
-        for half, marks in zip(halves, self._marks, strict=True):
-            draw_marks(half, marks, self._layout)
-        frame = halves[0]
-        if len(halves) > 1:
-            frame = np.concatenate(halves, axis=1)
-            middle, seam = halves[0].shape[1], max(1, round(self._layout.em / 16))
-            frame[:, middle - seam : middle + seam] = 255
-        self._painter.paint(frame, shot.notes)
         return frame
 
     def _placed_marks(self, run: int, shot: Shot) -> list[PlacedMark]:
@@ -271,15 +268,14 @@ def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
     stopped = threading.Event()
 
     def run() -> None:
-        error: BaseException | None = None
         try:
             for item in items:
                 if stopped.is_set():
                     return
                 ready.put((item, None))
+            ready.put((_END, None))
         except BaseException as failure:  # of any kind: it is raised in the consumer's thread
-            error = failure
-        ready.put((_END, error))
+            ready.put((_END, failure))
 
     def take() -> Iterator[Item]:
         while True:

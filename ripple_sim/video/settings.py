@@ -30,8 +30,6 @@ from ripple_sim.solver.gl import GLContext
 
 from .options import Backend, SceneOptions, VideoOptions
 
-_PACKAGES = ("numpy", "numba", "moderngl", "av", "pillow")
-
 
 def origin(scene: Scene, options: SceneOptions) -> dict[str, str | int]:
     """What the options of a video or an export change of a scene's waves, its fingerprint, and versions of packages."""
@@ -52,7 +50,7 @@ def versions() -> dict[str, str]:
     return {
         "ripple-sim": __version__,
         "mujoco": mujoco.__version__,
-        **{package: version(package) for package in _PACKAGES},
+        **{package: version(package) for package in ("numpy", "numba", "moderngl", "av", "pillow")},
     }
 
 
@@ -63,9 +61,8 @@ def scene_digest(scene: Scene) -> str:
     """
     hasher = hashlib.blake2b(digest_size=8)
     _add_fields(hasher, scene.model)
-    entries = msgspec.json.encode(
-        (scene.targets, scene.camera, scene.events, scene.two_way, *([scene.sensors] if scene.sensors else []))
-    )
+    sensors = [scene.sensors] if scene.sensors else []
+    entries = msgspec.json.encode((scene.targets, scene.camera, scene.events, scene.two_way, *sensors))
     for path in itertools.chain.from_iterable(entry.files() for entry in scene.targets):
         entries = entries.replace(msgspec.json.encode(path), b'""')
         for file in sorted(Path(path).rglob("*")) if Path(path).is_dir() else [Path(path)]:
@@ -95,22 +92,19 @@ def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
     Shutter, aperture, focus and exposures stay as they are: see `with_exposure`. Raises `VideoError` for an output of
     unknown format.
     """
+    fps = default_fps(output) if options.fps is None else options.fps  # first: it refuses an unknown format
+    backend = options.backend
+    if backend == "auto":  # the one that is meant for the largest target of known resolution
+        sides = [options.resolution or entry.resolution for entry in scene.targets]
+        known = [6 * n * n for n in sides if n is not None]
+        backend = cast(Backend, auto_backend(max(known)) if known else auto_backend())
     return dataclasses.replace(
         options,
-        fps=default_fps(output) if options.fps is None else options.fps,
+        fps=fps,
         duration=scene.duration if options.duration is None else options.duration,
         overlay=tuple(scene.overlay if options.overlay is None else options.overlay),
-        backend=_backend(options, scene),
+        backend=backend,
     )
-
-
-def _backend(options: VideoOptions, scene: Scene) -> Backend:
-    """The backend that is meant, for the largest target of known resolution."""
-    if options.backend != "auto":
-        return options.backend
-    sides = [options.resolution or entry.resolution for entry in scene.targets]
-    known = [6 * n * n for n in sides if n is not None]
-    return cast(Backend, auto_backend(max(known)) if known else auto_backend())
 
 
 def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> dict[str, str | int | float]:
