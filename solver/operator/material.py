@@ -384,7 +384,8 @@ def _thickness(value: Any) -> float | NDArray[np.float64]:
         require_positive(thickness=(value, "m"))
         return float(value)
     depth = np.asarray(value)
-    wrong = ~(np.isfinite(depth) & (depth > 0)) if np.issubdtype(depth.dtype, np.number) else np.ones(1, np.bool_)
+    numbers = depth.size > 0 and np.issubdtype(depth.dtype, np.number)
+    wrong = ~(np.isfinite(depth) & (depth > 0)) if numbers else np.ones(1, np.bool_)
     if wrong.any():
         worst = depth.tolist() if depth.size == 0 else depth.flat[np.argmax(wrong)].item()
         raise SolverError(f"thickness is {shown(worst)} m; valid is {POSITIVE.words}, or one at every texel")

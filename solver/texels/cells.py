@@ -197,7 +197,7 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
     return links, areas
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _virtual_node(corners: Floats) -> Floats:
     """Weights [k], of sum 1, of the point whose triangles with the sides of a polygon [3, k] have least squared areas.
 
@@ -228,7 +228,7 @@ def _virtual_node(corners: Floats) -> Floats:
     return weights
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
     """The point with such weights at the corners [3, k]."""
     x, y, z = 0.0, 0.0, 0.0
@@ -237,7 +237,7 @@ def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
     return x, y, z
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
     """Solution of a symmetric positive semidefinite system [3, 3]; next to 0 where this leaves it open."""
     ridge = _FLAT**2 * (matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) + 1e-300
