@@ -278,9 +278,6 @@ _STRIPS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 1, 3), (1, 3, 0, 2))
 
 _NOTHING = np.zeros(0, np.int64)
 
-# Geometric weights of a cell's links [l, k], shares of its area [s, k], and the area [k], from its corners [3, j, k].
-Law: TypeAlias = Callable[[Floats], tuple[Floats, Floats, Floats]]
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SpecialCells:
@@ -291,6 +288,7 @@ class SpecialCells:
     corners : int64 [j, k]
         Flat places of their corners in a field with halo.
     law : callable
+        Geometric weights of their links [l, k], shares of their areas [s, k], and these [k], from corners [3, j, k].
     links : (int64 [m], int64 [m])
         Of the weights [l, k], flat, those that are added, and the flat places among a stencil's weights.
     shares : (int64 [m], int64 [m])
@@ -302,7 +300,7 @@ class SpecialCells:
     """
 
     corners: Ints
-    law: Law
+    law: Callable[[Floats], tuple[Floats, Floats, Floats]]
     links: tuple[Ints, Ints]
     shares: tuple[Ints, Ints]
     irregular: tuple[Ints, Ints] = (_NOTHING, np.zeros((0, 2), np.int64))
