@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array, diags_array, triu, vstack
+from scipy.sparse import csr_array, diags_array, eye_array, triu, vstack
 
 from ..errors import SolverError, shown
 from ..kernel import Floats, Ints
@@ -182,7 +182,7 @@ def fitted_rows(
     points, areas = texels.positions.reshape(-1, 3), texels.areas.reshape(-1)
     both = np.concatenate([pairs, pairs[:, ::-1], np.arange(count)[:, None].repeat(2, axis=1)])
     near = csr_array((np.ones(len(both)), both.T), shape=(count, count))
-    rings = (csr_array((np.ones(size), (index, outer)), shape=(size, count)) @ near @ near > 0).astype(np.float64)
+    rings = (near[outer] @ near > 0).astype(np.float64)
     spacing = np.sqrt((rings @ areas) / rings.sum(axis=1))
     held = np.flatnonzero(places.conditions != FREE)
     beside = csr_array((np.ones(len(held)), (places.texels[held], held)), shape=(count, len(places.points)))
@@ -275,7 +275,7 @@ def plate_matrix(
     # beside a clamp the height is d^2 / 2 times its second derivative
     way = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
     share = np.minimum(way**2 / (2 * areas[held]), 0.5)
-    own = csr_array((np.ones(len(held)), (np.arange(len(held)), held)), shape=(len(held), count))
+    own = eye_array(count, format="csr")[held]
     leaving = diags_array(np.sqrt(_MISFIT * D / areas)[held]) @ (own - diags_array(share) @ L[held])
     rows = csr_array(vstack([rows, leaving]))
     owners = np.concatenate([owners, len(at) + np.arange(len(held))])

@@ -146,9 +146,7 @@ class WaveOperator:
         """
         topology = self.topology
         # what joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours
-        ties: list[tuple[Stencil, Floats | None]] = [(self.stencil, None)]
-        if self.bending is not None:
-            ties.append(self.bending)
+        ties: list[tuple[Stencil, Floats | None]] = [(self.stencil, None), *([self.bending] if self.bending else [])]
         chart, side = np.nonzero(topology.glued[..., 0] >= 0)
         # part of the mesh to which each chart belongs, [C], from 0
         of_chart = labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))

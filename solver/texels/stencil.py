@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
@@ -63,8 +63,6 @@ class IrregularLinks(NamedTuple):
 
 
 NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
-
-_Places: TypeAlias = tuple[slice, slice, slice]
 
 # Row and column of the two ends of every link from the place where it is stored, and the slices of a field with halo
 # that hold them.
@@ -254,7 +252,7 @@ class Stencil:
         """Gershgorin's bound of the largest eigenvalue over a lumped mass [C, n, n]."""
         return float((self.absolute_sums() * 2 / mass).max())
 
-    def _links(self) -> Iterator[tuple[int, _Places, _Places]]:
+    def _links(self) -> Iterator[tuple[int, tuple[slice, ...], tuple[slice, ...]]]:
         """Of the eight links of every texel, the direction, the places where it starts, and its other ends."""
         n = self.topology.shape[1]
         for link, ends in enumerate(_ENDS):
