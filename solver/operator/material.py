@@ -373,8 +373,7 @@ class Material:
         chosen = PRESETS[name]
         law = getattr(cls, chosen.law)
         valid = inspect.signature(law).parameters
-        unknown = [key for key in parameters if key not in valid]
-        if unknown:
+        if unknown := [key for key in parameters if key not in valid]:
             raise SolverError(f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {', '.join(valid)}")
         return law(**{**chosen.parameters, **parameters})
 

@@ -283,8 +283,8 @@ def plate_matrix(
     saddle = _saddle(texels.normals.reshape(-1, 3), edges, gradients, 2 * (1 - poisson) * D * ~outer)
     matrix = csr_array(total + saddle)
     above = triu(matrix, 1).tocoo()
-    springs, own_share = matrix @ np.ones(count), matrix.diagonal()
-    springs[np.abs(springs) <= _TINY * own_share] = 0.0  # sums that are round-off are no springs
+    springs, diagonal = matrix @ np.ones(count), matrix.diagonal()
+    springs[np.abs(springs) <= _TINY * diagonal] = 0.0  # sums that are round-off are no springs
     links = IrregularLinks.of(np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data)
     return links, springs, ~outer.reshape(texels.shape)
 
