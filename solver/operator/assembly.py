@@ -22,7 +22,7 @@ from ..texels.texel_mesh import TexelMesh, smoothed, softening
 from .coefficients import LIMITS
 from .deep_water import FluidOperator, over_fluid
 from .material import Material
-from .plate_rim import FREE, RIMS, Rim, links_and_springs, plate_matrix, rim_conditions, rim_places, tension_springs
+from .plate_rim import FREE, RIMS, Rim, plate_matrix, rim_conditions, rim_places, tension_springs
 from .wave_operator import Bending, WaveOperator
 
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
@@ -63,25 +63,23 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
     texels, field = texel_fields(atlas, material, rim == "fixed" or (rim in RIMS[1:] and (not bends or kind != "fem")))
     density, area = field["density"], atlas.areas
     if kind == "fem":
-        assemble = functools.partial(texels.stencil, softening=softening(texels))
+        soft = softening(texels)
+        assemble = functools.partial(texels.stencil, softening=soft)
     else:
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
         assemble = functools.partial(_difference_stencil, texels, kind, area[0, 0, 0])
     grip = source_grip(field["speed"] ** 2, field["stiffness"], field["bending"])
-    tension = density * field["speed"] ** 2
+    tension, rigidity = density * field["speed"] ** 2, density * field["bending"]
     stencil, laplace = assemble(tension), assemble(np.ones_like(area)) if bends else None
-    bending, links = None if laplace is None else Bending(laplace, density * field["bending"] / area), NO_LINKS
+    bending, links = None if laplace is None else Bending(laplace, rigidity / area), NO_LINKS
     if kind == "fem" and not texels.topology.fixed_rim and (conditions > (0 if bends else FREE)).any():
         places = rim_places(texels, conditions)
         springs, held = tension_springs(places, texels, tension.ravel()), places.texels[places.conditions != FREE]
         field["fixed"].reshape(-1)[held] |= texels.bare_rim.reshape(-1)[held]
         if bending is not None:
-            matrix, inner = plate_matrix(
-                texels, places, softening(texels), density * field["bending"], material.poisson, bending.laplace
-            )
+            links, beside, inner = plate_matrix(texels, places, soft, rigidity, material.poisson, bending.laplace)
             bending = bending._replace(rigidity=bending.rigidity * inner)
-            links, beside = links_and_springs(matrix)
             springs += beside
             stencil.irregular = IrregularLinks.joined(stencil.irregular, links)
         field["stiffness"] += (springs / (density * area).ravel()).reshape(area.shape)

@@ -124,12 +124,9 @@ def over_fluid(operator: WaveOperator, deep: float, geometry: Stencil, areas: Fl
 
     Raises `SolverError` if the density varies, or the surface bends or yields.
     """
-    for wrong, what in (
-        (operator.density is not None, "a density that varies"),
-        (operator.bending is not None, "bending"),
-        (operator.yield_height is not None, "a yield height"),
-    ):
-        if wrong:
+    excluded = operator.density, operator.bending, operator.yield_height
+    for field, what in zip(excluded, ("a density that varies", "bending", "a yield height"), strict=True):
+        if field is not None:
             raise SolverError(f"a material with deep fluid has {what}; valid is one density alone")
-    given = {field.name: getattr(operator, field.name) for field in dataclasses.fields(operator)}
+    given = {each.name: getattr(operator, each.name) for each in dataclasses.fields(operator)}
     return FluidOperator(**given, deep=deep, geometry=geometry, areas=areas)

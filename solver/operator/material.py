@@ -373,8 +373,7 @@ class Material:
         chosen = PRESETS[name]
         law = getattr(cls, chosen.law)
         valid = inspect.signature(law).parameters
-        unknown = [key for key in parameters if key not in valid]
-        if unknown:
+        if unknown := [key for key in parameters if key not in valid]:
             raise SolverError(f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {', '.join(valid)}")
         return law(**{**chosen.parameters, **parameters})
 
@@ -384,7 +383,8 @@ def _thickness(value: Any) -> float | NDArray[np.float64]:
         require_positive(thickness=(value, "m"))
         return float(value)
     depth = np.asarray(value)
-    wrong = ~(np.isfinite(depth) & (depth > 0)) if np.issubdtype(depth.dtype, np.number) else np.ones(1, np.bool_)
+    numbers = depth.size > 0 and np.issubdtype(depth.dtype, np.number)
+    wrong = ~(np.isfinite(depth) & (depth > 0)) if numbers else np.ones(1, np.bool_)
     if wrong.any():
         worst = depth.tolist() if depth.size == 0 else depth.flat[np.argmax(wrong)].item()
         raise SolverError(f"thickness is {shown(worst)} m; valid is {POSITIVE.words}, or one at every texel")

@@ -17,13 +17,13 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array, diags_array, triu, vstack
+from scipy.sparse import csr_array, diags_array, eye_array, triu, vstack
 
 from ..errors import SolverError, shown
 from ..kernel import Floats, Ints
 from ..texels.stencil import IrregularLinks, Stencil, stiffness_matrix
 from ..texels.texel_mesh import TexelMesh
-from ..texels.topology import TRIANGLE, TexelTopology
+from ..texels.topology import TRIANGLE
 
 # Waves come back upright from a free rim, inverted from one that is held. "fixed": heights and, of a plate, L h are 0.
 RIMS = ("free", "supported", "clamped", "fixed")
@@ -119,19 +119,6 @@ def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
     return RimPlaces(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
-def _polygons(topology: TexelTopology) -> list[Ints]:
-    """Corners of all cells between texels, counter-clockwise, [k, m] for each number of corners m."""
-    halo = np.where(topology.rim, -1, topology.halo)
-    cells = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1)
-    corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
-    triangles = cells[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]  # a place of theirs shows nothing
-    kinds = [cells[(cells >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
-    counts = sorted({len(each) for each in topology.polygons})
-    kinds += [np.array([each for each in topology.polygons if len(each) == m]) for m in counts]
-    # those across a glued side come once from each chart
-    return [each[np.unique(np.sort(each, axis=1), axis=0, return_index=True)[1]] for each in kinds if len(each)]
-
-
 def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:
     """The cells of a texel mesh, with their gradients.
 
@@ -144,9 +131,19 @@ def plate_cells(texels: TexelMesh) -> tuple[Ints, Ints, list[csr_array]]:
     gradients : list of csr [cells, T], three
         From heights to the components of the gradient in space [1/m].
     """
-    points, count = texels.positions.reshape(-1, 3), texels.topology.texel_count
+    topology, points = texels.topology, texels.positions.reshape(-1, 3)
+    halo, count = np.where(topology.rim, -1, topology.halo), topology.texel_count
+    quads = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1)
+    corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
+    triangles = quads[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]  # a place of theirs shows nothing
+    # corners of all cells between texels, counter-clockwise, [k, m] for each number of corners m
+    kinds = [quads[(quads >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
+    numbers = sorted({len(each) for each in topology.polygons})
+    kinds += [np.array([each for each in topology.polygons if len(each) == m]) for m in numbers]
     pairs, entries, cells = [], [], 0
-    for corners in _polygons(texels.topology):
+    for corners in filter(len, kinds):
+        # those across a glued side come once from each chart
+        corners = corners[np.unique(np.sort(corners, axis=1), axis=0, return_index=True)[1]]
         x, m = points[corners], corners.shape[1]
         after, before = np.roll(x, -1, axis=1), np.roll(x, 1, axis=1)
         area = np.cross(x, after).sum(axis=1) / 2
@@ -185,7 +182,7 @@ def fitted_rows(
     points, areas = texels.positions.reshape(-1, 3), texels.areas.reshape(-1)
     both = np.concatenate([pairs, pairs[:, ::-1], np.arange(count)[:, None].repeat(2, axis=1)])
     near = csr_array((np.ones(len(both)), both.T), shape=(count, count))
-    rings = (csr_array((np.ones(size), (index, outer)), shape=(size, count)) @ near @ near > 0).astype(np.float64)
+    rings = (near[outer] @ near > 0).astype(np.float64)
     spacing = np.sqrt((rings @ areas) / rings.sum(axis=1))
     held = np.flatnonzero(places.conditions != FREE)
     beside = csr_array((np.ones(len(held)), (places.texels[held], held)), shape=(count, len(places.points)))
@@ -240,8 +237,8 @@ def tension_springs(places: RimPlaces, texels: TexelMesh, tension: Floats) -> Fl
 
 def plate_matrix(
     texels: TexelMesh, places: RimPlaces, softening: Floats, rigidity: Floats, poisson: float, laplace: Stencil
-) -> tuple[csr_array, NDArray[np.bool_]]:
-    """What bending adds to L B L beside rims.
+) -> tuple[IrregularLinks, Floats, NDArray[np.bool_]]:
+    """What bending adds to L B L beside rims: a matrix [kg/s^2], symmetric, with L B L positive semidefinite.
 
     Parameters
     ----------
@@ -257,8 +254,9 @@ def plate_matrix(
 
     Returns
     -------
-    matrix : csr [T, T]
-        [kg/s^2], symmetric: with L B L positive semidefinite.
+    links : IrregularLinks
+    springs : float64 [T]
+        From each texel to where it is at rest [N/m].
     inner : bool [C, n, n]
         Where L B L holds; elsewhere B is to be 0.
     """
@@ -277,13 +275,18 @@ def plate_matrix(
     # beside a clamp the height is d^2 / 2 times its second derivative
     way = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
     share = np.minimum(way**2 / (2 * areas[held]), 0.5)
-    own = csr_array((np.ones(len(held)), (np.arange(len(held)), held)), shape=(len(held), count))
+    own = eye_array(count, format="csr")[held]
     leaving = diags_array(np.sqrt(_MISFIT * D / areas)[held]) @ (own - diags_array(share) @ L[held])
     rows = csr_array(vstack([rows, leaving]))
     owners = np.concatenate([owners, len(at) + np.arange(len(held))])
     total = rows.T @ diags_array(_evened(rows, owners, L, D, areas)) @ rows
     saddle = _saddle(texels.normals.reshape(-1, 3), edges, gradients, 2 * (1 - poisson) * D * ~outer)
-    return csr_array(total + saddle), ~outer.reshape(texels.shape)
+    matrix = csr_array(total + saddle)
+    above = triu(matrix, 1).tocoo()
+    springs, diagonal = matrix @ np.ones(count), matrix.diagonal()
+    springs[np.abs(springs) <= _TINY * diagonal] = 0.0  # sums that are round-off are no springs
+    links = IrregularLinks.of(np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data)
+    return links, springs, ~outer.reshape(texels.shape)
 
 
 def _evened(rows: csr_array, owners: Ints, laplace: csr_array, rigidity: Floats, areas: Floats) -> Floats:
@@ -297,17 +300,6 @@ def _evened(rows: csr_array, owners: Ints, laplace: csr_array, rigidity: Floats,
     np.minimum.at(factor, owners[entry.row], (usual / np.maximum(rate, usual))[entry.col])
     factor[-1] = 1.0  # of what has no owner
     return factor[owners]
-
-
-def links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
-    """A symmetric matrix [T, T] as links between texels, and springs [T] from each to where it is at rest [N/m].
-
-    Sums that are round-off are no springs.
-    """
-    above = triu(matrix, 1).tocoo()
-    springs, own = matrix @ np.ones(matrix.shape[0]), matrix.diagonal()
-    springs[np.abs(springs) <= _TINY * own] = 0.0
-    return IrregularLinks.of(np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data), springs
 
 
 def _saddle(normals: Floats, edges: Ints, gradients: list[csr_array], factor: Floats) -> csr_array:

@@ -17,7 +17,7 @@ from .wave_operator import WaveOperator, damped_step
 
 
 class VolumeBalance:
-    """Takes the mean out of sources, one for each part of the surface that floats freely; see `floating_parts`.
+    """Takes the mean out of sources, one for each part of the surface that floats freely; see `WaveOperator`.
 
     A pressure moves each texel by one over its density. Taking that much of it out of a momentum leaves the sum of area
     times velocity unchanged, and is the orthogonal projection with masses as weights: it adds no energy.

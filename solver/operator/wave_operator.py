@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,55 +21,9 @@ from ..mesh.topology import labels
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
 from ..texels.topology import TexelTopology
 
-# What joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours.
-Tie: TypeAlias = tuple[Stencil, Floats | None]
 
-
-def floating_parts(ties: Sequence[Tie], held: Bools, movable: Bools) -> Ints32 | None:
-    """Number of the part to which each texel belongs, [C, n, n]; None where there is one part only.
-
-    Texels belong together where something joins them. Of each of the mesh's own parts, all those that are held count as
-    one, however zero wave speeds cut them up: what holds them brings them back to where they were.
-
-    Parameters
-    ----------
-    ties : sequence of (Stencil, rigidity or None)
-        What joins texels.
-    held : bool [C, n, n]
-        Texels that a spring or a clamp holds.
-    movable : bool [C, n, n]
-        The others are rigid, and belong to any part.
-    """
-    topology = ties[0][0].topology
-    chart, side = np.nonzero(topology.glued[..., 0] >= 0)
-    # part of the mesh to which each chart belongs, [C], from 0
-    of_chart = labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
-    for stencil, rigidity in ties:
-        sides = (stencil.weights[:, link][link_exists(topology, link)] for link in range(2))
-        # where the sides of all quads are links, every part of the mesh is one
-        if (rigidity is None or (rigidity > 0).all()) and all(side.all() for side in sides):
-            charts = np.broadcast_to(of_chart[:, None, None], topology.shape)
-            return np.ascontiguousarray(charts, np.int32) if of_chart.any() else None
-    part = connected_components(sum(_graph(tie) for tie in ties), directed=False)[1].astype(np.int64)
-    is_held = np.bincount(part, held.reshape(-1)) > 0
-    # those that are held bear the number of their part of the mesh, after all others
-    of_texel = np.repeat(of_chart, topology.texel_count // len(of_chart))
-    part = np.where(is_held[part], part.max() + 1 + of_texel, part)
-    moves = movable.reshape(-1)
-    names, number = np.unique(part[moves], return_inverse=True)
-    if len(names) <= 1:
-        return None
-    # rigid texels do not break up a chart
-    part[:] = -1
-    part[moves] = number
-    charts = part.reshape(len(of_chart), -1)
-    filled = np.where(charts < 0, charts.max(axis=1, keepdims=True).clip(0), charts)
-    return filled.astype(np.int32).reshape(topology.shape)
-
-
-def _graph(tie: Tie) -> csr_array:
+def _graph(stencil: Stencil, rigidity: Floats | None) -> csr_array:
     """Texels that are joined, [C n^2, C n^2]; not symmetric."""
-    stencil, rigidity = tie
     graph = abs(stiffness_matrix(stencil))
     if rigidity is not None:
         graph = csr_array(graph.multiply((rigidity.reshape(-1, 1) > 0).astype(np.float64)))
@@ -184,9 +138,39 @@ class WaveOperator:
 
     @functools.cached_property
     def parts(self) -> Ints32 | None:
-        """Number of the freely floating part to which each texel belongs, [C, n, n], or None: `floating_parts`."""
-        ties: list[Tie] = [(self.stencil, None), *([] if self.bending is None else [self.bending])]
-        return floating_parts(ties, (self.stiffness > 0) | self.anchored, self.movable)
+        """Number of the freely floating part to which each texel belongs, [C, n, n]; None where there is one part only.
+
+        Texels belong together where something joins them. Of each of the mesh's own parts, all those that a spring or a
+        clamp holds count as one, however zero wave speeds cut them up: what holds them brings them back to where they
+        were. Those that are not movable are rigid, and belong to any part.
+        """
+        topology = self.topology
+        # what joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours
+        ties: list[tuple[Stencil, Floats | None]] = [(self.stencil, None), *([self.bending] if self.bending else [])]
+        chart, side = np.nonzero(topology.glued[..., 0] >= 0)
+        # part of the mesh to which each chart belongs, [C], from 0
+        of_chart = labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
+        for stencil, rigidity in ties:
+            sides = (stencil.weights[:, link][link_exists(topology, link)] for link in range(2))
+            # where the sides of all quads are links, every part of the mesh is one
+            if (rigidity is None or (rigidity > 0).all()) and all(side.all() for side in sides):
+                charts = np.broadcast_to(of_chart[:, None, None], topology.shape)
+                return np.ascontiguousarray(charts, np.int32) if of_chart.any() else None
+        part = connected_components(sum(_graph(*tie) for tie in ties), directed=False)[1].astype(np.int64)
+        is_held = np.bincount(part, ((self.stiffness > 0) | self.anchored).reshape(-1)) > 0
+        # those that are held bear the number of their part of the mesh, after all others
+        of_texel = np.repeat(of_chart, topology.texel_count // len(of_chart))
+        part = np.where(is_held[part], part.max() + 1 + of_texel, part)
+        moves = self.movable.reshape(-1)
+        names, number = np.unique(part[moves], return_inverse=True)
+        if len(names) <= 1:
+            return None
+        # rigid texels do not break up a chart
+        part[:] = -1
+        part[moves] = number
+        charts = part.reshape(len(of_chart), -1)
+        filled = np.where(charts < 0, charts.max(axis=1, keepdims=True).clip(0), charts)
+        return filled.astype(np.int32).reshape(topology.shape)
 
     def moved(self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | None) -> WaveOperator:
         """The same surface with its texels elsewhere: masses, and what holds or parts it, stay."""

@@ -197,7 +197,7 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
     return links, areas
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _virtual_node(corners: Floats) -> Floats:
     """Weights [k], of sum 1, of the point whose triangles with the sides of a polygon [3, k] have least squared areas.
 
@@ -228,7 +228,7 @@ def _virtual_node(corners: Floats) -> Floats:
     return weights
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
     """The point with such weights at the corners [3, k]."""
     x, y, z = 0.0, 0.0, 0.0
@@ -237,7 +237,7 @@ def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
     return x, y, z
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
     """Solution of a symmetric positive semidefinite system [3, 3]; next to 0 where this leaves it open."""
     ridge = _FLAT**2 * (matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) + 1e-300
@@ -278,9 +278,6 @@ _STRIPS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 1, 3), (1, 3, 0, 2))
 
 _NOTHING = np.zeros(0, np.int64)
 
-# Geometric weights of a cell's links [l, k], shares of its area [s, k], and the area [k], from its corners [3, j, k].
-Law: TypeAlias = Callable[[Floats], tuple[Floats, Floats, Floats]]
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SpecialCells:
@@ -291,6 +288,7 @@ class SpecialCells:
     corners : int64 [j, k]
         Flat places of their corners in a field with halo.
     law : callable
+        Geometric weights of their links [l, k], shares of their areas [s, k], and these [k], from corners [3, j, k].
     links : (int64 [m], int64 [m])
         Of the weights [l, k], flat, those that are added, and the flat places among a stencil's weights.
     shares : (int64 [m], int64 [m])
@@ -302,7 +300,7 @@ class SpecialCells:
     """
 
     corners: Ints
-    law: Law
+    law: Callable[[Floats], tuple[Floats, Floats, Floats]]
     links: tuple[Ints, Ints]
     shares: tuple[Ints, Ints]
     irregular: tuple[Ints, Ints] = (_NOTHING, np.zeros((0, 2), np.int64))

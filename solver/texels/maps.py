@@ -89,7 +89,10 @@ def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float
 def _pixels(image: str | Path | ArrayLike, channel: str) -> NDArray[np.float64]:
     """Values from 0 to 1 of one channel, [height, width]."""
     if isinstance(image, str | Path):
-        pixels = read_image(SolverError, image, "image", _brightness)
+        as_stored = ("L", "LA", "RGB", "RGBA")  # the numbers of a palette are not brightness
+        pixels = read_image(
+            SolverError, image, "image", lambda mode: mode if mode in as_stored or mode[0] == "I" else "RGBA"
+        )
         pixels = pixels / (255.0 if pixels.dtype == np.uint8 else 65535.0)
     else:
         pixels = np.asarray(image, dtype=np.float64)
@@ -106,8 +109,3 @@ def _pixels(image: str | Path | ArrayLike, channel: str) -> NDArray[np.float64]:
     if place >= channels:
         raise SolverError(f"the image has no channel {channel!r}, only {channels}; use 'luminance'")
     return pixels[..., place]
-
-
-def _brightness(mode: str) -> str:
-    """The numbers of a palette are not brightness."""
-    return mode if mode in ("L", "LA", "RGB", "RGBA") or mode[0] == "I" else "RGBA"

@@ -13,10 +13,9 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import csr_array
 
@@ -65,8 +64,6 @@ class IrregularLinks(NamedTuple):
 
 NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
 
-_Places: TypeAlias = tuple[slice, slice, slice]
-
 # Row and column of the two ends of every link from the place where it is stored, and the slices of a field with halo
 # that hold them.
 _ENDS = (((0, 0), (0, 1)), ((0, 0), (1, 0)), ((0, 0), (1, 1)), ((0, 1), (1, 0)))
@@ -89,19 +86,13 @@ def link_exists(topology: TexelTopology, link: int) -> Bools:
     return there[a] & there[b] & (topology.own[a] | topology.own[b])
 
 
-def ties_to_rim(topology: TexelTopology, link: int) -> Bools:
-    """Where a link joins one of the chart's own texels to a fixed rim, [C, n + 1, n + 1]."""
-    a, b = LINK_ENDS[link]
-    own, rim = topology.own, topology.rim & topology.fixed_rim
-    return (own[a] & rim[b]) | (rim[a] & own[b])
-
-
 @functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
 def rim_ties(topology: TexelTopology) -> tuple[Ints, Ints]:
     """Flat texels [k] that links tie to a fixed rim, and the flat places [k] of these among a stencil's weights."""
-    tied = np.stack([ties_to_rim(topology, link) for link in range(4)], axis=1)
-    own = np.stack([np.where(topology.own[a], topology.halo[a], topology.halo[b]) for a, b in LINK_ENDS], axis=1)
-    return own[tied], np.flatnonzero(tied)
+    own, rim = topology.own, topology.rim & topology.fixed_rim
+    tied = np.stack([(own[a] & rim[b]) | (rim[a] & own[b]) for a, b in LINK_ENDS], axis=1)
+    texels = np.stack([np.where(own[a], topology.halo[a], topology.halo[b]) for a, b in LINK_ENDS], axis=1)
+    return texels[tied], np.flatnonzero(tied)
 
 
 class CrossingLinks(NamedTuple):
@@ -158,8 +149,9 @@ def crossing_links(topology: TexelTopology) -> CrossingLinks:
 @functools.lru_cache(maxsize=4)
 def missing_links(topology: TexelTopology) -> Ints:
     """Flat places, among a stencil's weights, of what is no link."""
-    there = [link_exists(topology, link) | ties_to_rim(topology, link) for link in range(4)]
-    return np.flatnonzero(~np.stack(there, axis=1))
+    missing = ~np.stack([link_exists(topology, link) for link in range(4)], axis=1)
+    missing.reshape(-1)[rim_ties(topology)[1]] = False
+    return np.flatnonzero(missing)
 
 
 # Largest eigenvalue of an even grid's stencil times its spacing squared: that of the chessboard pattern.
@@ -175,6 +167,9 @@ _RESIDUAL, _LOOK, _MOST = 2e-3, 5, 1000
 def largest_eigenvalue(force: Callable[[Floats], Floats], mass: Floats, free: Bools, bound: float) -> float:
     """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
 
+    Plain Lanczos, without a basis that is kept orthogonal: lost orthogonality repeats eigenvalues and makes no new ones
+    (Paige 1972), and the sums are numpy's own, since BLAS' threads wait for each other where others use the cores.
+
     Parameters
     ----------
     force : callable
@@ -183,42 +178,29 @@ def largest_eigenvalue(force: Callable[[Floats], Floats], mass: Floats, free: Bo
     free : bool [C, n, n]
         The other texels do not move.
     bound : float
-        One that is always safe, such as Gershgorin's, caps the estimate.
+        One that is always safe, such as Gershgorin's, caps the estimate, and stands where none is found.
     """
     if not free.any():
         return 0.0
     if bound == 0 or mass.shape[1] < _LANCZOS_FROM:
         return bound
-    weight = free / np.sqrt(mass)
-
-    def multiply(x: NDArray) -> NDArray:
-        return -(force(x.reshape(weight.shape) * weight) * weight).ravel()
-
-    start = np.random.default_rng(0).standard_normal(mass.size)
-    return float(np.clip(1.005 * _lanczos(multiply, start, bound), 0, bound))
-
-
-def _lanczos(multiply: Callable[[NDArray], NDArray], start: Floats, bound: float) -> float:
-    """Largest eigenvalue of a symmetric matrix; the bound if it is not found.
-
-    Plain Lanczos, without a basis that is kept orthogonal: lost orthogonality repeats eigenvalues and makes no new ones
-    (Paige 1972), and the sums are numpy's own, since BLAS' threads wait for each other where others use the cores.
-    """
+    weight, start = free / np.sqrt(mass), np.random.default_rng(0).standard_normal(mass.size)
     before, vector = np.zeros_like(start), start / np.sqrt((start * start).sum())
     diagonal: list[float] = []
     side: list[float] = []
     for step in range(1, _MOST + 1):
-        rest = multiply(vector) - (side[-1] if side else 0.0) * before
+        pull = -(force(vector.reshape(weight.shape) * weight) * weight).ravel()
+        rest = pull - (side[-1] if side else 0.0) * before
         diagonal.append(float((vector * rest).sum()))
         rest -= diagonal[-1] * vector
         length = float(np.sqrt((rest * rest).sum()))
         if step % _LOOK == 0 or length == 0.0:
             top, vectors = eigh_tridiagonal(diagonal, side, select="i", select_range=(step - 1, step - 1))
             if length * abs(vectors[-1, 0]) <= _RESIDUAL * abs(top[0]):
-                return float(top[0])
+                return float(np.clip(1.005 * top[0], 0, bound))
         side.append(length)
         before, vector = vector, rest / length
-    return bound
+    return float(bound)
 
 
 @dataclasses.dataclass(eq=False)
@@ -240,7 +222,9 @@ class Stencil:
 
     def __call__(self, field: Floats) -> Floats:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
-        around, result = self.topology.with_boundary(field), np.zeros(self.topology.shape)
+        around, result = self.topology.with_halo(field), np.zeros(self.topology.shape)
+        if self.topology.fixed_rim:
+            around[self.topology.rim] = 0
         for link, start, end in self._links():
             result += self.weights[:, link][start] * (around[end] - field)
         links, h = self.irregular, field.reshape(-1)
@@ -268,7 +252,7 @@ class Stencil:
         """Gershgorin's bound of the largest eigenvalue over a lumped mass [C, n, n]."""
         return float((self.absolute_sums() * 2 / mass).max())
 
-    def _links(self) -> Iterator[tuple[int, _Places, _Places]]:
+    def _links(self) -> Iterator[tuple[int, tuple[slice, ...], tuple[slice, ...]]]:
         """Of the eight links of every texel, the direction, the places where it starts, and its other ends."""
         n = self.topology.shape[1]
         for link, ends in enumerate(_ENDS):

@@ -257,7 +257,7 @@ def quad_pass(around: Floats, cells: QuadCells, weights: Floats, areas: Floats) 
                 _add_row(sides, row * width - begin, below, weights[chart], areas[chart], r, cells.scale**2)
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _weigh(places: Floats, first: int, count: int, cells: QuadCells, sides: Floats32) -> None:
     """Geometric weights of the six links of the quads of consecutive places, and their areas times scale squared.
 
@@ -284,7 +284,7 @@ def _weigh(places: Floats, first: int, count: int, cells: QuadCells, sides: Floa
         found[c + 4 * _ROW], found[c + 5 * _ROW], found[c + 6 * _ROW] = rising, falling, area
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _scale(sides: Floats32, cells: QuadCells, first: int, count: int, factor: Floats32) -> None:
     """Multiply the weights of a band by what the coefficient has become; leave a quarter of the areas.
 
@@ -302,7 +302,7 @@ def _scale(sides: Floats32, cells: QuadCells, first: int, count: int, factor: Fl
             row[c] = factor[c] * row[c] if conductance[c] > 0 else _ZERO
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _add_row(sides: Floats32, begin: int, below: Floats32, weights: Floats, areas: Floats, r: int, unit: float) -> None:
     """Give a chart's row of weights and areas to links and texels; `below` has north sides and areas of the last.
 

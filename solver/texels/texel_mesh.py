@@ -341,12 +341,11 @@ def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
 
 def folded_texels(texels: TexelMesh) -> int:
     """Number of texels of which a corner between two neighbours faces away from the surface's normal."""
-    around, normals = texels.halo_positions, texels.normals
-    own = around[:, 1:-1, 1:-1]
+    around, own = texels.halo_positions, texels.positions
     beside = [around[:, 1:-1, 2:], around[:, 2:, 1:-1], around[:, 1:-1, :-2], around[:, :-2, 1:-1]]
     folded = np.zeros(own.shape[:3], bool)
     for k in range(4):
         # NaN, where there is no neighbour, is not below 0
         facing = np.cross(beside[k] - own, beside[(k + 1) % 4] - own)
-        folded |= np.einsum("...k,...k->...", facing, normals) < 0
+        folded |= np.einsum("...k,...k->...", facing, texels.normals) < 0
     return int(folded.sum())

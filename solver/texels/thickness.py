@@ -156,11 +156,13 @@ def thickness_map(
             f"and in metres: the surface goes from {points.min(axis=0).round(4)} to {points.max(axis=0).round(4)}"
         )
     if out.any() and limits[0] == 0:
-        _warn(f"what lies inside comes out of the surface at {out.mean():.1%} of the texels: no layer is left")
+        message = f"what lies inside comes out of the surface at {out.mean():.1%} of the texels: no layer is left"
+        warnings.warn(message, RippleWarning, stacklevel=3)
     way = np.clip(way, max(limits[0], _LEAST_THICKNESS * size), limits[1])
     if np.isinf(way).any():
         greatest = float(way[met].max())
-        _warn(f"{1 - met.mean():.1%} of the texels have nothing below them; they get the greatest: {greatest:.3g} m")
+        message = f"{1 - met.mean():.1%} of the texels have nothing below them; they get the greatest: {greatest:.3g} m"
+        warnings.warn(message, RippleWarning, stacklevel=3)
         way = np.where(met, way, greatest)
     return smoothed(atlas.texels.topology, way.reshape(atlas.areas.shape))
 
@@ -184,7 +186,3 @@ def _cast(corners: Floats, points: Floats, ways: Floats, size: float) -> tuple[F
     out[met] = along > 0  # the first that is met is the far side
     distance[out] = 0.0
     return distance, out
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, RippleWarning, stacklevel=3)

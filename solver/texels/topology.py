@@ -72,15 +72,7 @@ class TexelTopology:
     @functools.cached_property
     def own(self) -> NDArray[np.bool_]:
         """Places that are a chart's own texels, not its halo, [C, n + 2, n + 2]."""
-        own = np.zeros(self.halo.shape, dtype=bool)
-        own[:, 1:-1, 1:-1] = True
-        return own
-
-    @functools.cached_property
-    def ghosts(self) -> NDArray[np.bool_]:
-        """Places of the halo that show a texel, [C, n + 2, n + 2]; those beyond a fixed rim show nothing."""
-        ghosts = ~self.own & (self.halo >= 0)
-        return ghosts & ~self.rim if self.fixed_rim else ghosts
+        return np.pad(np.ones(self.shape, dtype=bool), ((0, 0), (1, 1), (1, 1)))
 
     def with_halo(self, field: NDArray) -> NDArray:
         """Surround each chart of a field [C, n, n, ...] by its halo; 0 where no texel lies."""
@@ -88,21 +80,15 @@ class TexelTopology:
         texels[self.halo < 0] = 0
         return texels
 
-    def with_boundary(self, field: NDArray) -> NDArray:
-        """A height with its halo, as `with_halo`; beyond a fixed rim it is 0."""
-        around = self.with_halo(field)
-        if self.fixed_rim:
-            around[self.rim] = 0
-        return around
-
     @functools.cached_property
     def addresses(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Flat addresses in a field with halo, [C, n + 2, n + 2].
 
-        Those of every texel, by flat index [C n^2]; of the places of the halo that show a texel [k]; and of the texels
-        that they show [k].
+        Those of every texel, by flat index [C n^2]; of the places of the halo that show a texel [k], which those beyond
+        a fixed rim do not; and of the texels that they show [k].
         """
-        address, ghosts = np.arange(self.halo.size).reshape(self.halo.shape), self.ghosts
+        address = np.arange(self.halo.size).reshape(self.halo.shape)
+        ghosts = ~self.own & (self.halo >= 0) & ~(self.rim & self.fixed_rim)
         texels = address[self.own]
         return texels, address[ghosts], texels[self.halo[ghosts]]
 

@@ -70,8 +70,9 @@ def test_of_several_bodies_the_nearest_counts() -> None:
 def test_rays_that_miss_get_the_greatest_thickness_and_a_warning() -> None:
     atlas, centre = sphere_atlas(1.0, 48), (0.0, 0.0, 0.35)
     small = ball(centre, 0.2)
-    with pytest.warns(RippleWarning, match="have nothing below them"):
+    with pytest.warns(RippleWarning, match="have nothing below them") as told:
         thickness = thickness_map(atlas, small)
+    assert told[0].filename == __file__
     below = atlas.positions[..., 2] < -0.5
     assert thickness[atlas.positions[..., 2] > 0.998] == pytest.approx(0.45, abs=0.02)
     # rays from below go on through the middle to the ball, the longest of them is what others get
@@ -82,8 +83,9 @@ def test_rays_that_miss_get_the_greatest_thickness_and_a_warning() -> None:
 def test_what_comes_out_of_the_surface_leaves_no_layer() -> None:
     atlas = sphere_atlas(1.0, 32)
     large = Mesh.from_arrays(*polygonise(sphere((0.0, 0.0, 0.6), 0.6), ((-0.8, -0.8, -0.2), (0.8, 0.8, 1.4)), 0.05))
-    with pytest.warns(RippleWarning, match="comes out of the surface"):
+    with pytest.warns(RippleWarning, match="comes out of the surface") as told:
         thickness = thickness_map(atlas, large)
+    assert told[0].filename == __file__
     assert np.median(thickness[atlas.positions[..., 2] > 0.95]) < 1e-3
 
 
