@@ -120,8 +120,7 @@ class LocalExecutor(Executor):
         self.places = workers
         self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._cores = shares(available_cores(), workers)
-        self._pools: dict[int, ProcessPoolExecutor] = {}
-        self._processes: dict[int, Future[int]] = {}
+        self._pools: dict[int, tuple[ProcessPoolExecutor, Future[int]]] = {}  # with the number of its process
         for place in range(workers):
             self._free.put(place)
 
@@ -138,8 +137,7 @@ class LocalExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes; without `wait` at once, whatever they are at."""
-        for place, pool in list(self._pools.items()):
-            process = self._processes[place]
+        for pool, process in list(self._pools.values()):
             if not wait and process.done() and not process.exception():
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(process.result(), signal.SIGKILL)
@@ -149,12 +147,12 @@ class LocalExecutor(Executor):
         if place not in self._pools:
             spawn = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
             pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin, initargs=(self._cores[place],))
-            self._pools[place], self._processes[place] = pool, pool.submit(os.getpid)
-        return self._pools[place]
+            self._pools[place] = pool, pool.submit(os.getpid)
+        return self._pools[place][0]
 
     def _release(self, place: int, future: Future) -> None:
         if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
-            self._pools.pop(place).shutdown(wait=False)
+            self._pools.pop(place)[0].shutdown(wait=False)
         self._free.put(place)
 
 

@@ -205,7 +205,12 @@ def stored(plan: Plan) -> StoredPlan:
 
     Raises `RippleError` if one is invalid.
     """
-    files = {source: _fingerprint(source) for source in dict.fromkeys(plan.sources)}
+    files = {}
+    for source in dict.fromkeys(plan.sources):
+        if Path(source).suffix in ("", ".toml"):
+            files[source] = scene_digest(load_scene(source))
+        else:
+            files[source] = hashlib.blake2b(Path(source).read_bytes(), digest_size=8).hexdigest()
     return StoredPlan(plan, files, versions())
 
 
@@ -241,12 +246,6 @@ def load_stored(path: Path) -> StoredPlan:
         return found
     except (OSError, RecursionError, ValueError, SceneError) as error:  # strings that are not UTF-8 are a ValueError
         raise BatchError(f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is") from error
-
-
-def _fingerprint(source: str) -> str:
-    if Path(source).suffix in ("", ".toml"):
-        return scene_digest(load_scene(source))
-    return hashlib.blake2b(Path(source).read_bytes(), digest_size=8).hexdigest()
 
 
 def _flat(value: Any) -> dict[str, Any]:

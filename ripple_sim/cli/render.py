@@ -176,10 +176,7 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         self.check_input()  # before what this machine may lack
         if self.renderer == "cycles":
             self._run_cycles()
-        else:
-            self._run_gl()
-
-    def _run_gl(self) -> None:
+            return
         from ripple_sim.video.settings import check_options
 
         check_options(self.options(), self.output)  # before anything that takes time
