@@ -60,6 +60,9 @@ class Simulation:
         Those of the scene, by name.
     """
 
+    impulses: list[Impulse]
+    _steps: int  # of the next frame, already taken
+
     @checked(SceneError, scene=instance(Scene, ", from load_scene or drop_scene"), fps=POSITIVE, on_step=FUNCTION)
     def __init__(
         self,
@@ -199,5 +202,5 @@ class Simulation:
         for geom, height in self._heights.items():
             self.ripples[geom].add_height(height)
         self._script = Script(self.model, self.scene.events, list(self.ripples))
-        self.impulses: list[Impulse] = []
-        self._steps = 0  # of the next frame, already taken
+        self.impulses = []
+        self._steps = 0

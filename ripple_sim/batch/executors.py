@@ -179,13 +179,11 @@ def _end_with_parent() -> None:
 def first_alone(work: Path, what: str) -> Iterator[None]:
     """Let the first of something, by its name, be done alone on each machine; others that share `work` wait."""
     ready = work / f"ready-{socket.gethostname()}-{what}"
-    if ready.exists():
-        yield
-        return
-    with (work / f"first-{socket.gethostname()}-{what}").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not ready.exists():
-            yield
-            ready.touch()
-            return
+    if not ready.exists():
+        with (work / f"first-{socket.gethostname()}-{what}").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not ready.exists():
+                yield
+                ready.touch()
+                return
     yield

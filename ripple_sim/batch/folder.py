@@ -132,17 +132,14 @@ class BatchFolder:
         work.mkdir(parents=True, exist_ok=True)
         handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
         try:
-            try:
+            mine = False
+            with contextlib.suppress(BlockingIOError):
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                yield None
-                return
-            if self.is_finished(number):  # by another process, meanwhile
-                with contextlib.suppress(OSError):  # it is not empty
-                    work.rmdir()
-                yield None
-            else:
-                yield work
+                mine = not self.is_finished(number)
+                if not mine:  # but finished by another process, meanwhile
+                    with contextlib.suppress(OSError):  # it is not empty
+                        work.rmdir()
+            yield work if mine else None
         finally:
             os.close(handle)
 

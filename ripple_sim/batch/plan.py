@@ -373,5 +373,4 @@ def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Di
         if isinstance(value, dict) and not set(value) & {*KINDS, "apply"}:
             yield from _distributions(value, key)
             continue
-        table_of_value = value if isinstance(value, dict) else {"constant": value}
-        yield key, converted(table_of_value, Distribution, f"plan: {key}")
+        yield key, converted(value if isinstance(value, dict) else {"constant": value}, Distribution, f"plan: {key}")
