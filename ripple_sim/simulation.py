@@ -175,8 +175,7 @@ class Simulation:
         with physics_errors():
             mujoco.mj_step(self.model, self.data)
         stepped = work_clock()
-        broken = divergence(self.data)
-        if broken is not None:
+        if (broken := divergence(self.data)) is not None:
             raise SimulationError(
                 f"the physics became unstable at {self.data.time:.4g} s ({broken}); "
                 "use a shorter time step in the MJCF's <option>, or softer contacts"

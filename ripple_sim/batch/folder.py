@@ -220,8 +220,7 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
         before, now = _flat(load_stored(batch.plan)), _flat(plan)
         # a larger batch begins like a smaller one
         keys = (before.keys() | now.keys()) - {"plan.count"}
-        changed = sorted(key for key in keys if before.get(key) != now.get(key))
-        if changed:
+        if changed := sorted(key for key in keys if before.get(key) != now.get(key)):
             key = changed[0]
             more = f", and {len(changed) - 1} more ({', '.join(changed[1:4])})" if len(changed) > 1 else ""
             raise BatchError(

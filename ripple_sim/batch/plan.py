@@ -108,8 +108,7 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
                 raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
         if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
             raise SceneError(f"plan: {key} has length {self.length}; valid is 1 or more, of numbers")
-        problem = self._problem()
-        if problem:
+        if problem := self._problem():
             raise SceneError(f"plan: {key} is drawn from {kind} = {shown(getattr(self, kind))}; {problem}")
 
     def _problem(self) -> str | None:

@@ -109,8 +109,7 @@ class _Rate(ProgressColumn):
     def render(self, task: Task) -> Text:
         from ripple_sim.solver.kernel import compile_times, compiling
 
-        module = compiling()
-        if module is None:
+        if (module := compiling()) is None:
             return Text(f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed")
         stage = _stage(module)
         seconds = sum(time for each, time in compile_times().items() if _stage(each) == stage)

@@ -161,18 +161,25 @@ class Script:
         moved: list[DropEntry | ThrowEntry | PlaceEntry] = [*events.drop, *events.throw, *events.place]
         self._moved = [(entry, *free_joint(model, entry)) for entry in sorted(moved, key=lambda entry: entry.time)]
         self._home: dict[str, NDArray[np.float64]] = {}
-        for poke in events.poke:
-            _check_target(model, "poke", poke, targets)
-            if not (np.isfinite([poke.impulse, *poke.point]).all() and 0 <= poke.radius < np.inf):
+        surfaces: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
+        for surface in surfaces:
+            verb = "poke" if isinstance(surface, PokeEntry) else "change"
+            check_time(verb, surface.geom, surface.time)
+            if target_name(model, find_any(model, surface.geom)) not in targets:
                 raise SceneError(
-                    f"[[poke]] of {poke.geom!r} has point {poke.point} m, impulse {poke.impulse!r} N s, radius "
-                    f"{poke.radius!r} m; valid are finite numbers, the radius 0 or greater"
+                    f"[[{verb}]] names the geom {surface.geom!r}, which does not ripple; the rippling geoms are "
+                    f"{', '.join(map(repr, targets))}"
                 )
-        for change in events.change:
-            _check_target(model, "change", change, targets)
+            if isinstance(surface, PokeEntry) and not (
+                np.isfinite([surface.impulse, *surface.point]).all() and 0 <= surface.radius < np.inf
+            ):
+                raise SceneError(
+                    f"[[poke]] of {surface.geom!r} has point {surface.point} m, impulse {surface.impulse!r} N s, "
+                    f"radius {surface.radius!r} m; valid are finite numbers, the radius 0 or greater"
+                )
         controls = sorted(events.control, key=lambda entry: entry.time)
         self._actuators = {entry.actuator: _actuator(model, entry) for entry in controls}
-        sudden: list[PokeEntry | ChangeEntry | ControlEntry] = [*controls, *events.poke, *events.change]
+        sudden: list[PokeEntry | ChangeEntry | ControlEntry] = [*controls, *surfaces]
         self._sudden = sorted(sudden, key=lambda entry: entry.time)
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
@@ -208,15 +215,6 @@ class Script:
                 ripples.poke(event.geom, event.point, event.impulse, event.radius)
             else:
                 ripples.change_material(event.geom, **given_fields(event.material))
-
-
-def _check_target(model: mujoco.MjModel, verb: str, entry: PokeEntry | ChangeEntry, targets: Sequence[str]) -> None:
-    check_time(verb, entry.geom, entry.time)
-    if target_name(model, find_any(model, entry.geom)) not in targets:
-        raise SceneError(
-            f"[[{verb}]] names the geom {entry.geom!r}, which does not ripple; the rippling geoms are "
-            f"{', '.join(map(repr, targets))}"
-        )
 
 
 def _actuator(model: mujoco.MjModel, entry: ControlEntry) -> int:
