@@ -86,8 +86,7 @@ def _vendor_problems() -> Iterator[str]:
             f"version, or, {_CONTAINER}"
         )
     for file in files:
-        library = _library_of(file)
-        if library is None:
+        if (library := _library_of(file)) is None:
             yield f"the EGL vendor file {file} is damaged: reinstall the package it belongs to: dpkg -S {file}"
             continue
         try:
@@ -120,8 +119,7 @@ def _install_nvidia() -> str:
 
 def _vendor_files() -> tuple[list[Path], str]:
     """The vendor files that libglvnd reads, and its search path."""
-    names = os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES")
-    if names:
+    if names := os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES"):
         return [Path(name) for name in names.split(":")], f"__EGL_VENDOR_LIBRARY_FILENAMES={names}"
     folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS")
     places = folders.split(":") if folders else list(_VENDOR_FOLDERS)

@@ -142,11 +142,24 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             )
         self._materials, self._looks, self._options = materials, looks, options
         self._lookat: NDArray[np.float64] | None = None
-        self._given, self._counts = sensors or {}, dict[str, int]()
+        self._given, self._counts = sensors or {}, dict[str, int]()  # samples of each sensor in a control step
         self._blocks: dict[str, NDArray[np.float32]] = {}
         self._couple()
-        if self._given:
-            self.observation_space = self._space()
+        if not self._given:
+            return
+        own = self.env.observation_space
+        spaces = dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
+        control = float(getattr(self.unwrapped, "dt", 0.0))
+        for name, sensor in self._sensors.items():
+            count = sensor.rate * control
+            if name in spaces or round(count) < 1 or abs(count - round(count)) > 1e-6 * count:
+                raise SceneError(
+                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s; valid are whole "
+                    f"numbers, and names other than {', '.join(map(repr, spaces))}"
+                )
+            shape = round(count), len(sensor.points)
+            self._counts[name], spaces[name] = shape[0], gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+        self.observation_space = gymnasium.spaces.Dict(spaces)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Step the environment, and the ripples with each of its physics steps."""
@@ -207,22 +220,6 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             name: self.ripples[given["geom"]].sensor(**{key: value for key, value in given.items() if key != "geom"})
             for name, given in self._given.items()
         }
-
-    def _space(self) -> gymnasium.spaces.Dict:
-        """Space of the observation with its sensors; sets how many samples each has in a control step."""
-        own = self.env.observation_space
-        spaces = dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
-        control = float(getattr(self.unwrapped, "dt", 0.0))
-        for name, sensor in self._sensors.items():
-            count = sensor.rate * control
-            if name in spaces or round(count) < 1 or abs(count - round(count)) > 1e-6 * count:
-                raise SceneError(
-                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s; valid are whole "
-                    f"numbers, and names other than {', '.join(map(repr, spaces))}"
-                )
-            shape = round(count), len(sensor.points)
-            self._counts[name], spaces[name] = shape[0], gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
-        return gymnasium.spaces.Dict(spaces)
 
     def _sensed(self, observation: Any) -> Any:
         """An observation with the next block of each sensor, if there are any."""

@@ -60,6 +60,9 @@ class Simulation:
         Those of the scene, by name.
     """
 
+    impulses: list[Impulse]
+    _steps: int  # of the next frame, already taken
+
     @checked(SceneError, scene=instance(Scene, ", from load_scene or drop_scene"), fps=POSITIVE, on_step=FUNCTION)
     def __init__(
         self,
@@ -87,7 +90,6 @@ class Simulation:
         self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
         self.model.opt.timestep = 1 / (fps * self.steps_per_frame)
         self.data = mujoco.MjData(self.model)
-        self._reset_bodies()
         self.ripples = Ripples(
             self.model,
             {entry.geom: uniform_material(entry) for entry in scene.targets},
@@ -110,18 +112,15 @@ class Simulation:
                 self.ripples.allow_any_height(entry.geom)
         shaped = {entry.geom: entry.height for entry in scene.targets if entry.height is not None}
         self._heights = {geom: height.heights(self.ripples, geom) for geom, height in shaped.items()}
-        self._raise_surfaces()
         self._materials = {name: self.ripples[name].material for name in self.ripples}
-        self._script = Script(self.model, scene.events, list(self.ripples))
+        self.physics_seconds = self.wave_seconds = 0.0
+        self.reset()
         self.sensors = {}
         for sensor in scene.sensors:
             points = [sensor.point] if sensor.point is not None else sensor.points
             at = sensor.site if sensor.site is not None else self.ripples.to_geom(sensor.geom, points)
             waves = self.ripples[sensor.geom]
             self.sensors[sensor.name] = waves.sensor(at, sensor.kind, sensor.rate, thickness=sensor.thickness)
-        self.physics_seconds = self.wave_seconds = 0.0
-        self.impulses: list[Impulse] = []
-        self._steps = 0  # of the next frame, already taken
 
     @classmethod
     def of(
@@ -176,8 +175,7 @@ class Simulation:
         with physics_errors():
             mujoco.mj_step(self.model, self.data)
         stepped = work_clock()
-        broken = divergence(self.data)
-        if broken is not None:
+        if (broken := divergence(self.data)) is not None:
             raise SimulationError(
                 f"the physics became unstable at {self.data.time:.4g} s ({broken}); "
                 "use a shorter time step in the MJCF's <option>, or softer contacts"
@@ -189,25 +187,19 @@ class Simulation:
 
     def reset(self) -> None:
         """Return to the beginning: bodies, waves, materials and script."""
-        self._reset_bodies()
-        self.ripples.reset()
-        for name, material in self._materials.items():
-            if self.ripples[name].material is not material:
-                self.ripples.change_material(name, **vars(material))
-                self._materials[name] = self.ripples[name].material
-        self._raise_surfaces()
-        self._script = Script(self.model, self.scene.events, list(self.ripples))
-        self.impulses = []
-        self._steps = 0
-
-    def _raise_surfaces(self) -> None:
-        for geom, height in self._heights.items():
-            self.ripples[geom].add_height(height)
-
-    def _reset_bodies(self) -> None:
         if self.model.nkey:
             mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
         else:
             mujoco.mj_resetData(self.model, self.data)
         with physics_errors():
             mujoco.mj_forward(self.model, self.data)
+        self.ripples.reset()
+        for name, material in self._materials.items():
+            if self.ripples[name].material is not material:
+                self.ripples.change_material(name, **vars(material))
+                self._materials[name] = self.ripples[name].material
+        for geom, height in self._heights.items():
+            self.ripples[geom].add_height(height)
+        self._script = Script(self.model, self.scene.events, list(self.ripples))
+        self.impulses = []
+        self._steps = 0

@@ -120,8 +120,7 @@ class LocalExecutor(Executor):
         self.places = workers
         self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._cores = shares(available_cores(), workers)
-        self._pools: dict[int, ProcessPoolExecutor] = {}
-        self._processes: dict[int, Future[int]] = {}
+        self._pools: dict[int, tuple[ProcessPoolExecutor, Future[int]]] = {}  # with the number of its process
         for place in range(workers):
             self._free.put(place)
 
@@ -138,8 +137,7 @@ class LocalExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes; without `wait` at once, whatever they are at."""
-        for place, pool in list(self._pools.items()):
-            process = self._processes[place]
+        for pool, process in list(self._pools.values()):
             if not wait and process.done() and not process.exception():
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(process.result(), signal.SIGKILL)
@@ -149,12 +147,12 @@ class LocalExecutor(Executor):
         if place not in self._pools:
             spawn = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
             pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin, initargs=(self._cores[place],))
-            self._pools[place], self._processes[place] = pool, pool.submit(os.getpid)
-        return self._pools[place]
+            self._pools[place] = pool, pool.submit(os.getpid)
+        return self._pools[place][0]
 
     def _release(self, place: int, future: Future) -> None:
         if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
-            self._pools.pop(place).shutdown(wait=False)
+            self._pools.pop(place)[0].shutdown(wait=False)
         self._free.put(place)
 
 
@@ -171,8 +169,7 @@ def _begin(cores: list[int]) -> None:
 
 
 def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
+    if (parent := multiprocessing.parent_process()) is not None:
         parent.join()
         os._exit(1)
 
@@ -181,13 +178,11 @@ def _end_with_parent() -> None:
 def first_alone(work: Path, what: str) -> Iterator[None]:
     """Let the first of something, by its name, be done alone on each machine; others that share `work` wait."""
     ready = work / f"ready-{socket.gethostname()}-{what}"
-    if ready.exists():
-        yield
-        return
-    with (work / f"first-{socket.gethostname()}-{what}").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not ready.exists():
-            yield
-            ready.touch()
-            return
+    if not ready.exists():
+        with (work / f"first-{socket.gethostname()}-{what}").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not ready.exists():
+                yield
+                ready.touch()
+                return
     yield

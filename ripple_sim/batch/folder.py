@@ -132,17 +132,14 @@ class BatchFolder:
         work.mkdir(parents=True, exist_ok=True)
         handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
         try:
-            try:
+            mine = False
+            with contextlib.suppress(BlockingIOError):
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                yield None
-                return
-            if self.is_finished(number):  # by another process, meanwhile
-                with contextlib.suppress(OSError):  # it is not empty
-                    work.rmdir()
-                yield None
-            else:
-                yield work
+                mine = not self.is_finished(number)
+                if not mine:  # but finished by another process, meanwhile
+                    with contextlib.suppress(OSError):  # it is not empty
+                        work.rmdir()
+            yield work if mine else None
         finally:
             os.close(handle)
 
@@ -205,7 +202,12 @@ def stored(plan: Plan) -> StoredPlan:
 
     Raises `RippleError` if one is invalid.
     """
-    files = {source: _fingerprint(source) for source in dict.fromkeys(plan.sources)}
+    files = {}
+    for source in dict.fromkeys(plan.sources):
+        if Path(source).suffix in ("", ".toml"):
+            files[source] = scene_digest(load_scene(source))
+        else:
+            files[source] = hashlib.blake2b(Path(source).read_bytes(), digest_size=8).hexdigest()
     return StoredPlan(plan, files, versions())
 
 
@@ -218,8 +220,7 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
         before, now = _flat(load_stored(batch.plan)), _flat(plan)
         # a larger batch begins like a smaller one
         keys = (before.keys() | now.keys()) - {"plan.count"}
-        changed = sorted(key for key in keys if before.get(key) != now.get(key))
-        if changed:
+        if changed := sorted(key for key in keys if before.get(key) != now.get(key)):
             key = changed[0]
             more = f", and {len(changed) - 1} more ({', '.join(changed[1:4])})" if len(changed) > 1 else ""
             raise BatchError(
@@ -241,12 +242,6 @@ def load_stored(path: Path) -> StoredPlan:
         return found
     except (OSError, RecursionError, ValueError, SceneError) as error:  # strings that are not UTF-8 are a ValueError
         raise BatchError(f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is") from error
-
-
-def _fingerprint(source: str) -> str:
-    if Path(source).suffix in ("", ".toml"):
-        return scene_digest(load_scene(source))
-    return hashlib.blake2b(Path(source).read_bytes(), digest_size=8).hexdigest()
 
 
 def _flat(value: Any) -> dict[str, Any]:

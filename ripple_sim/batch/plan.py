@@ -108,8 +108,7 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
                 raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
         if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
             raise SceneError(f"plan: {key} has length {self.length}; valid is 1 or more, of numbers")
-        problem = self._problem()
-        if problem:
+        if problem := self._problem():
             raise SceneError(f"plan: {key} is drawn from {kind} = {shown(getattr(self, kind))}; {problem}")
 
     def _problem(self) -> str | None:
@@ -373,5 +372,4 @@ def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Di
         if isinstance(value, dict) and not set(value) & {*KINDS, "apply"}:
             yield from _distributions(value, key)
             continue
-        table_of_value = value if isinstance(value, dict) else {"constant": value}
-        yield key, converted(table_of_value, Distribution, f"plan: {key}")
+        yield key, converted(value if isinstance(value, dict) else {"constant": value}, Distribution, f"plan: {key}")

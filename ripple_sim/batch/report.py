@@ -16,7 +16,7 @@ from ripple_sim.solver.errors import PATH, checked
 from ripple_sim.solver.files import atomic_write
 
 from .finished import finished_scenes
-from .folder import BatchFolder, load_stored
+from .folder import BatchFolder, Failure, load_stored
 
 _MOST = 5_000  # scenes on the page
 
@@ -47,13 +47,11 @@ def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
 def _card(batch: BatchFolder, row: dict[str, Any]) -> str:
     number = row["number"]
     if row["status"] != "finished":
-        log = f"failed/{number:06d}.log"
-        return f'<a class="failed" href="{log}">{number}: {html.escape(str(row["error"]))}</a>\n'
+        return f'<a class="failed" href="failed/{number:06d}.log">{number}: {html.escape(str(row["error"]))}</a>\n'
     title = html.escape("\n".join(f"{name}: {value}" for name, value in row.items()), quote=True)
     thumbnail = batch.thumbnail(number)
     image = f'<img loading="lazy" src="thumbnails/{thumbnail.name}" alt="">' if thumbnail.exists() else ""
-    folder = batch.scene(number)
-    link = f"scenes/{folder.name}/" if folder.exists() else "tars/"
+    link = f"scenes/{number:06d}/" if batch.scene(number).exists() else "tars/"
     text = f"{number}: {html.escape(row['source'])}, {row['impulse']:.3g} N s"
     return f'<a href="{link}" title="{title}">{image}{text}</a>\n'
 
@@ -79,17 +77,17 @@ def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
     """
     import pyarrow
 
-    damaged = {}
+    damaged: dict[int, Failure] = {}
     for scene in finished_scenes(batch, rows):
         try:
             rows[scene.number] = row(scene.facts(), scene.times())
         except BatchError as error:  # or another process packs it, and will write the index too
-            damaged[scene.number] = {"number": scene.number, "status": "failed", "attempts": 0, "error": str(error)}
+            damaged[scene.number] = Failure(error=str(error))
     failed = {
         number: {"number": number, "status": "failed", "attempts": failure.attempts, "error": failure.error}
-        for number, failure in batch.failures().items()
+        for number, failure in (batch.failures() | damaged).items()
     }
-    listed = [each for _, each in sorted((failed | damaged | rows).items())]
+    listed = [each for _, each in sorted((failed | rows).items())]
     names = dict.fromkeys(["number", *(name for each in listed for name in each)])
     columns = {name: [each.get(name) for each in listed] for name in names}
     for name, values in columns.items():

@@ -13,7 +13,7 @@ import shutil
 import tempfile
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -245,8 +245,20 @@ def run_batch(
                 batch.forget_failure(number)
         parquet()  # before anything that takes time
         run = BatchRun(batch, plan, options)
-        with _executor(options, run) as executor:
+        executor: LocalExecutor | DaskExecutor
+        if options.dask is not None:
+            executor = DaskExecutor(options.dask)
+        else:
+            executor = LocalExecutor(min(options.workers or usual_workers(), max(1, len(run.pending))))
+        try:
             run.work(executor, progress)
+        except BaseException as error:  # such as Ctrl-C: what is unfinished goes on next time
+            gone = executor.refusal() if isinstance(executor, DaskExecutor) and isinstance(error, Exception) else None
+            executor.shutdown(wait=False, cancel_futures=True)
+            if gone is not None:
+                raise gone from ConnectionError(str(error))
+            raise
+        executor.shutdown()
         write_index(batch, run.rows)
         full = run.full
     except OSError as error:
@@ -257,24 +269,6 @@ def run_batch(
         advice = "make room, or lower --keep-free, and run the same command again to go on"
         raise BatchError(f"{full}; {advice}") from OSError(errno.ENOSPC, full)
     return run.progress
-
-
-@contextlib.contextmanager
-def _executor(options: RunOptions, run: BatchRun) -> Iterator[LocalExecutor | DaskExecutor]:
-    executor: LocalExecutor | DaskExecutor
-    if options.dask is not None:
-        executor = DaskExecutor(options.dask)
-    else:
-        executor = LocalExecutor(min(options.workers or usual_workers(), max(1, len(run.pending))))
-    try:
-        yield executor
-    except BaseException as error:  # such as Ctrl-C: what is unfinished goes on next time
-        gone = executor.refusal() if isinstance(executor, DaskExecutor) and isinstance(error, Exception) else None
-        executor.shutdown(wait=False, cancel_futures=True)
-        if gone is not None:
-            raise gone from ConnectionError(str(error))
-        raise
-    executor.shutdown()
 
 
 _SHOWN = 3  # scenes whose values are told

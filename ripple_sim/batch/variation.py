@@ -45,9 +45,19 @@ def vary_table(table: dict[str, Any], entries: Mapping[str, Distribution], strea
     values = {}
     for key, distribution in entries.items():
         for holder, place, name in _places(table, parse_key(key), ""):
-            value = distribution.draw(stream(key if distribution.together else name))
-            values[name] = value
-            _put(holder, place, name, value, distribution.apply)
+            value = values[name] = distribution.draw(stream(key if distribution.together else name))
+            if distribution.apply != "set":
+                old = holder.get(place) if isinstance(holder, dict) else holder[place]
+                try:
+                    if old is None:  # left out, which numpy takes for NaN
+                        raise TypeError
+                    value = combined(np.asarray(old, float), value, distribution.apply).tolist()
+                except (TypeError, ValueError, OverflowError) as error:
+                    raise SceneError(
+                        f"plan: {name} is {shown(old)} in the scene, which {shown(value)} cannot {distribution.apply}; "
+                        "write a number into the scene file, or set the value"
+                    ) from error
+            holder[place] = value
     return values
 
 
@@ -74,21 +84,6 @@ def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterat
         yield from _places(inner, rest, here)
     else:
         raise SceneError(f"plan: the scene has no {'.'.join([here, *(name for name, _ in rest)])} to vary")
-
-
-def _put(holder: Any, place: Any, name: str, value: Any, apply: str) -> None:
-    if apply != "set":
-        old = holder.get(place) if isinstance(holder, dict) else holder[place]
-        try:
-            if old is None:  # left out, which numpy takes for NaN
-                raise TypeError
-            value = combined(np.asarray(old, float), value, apply).tolist()
-        except (TypeError, ValueError, OverflowError) as error:
-            raise SceneError(
-                f"plan: {name} is {shown(old)} in the scene, which {shown(value)} cannot {apply}; write a "
-                "number into the scene file, or set the value"
-            ) from error
-    holder[place] = value
 
 
 def combined(old: Any, value: Any, apply: str) -> Any:
@@ -120,8 +115,7 @@ def vary_model(spec: mujoco.MjSpec, entries: Mapping[str, Distribution], stream:
     values = {}
     for key, distribution in entries.items():
         for element, attribute, index, name in _attributes(spec, key):
-            value = distribution.draw(stream(key if distribution.together else name))
-            values[name] = value
+            value = values[name] = distribution.draw(stream(key if distribution.together else name))
             try:
                 _assign(element, attribute, index, value, distribution.apply)
             except (TypeError, ValueError, IndexError, OverflowError) as error:

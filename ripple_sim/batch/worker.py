@@ -186,8 +186,7 @@ def make_scene(folder: str, number: int) -> Outcome:
             return Outcome(number, "there" if batch.is_finished(number) else "busy")
         try:
             facts = _make(load_stored(batch.plan).plan, number, place, batch)
-            seconds = time.perf_counter() - start
-            times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
+            times = {"seconds": time.perf_counter() - start, "cpu_seconds": time.process_time() - work}
             _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
         except Exception as error:  # of any kind: the batch goes on without this scene
             clear(place)

@@ -20,8 +20,7 @@ LAYOUTS, BASELINES = ("auto", "cube", "patches"), ("paper", "uncorrected", "dyna
 
 def parse_size(word: str) -> tuple[int, int]:
     """Read width and height [pixels] from a word such as "1280x720"."""
-    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)
-    if match is None:
+    if (match := re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)) is None:
         raise ValueError(f"{shown(word)} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720")
     return int(match[1]), int(match[2])
 

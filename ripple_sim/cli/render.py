@@ -109,8 +109,7 @@ class _Rate(ProgressColumn):
     def render(self, task: Task) -> Text:
         from ripple_sim.solver.kernel import compile_times, compiling
 
-        module = compiling()
-        if module is None:
+        if (module := compiling()) is None:
             return Text(f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed")
         stage = _stage(module)
         seconds = sum(time for each, time in compile_times().items() if _stage(each) == stage)
@@ -176,10 +175,7 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         self.check_input()  # before what this machine may lack
         if self.renderer == "cycles":
             self._run_cycles()
-        else:
-            self._run_gl()
-
-    def _run_gl(self) -> None:
+            return
         from ripple_sim.video.settings import check_options
 
         check_options(self.options(), self.output)  # before anything that takes time

@@ -22,7 +22,6 @@ from tyro.conf import Positional, arg
 from .arguments import Gigabytes, Limit, Shard
 
 if TYPE_CHECKING:
-    from ripple_sim.batch.plan import Plan
     from ripple_sim.batch.run import Progress
 
 
@@ -139,9 +138,16 @@ class BatchCommand:
 
     def run(self) -> None:
         """Do what is asked for."""
+        from ripple_sim.batch.plan import read_plan
         from ripple_sim.batch.report import parquet, status_text
+        from ripple_sim.errors import BatchError
 
-        plan, folder = self._plan_and_folder()
+        plan = None if self.plan.is_dir() else read_plan(self.plan)
+        if plan is None and self.output is not None:
+            raise BatchError(f"{self.plan} is the folder of a batch: leave -o out, or name a plan")
+        if plan is not None and self.output is None and not self.dry_run:
+            raise BatchError("a plan needs a folder for its scenes: add -o DIR")
+        folder = self.plan if plan is None else self.output or self.plan.with_suffix("")
         parquet()  # before anything that takes time
         if self.status:
             print(status_text(folder))
@@ -163,20 +169,6 @@ class BatchCommand:
             with batch_progress() as progress:
                 run_batch(plan, folder, options, progress=progress)
             print(status_text(folder))
-
-    def _plan_and_folder(self) -> tuple[Plan | None, Path]:
-        from ripple_sim.errors import BatchError
-
-        if self.plan.is_dir():
-            if self.output is not None:
-                raise BatchError(f"{self.plan} is the folder of a batch: leave -o out, or name a plan")
-            return None, self.plan
-        from ripple_sim.batch.plan import read_plan
-
-        plan = read_plan(self.plan)
-        if self.output is None and not self.dry_run:
-            raise BatchError("a plan needs a folder for its scenes: add -o DIR")
-        return plan, self.output or self.plan.with_suffix("")
 
 
 _BETWEEN = 60.0  # lines in a log [s]

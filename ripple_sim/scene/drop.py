@@ -219,15 +219,13 @@ def _up(mesh: Mesh, usual: str) -> str:
     extents = np.ptp(mesh.V, axis=0)
     if flat := [axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()]:
         return flat[0]
-    return min(UP_AXES, key=lambda axis: (not _stands(mesh, axis), axis != usual))
-
-
-def _stands(mesh: Mesh, up: str) -> bool:
-    """Whether the middle of a surface is above what touches the floor, give or take."""
-    V = _standing(mesh, up)
-    below = V[V[:, 2] <= _FOOT * SIZE][:, :2] - _sampled(V, mesh.F)[0].mean(axis=0)[:2]
-    angles = np.sort(np.arctan2(below[:, 1], below[:, 0]))
-    return bool(np.diff(angles, append=angles[0] + 2 * np.pi).max() < np.pi)
+    falls = {}
+    for axis in UP_AXES:  # if the middle of the surface is not above what touches the floor, give or take
+        V = _standing(mesh, axis)
+        below = V[V[:, 2] <= _FOOT * SIZE][:, :2] - _sampled(V, mesh.F)[0].mean(axis=0)[:2]
+        angles = np.sort(np.arctan2(below[:, 1], below[:, 0]))
+        falls[axis] = not np.diff(angles, append=angles[0] + 2 * np.pi).max() < np.pi
+    return min(UP_AXES, key=lambda axis: (falls[axis], axis != usual))
 
 
 def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:

@@ -70,21 +70,6 @@ class PlaceEntry(msgspec.Struct, forbid_unknown_fields=True):
     """Quaternion w x y z; by default unchanged."""
 
 
-def _set_motion(data: mujoco.MjData, entry: DropEntry | ThrowEntry | PlaceEntry, position: int, velocity: int) -> None:
-    if entry.position is not None:
-        data.qpos[position : position + 3] = entry.position
-    quaternion = data.qpos[position + 3 : position + 7]
-    if entry.orientation is not None:
-        quaternion[:] = np.array(entry.orientation) / np.linalg.norm(entry.orientation)
-    data.qvel[velocity : velocity + 6] = 0
-    if not isinstance(entry, PlaceEntry):
-        data.qvel[velocity : velocity + 3] = entry.velocity
-        # a free joint keeps its angular velocity in the body's own frame
-        back = np.zeros(4)
-        mujoco.mju_negQuat(back, quaternion)
-        mujoco.mju_rotVecQuat(data.qvel[velocity + 3 : velocity + 6], np.array(entry.angular_velocity), back)
-
-
 def free_joint(model: mujoco.MjModel, entry: DropEntry | ThrowEntry | PlaceEntry) -> tuple[int, int]:
     """Addresses of the body's free joint in qpos and qvel."""
     verb = type(entry).__name__.removesuffix("Entry").lower()
@@ -176,18 +161,26 @@ class Script:
         moved: list[DropEntry | ThrowEntry | PlaceEntry] = [*events.drop, *events.throw, *events.place]
         self._moved = [(entry, *free_joint(model, entry)) for entry in sorted(moved, key=lambda entry: entry.time)]
         self._home: dict[str, NDArray[np.float64]] = {}
-        for poke in events.poke:
-            _check_target(model, "poke", poke, targets)
-            if not (np.isfinite([poke.impulse, *poke.point]).all() and 0 <= poke.radius < np.inf):
+        surfaces: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
+        for surface in surfaces:
+            verb = "poke" if isinstance(surface, PokeEntry) else "change"
+            check_time(verb, surface.geom, surface.time)
+            if target_name(model, find_any(model, surface.geom)) not in targets:
                 raise SceneError(
-                    f"[[poke]] of {poke.geom!r} has point {poke.point} m, impulse {poke.impulse!r} N s, radius "
-                    f"{poke.radius!r} m; valid are finite numbers, the radius 0 or greater"
+                    f"[[{verb}]] names the geom {surface.geom!r}, which does not ripple; the rippling geoms are "
+                    f"{', '.join(map(repr, targets))}"
                 )
-        for change in events.change:
-            _check_target(model, "change", change, targets)
-        self._controls = [(entry, _actuator(model, entry)) for entry in sorted(events.control, key=lambda e: e.time)]
-        surface_events: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
-        self._surface_events = sorted(surface_events, key=lambda event: event.time)
+            if isinstance(surface, PokeEntry) and not (
+                np.isfinite([surface.impulse, *surface.point]).all() and 0 <= surface.radius < np.inf
+            ):
+                raise SceneError(
+                    f"[[poke]] of {surface.geom!r} has point {surface.point} m, impulse {surface.impulse!r} N s, "
+                    f"radius {surface.radius!r} m; valid are finite numbers, the radius 0 or greater"
+                )
+        controls = sorted(events.control, key=lambda entry: entry.time)
+        self._actuators = {entry.actuator: _actuator(model, entry) for entry in controls}
+        sudden: list[PokeEntry | ChangeEntry | ControlEntry] = [*controls, *surfaces]
+        self._sudden = sorted(sudden, key=lambda entry: entry.time)
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
         """Carry out the events that are due."""
@@ -197,29 +190,31 @@ class Script:
                 pose = slice(position, position + 7)
                 data.qpos[pose] = self._home.setdefault(entry.body, data.qpos[pose].copy())
                 data.qvel[velocity : velocity + 6] = 0
-            if entry.time <= data.time + 1e-9:
-                _set_motion(data, entry, position, velocity)
-                begun += 1
+            if entry.time > data.time + 1e-9:
+                continue
+            begun += 1
+            if entry.position is not None:
+                data.qpos[position : position + 3] = entry.position
+            quaternion = data.qpos[position + 3 : position + 7]
+            if entry.orientation is not None:
+                quaternion[:] = np.array(entry.orientation) / np.linalg.norm(entry.orientation)
+            data.qvel[velocity : velocity + 6] = 0
+            if not isinstance(entry, PlaceEntry):
+                data.qvel[velocity : velocity + 3] = entry.velocity
+                # a free joint keeps its angular velocity in the body's own frame
+                back = np.zeros(4)
+                mujoco.mju_negQuat(back, quaternion)
+                mujoco.mju_rotVecQuat(data.qvel[velocity + 3 : velocity + 6], np.array(entry.angular_velocity), back)
         # sorted by time: those that have begun are the first
         del self._moved[:begun]
-        while self._controls and self._controls[0][0].time <= data.time + 1e-9:
-            control, actuator = self._controls.pop(0)
-            data.ctrl[actuator] = control.value
-        while self._surface_events and self._surface_events[0].time <= data.time + 1e-9:
-            event = self._surface_events.pop(0)
-            if isinstance(event, PokeEntry):
+        while self._sudden and self._sudden[0].time <= data.time + 1e-9:
+            event = self._sudden.pop(0)
+            if isinstance(event, ControlEntry):
+                data.ctrl[self._actuators[event.actuator]] = event.value
+            elif isinstance(event, PokeEntry):
                 ripples.poke(event.geom, event.point, event.impulse, event.radius)
             else:
                 ripples.change_material(event.geom, **given_fields(event.material))
-
-
-def _check_target(model: mujoco.MjModel, verb: str, entry: PokeEntry | ChangeEntry, targets: Sequence[str]) -> None:
-    check_time(verb, entry.geom, entry.time)
-    if target_name(model, find_any(model, entry.geom)) not in targets:
-        raise SceneError(
-            f"[[{verb}]] names the geom {entry.geom!r}, which does not ripple; the rippling geoms are "
-            f"{', '.join(map(repr, targets))}"
-        )
 
 
 def _actuator(model: mujoco.MjModel, entry: ControlEntry) -> int:

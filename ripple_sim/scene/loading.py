@@ -267,24 +267,22 @@ def load_scene(
 def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[str, ...] = ()) -> Scene:
     """The scene of a name and notes that the content of a scene file makes of a model, checked; raises as that does."""
     events = Events(**{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)})
-    targets = tuple(_suited(model, entry) for entry in content.ripple)
+    targets = []
+    for entry in content.ripple:
+        preset = entry.material.preset
+        preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
+        if preset is not None and preset.name == "suited":  # what it leaves out is found from the model
+            given = given_fields(preset, without="name")
+            if not {"size", "hit"} <= set(given):
+                given = typical_hit(model, entry.geom) | given
+            material = msgspec.structs.replace(entry.material, preset=PresetEntry(name="suited", **given))
+            entry = msgspec.structs.replace(entry, material=material)
+        targets.append(entry)
     look = content.two_way, tuple(content.overlay), content.lighting
-    scene = Scene(name, model, targets, content.camera, content.duration, events, *look, notes, tuple(content.sensor))
+    sensors = tuple(content.sensor)
+    scene = Scene(name, model, tuple(targets), content.camera, content.duration, events, *look, notes, sensors)
     check_scene(scene)
     return scene
-
-
-def _suited(model: mujoco.MjModel, entry: RippleEntry) -> RippleEntry:
-    """The entry with what its preset "suited" leaves out, if it has that, found from the model."""
-    preset = entry.material.preset
-    preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
-    if preset is None or preset.name != "suited":
-        return entry
-    given = given_fields(preset, without="name")
-    if not {"size", "hit"} <= set(given):
-        given = typical_hit(model, entry.geom) | given
-    material = msgspec.structs.replace(entry.material, preset=PresetEntry(name="suited", **given))
-    return msgspec.structs.replace(entry, material=material)
 
 
 def load_model(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import logging
+import logging.handlers
+import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -89,24 +90,17 @@ def _statements(path: Path, skipped: str = "vf#") -> Iterator[tuple[str, str]]:
 
 def _embedded(mesh_path: Path) -> list[Image.Image]:
     """Base colour images in a GLB or glTF file."""
-    log, handler = logging.getLogger("trimesh"), logging.Handler()
-    logged: list[Any] = []
-
-    def hear(record: logging.LogRecord) -> bool:
-        logged.append(record.exc_info and record.exc_info[1])
-        return False
-
     # an image beyond pillow's limit is logged, at the lowest level, and left out
+    log, heard = logging.getLogger("trimesh"), logging.handlers.BufferingHandler(sys.maxsize)
     level = log.level
-    handler.addFilter(hear)
-    log.addHandler(handler)
+    log.addHandler(heard)
     log.setLevel(logging.DEBUG)
     try:
         parts = trimesh.load_scene(mesh_path).geometry.values()
     finally:
-        log.removeHandler(handler)
+        log.removeHandler(heard)
         log.setLevel(level)
-    for error in logged:
+    for error in (record.exc_info[1] for record in heard.buffer if record.exc_info):
         if isinstance(error, Image.DecompressionBombError):
             raise SceneError(f"an image in {mesh_path.name} cannot be read: {error} Scale it down")
     materials = (getattr(part.visual, "material", None) for part in parts)

@@ -152,8 +152,7 @@ def parse_request(words: Iterable[str]) -> Request:
             with contextlib.suppress(ValueError):
                 limit = float(value)
             if not 0 < limit < math.inf:
-                unit = HEATMAPS[name]
-                raise SceneError(f"overlay {word.strip()!r}: the range must be a positive number [{unit}]")
+                raise SceneError(f"overlay {word.strip()!r}: the range must be a positive number [{HEATMAPS[name]}]")
             chosen[name] = limit
     heatmaps = [name for name in HEATMAPS if name in chosen]
     if len(heatmaps) > 1:

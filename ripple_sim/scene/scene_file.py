@@ -295,8 +295,7 @@ def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
     """
     atlas, coefficients = ripples[entry.geom].atlas, {}
     if entry.inside:
-        to_atlas = functools.partial(ripples.to_geom, entry.geom)
-        bodies = [moved(each.body(), to_atlas) for each in entry.inside]
+        bodies = [moved(each.body(), functools.partial(ripples.to_geom, entry.geom)) for each in entry.inside]
         thickness = thickness_map(atlas, bodies, entry.thickness_limits)
         coefficients.update(vars(entry.material.material(thickness)))
     for name, each in entry.material.maps().items():

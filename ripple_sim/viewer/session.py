@@ -180,8 +180,7 @@ class Session:
 
     def poke(self, origin: ArrayLike, direction: ArrayLike) -> NDArray[np.float64] | None:
         """Press on the first surface on a ray, with `poke_impulse`; return the point in its frame [m], if any."""
-        hit = self.pick(origin, direction)
-        if hit is None:
+        if (hit := self.pick(origin, direction)) is None:
             return None
         name, point, _ = hit
         self.simulation.ripples[name].add_impulse(point, self.poke_impulse, self._poke_radius)

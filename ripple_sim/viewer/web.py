@@ -143,8 +143,7 @@ def check_web(port: int, host: str) -> None:
     DisplayError
         If trame is not installed, the port is not free, or the host is not of this machine.
     """
-    missing = [name for name in ("trame", "trame_vtk") if importlib.util.find_spec(name) is None]
-    if missing:
+    if missing := [name for name in ("trame", "trame_vtk") if importlib.util.find_spec(name) is None]:
         raise DisplayError(
             f"--web needs {' and '.join(missing)}, which is not installed; install it with: "
             "pip install 'ripple-sim[web]'"
