@@ -154,9 +154,8 @@ def join_clips(
     sound : float [k], optional
         See `Stream`.
     """
-    output = open_container(path, container)
-    track = target = None
-    try:
+    with open_container(path, container) as output:
+        track = target = None
         for clip, first in clips:
             with av.open(str(clip)) as source:
                 video = source.streams.video[0]
@@ -178,5 +177,3 @@ def join_clips(
                         track.encode(packet.pts / fps)
         if track is not None:
             track.finish()
-    finally:
-        output.close()

@@ -31,7 +31,7 @@ from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.files import final_path
 
 from .clip import GIF, Clip, Stream
-from .replace import MARK, check_folder, made_here, mark_gif
+from .replace import MARK, check_folder, made_here, mark_gif, read_object
 
 # ITU-R BT.709: x and y of red, green, blue and white
 _BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
@@ -80,14 +80,10 @@ def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> N
     graph.configure()
     colours.push(palette)
     colours.push(None)
-    gif = Clip(path, GIF, stream)
-    try:
+    with contextlib.closing(Clip(path, GIF, stream)) as gif:
         for image in _filtered(_images(clips, stream.fps), frames, sink):
             gif.encode(image)
-    except BaseException:
-        gif.close()
-        raise
-    gif.finish()
+        gif.finish()
     mark_gif(path)
 
 
@@ -225,10 +221,7 @@ def _check_folder(video: Path, overwrite: bool) -> None:
         return _NAME.fullmatch(file.name.lstrip(".")) is not None and (unfinished or overwrite or made_here(file))
 
     check_folder(VideoError, "passes", folder, own)
-    try:
-        owner = json.loads((folder / _CONTENTS).read_text()).get("video")
-    except (OSError, ValueError, AttributeError, RecursionError):  # also of brackets in brackets without end
-        owner = None  # the folder does not say whose it is
+    owner = read_object(folder / _CONTENTS).get("video")  # None: the folder does not say whose it is
     if owner not in (None, final_path(video).name) and not overwrite:
         raise VideoError(
             f"cannot write passes to {folder}: they are those of {owner}; name another output, or add --overwrite"

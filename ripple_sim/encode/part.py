@@ -18,7 +18,7 @@ from pathlib import Path
 from ripple_sim.errors import VideoError
 
 from .output import check_replaceable
-from .replace import MARK, is_plain, made_here, move
+from .replace import MARK, is_plain, made_here, move, read_object
 
 SETTINGS, STATES = "settings.json", "states.txt"
 _FRAMES, _WHOLE = "frames", "whole"
@@ -192,12 +192,7 @@ class Part:
 
     def _strangers(self) -> Iterator[str]:
         """Names of what no writer has put here, in the folder and in that of the segments."""
-        settings = self.folder / SETTINGS
-        try:
-            found = json.loads(settings.read_text()) if settings.is_file() else None
-        except (OSError, ValueError, RecursionError):
-            found = None
-        ours = isinstance(found, dict) and MARK in found
+        ours = MARK in read_object(self.folder / SETTINGS)
         for entry in self.folder.iterdir():
             own = is_plain(entry) and entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE)
             if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():

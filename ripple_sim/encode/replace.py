@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from PIL.PngImagePlugin import PngInfo
 
@@ -31,6 +33,15 @@ def made_here(path: Path) -> bool:
 def is_plain(path: Path) -> bool:
     """Whether a path is a file and no link."""
     return path.is_file() and not path.is_symlink()
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """What a JSON file says; nothing where it is missing, damaged, no plain file or no object."""
+    try:
+        found = json.loads(path.read_text()) if path.is_file() else None
+    except (OSError, ValueError, RecursionError):  # the last one of brackets in brackets without end
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def png_mark() -> PngInfo:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.encode.replace import MARK
+from ripple_sim.encode.replace import MARK, read_object
 from ripple_sim.solver.texels.moving import SurfaceRide
 from ripple_sim.solver.waves.sensor import UNITS
 
@@ -84,11 +83,7 @@ class Store:
 
 def made_here(path: Path) -> bool:
     """Whether a folder is a store from here, with nothing else in it."""
-    try:
-        marked = json.loads((path / ".zattrs").read_text()).get("software") == MARK
-    except (OSError, ValueError, AttributeError, RecursionError):  # also of brackets in brackets without end
-        return False
-    return marked and all(
+    return read_object(path / ".zattrs").get("software") == MARK and all(
         not each.is_symlink() and (each.is_dir() or each.name in _METADATA or _CHUNK_NAME.fullmatch(each.name))
         for each in path.rglob("*")
     )

@@ -35,7 +35,7 @@ from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
 
 from .moving_mesh import MovingMesh
 from .source import Source, Writer
-from .visuals import Finish, Solid, mean_color, solid_finish, solids, target_finish, target_uv
+from .visuals import Finish, Solid, mean_color, solids, target_finish
 
 __all__ = ["PageWriter", "made_here"]
 
@@ -55,8 +55,7 @@ class PagePart(NamedTuple):
 def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
     """A target at rest; its points follow along `directions`, and with its mesh's own vertices."""
     model, geom = source.model, source.ripples.geom_ids[name]
-    finish = target_finish(model, geom, *source.paints[name], mesh.uv is not None)
-    uv = target_uv(model, geom, mesh) if finish.texture >= 0 else None
+    finish, uv = target_finish(source, name, mesh)
     soft = is_soft(model, geom)  # and so in the world
     meta = {
         "name": name,
@@ -115,7 +114,7 @@ def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     }
 
 
-def _solid_part(model: mujoco.MjModel, solid: Solid) -> PagePart:
+def _solid_part(solid: Solid) -> PagePart:
     meta = {
         "name": solid.name,
         "target": False,
@@ -123,7 +122,7 @@ def _solid_part(model: mujoco.MjModel, solid: Solid) -> PagePart:
         "position": solid.position.tolist(),
         "quaternion": solid.quaternion.tolist(),
         "open": False,
-        **_look(solid_finish(model, solid.visual)),
+        **_look(solid.finish),
     }
     return _part(meta, solid.F, [solid.points, solid.normals], solid.uv)
 
@@ -304,7 +303,7 @@ class PageWriter(Writer):
         targets = set(source.ripples.geom_ids.values())
         floor = find_floor(model, targets)
         found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
-        parts = [*(target.part for target in self._targets.values()), *(_solid_part(model, solid) for solid in found)]
+        parts = [*(target.part for target in self._targets.values()), *(_solid_part(solid) for solid in found)]
         pose = source.pose(data)
         floor_meta = None if floor is None else floor_of(model, floor)
         textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])

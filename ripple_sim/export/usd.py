@@ -31,7 +31,7 @@ from ripple_sim.solver.files import final_path
 from .moving_mesh import Displaced, MovingMesh
 from .source import Source
 from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
-from .visuals import solid_finish, solids, target_finish, target_uv
+from .visuals import solids, target_finish
 
 
 def succeed(work: Callable[..., bool], *arguments: object) -> None:
@@ -190,7 +190,7 @@ class UsdWriter:
             mesh.CreatePointsAttr(vectors(solid.points))
             mesh.CreateNormalsAttr(vectors(solid.normals))
             mesh.CreateExtentAttr(extent(solid.points))
-            self._materials.bind(mesh, solid_finish(source.model, solid.visual))
+            self._materials.bind(mesh, solid.finish)
         self._before: dict[str, NDArray[np.float32]] = {}
         self._surfaces = {name: self._define_surface(name) for name in source.ripples}
         self._last = 0
@@ -288,8 +288,8 @@ class UsdWriter:
         source, model = self._source, self._source.model
         geom = source.ripples.geom_ids[name]
         surface, atlas, soft = source.mesh(name), source.ripples[name].rest, is_soft(model, geom)
-        finish = target_finish(model, geom, *source.paints[name], surface.uv is not None)
-        uv = surface.uv if finish.texture < 0 else target_uv(model, geom, surface)
+        finish, uv = target_finish(source, name, surface)
+        uv = surface.uv if uv is None else uv
         body = self._bodies[0 if soft else int(model.geom_bodyid[geom])]
         path = child(self._stage, body.GetPath(), target_name(model, geom))
         mesh = define_mesh(self._stage, path, surface.F, uv, open_surface=not atlas.mesh.closed)

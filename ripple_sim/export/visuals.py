@@ -18,6 +18,7 @@ from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
 from ripple_sim.render.visuals.visual import Look, Visual, geom_visual, look_of, texture_pixels, visible_geoms
 
 from .moving_mesh import MovingMesh
+from .source import Source
 
 _SEGMENTS = 12  # to a right angle
 
@@ -27,7 +28,7 @@ class Solid(NamedTuple):
 
     Attributes
     ----------
-    visual : Visual
+    finish : Finish
     name : str
     body : int
     position, quaternion : float64 [3], [4]
@@ -38,7 +39,7 @@ class Solid(NamedTuple):
         Of the corners in its flat texture, v from the image's lower edge; images repeat.
     """
 
-    visual: Visual
+    finish: Finish
     name: str
     body: int
     position: NDArray[np.float64]
@@ -64,16 +65,20 @@ def solids(model: mujoco.MjModel, targets: set[int], segments: int = _SEGMENTS) 
     return [_solid(model, visual, make(segments)) for visual, (_, make) in visuals_of(model, geoms)]
 
 
-def solid_finish(model: mujoco.MjModel, visual: Visual) -> Finish:
-    """How a geom or site looks."""
-    return _finish(model, look_of(model, visual), visual.color, mapping_of(model, visual), visual.opacity)
+def target_finish(source: Source, name: str, mesh: MovingMesh) -> tuple[Finish, NDArray[np.float64] | None]:
+    """How a target looks, as in the renderer; and places [m, 3, 2] of its mesh's corners in its flat texture, if any.
 
-
-def target_finish(
-    model: mujoco.MjModel, geom: int, chosen: str, color: tuple[float, float, float] | None, has_uv: bool
-) -> Finish:
-    """How a target of a chosen look, and sRGB colour if it is given one, looks, as in the renderer."""
-    return _finish(model, *painted(model, geom, chosen, color, has_uv))
+    See `Solid` for the places.
+    """
+    model, geom = source.model, source.ripples.geom_ids[name]
+    finish = _finish(model, *painted(model, geom, *source.paints[name], mesh.uv is not None))
+    if finish.texture < 0:
+        return finish, None
+    mapping = mapping_of(model, geom_visual(model, geom))
+    if not mapping.own or mesh.uv is None:
+        return finish, texture_places(mapping, mapping.at(mesh.rest.astype(np.float64))[mesh.F])
+    # v from the upper edge
+    return finish, texture_places(mapping, np.array([0.0, 1.0]) + np.array([1.0, -1.0]) * mesh.uv)
 
 
 def _finish(
@@ -83,14 +88,6 @@ def _finish(
     if mapping.kind == MappingKind.FLAT_IMAGE:
         return Finish(look, color, opacity, mapping.texture)
     return Finish(look, color * mean_color(model, mapping), opacity, -1)
-
-
-def target_uv(model: mujoco.MjModel, geom: int, mesh: MovingMesh) -> NDArray[np.float64]:
-    """Places [m, 3, 2] of the corners of a target's mesh in its flat texture; see `Solid`."""
-    mapping = mapping_of(model, geom_visual(model, geom))
-    if not mapping.own or mesh.uv is None:
-        return texture_places(mapping, mapping.at(mesh.rest.astype(np.float64))[mesh.F])
-    return texture_places(mapping, np.array([0.0, 1.0]) + np.array([1.0, -1.0]) * mesh.uv)  # v from the upper edge
 
 
 def texture_places(mapping: TextureMapping, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -118,4 +115,5 @@ def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
     normals = normalized(mesh.normals)
     if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
         normals = normalized(normals / visual.half_sizes)
-    return Solid(visual, name, int(own.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv)
+    finish = _finish(model, look_of(model, visual), visual.color, mapping, visual.opacity)
+    return Solid(finish, name, int(own.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv)

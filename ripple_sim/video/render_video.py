@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import queue
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -254,7 +253,7 @@ def open_video(
 
 Item = TypeVar("Item")
 
-_END = object()
+_END: Any = object()
 
 
 @contextlib.contextmanager
@@ -264,37 +263,19 @@ def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
     Items come in their order; the thread alone consumes them. An exception of the iterable is raised in place of its
     next item. Leaving the block stops the thread at its current item.
     """
-    ready: queue.Queue[tuple[Any, BaseException | None]] = queue.Queue(depth)
-    stopped = threading.Event()
-
-    def run() -> None:
-        try:
-            for item in items:
-                if stopped.is_set():
-                    return
-                ready.put((item, None))
-            ready.put((_END, None))
-        except BaseException as failure:  # of any kind: it is raised in the consumer's thread
-            ready.put((_END, failure))
+    iterator, pool = iter(items), ThreadPoolExecutor(1, "simulation")
+    # one more than wait: it is held until there is room
+    waiting = deque(pool.submit(next, iterator, _END) for _ in range(depth + 1))
 
     def take() -> Iterator[Item]:
-        while True:
-            item, error = ready.get()
-            if error is not None:
-                raise error
-            if item is _END:
-                return
+        while (item := waiting.popleft().result()) is not _END:
+            waiting.append(pool.submit(next, iterator, _END))
             yield item
 
-    thread = threading.Thread(target=run, name="simulation", daemon=True)
-    thread.start()
     try:
         yield take()
     finally:
-        stopped.set()
-        while thread.is_alive():
-            with contextlib.suppress(queue.Empty):  # makes room for the thread's current item
-                ready.get(timeout=0.05)
+        pool.shutdown(cancel_futures=True)
 
 
 @dataclasses.dataclass(frozen=True)

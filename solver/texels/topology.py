@@ -80,6 +80,13 @@ class TexelTopology:
         texels[self.halo < 0] = 0
         return texels
 
+    def with_boundary(self, field: NDArray) -> NDArray:
+        """A height with its halo, as `with_halo`; beyond a fixed rim it is 0."""
+        around = self.with_halo(field)
+        if self.fixed_rim:
+            around[self.rim] = 0
+        return around
+
     @functools.cached_property
     def addresses(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Flat addresses in a field with halo, [C, n + 2, n + 2].

@@ -128,7 +128,7 @@ def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(scene, 
         monkeypatch.setattr(GLContext, "software", not hardware)
         options, folder = VideoOptions(**OPTIONS, duration=0.2, backend="gl"), tmp_path / f"frames {hardware}"
         render_video(scene, folder, options, on_step=lambda _: threads.add(threading.current_thread().name))
-        assert threads == {"simulation" if hardware else "MainThread"}
+        assert threads == {"simulation_0" if hardware else "MainThread"}
     host, device = (
         np.array([np.asarray(Image.open(path), int) for path in sorted((tmp_path / f"frames {hardware}").iterdir())])
         for hardware in (False, True)
