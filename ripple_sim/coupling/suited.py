@@ -103,9 +103,7 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     """
     if not material.unset:
         return material
-    speed = _speed(coupled.model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    narrow = "stiffness" in material.unset
-    stiffness = _stiffness(coupled.model, extent, speed) if narrow else float(np.min(material.stiffness))
+    speed, stiffness = _speed_and_stiffness(coupled.model, extent, material)
     density = _density_under(coupled, geom, extent, speed, stiffness)
     if density == 0:
         density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
@@ -125,6 +123,14 @@ def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: 
     )
     speed = float(np.hypot(speed, _LONGEST / extent.size * bending**0.5))
     return min(_density_under(coupled, geom, extent, speed, stiffness, limit), 1e12)
+
+
+def _speed_and_stiffness(model: mujoco.MjModel, extent: Extent, material: Material) -> tuple[float, float]:
+    """Those of the material, its highest and its least, or else suited ones."""
+    speed = _speed(model, extent) if "speed" in material.unset else float(np.max(material.speed))
+    if "stiffness" in material.unset:  # dents are narrow, but no more than the time step resolves
+        return speed, float(min(narrow_stiffness(extent.size, speed), (_STIFFEST / model.opt.timestep) ** 2, 1e12))
+    return speed, float(np.min(material.stiffness))
 
 
 def _filled_in(material: Material, speed: float, stiffness: float, density: float) -> Material:
@@ -157,11 +163,6 @@ def _density_under(
         density_under(weight, min(_REST * extent.radius, limit), **of),
         density_after(impulse, min(_HIT * extent.radius, limit), duration=duration, **of),
     )
-
-
-def _stiffness(model: mujoco.MjModel, extent: Extent, speed: float) -> float:
-    """With which dents are narrow, but no more than the time step resolves [1/s^2]."""
-    return float(min(narrow_stiffness(extent.size, speed), (_STIFFEST / model.opt.timestep) ** 2, 1e12))
 
 
 def _density(mass: float, extent: Extent) -> float:
@@ -306,9 +307,9 @@ def suited_targets(
             extent = Extent.of(surface.mesh)
             if materials[name].unset:
                 # by its size and the mass of its bodies: what may hit it is not looked at
-                speed, mass = _speed(model, extent), float(model.body_mass[surface.bodies].sum())
-                stiffness, density = _stiffness(model, extent, speed), _density(mass, extent)
-                suited[name] = _filled_in(materials[name], speed, stiffness, density)
+                density = _density(float(model.body_mass[surface.bodies].sum()), extent)
+                found = _speed_and_stiffness(model, extent, materials[name])
+                suited[name] = _filled_in(materials[name], *found, density)
             texels.setdefault(name, _SOFT)
     left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:

@@ -110,10 +110,10 @@ def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool = Fals
     """
     if name not in BACKENDS:
         raise SolverError(f"backend {name!r} does not exist; valid are {', '.join(map(repr, BACKENDS))}")
-    if name == "auto":
-        name = auto_backend(operator.mass.size)
     if isinstance(operator, FluidOperator):
         return FluidBackend(operator, keeps_volume=keeps_volume)
+    if name == "auto":
+        name = auto_backend(operator.mass.size)
     return (GLBackend if name == "gl" else CPUBackend)(operator, keeps_volume=keeps_volume)
 
 

@@ -76,6 +76,12 @@ def test_the_balls_momentum_reaches_the_surface(xml, name, recwarn):
     assert waves.atlas.layout == ("patches" if name == "cloth" else "cube")
 
 
+def test_the_stiffness_that_is_left_open_suits_the_speed_that_is_given():
+    model = mujoco.MjModel.from_xml_string(CLOTH)
+    slow, fast = (Run(model, "cloth", material=Material(speed=c), resolution=8) for c in (0.4, 0.8))
+    assert fast.ripples["cloth"].material.stiffness == pytest.approx(4 * slow.ripples["cloth"].material.stiffness)
+
+
 HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
 <flexcomp name="cloth" type="grid" count="9 9 1" spacing=".05 .05 .05" pos="0 0 .5" dim="2" radius=".005" mass=".5">
 <contact selfcollide="none"/><edge equality="true" damping=".01"/><pin id="0 8 72 80"/></flexcomp>
