@@ -77,7 +77,7 @@ def test_parameters_that_share_a_line_share_a_default(path: str) -> None:
             assert len(defaults) <= 1, f"{path}: {line} have the defaults {', '.join(sorted(defaults))}"
 
 
-@pytest.mark.parametrize("entry", {SceneFile, *TABLES.values()}, ids=lambda entry: entry.__name__)
+@pytest.mark.parametrize("entry", [SceneFile, *dict.fromkeys(TABLES.values())], ids=lambda entry: entry.__name__)
 def test_every_key_of_a_scene_file_has_a_text(entry: type[msgspec.Struct]) -> None:
     texts = hook("scene_tables").key_texts(entry)
     assert not [field.name for field in msgspec.structs.fields(entry) if not texts.get(field.name)]
