@@ -128,8 +128,7 @@ def _walk_to_triangles(
     sphere: Floats, F: Ints, neighbours: Ints, directions: Floats, hits: Ints, barycentrics: Floats
 ) -> int:
     """Walk each ray's hit to the triangle that truly contains it; fill barycentrics; return how many rays are lost."""
-    lost = 0
-    previous = 0
+    lost = previous = 0
     for i in range(len(directions)):
         d = directions[i]
         triangle = hits[i] if hits[i] >= 0 else previous
@@ -154,8 +153,7 @@ def _walk_to_triangles(
         x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
         total = x + y + z
         barycentrics[i, 0], barycentrics[i, 1], barycentrics[i, 2] = x / total, y / total, z / total
-        hits[i] = triangle
-        previous = triangle
+        hits[i] = previous = triangle
     return lost
 
 

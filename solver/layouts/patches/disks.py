@@ -130,8 +130,7 @@ def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     A part that round-off folds with mean-value weights is laid out with equal ones.
     """
     size = len(surface.V)
-    key, copies = np.unique(part[:, None] * size + surface.F, return_inverse=True)
-    corners = copies.reshape(-1, 3)
+    key, corners = np.unique(part[:, None] * size + surface.F, return_inverse=True)
     fixed = np.full(len(key), -1)
     on_border, vertex, place = border
     fixed[np.searchsorted(key, on_border * size + vertex)] = np.arange(len(vertex))

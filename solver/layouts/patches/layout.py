@@ -124,9 +124,7 @@ def _moved(seamless: SeamlessMap, reference: Reference, vertices: Ints, triangle
         if energy_of(seamless, reference, triangles) < (1.0 - _WORTH) * before:
             return True
     seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices] = z, chart, freedom
-    for i in range(len(triangles)):
-        for k in range(3):
-            seamless.turn[triangles[i], k], seamless.shift[triangles[i], k] = turn[i, k], shift[i, k]
+    seamless.turn[triangles], seamless.shift[triangles] = turn, shift
     return False
 
 
@@ -294,7 +292,7 @@ def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], 
     for each in range(len(number)):
         faces = np.flatnonzero(of == each)
         used, corners = np.unique(F[faces], return_inverse=True)
-        parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces))
+        parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners), parent=faces))
     return parts, count.tolist(), share
 
 
