@@ -128,8 +128,7 @@ def _walk_to_triangles(
     sphere: Floats, F: Ints, neighbours: Ints, directions: Floats, hits: Ints, barycentrics: Floats
 ) -> int:
     """Walk each ray's hit to the triangle that truly contains it; fill barycentrics; return how many rays are lost."""
-    lost = 0
-    previous = 0
+    lost = previous = 0
     for i in range(len(directions)):
         d = directions[i]
         triangle = hits[i] if hits[i] >= 0 else previous
@@ -154,8 +153,7 @@ def _walk_to_triangles(
         x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
         total = x + y + z
         barycentrics[i, 0], barycentrics[i, 1], barycentrics[i, 2] = x / total, y / total, z / total
-        hits[i] = triangle
-        previous = triangle
+        hits[i] = previous = triangle
     return lost
 
 
@@ -291,21 +289,10 @@ def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
     AtlasError
         If the radius is not positive and finite, the resolution is invalid, or the atlas cannot fit into memory.
     """
-    resolution = check_resolution(resolution)
-    check_memory(resolution)
-    directions, topology = texel_directions(resolution), cube_topology(resolution)
-    F, triangles, barycentrics = _texel_triangulation(topology.halo, resolution)
-    return SphereAtlas(
-        mesh=Mesh(V=radius * directions.reshape(-1, 3), F=F),
-        texels=TexelMesh.of(topology, radius * directions, normals=directions),
-        chart_map=CubeChartMap(directions.reshape(-1, 3)),
-        triangles=triangles,
-        barycentrics=barycentrics,
-    )
-
-
-def _texel_triangulation(halo: Ints, n: int) -> tuple[Ints, Ints, Floats]:
-    """Triangles of the texel mesh; for each texel, one triangle [6, N, N] and the corner of it [6, N, N, 3] it is."""
+    n = check_resolution(resolution)
+    check_memory(n)
+    directions, topology = texel_directions(n), cube_topology(n)
+    halo = topology.halo
     sw, se, nw, ne = halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, :-1], halo[:, 1:, 1:]
     # a cell across a cube edge appears on two charts, one at a cube corner on three: it belongs to its lowest texel
     cells = np.stack([sw, se, ne, nw], axis=-1).reshape(-1, 4)
@@ -313,7 +300,13 @@ def _texel_triangulation(halo: Ints, n: int) -> tuple[Ints, Ints, Floats]:
     lowest = np.where(cells < 0, np.iinfo(np.int64).max, cells).min(axis=1)
     cells = cells[owner == lowest // (n * n)]
     whole = (cells >= 0).all(axis=1)
-    corner_cells = cells[~whole]
-    corners = np.array([cell[cell >= 0] for cell in corner_cells]).reshape(-1, 3)
+    corners = np.array([cell[cell >= 0] for cell in cells[~whole]]).reshape(-1, 3)
     F = np.concatenate([cells[whole][:, [0, 1, 2]], cells[whole][:, [0, 2, 3]], corners])
-    return F, *triangles_of(F, np.arange(6 * n * n).reshape(6, n, n))
+    triangles, barycentrics = triangles_of(F, np.arange(6 * n * n).reshape(6, n, n))
+    return SphereAtlas(
+        mesh=Mesh(V=radius * directions.reshape(-1, 3), F=F),
+        texels=TexelMesh.of(topology, radius * directions, normals=directions),
+        chart_map=CubeChartMap(directions.reshape(-1, 3)),
+        triangles=triangles,
+        barycentrics=barycentrics,
+    )

@@ -141,7 +141,20 @@ def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
     number = np.full(len(metric.unit), -1)
     number[seeds] = np.arange(len(seeds))
-    return VoronoiCells(seeds, _gathered(metric.surface, number[source], seeds), distance)
+    label, ends = number[source], metric.surface.edges.ends
+    # vertices that hang on their cell by no edge are given to a neighbour's
+    for _ in range(_MOST_PASSES):
+        inner = label[ends[:, 0]] == label[ends[:, 1]]
+        links = coo_array((np.ones(inner.sum()), tuple(ends[inner].T)), shape=metric.graph.shape)
+        part = connected_components(links, directed=False)[1]
+        stray = part != part[seeds][label]
+        beside = stray[ends[:, 0]] != stray[ends[:, 1]]
+        if not beside.any():
+            break
+        first = stray[ends[beside, 0]]
+        lone, kept = np.where(first, ends[beside].T, ends[beside, ::-1].T)
+        label[lone] = label[kept]
+    return VoronoiCells(seeds, label, distance)
 
 
 def centred_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
@@ -158,24 +171,6 @@ def centred_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
             break
         seeds = moved
     return voronoi_cells(metric, seeds)
-
-
-def _gathered(surface: TriangleSurface, label: Ints, seeds: Ints) -> Ints:
-    """Give vertices that hang on their cell by no edge to a neighbour's."""
-    ends, size = surface.edges.ends, len(surface.V)
-    for _ in range(_MOST_PASSES):
-        inner = label[ends[:, 0]] == label[ends[:, 1]]
-        links = coo_array((np.ones(inner.sum()), tuple(ends[inner].T)), shape=(size, size))
-        part = connected_components(links, directed=False)[1]
-        stray = part != part[seeds][label]
-        beside = stray[ends[:, 0]] != stray[ends[:, 1]]
-        if not beside.any():
-            break
-        first = stray[ends[beside, 0]]
-        lone, kept = np.where(first, ends[beside].T, ends[beside, ::-1].T)
-        label = label.copy()
-        label[lone] = label[kept]
-    return label
 
 
 # Triangles between two cells, the one vertex on its side of the border; and between three.

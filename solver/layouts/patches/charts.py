@@ -25,13 +25,8 @@ Halves = list[tuple[Path, Path]]  # of each arc of a part's border
 
 def corner_charts(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sides]]:
     """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
-    surface, sides = cut_polygons(*with_middles(cells))
-    return surface, charts_of(surface, sides), sides
-
-
-def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Halves]]:
-    """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
     surface = cells.surface
+    # arcs of a single edge get a vertex in its middle, at which they are cut in half, and all cells inner vertices
     single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
     key = [len(surface.V), 1]
     chosen = np.isin(surface.edges.ends @ key, np.sort(single, axis=1) @ key)
@@ -42,8 +37,8 @@ def with_middles(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Halv
     ]
     cell = cells.cell[origin]
     split, origin = halved_chords(finer, cell, on_paths(finer, arcs))
-    halves = [[halves_of(split.V, arc) for arc in each] for each in arcs]
-    return split, cell[origin], halves
+    surface, sides = cut_polygons(split, cell[origin], [[halves_of(split.V, arc) for arc in each] for each in arcs])
+    return surface, charts_of(surface, sides), sides
 
 
 def halves_of(V: Floats, arc: Path) -> tuple[Path, Path]:

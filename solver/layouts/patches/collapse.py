@@ -130,7 +130,6 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
         seamless = seamless._replace(F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star)
         parents = parents[0][left], inside[left]
     used, F = np.unique(seamless.F, return_inverse=True)
-    F = F.reshape(-1, 3)
     start, star = stars(F, len(used))
     seamless = seamless._replace(
         F=F, chart=seamless.chart[used], z=seamless.z[used], freedom=seamless.freedom[used], star_start=start, star=star

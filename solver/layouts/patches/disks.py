@@ -102,25 +102,19 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     beside = number[edges.sides[links] // 3]  # -1 at a rim: the last
     order = np.argsort(-loop, kind="stable")
     order = order[~tree[order]]
-    closing = order[_closing(beside[order], int(inner.sum()) + 1)]
-    if not len(closing):
-        return int(np.argmax(np.where(own, cells.distance, -1.0)))
-    best = ends[closing[-1]]
-    return int(best[np.argmax(distance[best])])
-
-
-def _closing(beside: Ints, triangles: int) -> list[int]:
-    """Edges, in this order, whose two triangles are joined already."""
-    root, closing = list(range(triangles)), []
-    for e, (a, b) in enumerate(beside.tolist()):
+    root, closing = list(range(int(inner.sum()) + 1)), -1  # the last edge whose two triangles are joined already
+    for e, (a, b) in zip(order.tolist(), beside[order].tolist(), strict=True):
         while root[a] != a:
             root[a] = a = root[root[a]]
         while root[b] != b:
             root[b] = b = root[root[b]]
         if a == b:
-            closing.append(e)
+            closing = e
         root[a] = b
-    return closing
+    if closing < 0:
+        return int(np.argmax(np.where(own, cells.distance, -1.0)))
+    best = ends[closing]
+    return int(best[np.argmax(distance[best])])
 
 
 # half-angle tangents; beyond them triangles are so bad that round-off would fold them
@@ -136,8 +130,7 @@ def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     A part that round-off folds with mean-value weights is laid out with equal ones.
     """
     size = len(surface.V)
-    key, copies = np.unique(part[:, None] * size + surface.F, return_inverse=True)
-    corners = copies.reshape(-1, 3)
+    key, corners = np.unique(part[:, None] * size + surface.F, return_inverse=True)
     fixed = np.full(len(key), -1)
     on_border, vertex, place = border
     fixed[np.searchsorted(key, on_border * size + vertex)] = np.arange(len(vertex))

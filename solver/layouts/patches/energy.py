@@ -193,7 +193,15 @@ def newton_step(
     system = System.zeros(len(seamless.z), len(ends))
     energy = total_energy(seamless, reference)
     assemble(seamless, reference, edge, ends, system)
-    _hold(seamless.freedom, ends, system)
+    # the directions in which vertices may not move are taken out
+    free = np.stack([seamless.freedom & 1, seamless.freedom >> 1], axis=1).astype(bool)
+    system.gradient[~free] = 0.0
+    system.diagonal[~free[:, 0], 0] = system.diagonal[~free[:, 1], 2] = 1.0
+    system.diagonal[~free.all(axis=1), 1] = 0.0
+    held = np.flatnonzero(~free[ends].all(axis=(1, 2)))
+    first, second = free[ends[held]].transpose(1, 0, 2)
+    both = (first[:, :, None] & second[:, None, :]).reshape(-1, 4)
+    system.blocks[held] = np.where(both, system.blocks[held], 0.0)
     step = conjugate_gradients(ends, system, cg_steps, CG_TOLERANCE)
     slope = float((system.gradient * step).sum())
     if not slope < 0:
@@ -209,18 +217,6 @@ def newton_step(
     seamless.z[:] = before + t * way
     rehome(seamless, before)
     return energy - lower, t
-
-
-def _hold(freedom: Ints, ends: Ints32, system: System) -> None:
-    """Take out the directions in which vertices may not move."""
-    free = np.stack([freedom & 1, freedom >> 1], axis=1).astype(bool)
-    system.gradient[~free] = 0.0
-    system.diagonal[~free[:, 0], 0] = system.diagonal[~free[:, 1], 2] = 1.0
-    system.diagonal[~free.all(axis=1), 1] = 0.0
-    held = np.flatnonzero(~free[ends].all(axis=(1, 2)))
-    first, second = free[ends[held]].transpose(1, 0, 2)
-    both = (first[:, :, None] & second[:, None, :]).reshape(-1, 4)
-    system.blocks[held] = np.where(both, system.blocks[held], 0.0)
 
 
 @kernel

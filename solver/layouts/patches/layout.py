@@ -124,9 +124,7 @@ def _moved(seamless: SeamlessMap, reference: Reference, vertices: Ints, triangle
         if energy_of(seamless, reference, triangles) < (1.0 - _WORTH) * before:
             return True
     seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices] = z, chart, freedom
-    for i in range(len(triangles)):
-        for k in range(3):
-            seamless.turn[triangles[i], k], seamless.shift[triangles[i], k] = turn[i, k], shift[i, k]
+    seamless.turn[triangles], seamless.shift[triangles] = turn, shift
     return False
 
 
@@ -248,8 +246,17 @@ def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
     large = first is not None
     quads = [first if first and i == widest else quads_of(part, counts[i], large) for i, part in enumerate(parts)]
     wanted = shares * sum(len(each.glued) for each in quads)
+    # cells are mended until they are disks with corners enough, which changes their number: a part that has come to
+    # more or less than the charts that its area should have is cut again, and the best of the tries kept
     for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
-        quads[i] = _recut(parts[i], quads[i], counts[i], wanted[i], large)
+        latest, count = quads[i], counts[i]
+        for _ in range(_TRIES):
+            charts = len(latest.glued)
+            count, before = max(1, round(count * float(np.sqrt(wanted[i] / charts)))), count
+            if abs(charts / wanted[i] - 1) < _MISJUDGED or count == before:
+                break
+            latest = quads_of(parts[i], count, large)
+            quads[i] = min(quads[i], latest, key=lambda each: abs(np.log(len(each.glued) / wanted[i])))
     whole = _joined(quads)
     surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)
     relax(surface.V, seamless)
@@ -272,22 +279,6 @@ def relax(V: Floats, seamless: SeamlessMap) -> None:
     relax_all(seamless, reference, _FINE)
 
 
-def _recut(part: TriangleSurface, quads: Quads, count: int, wanted: float, large: bool) -> Quads:
-    """Cut a part again that has come to more or less than the charts that its area should have; the best of the tries.
-
-    Cells are mended until they are disks with corners enough, which changes their number.
-    """
-    best = quads
-    for _ in range(_TRIES):
-        charts = len(quads.glued)
-        count, before = max(1, round(count * float(np.sqrt(wanted / charts)))), count
-        if abs(charts / wanted - 1) < _MISJUDGED or count == before:
-            break
-        quads = quads_of(part, count, large)
-        best = min(best, quads, key=lambda each: abs(np.log(len(each.glued) / wanted)))
-    return best
-
-
 def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], list[int], Floats]:
     """Each connected component, how many cells it gets, and its share of the area."""
     part = labels(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), len(V))
@@ -301,7 +292,7 @@ def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], 
     for each in range(len(number)):
         faces = np.flatnonzero(of == each)
         used, corners = np.unique(F[faces], return_inverse=True)
-        parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners.reshape(-1, 3)), parent=faces))
+        parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners), parent=faces))
     return parts, count.tolist(), share
 
 

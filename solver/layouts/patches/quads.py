@@ -110,11 +110,9 @@ def _paired(pairing: Pairing) -> bool:
     if (pairing.closed < 0).any():
         return False
     for _ in range(_MOST_PASSES):
-        better = False
-        for e in range(len(pairing.ends)):
-            if pairing.closed[pairing.ends[e, 0]] != e:
-                better = _improve(pairing, e) or better
-        if not better:
+        joints = range(len(pairing.ends))
+        better = [_improve(pairing, e) for e in joints if pairing.closed[pairing.ends[e, 0]] != e]
+        if not any(better):
             break
     return True
 

@@ -197,7 +197,11 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
     at_vertices = np.stack([flat.part[touched], surface.F[touched, corner], reach[touched, corner]])
     on_edges = np.stack([flat.part[triangle[crossed]], middles[crossed], distance[crossed]])
     points = np.concatenate([at_vertices, on_edges], axis=1)
-    return Flat(finer, flat.part[source], weights @ flat.places[source]), _paths(points, len(start))
+    # a point on a line is seen from all triangles beside it
+    part, vertex = points[:2, np.lexsort((points[2], points[0]))].astype(np.int64)
+    first = (np.diff(part, prepend=-1) != 0) | (np.diff(vertex, prepend=-1) != 0)
+    paths = np.split(vertex[first], np.searchsorted(part[first], np.arange(1, len(start))))
+    return Flat(finer, flat.part[source], weights @ flat.places[source]), paths
 
 
 def _place_of(flat: Flat, vertex: Ints) -> Floats:
@@ -206,14 +210,6 @@ def _place_of(flat: Flat, vertex: Ints) -> Floats:
     triangle, k = np.nonzero(vertex[flat.part][:, None] == flat.surface.F)
     places[flat.part[triangle]] = flat.places[triangle, k]
     return places
-
-
-def _paths(points: Floats, parts: int) -> list[Ints]:
-    """Vertices of each part in order, from rows part, vertex, and distance along the line."""
-    order = np.lexsort((points[2], points[0]))
-    part, vertex = points[:2, order].astype(np.int64)
-    first = (np.diff(part, prepend=-1) != 0) | (np.diff(vertex, prepend=-1) != 0)
-    return np.split(vertex[first], np.searchsorted(part[first], np.arange(1, parts)))
 
 
 _MOST_ROUNDS = 100

@@ -97,8 +97,7 @@ def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
         e, f, ((rho - 1) ** 2 + tau * tau) / rest, -2 * tau / rest, ((rho + 1) ** 2 + tau * tau) / rest, F, len(V)
     )
     southern = np.argsort(S[:, 2], kind="stable")[: max(round(SOUTHERN_SHARE * len(V)), 3)]
-    repaired = _to_sphere(_solve_dirichlet(stiffness, southern, plane[southern]))
-    return repaired * [1, 1, -1]
+    return _to_sphere(_solve_dirichlet(stiffness, southern, plane[southern])) * [1, 1, -1]
 
 
 def _stiffness(

@@ -58,8 +58,7 @@ def preceding(h: Any) -> Any:
 @kernel
 def gather_star(table: CornerTable, v: int, star: Ints32) -> int:
     """Fill `star` with the half-edges that leave v, counterclockwise, and return how many there are."""
-    first = table.leaving[v]
-    h = first
+    first = h = table.leaving[v]
     degree = 0
     while True:
         star[degree] = h

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SphereMapError
-from ...kernel import Floats, Ints, Ints32, kernel
+from ...kernel import Floats, Ints32, kernel
 from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
 from ..energy import FOLDED, FREE, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
@@ -254,7 +254,13 @@ def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
     # rounding, the last bits would decide between the many equivalent ways out of a symmetric coarse level
     V = V - np.mean(V, axis=0, dtype=np.float64)
     V = np.rint(V * np.sqrt(4 * np.pi / np.sum(triangle_areas(V, F))) * GRID) / GRID
-    order = _morton_order(V)
+    # along a Morton curve neighbours in space come close together in memory
+    cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(np.int64)
+    code = np.zeros(len(V), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    order = np.argsort(code, kind="stable")
     number = np.empty(len(V), dtype=np.int64)
     number[order] = np.arange(len(V))
     triangles = number[F]
@@ -315,16 +321,6 @@ def _level_sizes(n: int) -> list[int]:
     if len(sizes) > 1 and sizes[-2] > 0.75 * n:
         del sizes[-2]
     return sizes
-
-
-def _morton_order(V: Floats) -> Ints:
-    """Vertices along a Morton curve: neighbours in space come close together in memory."""
-    cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(np.int64)
-    code = np.zeros(len(V), dtype=np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return np.argsort(code, kind="stable")
 
 
 CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
