@@ -332,18 +332,16 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     painter = AtlasPainter(atlas, STRETCH_COLORS(stretch_shade(stretch))[..., :3])
     front, back = View(up=up), View(azimuth=View.azimuth + 180, up=up)
     if atlas.layout == "cube":
-        show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
-        show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
-        show(figure, (0.42, 0.07, 0.20, 0.355), sphere_image(painter, atlas.resolution, front, 380), "on the sphere")
-        show(figure, (0.635, 0.455, 0.35, 0.47), cross(painter, atlas.resolution, 160), "the six charts, unfolded")
+        large, small = painter, (sphere_image(painter, atlas.resolution, front, 380), "on the sphere")
+        page = cross(painter, atlas.resolution, 160), "the six charts, unfolded"
     else:
         colors = np.broadcast_to(chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3))
-        charts = AtlasPainter(atlas, colors)
-        show(figure, (0.025, 0.05, 0.37, 0.82), charts.mesh(front, 800))
-        show(figure, (0.42, 0.50, 0.20, 0.38), charts.mesh(back, 400), "the other side")
-        show(figure, (0.42, 0.07, 0.20, 0.355), painter.mesh(front, 380), "stretch")
-        page = squares(painter, atlas.texels.shape, 672, 508)
-        show(figure, (0.635, 0.455, 0.35, 0.47), page, f"the {atlas.texels.shape[0]} charts, side by side")
+        large, small = AtlasPainter(atlas, colors), (painter.mesh(front, 380), "stretch")
+        page = squares(painter, atlas.texels.shape, 672, 508), f"the {len(colors)} charts, side by side"
+    show(figure, (0.025, 0.05, 0.37, 0.82), large.mesh(front, 800))
+    show(figure, (0.42, 0.50, 0.20, 0.38), large.mesh(back, 400), "the other side")
+    show(figure, (0.42, 0.07, 0.20, 0.355), *small)
+    show(figure, (0.635, 0.455, 0.35, 0.47), *page)
     _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
     _figures(figure, atlas)
     save_plot(figure, path)

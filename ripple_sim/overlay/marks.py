@@ -222,9 +222,15 @@ class ContactMarks:
             self._add(impulse)
         self._contacts = [contact for contact in self._contacts if contact.impulse > _FADED * contact.largest]
         touched = {contact.geom for contact in self._contacts}
-        heights = {name: self._simulation.ripples[name].height for name in sorted(touched)}
-        weakest_first = sorted(self._contacts, key=lambda contact: contact.impulse)
-        return [self._mark(contact, float(heights[contact.geom][contact.texel])) for contact in weakest_first]
+        heights, marks = {name: self._simulation.ripples[name].height for name in sorted(touched)}, []
+        for contact in sorted(self._contacts, key=lambda contact: contact.impulse):
+            (position, rotation), waves = self._pose(contact.geom), self._simulation.ripples[contact.geom]
+            normal, height = waves.atlas.normals[contact.texel], float(heights[contact.geom][contact.texel])
+            place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
+            opacity = min((contact.impulse / contact.largest - _FADED) / (_FADING - _FADED), 1.0)
+            point = position + rotation @ (place + height * normal)
+            marks.append(Mark(point, axis=rotation @ normal, impulse=contact.impulse, opacity=opacity))
+        return marks
 
     def _add(self, hit: Impulse) -> None:
         if hit.impulse <= 0:
@@ -242,15 +248,6 @@ class ContactMarks:
         contact.place, contact.texel = place, hit.texel
         contact.impulse += hit.impulse
         contact.largest = max(contact.largest, contact.impulse)
-
-    def _mark(self, contact: _Contact, height: float) -> Mark:
-        position, rotation = self._pose(contact.geom)
-        waves = self._simulation.ripples[contact.geom]
-        normal = waves.atlas.normals[contact.texel]
-        place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
-        point = position + rotation @ (place + height * normal)
-        opacity = min((contact.impulse / contact.largest - _FADED) / (_FADING - _FADED), 1.0)
-        return Mark(point, axis=rotation @ normal, impulse=contact.impulse, opacity=opacity)
 
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])

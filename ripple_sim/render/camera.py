@@ -135,23 +135,17 @@ def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> V
     if isinstance(camera, numbers.Integral):
         if camera != -1:
             return Camera.from_mjcf(model, data, int(camera))
-        free = mujoco.MjvCamera()
-        mujoco.mjv_defaultFreeCamera(model, free)
-        free.orthographic = 0
-        return _placed(model, data, free)
+        camera = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(model, camera)
+        camera.orthographic = 0
     if isinstance(camera, str):
         return Camera.from_mjcf(model, data, camera)
-    if isinstance(camera, mujoco.MjvCamera):
-        return _placed(model, data, camera)
-    raise SceneError(
-        f"camera is {type(camera).__name__}; valid are a Camera, a FixedCamera, the name or the id of a camera in the "
-        "model, -1 for the free camera, and a mujoco.MjvCamera"
-    )
-
-
-def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera) -> Viewpoint:
-    """A camera of MuJoCo's where `mjv_updateCamera` places it."""
-    kinds = mujoco.mjtCamera
+    if not isinstance(camera, mujoco.MjvCamera):
+        raise SceneError(
+            f"camera is {type(camera).__name__}; valid are a Camera, a FixedCamera, the name or the id of a camera in "
+            "the model, -1 for the free camera, and a mujoco.MjvCamera"
+        )
+    kinds = mujoco.mjtCamera  # a camera of MuJoCo's is where `mjv_updateCamera` places it
     if camera.type == kinds.mjCAMERA_FIXED:
         return Camera.from_mjcf(model, data, camera.fixedcamid)
     if camera.orthographic:

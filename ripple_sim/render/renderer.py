@@ -264,7 +264,16 @@ class Renderer:
             drawn.update(ctx, data, height_maps, pose)
             shading.clear(ctx)  # which a software driver does during what follows
             self._update(data, pose, exposure)
-            self._draw_maps(ctx)
+            # what shading looks up; a software driver stops for each texture that it is still drawing to
+            ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+            ctx.depth_func = "<="
+            self._shadows.draw(drawn.cast)
+            self._occlusion.look_up(ctx, drawn.cast)
+            self._shadows.find_blockers(ctx)
+            if self._transmission is not None:
+                self._transmission.draw(self._shadows.views, drawn.cast)
+                self._transmission.bind()
+            self._occlusion.shade(ctx, self._shadows)
             shading.begin(ctx)
             drawn.draw()
             balls = drawn.balls(data)
@@ -326,19 +335,6 @@ class Renderer:
             floor.shade(frame, casting, casters)
         frame.set_vector("counts", [0, len(lights), exposure], len(casting))
         frame.bind()
-
-    def _draw_maps(self, ctx: moderngl.Context) -> None:
-        """Draw what shading looks up. A software driver stops for each texture that it is still drawing to."""
-        scene, shadows = self._scene, self._shadows
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        ctx.depth_func = "<="
-        shadows.draw(scene.cast)
-        self._occlusion.look_up(ctx, scene.cast)
-        shadows.find_blockers(ctx)
-        if self._transmission is not None:
-            self._transmission.draw(shadows.views, scene.cast)
-            self._transmission.bind()
-        self._occlusion.shade(ctx, shadows)
 
     def _bind(self) -> None:
         """Bind what shading needs."""

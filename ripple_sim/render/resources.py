@@ -153,7 +153,9 @@ def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Te
 
 
 def srgb_cube(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
-    """Cube map with mipmaps, of pixels [6 size, size, 3]: its faces below one another."""
+    """Cube map with mipmaps, of pixels [6 size, size, 3]: its faces below one another, or one image for all of them."""
+    if len(pixels) != 6 * pixels.shape[1]:
+        pixels = np.concatenate([pixels[: pixels.shape[1]]] * 6)
     with resources.gl as ctx:
         faces = [fitted(face, ctx.info["GL_MAX_CUBE_MAP_TEXTURE_SIZE"]) for face in np.split(pixels, 6)]
     opaque, size = Image.fromarray(np.concatenate(faces)).convert("RGBA").tobytes(), faces[0].shape[1]

@@ -5,10 +5,7 @@ from .adaptive import (
     spline_samples as spline_samples,
     spline_weights as spline_weights,
 )
-from .moving import (
-    MovingOcclusion as MovingOcclusion,
-    MovingVertices as MovingVertices,
-)
+from .moving import MovingOcclusion as MovingOcclusion, MovingVertices as MovingVertices
 from .surface import (
     Charts as Charts,
     Surface as Surface,

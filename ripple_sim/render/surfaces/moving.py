@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -16,9 +14,6 @@ from ripple_sim.solver.mesh.vectors import cross, dot, row, subtract
 from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 from .tessellation import coarse_mesh
-
-# where points are [m], directions of displacement, and normals, float32 [n, 3] each
-Moved: TypeAlias = tuple[Floats32, Floats32, Floats32]
 
 
 class MovingVertices:
@@ -51,8 +46,8 @@ class MovingVertices:
         offset = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])
         self.rest = corners, weights, offset, *rest[1:]
 
-    def __call__(self, V: NDArray[np.float64]) -> Moved:
-        """Where the points are for vertices [k, 3] [m]."""
+    def __call__(self, V: NDArray[np.float64]) -> tuple[Floats32, Floats32, Floats32]:
+        """Points [m], directions of displacement and normals, float32 [n, 3] each, for vertices [k, 3] [m]."""
         V = np.ascontiguousarray(V, np.float64)
         maps = _vertex_maps(self._V, V, self._F)
         points, directions, normals = (np.empty((len(self.rest[0]), 3), np.float32) for _ in range(3))

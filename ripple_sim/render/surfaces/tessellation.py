@@ -156,23 +156,11 @@ def coarse_mesh(
     """
     if len(features) <= count:
         return np.arange(len(features)), np.asarray(F)
-    chosen, owner = _spread(features, count)
-    merged = owner[F]
-    merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
-    # each begins with its least vertex, so that the same triangle is the same row
-    first = merged.argmin(axis=1)[:, None]
-    return chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0)
-
-
-def _spread(features: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows [count], each the farthest from those before, and the number among them of the nearest to every row [n].
-
-    In plain numpy, column by column: it takes twice the time of a compiled loop, and less than to compile that.
-    """
+    # each of those left is the farthest from those before, and `owner` the number of the nearest to every vertex; plain
+    # numpy, column by column, takes twice the time of a compiled loop, and less than to compile that
     columns = np.ascontiguousarray(features.T)
     chosen, owner = np.zeros(count, np.int64), np.zeros(len(features), np.int64)
-    square = np.full(len(features), np.inf)
-    latest = 0
+    square, latest = np.full(len(features), np.inf), 0
     for k in range(count):
         chosen[k] = latest
         distance = np.zeros(len(features))
@@ -182,4 +170,8 @@ def _spread(features: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64
         np.copyto(square, distance, where=nearer)
         owner[nearer] = k
         latest = int(square.argmax())
-    return chosen, owner
+    merged = owner[F]
+    merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
+    # each begins with its least vertex, so that the same triangle is the same row
+    first = merged.argmin(axis=1)[:, None]
+    return chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0)

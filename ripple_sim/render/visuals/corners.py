@@ -130,8 +130,14 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
     outer, inner = distances(1.0), distances(-1.0)
-    values, edges = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0)), edges_of(F).ends
-    return np.stack([_smoothed(each.mean(axis=1), edges) for each in values], axis=1)
+    means = np.stack([each.mean(axis=1) for each in (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0))], axis=1)
+    ends = edges_of(F).ends
+    here, there = np.concatenate([ends, ends[:, ::-1]]).T
+    degree = np.maximum(np.bincount(here, minlength=len(V)), 1)[:, None]
+    for _ in range(2):  # over neighbours, against the noise of few rays
+        sums = [np.bincount(here, weights=column[there], minlength=len(V)) for column in means.T]
+        means = (means + np.stack(sums, axis=1) / degree) / 2
+    return means
 
 
 def frames_about(normals: NDArray, along: NDArray | None = None) -> NDArray[np.float64]:
@@ -140,13 +146,3 @@ def frames_about(normals: NDArray, along: NDArray | None = None) -> NDArray[np.f
         along = np.where(np.abs(normals[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     tangent = normalized(np.cross(along, normals))  # a vertex without triangles has no normal
     return np.stack([tangent, np.cross(normals, tangent), normals], axis=1)
-
-
-def _smoothed(values: NDArray, edges: NDArray) -> NDArray[np.float64]:
-    """Average twice over neighbours along edges [k, 2], against the noise of few rays."""
-    both = np.concatenate([edges, edges[:, ::-1]])
-    degree = np.bincount(both[:, 0], minlength=len(values))
-    for _ in range(2):
-        mean = np.bincount(both[:, 0], weights=values[both[:, 1]], minlength=len(values)) / np.maximum(degree, 1)
-        values = (values + mean) / 2
-    return values

@@ -125,7 +125,7 @@ class Assets:
         if texture not in self._uploaded:
             pixels = texture_pixels(self.model, texture)
             flat = self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
-            self._uploaded[texture] = srgb_texture(self.resources, pixels) if flat else self._cube(pixels)
+            self._uploaded[texture] = (srgb_texture if flat else srgb_cube)(self.resources, pixels)
         return self._uploaded[texture]
 
     def skybox(self) -> tuple[moderngl.TextureCube, NDArray[np.float64]] | None:
@@ -133,16 +133,9 @@ class Assets:
         for texture in range(self.model.ntex):
             if self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
                 pixels = texture_pixels(self.model, texture)
-                self._uploaded[texture] = cube = self._cube(pixels)
+                self._uploaded[texture] = cube = srgb_cube(self.resources, pixels)
                 return cube, srgb_to_linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
         return None
-
-    def _cube(self, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
-        """Cube map of faces below one another."""
-        size = pixels.shape[1]
-        if pixels.shape[0] != 6 * size:  # one image for all faces
-            pixels = np.concatenate([pixels[:size]] * 6)
-        return srgb_cube(self.resources, pixels)
 
 
 _REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky

@@ -25,7 +25,7 @@ _WRAPPED = {
     _GEOM.mjGEOM_CAPSULE: MappingKind.CAPSULE_IMAGE,
 }
 
-_Tiling = tuple[float, float, float, float]
+_PLAIN = 1.0, 1.0, 0.0, 0.0  # tiling of a whole texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class TextureMapping:
     texture: int = -1
     scale: NDArray[np.float64] = field(default_factory=lambda: np.ones(3))
     own: bool = False
-    tiling: _Tiling = (1.0, 1.0, 0.0, 0.0)
+    tiling: tuple[float, float, float, float] = _PLAIN
     straight: float = 0.0
     stretch: float = 1.0
 
@@ -86,18 +86,20 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     texture = next((each for each in roles if each >= 0), -1)
     if texture < 0 or model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
         return TextureMapping()
-    uniform = bool(model.mat_texuniform[material])
-    if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE:
-        factor = np.where(half > 0, half, 1.0) if uniform else np.ones(3)
-        if visual.kind in _WRAPPED:
-            return _on_primitive(visual, MappingKind.CUBE_IMAGE, texture, factor, (1.0, 1.0, 0.0, 0.0))
-        return TextureMapping(MappingKind.CUBE_IMAGE, texture, factor)
+    uniform, cube = bool(model.mat_texuniform[material]), model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE
     repeat = np.array(model.mat_texrepeat[material], dtype=np.float64)
+    times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
+    factor = np.where(half > 0, half, 1.0) if cube and uniform else np.ones(3)
+    if visual.kind in _WRAPPED:  # by coordinates from -factor to factor
+        kind, tiling = (MappingKind.CUBE_IMAGE, _PLAIN) if cube else (_WRAPPED[visual.kind], (*times, 0.0, 0.0))
+        straight, stretch = (half[2], half[2] / half[0]) if visual.kind == _GEOM.mjGEOM_CAPSULE else (0.0, 1.0)
+        return TextureMapping(
+            kind, texture, factor / half, tiling=tiling, straight=float(straight), stretch=float(stretch)
+        )
+    if cube:
+        return TextureMapping(MappingKind.CUBE_IMAGE, texture, factor)
     if visual.kind in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN):
         return TextureMapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*repeat, 0.0, 0.0))
-    times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
-    if visual.kind in _WRAPPED:
-        return _on_primitive(visual, _WRAPPED[visual.kind], texture, np.ones(3), (*times, 0.0, 0.0))
     if visual.kind in _MESHES and visual.asset >= 0 and model.mesh_texcoordadr[visual.asset] >= 0:
         return TextureMapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*times, 0.0, 0.0))
     if visual.kind == _GEOM.mjGEOM_PLANE:
@@ -109,18 +111,3 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
         return TextureMapping(MappingKind.FLAT_IMAGE, texture, tiling=tiling)
     scale = 0.5 * (repeat if uniform else repeat / np.where(half[:2] > 0, half[:2], 1.0))
     return TextureMapping(MappingKind.FLAT_IMAGE, texture, tiling=(scale[0], -scale[1], -0.5, -0.5))
-
-
-def _on_primitive(
-    visual: Visual, kind: MappingKind, texture: int, factor: NDArray[np.float64], tiling: _Tiling
-) -> TextureMapping:
-    """Mapping by coordinates from -factor to factor."""
-    half, round_ends = visual.half_sizes, visual.kind == _GEOM.mjGEOM_CAPSULE
-    return TextureMapping(
-        kind,
-        texture,
-        factor / half,
-        tiling=tiling,
-        straight=float(half[2]) if round_ends else 0.0,
-        stretch=float(half[2] / half[0]) if round_ends else 1.0,
-    )

@@ -5,7 +5,6 @@ Looks are named sets of parameters for the surface of a target.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -213,7 +212,18 @@ def visuals_in(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> lis
         corners, pose = _corners_of(model, scene, drawn), (np.zeros(3, np.float32), np.eye(3, dtype=np.float32))
     size = np.array(drawn.size, dtype=np.float64)
     visual = Visual(False, -1, kind, size, -1, **paint, group=0, identity=identity, pose=pose, corners=corners)
-    return [visual] if corners is None or len(corners) else list(_edges_of(scene, visual))
+    if corners is None or len(corners):
+        return [visual]
+    edges = []
+    first, count, vertex = (int(n[identity[0]]) for n in (scene.flexedgeadr, scene.flexedgenum, scene.flexvertadr))
+    V = scene.flexvert.reshape(-1, 3)[vertex:]
+    for a, b in V[scene.flexedge.reshape(-1, 2)[first : first + count]]:
+        length, turn, rotation = float(np.linalg.norm(b - a)), np.zeros(4), np.zeros(9)
+        mujoco.mju_quatZ2Vec(turn, (b - a).astype(np.float64))
+        mujoco.mju_quat2Mat(rotation, turn)
+        half, pose = np.array([size[0], size[0], length / 2]), ((a + b) / 2, rotation.reshape(3, 3).astype(np.float32))
+        edges.append(replace(visual, kind=int(_GEOM.mjGEOM_CYLINDER), size=half, material=-1, pose=pose, corners=None))
+    return edges
 
 
 def _corners_of(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> NDArray[np.float32]:
@@ -235,20 +245,6 @@ def _corners_of(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> ND
         start = model.skin_texcoordadr[index]
         uv = model.skin_texcoord[start + F] if start >= 0 else np.zeros((len(F), 2))
     return np.concatenate([points, normals, uv], axis=1, dtype=np.float32)
-
-
-def _edges_of(scene: mujoco.MjvScene, flex: Visual) -> Iterator[Visual]:
-    """The edges of a scene's flex, as cylinders."""
-    index, radius = flex.identity[0], flex.size[0]
-    first, count, vertex = (int(n[index]) for n in (scene.flexedgeadr, scene.flexedgenum, scene.flexvertadr))
-    V = scene.flexvert.reshape(-1, 3)[vertex:]
-    for a, b in V[scene.flexedge.reshape(-1, 2)[first : first + count]]:
-        length, turn, rotation = float(np.linalg.norm(b - a)), np.zeros(4), np.zeros(9)
-        mujoco.mju_quatZ2Vec(turn, (b - a).astype(np.float64))
-        mujoco.mju_quat2Mat(rotation, turn)
-        pose = (a + b) / 2, rotation.reshape(3, 3).astype(np.float32)
-        size = np.array([radius, radius, length / 2])
-        yield replace(flex, kind=int(_GEOM.mjGEOM_CYLINDER), size=size, material=-1, pose=pose, corners=None)
 
 
 def _paint(model: Any, which: str, index: int) -> tuple[NDArray[np.float64], int, int]:
