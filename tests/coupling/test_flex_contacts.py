@@ -153,14 +153,6 @@ def slab() -> tuple[mujoco.MjModel, np.ndarray]:
     return model, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def frame_along(normal: np.ndarray) -> np.ndarray:
-    """Rows of a frame: a normal, and two directions across it."""
-    x = np.array(normal) / np.linalg.norm(normal)
-    y = np.cross(x, [0.6, -0.7, 0.2])
-    y /= np.linalg.norm(y)
-    return np.array([x, y, np.cross(x, y)])
-
-
 def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None = UP):
     """Which contacts of the ball with the block are kept, and their forces and normals.
 
@@ -169,7 +161,10 @@ def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None
     """
     model, normals = slab
     k = len(contacts)
-    frames = np.array([frame_along(normal) for normal, _ in contacts])
+    x = np.array([normal / np.linalg.norm(normal) for normal, _ in contacts])
+    y = np.cross(x, [0.6, -0.7, 0.2])
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    frames = np.stack([x, y, np.cross(x, y)], axis=1)
     elements = np.full((k, 2), -1, np.int32)
     if surface is not None:
         elements[:, 0] = (normals @ surface).argmax()

@@ -91,15 +91,6 @@ def direction_at(chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
     return unit(cube.CHART_NORMALS[chart] + a[:, None] * cube.CHART_U[chart] + b[:, None] * cube.CHART_V[chart])
 
 
-def interior_points(atlas: Atlas, seed: int):
-    """One random point inside each piece: its chart, interpolated coordinates, and true direction."""
-    coordinates = atlas.texture_coordinates()
-    weights = np.random.default_rng(seed).dirichlet(np.ones(3), size=len(coordinates.chart))
-    uv = np.einsum("pi,pij->pj", weights, coordinates.uv)
-    corners = coordinates.carry(atlas.sphere[atlas.mesh.F])
-    return coordinates.chart, uv, unit(np.einsum("pi,pij->pj", weights, corners))
-
-
 def test_pieces_make_up_every_triangle_in_its_winding() -> None:
     atlas = ball(2, 8)
     coordinates = atlas.texture_coordinates()
@@ -143,8 +134,13 @@ def test_triangles_are_cut_exactly_where_they_cross_a_cube_edge(animal: Atlas) -
 def test_interpolated_coordinates_converge_at_second_order() -> None:
     errors = []
     for subdivisions in (3, 4, 5):
-        chart, uv, directions = interior_points(ball(subdivisions, 8), 0)
-        distance = np.linalg.norm(direction_at(chart, uv) - directions, axis=1)
+        atlas = ball(subdivisions, 8)
+        coordinates = atlas.texture_coordinates()
+        # one random point inside each piece: its interpolated coordinates, and true direction
+        weights = np.random.default_rng(0).dirichlet(np.ones(3), size=len(coordinates.chart))
+        uv = np.einsum("pi,pij->pj", weights, coordinates.uv)
+        directions = unit(np.einsum("pi,pij->pj", weights, coordinates.carry(atlas.sphere[atlas.mesh.F])))
+        distance = np.linalg.norm(direction_at(coordinates.chart, uv) - directions, axis=1)
         assert distance.max() < 0.01
         errors.append(np.sqrt((distance**2).mean()))
     assert errors[0] / errors[1] == pytest.approx(4, abs=0.4)
