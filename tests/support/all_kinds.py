@@ -27,7 +27,10 @@ def thickened_graph(genus: int, seed: int, radius: float = 0.28, spacing: float 
     axes = [np.arange(a, b, spacing) for a, b in zip(low, high, strict=True)]
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
     P = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    distance = np.min([_from_segment(P, a, b) for a, b in ends], axis=0) - radius
+    distance = np.full(len(P), np.inf)
+    for a, b in ends:
+        share = np.clip((P - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        distance = np.minimum(distance, np.linalg.norm(P - a - share[:, None] * (b - a), axis=1) - radius)
     # not on a node, where triangles would have no area
     distance = np.where(np.abs(distance) < 0.01 * spacing, 0.01 * spacing, distance)
     V, F, _ = igl.marching_cubes(distance, P, *map(len, axes), 0.0)
@@ -47,11 +50,6 @@ def graph(genus: int, rng: np.random.Generator, size: int = 3) -> NDArray[np.flo
     edges += [link for link in links if reached.issuperset(link) and link not in edges][:genus]
     assert len(edges) == count - 1 + genus
     return np.array(edges, dtype=float)
-
-
-def _from_segment(P: NDArray, a: NDArray, b: NDArray) -> NDArray[np.float64]:
-    share = np.clip((P - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
-    return np.linalg.norm(P - a - share[:, None] * (b - a), axis=1)
 
 
 def punctured_ball(seed: int, holes: int, subdivisions: int = 3) -> Arrays:
