@@ -100,8 +100,7 @@ class Sighting:
                     taken = MovingVertices(*mesh, still, direction, direction)(V)
                     still, direction = (each.astype(np.float64) for each in taken[:2])
                 local = still + heights[:, None] * direction
-            moved = local @ later.rotations[geom].T + later.positions[geom]
-            flow[mask] = later.pixels(moved) - self.pixels(points)
+            flow[mask] = later.pixels(local @ later.rotations[geom].T + later.positions[geom]) - self.pixels(points)
         return flow
 
 

@@ -84,83 +84,83 @@ def set_world(scene, settings):
     scene.world = bpy.data.worlds.new("sky")
     scene.world.use_nodes = True
     scene.world.cycles.sampling_method = "NONE"
-    nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
+    tree = scene.world.node_tree
+    nodes, links = tree.nodes, tree.links
     nodes.clear()
     rays, direction, parts = (nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "TexCoord", "SeparateXYZ"))
     links.new(direction.outputs["Generated"], parts.inputs[0])
-    rise = smooth_step(nodes, links, parts.outputs["Z"], -0.1, 0.8)
-    seen = mixed(nodes, links, rise, settings["horizon"], settings["zenith"])
-    boxes, axes = soft_boxes(nodes, links, settings["boxes"])
-    diffuse = vectors(nodes, links, "SCALE", boxes, settings["boxes_diffuse"])
-    diffuse = vectors(nodes, links, "ADD", settings["sky"], diffuse)
-    glossy = vectors(nodes, links, "SCALE", boxes, settings["boxes_reflected"])
-    glossy = vectors(nodes, links, "ADD", glossy, vectors(nodes, links, "SCALE", seen, 0.75))
-    color = mixed(nodes, links, rays.outputs["Is Glossy Ray"], diffuse, glossy)
+    seen = mixed(tree, smooth_step(tree, parts.outputs["Z"], -0.1, 0.8), settings["horizon"], settings["zenith"])
+    boxes, axes = soft_boxes(tree, settings["boxes"])
+    diffuse = vectors(tree, "SCALE", boxes, settings["boxes_diffuse"])
+    diffuse = vectors(tree, "ADD", settings["sky"], diffuse)
+    glossy = vectors(tree, "SCALE", boxes, settings["boxes_reflected"])
+    glossy = vectors(tree, "ADD", glossy, vectors(tree, "SCALE", seen, 0.75))
+    color = mixed(tree, rays.outputs["Is Glossy Ray"], diffuse, glossy)
     for kind in ("Is Camera Ray", "Is Transmission Ray"):
-        color = mixed(nodes, links, rays.outputs[kind], color, seen)
+        color = mixed(tree, rays.outputs[kind], color, seen)
     background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
     links.new(color, background.inputs["Color"])
     links.new(background.outputs[0], output.inputs["Surface"])
     return axes
 
 
-def soft_boxes(nodes, links, boxes):
+def soft_boxes(tree, boxes):
     """Radiance of the boxes, far away, and for each the nodes that take its axes: to it, across, up."""
-    direction = nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+    direction = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
     total, axes = [0.0, 0.0, 0.0], []
     for box in boxes:
-        shares = [vectors(nodes, links, "DOT_PRODUCT", direction, [0.0, 0.0, 0.0]) for _ in range(3)]
-        inside = maths(nodes, links, "GREATER_THAN", shares[0], 0.0)
+        shares = [vectors(tree, "DOT_PRODUCT", direction, [0.0, 0.0, 0.0]) for _ in range(3)]
+        inside = maths(tree, "GREATER_THAN", shares[0], 0.0)
         for share, half in zip(shares[1:], box["half"], strict=True):
-            limit = maths(nodes, links, "MULTIPLY", shares[0], half)
-            near = maths(nodes, links, "LESS_THAN", maths(nodes, links, "ABSOLUTE", share, 0.0), limit)
-            inside = maths(nodes, links, "MULTIPLY", inside, near)
-        total = vectors(nodes, links, "ADD", total, vectors(nodes, links, "SCALE", box["radiance"], inside))
+            limit = maths(tree, "MULTIPLY", shares[0], half)
+            near = maths(tree, "LESS_THAN", maths(tree, "ABSOLUTE", share, 0.0), limit)
+            inside = maths(tree, "MULTIPLY", inside, near)
+        total = vectors(tree, "ADD", total, vectors(tree, "SCALE", box["radiance"], inside))
         axes.append([share.node for share in shares])
     return total, axes
 
 
-def smooth_step(nodes, links, value, low, high):
+def smooth_step(tree, value, low, high):
     """From 0 at `low` to 1 at `high`."""
-    step = nodes.new("ShaderNodeMapRange")
+    step = tree.nodes.new("ShaderNodeMapRange")
     step.interpolation_type = "SMOOTHSTEP"
     step.inputs["From Min"].default_value, step.inputs["From Max"].default_value = low, high
-    links.new(value, step.inputs["Value"])
+    tree.links.new(value, step.inputs["Value"])
     return step.outputs["Result"]
 
 
-def mixed(nodes, links, share, first, second):
+def mixed(tree, share, first, second):
     """Mix two colours, given as lists or as sockets."""
-    mix = nodes.new("ShaderNodeMix")
+    mix = tree.nodes.new("ShaderNodeMix")
     mix.data_type = "RGBA"
-    links.new(share, mix.inputs[0])
+    tree.links.new(share, mix.inputs[0])
     for socket, color in zip((mix.inputs[6], mix.inputs[7]), (first, second), strict=True):
-        set_input(links, socket, [*color, 1.0] if isinstance(color, list) else color)
+        set_input(tree, socket, [*color, 1.0] if isinstance(color, list) else color)
     return mix.outputs[2]
 
 
-def vectors(nodes, links, operation, first, second):
+def vectors(tree, operation, first, second):
     """Vector or number of an operation on two vectors, or to scale a vector, given as they are or as sockets."""
-    node = nodes.new("ShaderNodeVectorMath")
+    node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = operation
-    set_input(links, node.inputs[0], first)
-    set_input(links, node.inputs["Scale" if operation == "SCALE" else 1], second)
+    set_input(tree, node.inputs[0], first)
+    set_input(tree, node.inputs["Scale" if operation == "SCALE" else 1], second)
     return node.outputs["Value" if operation == "DOT_PRODUCT" else "Vector"]
 
 
-def maths(nodes, links, operation, first, second):
+def maths(tree, operation, first, second):
     """Number of an operation on two numbers, given as they are or as sockets."""
-    node = nodes.new("ShaderNodeMath")
+    node = tree.nodes.new("ShaderNodeMath")
     node.operation = operation
-    set_input(links, node.inputs[0], first)
-    set_input(links, node.inputs[1], second)
+    set_input(tree, node.inputs[0], first)
+    set_input(tree, node.inputs[1], second)
     return node.outputs[0]
 
 
-def set_input(links, socket, value):
+def set_input(tree, socket, value):
     """Link a socket, or set it to a number or a list."""
     if isinstance(value, bpy.types.NodeSocket):
-        links.new(value, socket)
+        tree.links.new(value, socket)
     else:
         socket.default_value = value
 
@@ -199,7 +199,8 @@ def fading_floor(settings):
     if floor is None or not floor.data.materials:
         return None
     material = floor.data.materials[0] = floor.data.materials[0].copy()
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    tree = material.node_tree
+    nodes, links = tree.nodes, tree.links
     output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
     surface = output.inputs["Surface"].links[0].from_socket
     for name in ("Specular IOR Level", "Coat Weight"):  # ours is matte
@@ -208,7 +209,7 @@ def fading_floor(settings):
     apart.operation = "DISTANCE"
     links.new(place.outputs["Position"], apart.inputs[0])
     near, far = (each * settings["distance"] for each in settings["fade"])
-    share = smooth_step(nodes, links, apart.outputs["Value"], near, far)
+    share = smooth_step(tree, apart.outputs["Value"], near, far)
     glow, mix = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeMixShader")
     glow.inputs["Color"].default_value = (*settings["horizon"], 1.0)
     links.new(share, mix.inputs[0])

@@ -102,9 +102,8 @@ def frames_of_cycles(python: str, settings: dict[str, Any], folder: Path) -> Ite
     told, errors = folder / "settings.json", folder / "blender.log"
     told.write_text(json.dumps({**settings, "folder": str(folder)}), encoding="utf-8")
     place = {**os.environ, "TMPDIR": str(folder)}  # Blender leaves folders behind where temporary files go
-    script = importlib.resources.files(__package__).joinpath("blender_process.py")
     with (
-        importlib.resources.as_file(script) as path,
+        importlib.resources.as_file(importlib.resources.files(__package__).joinpath("blender_process.py")) as path,
         errors.open("wb") as log,
         subprocess.Popen([python, str(path), str(told)], stdout=subprocess.PIPE, stderr=log, env=place) as process,
     ):

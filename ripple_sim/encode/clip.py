@@ -15,13 +15,9 @@ from numpy.typing import NDArray
 
 from .replace import MARK
 
-# Fixed, since x264's output depends on it; small, since the renderer needs the processor too.
-THREADS = 2
-
+THREADS = 2  # fixed, since x264's output depends on it; small, since the renderer needs the processor too
 SOUND_RATE = 48_000  # samples a second
-
-# By the container; 192 kbit/s.
-_AUDIO = {"mp4": "aac", "webm": "libopus"}
+_AUDIO = {"mp4": "aac", "webm": "libopus"}  # by the container; 192 kbit/s
 _BLOCK = 960  # samples that are encoded together, 20 ms
 
 

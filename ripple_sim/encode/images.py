@@ -33,8 +33,7 @@ from ripple_sim.solver.files import final_path
 from .clip import GIF, Clip, Stream
 from .replace import MARK, check_folder, made_here, mark_gif, read_object
 
-# ITU-R BT.709: x and y of red, green, blue and white
-_BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+_BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # ITU-R BT.709: x and y of red, green, blue and white
 
 
 def check_exr() -> None:
@@ -160,9 +159,8 @@ class PassFiles:
         text = json.dumps({**owner, "geoms": {str(k): name for k, name in self._geoms.items()}}, indent=1)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            for each in self.folder.iterdir():
-                if each not in kept:
-                    each.unlink()
+            for each in {*self.folder.iterdir()} - kept:
+                each.unlink()
         except OSError as error:
             raise self._error(error) from error
         self._write(self.folder / _CONTENTS, lambda path: path.write_text(text, encoding="utf-8"))

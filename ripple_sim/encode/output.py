@@ -23,8 +23,7 @@ from .clip import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips
 from .images import check_exr, join_gif, join_webp, write_exr
 from .replace import MARK, is_plain, made_here, png_mark
 
-# As many frames may be lost when a render is killed; each clip begins with a key frame.
-FRAMES_IN_CLIP = 48
+FRAMES_IN_CLIP = 48  # as many may be lost when a render is killed; each clip begins with a key frame
 
 Segments = Sequence[tuple[Path, int]]
 
@@ -98,8 +97,7 @@ FORMATS = {
 MIN_SIZE, MAX_SIZE = 16, 8192
 MAX_FPS = 240
 _H264_BLOCKS = 139_264
-# Browsers slow a GIF down to 10 frames per second if a frame lasts less than 0.02 s.
-MAX_GIF_FPS = 50
+MAX_GIF_FPS = 50  # browsers slow a GIF down to 10 frames per second if a frame lasts less than 0.02 s
 
 ENDINGS = (".mp4", ".webm", ".gif", ".webp")
 FRAME_FORMATS = ("png", "exr")
@@ -236,8 +234,6 @@ def _check_place(path: Path, form: str, overwrite: bool) -> None:
         if not (is_file and path.is_file()):
             raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
         check_replaceable(final_path(path), overwrite)
-    path = final_path(path)  # a link is written through
-    folder = next(each for each in path.absolute().parents if each.exists())
-    # Permission bits do not tell the truth for root or on a read-only disk; a real file does.
-    with tempfile.TemporaryFile(dir=folder):
+    # A link is written through. Permission bits do not tell the truth for root or on a read-only disk; a file does.
+    with tempfile.TemporaryFile(dir=next(each for each in final_path(path).parents if each.exists())):
         pass

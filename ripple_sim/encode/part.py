@@ -24,6 +24,7 @@ SETTINGS, STATES = "settings.json", "states.txt"
 _FRAMES, _WHOLE = "frames", "whole"
 _STATE = re.compile(r"([0-9]{1,9}) ([0-9a-f]+);")  # the semicolon is missing where a killed process cut the line off
 _SEGMENT = re.compile(r"frames?_(\d+)(?:-(\d+))?")
+Settings = Mapping[str, str | int | float]  # what decides the content of a file, by the names in messages
 
 
 class Part:
@@ -62,14 +63,7 @@ class Part:
     """
 
     def __init__(
-        self,
-        video: Path,
-        *,
-        suffix: str,
-        length: int,
-        settings: Mapping[str, str | int | float],
-        resume: bool,
-        overwrite: bool = False,
+        self, video: Path, suffix: str, length: int, settings: Settings, *, resume: bool, overwrite: bool
     ) -> None:
         self.video, self._overwrite = video, overwrite
         self.folder = video.with_name(video.name + ".part")
@@ -152,21 +146,21 @@ class Part:
         move(self._segments, folder)
         self.remove()
 
-    def keep(self) -> bool:
-        """Leave the complete segments for later, if there are any, and return whether there are."""
+    def keep(self) -> str:
+        """Leave the complete segments for later, and say so; without any, remove everything and say nothing."""
         if not self.frames:
             self.remove()
-            return False
+            return ""
         self._drop_unfinished()
         os.close(self._lock)
-        return True
+        return f"{self.frames} frames are kept in {self.folder}; --resume carries on from there"
 
     def remove(self) -> None:
         """Remove everything."""
         shutil.rmtree(self.folder, ignore_errors=True)
         os.close(self._lock)
 
-    def _compare(self, settings: Mapping[str, object]) -> None:
+    def _compare(self, settings: Settings) -> None:
         """Raise `VideoError` naming the first setting in which the interrupted video differs."""
         old, new = json.loads((self.folder / SETTINGS).read_text()), json.loads(json.dumps(settings))
         for name in sorted({*old, *new}):

@@ -10,9 +10,7 @@ import dataclasses
 import queue
 import threading
 import time
-from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -24,7 +22,7 @@ from ripple_sim.solver.files import final_path
 
 from .clip import Stream
 from .output import FORMATS, Format, Segment, check_output, video_format
-from .part import Part
+from .part import Part, Settings
 
 # Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or 44 MB of EXR.
 QUEUE_FRAMES = 8
@@ -129,9 +127,7 @@ class FrameWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         if error is None:
             self.close()
         else:
@@ -145,10 +141,8 @@ class FrameWriter:
             return
         self._abandoned = True
         self._stop()
-        if not self._finished and self._part.keep():
-            error.add_note(
-                f"{self._part.frames} frames are kept in {self._part.folder}; --resume carries on from there"
-            )
+        if not self._finished and (kept := self._part.keep()):
+            error.add_note(kept)
 
     def _raise_error(self) -> None:
         if (error := self._error) is not None:
@@ -215,7 +209,7 @@ def open_writer(
     fps: int,
     transparent: bool = False,
     frame_format: str = "png",
-    settings: Mapping[str, str | int | float] | None = None,
+    settings: Settings | None = None,
     resume: bool = False,
     overwrite: bool = False,
 ) -> FrameWriter:
@@ -258,14 +252,7 @@ def open_writer(
     check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format, overwrite=overwrite)
     video = FORMATS[video_format(path, frame_format)]
     try:
-        part = Part(
-            final_path(path),
-            suffix=video.suffix,
-            length=video.length,
-            settings=settings or {},
-            resume=resume,
-            overwrite=overwrite,
-        )
+        part = Part(final_path(path), video.suffix, video.length, settings or {}, resume=resume, overwrite=overwrite)
     except OSError as error:
         raise EncodingError(f"cannot write the video {path}: {error.strerror}") from error
     shape = (height, width, 4 if transparent else 3)

@@ -15,6 +15,7 @@ import mujoco
 from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.encode.part import Settings
 from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.render.visuals.visual import find_look, paint_of
 from ripple_sim.scene.scene import Scene
@@ -242,9 +243,6 @@ def framed(page: Path, aspect: float) -> str:
     return f'<iframe srcdoc="{source}" {size} style="border: 0; max-width: 100%" allowfullscreen></iframe>'
 
 
-Progress = Callable[[int, int], None]
-
-
 @dataclasses.dataclass(frozen=True)
 class ExportSummary:
     """What an export took: its frames, and times [s]; by Cycles, `write_seconds` is what the pictures took."""
@@ -266,7 +264,7 @@ def export_scene(
     output: str | Path,
     options: ExportOptions = ExportOptions(),  # noqa: B008 - frozen
     *,
-    progress: Progress | None = None,
+    progress: Callable[[int, int], None] | None = None,
     on_step: Callable[[Simulation], None] | None = None,
 ) -> ExportSummary:
     """Simulate a scene and write it to the file of another program.
@@ -302,7 +300,7 @@ def export_scene(
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)
     if options.chunk is not None:
-        settings: dict[str, str | int | float] = {  # what decides the content, by the names in messages
+        settings: Settings = {
             "the number of frames": frames,
             "the frame rate": options.fps,
             "the frames in a chunk": options.chunk,

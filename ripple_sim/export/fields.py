@@ -109,8 +109,7 @@ class FieldWriter(Writer):
         self._source = source
         self._store = store = Store(path, {"software": MARK, "fps": source.fps, "slow_motion": source.slow_motion})
         model = source.model
-        bodies = [model.body(i).name or f"body {i}" for i in range(model.nbody)]
-        store.fixed("body", ["body"], np.array(bodies))
+        store.fixed("body", ["body"], np.array([model.body(i).name or f"body {i}" for i in range(model.nbody)]))
         store.fixed("axis", ["axis"], np.array(["x", "y", "z"]))
         store.fixed("component", ["component"], np.array(["w", "x", "y", "z"]))
         store.grow("time", ["time"], np.zeros(()), "s", "time of the simulation")

@@ -64,9 +64,8 @@ def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
         "position": [0, 0, 0] if soft else model.geom_pos[geom].tolist(),
         "quaternion": [1, 0, 0, 0] if soft else model.geom_quat[geom].tolist(),
         "open": not source.ripples[name].atlas.mesh.closed,
-        **_look(finish),
     }
-    return _part(meta, mesh.F, [mesh.rest, mesh.directions], uv)
+    return _part(meta, finish, mesh.F, [mesh.rest, mesh.directions], uv)
 
 
 def floor_of(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
@@ -122,20 +121,15 @@ def _solid_part(solid: Solid) -> PagePart:
         "position": solid.position.tolist(),
         "quaternion": solid.quaternion.tolist(),
         "open": False,
-        **_look(solid.finish),
     }
-    return _part(meta, solid.F, [solid.points, solid.normals], solid.uv)
+    return _part(meta, solid.finish, solid.F, [solid.points, solid.normals], solid.uv)
 
 
-def _look(finish: Finish) -> dict[str, Any]:
-    look = finish.look
-    names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
-    values = {name: float(getattr(look, name)) for name in names}
-    return {"color": finish.color.tolist(), "opacity": finish.opacity, "texture": finish.texture, **values}
-
-
-def _part(meta: dict[str, Any], F: NDArray, fields: list[NDArray], uv: NDArray | None) -> PagePart:
+def _part(meta: dict[str, Any], finish: Finish, F: NDArray, fields: list[NDArray], uv: NDArray | None) -> PagePart:
     """Points and directions in 16 bits each, triangles, and texture coordinates of their corners."""
+    names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
+    values = {name: float(getattr(finish.look, name)) for name in names}
+    look = {"color": finish.color.tolist(), "opacity": finish.opacity, "texture": finish.texture, **values}
     F, vertices, triangles = memory_order(F, fields[0])
     points, directions = (np.asarray(field, np.float64)[vertices] for field in fields)
     low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-9)
@@ -144,7 +138,7 @@ def _part(meta: dict[str, Any], F: NDArray, fields: list[NDArray], uv: NDArray |
     if uv is not None:
         arrays.append(np.asarray(uv, "<f4")[triangles])
     counts = {"points": len(points), "triangles": len(F), "textured": uv is not None}
-    return PagePart({**meta, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices)
+    return PagePart({**meta, **look, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices)
 
 
 def _data_uri(model: mujoco.MjModel, texture: int) -> str:

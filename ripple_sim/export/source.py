@@ -12,6 +12,7 @@ import mujoco
 
 from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.ripples import Impulse, Ripples
+from ripple_sim.encode.part import Settings
 from ripple_sim.render.camera import Pose
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.solver.waves.sensor import Sensor
@@ -69,7 +70,7 @@ class Source:
     slow_motion: float = 1.0
     chunk: int = 0
     output: Path = Path()
-    settings: Mapping[str, str | int | float] | None = None
+    settings: Settings | None = None
     resume: bool = False
     sensors: Mapping[str, Sensor] = dataclasses.field(default_factory=dict)
     signals: bool = False

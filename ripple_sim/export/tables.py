@@ -51,8 +51,7 @@ _GROUP = 10_000  # rows that are kept in memory
 def rows(number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> Iterator[tuple]:
     """The impulses of a frame of a number, in the order of the columns."""
     for each in impulses:
-        point = (float(x) for x in each.point)
-        yield (number, data.time, each.geom, each.other, *point, each.impulse, *each.texel, each.inner)
+        yield (number, data.time, each.geom, each.other, *map(float, each.point), each.impulse, *each.texel, each.inner)
 
 
 def samples(sensors: Mapping[str, Sensor]) -> Iterator[tuple]:

@@ -71,9 +71,8 @@ class Chunks:
     def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
         self._stage, self._path, self._source = stage, path, source
         target, settings = final_path(source.output), source.settings or {}
-        self._part: Any = Part(  # None once it is handed over or closed
-            target, suffix=".usdc", length=source.chunk, settings=settings, resume=source.resume, overwrite=True
-        )
+        # None once it is handed over or closed
+        self._part: Any = Part(target, ".usdc", source.chunk, settings, resume=source.resume, overwrite=True)
         if damaged := [segment.name for segment, _ in self._part.segments if not made_here(segment)]:
             self._part.keep()
             raise VideoError(
@@ -125,12 +124,10 @@ class Chunks:
         """Give up; keep complete layers if the run can be resumed, and say so."""
         self._drop()
         part, self._part = self._part, None
-        if part is None:
-            return ""
-        if self._source.settings is None:
+        if part is not None and self._source.settings is None:
             part.remove()
             return ""
-        return f"{part.frames} frames are kept in {part.folder}; --resume carries on from there" if part.keep() else ""
+        return "" if part is None else part.keep()
 
     def _sample(self, write: Callable[[], None]) -> None:
         with Usd.EditContext(self._stage, self._layer):
@@ -302,8 +299,7 @@ class UsdWriter:
 
 def _stands(model: mujoco.MjModel, body: int) -> bool:
     """Whether a body is fixed to the world."""
-    root = int(model.body_weldid[body])
-    return root == 0 and int(model.body_mocapid[int(model.body_rootid[body])]) < 0
+    return int(model.body_weldid[body]) == 0 and int(model.body_mocapid[model.body_rootid[body]]) < 0
 
 
 def made_here(path: Path) -> bool:

@@ -126,8 +126,7 @@ class Lamps:
             self._lamps.append(lamp)
         sky = lighting.ambient + (_STUDIO_SKY if lighting.studio else 0.0)
         if sky.any():
-            dome = UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky"))
-            _set_light(dome, sky, 1.0)
+            _set_light(UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky")), sky, 1.0)
 
     def write(self, data: mujoco.MjData, time: float) -> None:
         """Add a frame."""

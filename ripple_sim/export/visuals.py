@@ -20,8 +20,6 @@ from ripple_sim.render.visuals.visual import Look, Visual, geom_visual, look_of,
 from .moving_mesh import MovingMesh
 from .source import Source
 
-_SEGMENTS = 12  # to a right angle
-
 
 class Solid(NamedTuple):
     """A geom or site as a mesh in its own frame.
@@ -59,8 +57,8 @@ class Finish(NamedTuple):
     texture: int
 
 
-def solids(model: mujoco.MjModel, targets: set[int], segments: int = _SEGMENTS) -> list[Solid]:
-    """Everything that is drawn of a model but its targets, which are geom ids."""
+def solids(model: mujoco.MjModel, targets: set[int], segments: int = 12) -> list[Solid]:
+    """Everything that is drawn of a model but its targets, which are geom ids; `segments` make up a right angle."""
     geoms = [geom for geom in visible_geoms(model) if geom not in targets]
     return [_solid(model, visual, make(segments)) for visual, (_, make) in visuals_of(model, geoms)]
 

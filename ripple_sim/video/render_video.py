@@ -11,7 +11,7 @@ import contextlib
 import dataclasses
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,6 +25,7 @@ from ripple_sim.coupling.geoms import geom_name
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.encode.images import PassFiles
+from ripple_sim.encode.part import Settings
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay.notes import TITLES, Notebook, Notes, color_table, compared_operators, grid_spacing
 from ripple_sim.overlay.panels import Layout, Painter, PlacedMark, Projection, draw_marks, place_marks
@@ -234,9 +235,7 @@ class Film:
         )
 
 
-def open_video(
-    output: Path, options: VideoOptions, settings: Mapping[str, str | int | float] | None = None
-) -> FrameWriter:
+def open_video(output: Path, options: VideoOptions, settings: Settings | None = None) -> FrameWriter:
     """Writer of a video with settled options; see `open_writer`."""
     return open_writer(
         output,
@@ -302,11 +301,8 @@ class Summary:
     wall_seconds: float
 
 
-# Shots that wait to be rendered. One would do if all frames took the same time.
-_WAITING = 2
-
-# The simulation's state is fingerprinted every so many frames, to be compared when a render is resumed.
-_CHECKED = 16
+_WAITING = 2  # shots that wait to be rendered; one would do if all frames took the same time
+_CHECKED = 16  # every so many frames the simulation's state is fingerprinted, to be compared when a render is resumed
 
 Progress = Callable[[int, int], None]
 

@@ -22,6 +22,7 @@ from ripple_sim import __version__
 from ripple_sim.encode import check_output, default_fps
 from ripple_sim.encode.images import check_passes
 from ripple_sim.encode.output import video_format
+from ripple_sim.encode.part import Settings
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay.notes import compared_operators
 from ripple_sim.scene.scene import Scene, check_duration, parse_request
@@ -82,8 +83,7 @@ def _add_fields(hasher: Any, struct: Any) -> None:
             _add_fields(hasher, value)
 
 
-# Options that replace those of the scene's camera, by the same names.
-EXPOSURE = ("shutter", "aperture", "focus", "exposures")
+EXPOSURE = ("shutter", "aperture", "focus", "exposures")  # replace those of the scene's camera, by the same names
 
 
 def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
@@ -107,7 +107,7 @@ def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
     )
 
 
-def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> dict[str, str | int | float]:
+def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> Settings:
     """What decides the pixels of a video, by the names in messages.
 
     The options are settled, and the scene has the exposure that they ask for.
