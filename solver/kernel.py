@@ -39,7 +39,6 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from .cache import cache_folder
-from .files import atomic_write
 
 # What takes long without anything to see is told here: on standard error, unless the user's program says otherwise.
 log = logging.getLogger("ripple_sim")
@@ -177,8 +176,14 @@ class _KernelCache(FunctionCache):
             content = dumps((key, fingerprint(self._py_func.__module__), data))
         except (KeyError, OSError):  # a newer source imports what was not there, or is gone
             return
-        with contextlib.suppress(OSError), atomic_write(path) as unfinished:
-            unfinished.write_bytes(_checksum(path, content) + content)
+        unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+        with contextlib.suppress(OSError):
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                unfinished.write_bytes(_checksum(path, content) + content)
+                unfinished.replace(path)  # also where a link to somebody's file lies
+            finally:
+                unfinished.unlink(missing_ok=True)
 
     def _path(self, key: Any) -> Path:
         name = f"{self._py_func.__module__}.{self._py_func.__qualname__}".replace("<", "").replace(">", "")
