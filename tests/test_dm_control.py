@@ -21,14 +21,12 @@ MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 OPTIONS: dict[str, Any] = {"resolution": 16, "backend": "cpu"}
 
 
-def dm_control_physics(xml: str) -> Any:
+# the stand-in everywhere, and the package itself where it is installed
+KINDS: list[Any] = [StandIn]
+if importlib.util.find_spec("dm_control"):
     from dm_control.mujoco import Physics
 
-    return Physics.from_xml_string(xml)
-
-
-# the stand-in everywhere, and the package itself where it is installed
-KINDS = [StandIn, *([dm_control_physics] if importlib.util.find_spec("dm_control") else [])]
+    KINDS.append(Physics.from_xml_string)
 
 
 @pytest.mark.parametrize("make", KINDS)

@@ -30,8 +30,7 @@ def compensated_sum(x):
     for each in x:
         small = each - lost
         grown = total + small
-        lost = (grown - total) - small
-        total = grown
+        total, lost = grown, (grown - total) - small
     return total
 
 

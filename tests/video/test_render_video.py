@@ -27,10 +27,6 @@ from ripple_sim.video import VideoOptions, prefetched
 OPTIONS = {"size": (64, 48), "fps": 30}
 
 
-def _push(simulation) -> None:
-    simulation.data.qvel[0] += 1e-9
-
-
 @pytest.mark.parametrize("name", ["clip.mp4", "frames"])
 def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
     whole, broken = tmp_path / "whole" / name, tmp_path / "broken" / name
@@ -87,8 +83,9 @@ def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene,
     with pytest.raises(VideoError, match="the scene's fingerprint was"):
         resume(load_scene(tmp_path / "scene.toml"))
     (tmp_path / "scene.xml").write_text(MJCF)
+    options, push = VideoOptions(resume=True, **OPTIONS), lambda each: np.add.at(each.data.qvel, 0, 1e-9)
     with pytest.raises(VideoError, match="at frame 16 the simulation is not in the state"):
-        render_video(scene, tmp_path / "frames", VideoOptions(resume=True, **OPTIONS), on_step=_push)
+        render_video(scene, tmp_path / "frames", options, on_step=push)
     assert json.loads((tmp_path / "frames.part" / "settings.json").read_text())["the size"] == "64x48"
 
 
