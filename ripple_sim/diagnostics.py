@@ -135,8 +135,18 @@ def _library_of(file: Path) -> str | None:
 
 
 PACKAGES = (
-    "ripple-sim", "mujoco", "numpy", "scipy", "numba", "libigl", "trimesh", "embreex", "moderngl", "av", "pyvista",
-)  # fmt: skip
+    "ripple-sim",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "numba",
+    "libigl",
+    "trimesh",
+    "embreex",
+    "moderngl",
+    "av",
+    "pyvista",
+)
 
 
 def collect() -> dict[str, Any]:

@@ -230,9 +230,13 @@ class TargetLoad:
         self._filter.forget_places()
 
     def touched(
-        self, contacts: Contacts, pose: tuple[Floats, Floats], timestep: float, elapsed: float,
+        self,
+        contacts: Contacts,
+        pose: tuple[Floats, Floats],
+        timestep: float,
+        elapsed: float,
         data: mujoco.MjData | None = None,
-    ) -> tuple[Load, StepContacts]:  # fmt: skip
+    ) -> tuple[Load, StepContacts]:
         """Load over a time in which geoms touch, and what they did.
 
         Parameters

@@ -44,9 +44,16 @@ class Store:
         array.attrs.update(_attributes(dimensions, unit, text))
 
     def grow(
-        self, name: str, dimensions: list[str], like: NDArray, unit: str, text: str = "", *, chunk: int = CHUNK,
+        self,
+        name: str,
+        dimensions: list[str],
+        like: NDArray,
+        unit: str,
+        text: str = "",
+        *,
+        chunk: int = CHUNK,
         before: int = 0,
-    ) -> Any:  # fmt: skip
+    ) -> Any:
         """Begin an array of entries like one, which stands `before` times in it already; replace one of this name."""
         if name in self._group:
             del self._group[name]

@@ -124,9 +124,15 @@ class MovingMesh:
 
 @kernel
 def _displace(
-    height_map: Floats32, rates: Floats32, still: Floats32, directions: Floats32, upright: Floats32, texels: Ints32,
-    offsets: Floats32, shape: Displaced,
-) -> None:  # fmt: skip
+    height_map: Floats32,
+    rates: Floats32,
+    still: Floats32,
+    directions: Floats32,
+    upright: Floats32,
+    texels: Ints32,
+    offsets: Floats32,
+    shape: Displaced,
+) -> None:
     """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2].
 
     The surface without waves has its points `still`, directions and normals `upright`, [n, 3]. `texels` [n, 3] are the

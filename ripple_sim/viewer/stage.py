@@ -103,9 +103,16 @@ class SkinActor:
         mesh.point_data.set_array(_PER_METRE * shape.height, HEIGHT)
         mesh.set_active_scalars(HEIGHT)
         self.actor = plotter.add_mesh(
-            mesh, scalars=HEIGHT, cmap="coolwarm", clim=(-1.0, 1.0), color=color.tolist(), show_scalar_bar=False,
-            copy_mesh=False, interpolation="Phong", **_SHADING,
-        )  # fmt: skip
+            mesh,
+            scalars=HEIGHT,
+            cmap="coolwarm",
+            clim=(-1.0, 1.0),
+            color=color.tolist(),
+            show_scalar_bar=False,
+            copy_mesh=False,
+            interpolation="Phong",
+            **_SHADING,
+        )
         self.actor.prop.specular_color = "white"
 
     def update(self, shape: Displaced, pose: tuple[NDArray, NDArray], limit: float | None) -> None:

@@ -192,10 +192,14 @@ class ExtraForces:
             )
 
     def _apply(
-        self, shader: moderngl.ComputeShader, stencil: StencilBuffer,
+        self,
+        shader: moderngl.ComputeShader,
+        stencil: StencilBuffer,
         links: tuple[int, moderngl.Buffer, moderngl.Buffer],
-        field: moderngl.Buffer, result: moderngl.Buffer, *factors: moderngl.Buffer,
-    ) -> None:  # fmt: skip
+        field: moderngl.Buffer,
+        result: moderngl.Buffer,
+        *factors: moderngl.Buffer,
+    ) -> None:
         bind_buffers(field, result, None, stencil.buffer, *factors)
         self._fields.run_texels(shader)
         count, *buffers = links

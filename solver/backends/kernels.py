@@ -274,10 +274,21 @@ def flow(h: Floats32, limit: Floats32, dent: Floats32) -> None:
 
 @kernel
 def advance(
-    substeps: int, dt: np.float32, h: Floats32, v: Floats32, h_next: Floats32, halo: Ints,
-    kick: Kick, addresses: Ints, kicks: Floats32,
-    viscosity: Weights | None, features: Features | None, probes: Probes | None, dent: Floats32, sums: Floats32,
-) -> None:  # fmt: skip
+    substeps: int,
+    dt: np.float32,
+    h: Floats32,
+    v: Floats32,
+    h_next: Floats32,
+    halo: Ints,
+    kick: Kick,
+    addresses: Ints,
+    kicks: Floats32,
+    viscosity: Weights | None,
+    features: Features | None,
+    probes: Probes | None,
+    dent: Floats32,
+    sums: Floats32,
+) -> None:
     """Substeps of dt, from the first half drift to the last, and velocities [k] that kick the texels at addresses [k].
 
     The height ends in `h_next` where their number is odd.

@@ -16,10 +16,9 @@ import numpy as np
 
 from ..kernel import Floats, Ints32, kernel
 from ..mesh.vectors import Vector, combine, cross, dot, subtract
-from .energy import Reference, Shares, projected_hessian
+from .energy import MOST_TRIALS, Reference, Shares, projected_hessian
 
 FURTHER, SHORTER = 1.6, 0.6  # factors from one trial step to the next
-MOST_TRIALS = 14
 CG_TOLERANCE = 0.03
 SHORT_STEP = 0.3  # a Newton step cut to less than this asks for fewer steps of conjugate gradients
 
@@ -142,9 +141,16 @@ def add_triangle(
 
 @kernel
 def _add_vertex(
-    v: int, grad_d: Vector, grad_j: Vector, half: float, x: Vector, y: Vector, bend: float, shares: Shares,
+    v: int,
+    grad_d: Vector,
+    grad_j: Vector,
+    half: float,
+    x: Vector,
+    y: Vector,
+    bend: float,
+    shares: Shares,
     system: System,
-) -> Corner:  # fmt: skip
+) -> Corner:
     """Add what a triangle says about its vertex v, given the gradients of D and of J / `half` there."""
     dx, dy, jx, jy = dot(grad_d, x), dot(grad_d, y), half * dot(grad_j, x), half * dot(grad_j, y)
     dd, dj, jj = shares[4], shares[5], shares[6]
