@@ -133,6 +133,14 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
+def warn_caller(message: str) -> None:
+    """Give a `RippleWarning` with the line of the user's that led here, through however many of this package's."""
+    frame, level = inspect.currentframe(), 1
+    while frame and frame.f_globals.get("__name__", "").split(".")[0] in ("ripple_sim", "contextlib"):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, RippleWarning, stacklevel=level)
+
+
 def deprecated(old: str, instead: str, goes: str) -> None:
     """Warn, from what the user calls, that it is deprecated: it still works, and goes with the version `goes`."""
     warnings.warn(f"{old} is deprecated and goes with {goes}; use {instead}", DeprecationWarning, stacklevel=3)

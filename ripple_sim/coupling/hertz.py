@@ -21,14 +21,13 @@ from scipy.special import betaincinv
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Load
-from ripple_sim.solver.errors import POSITIVE, shown
+from ripple_sim.solver.errors import POSITIVE, shown, warn_caller
 from ripple_sim.solver.kernel import Floats, Ints
 
 from .contacts import Contacts, collider_ids, normal_rows
 from .energy import impedance
 from .geoms import ByGeom, find_any, for_each
 from .model import CoupledModel
-from .stepping import warn_caller
 
 PULSES = ("contact", "hertz")
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Mesh
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
 from .geoms import ENDLESS, find_collision_geoms, geom_name, rotation_in_body
 from .soft import SoftSurface, is_soft, soft_names
-from .stepping import warn_caller
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
 SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))

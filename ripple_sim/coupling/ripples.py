@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
-from ripple_sim.solver.errors import checked, whole
+from ripple_sim.solver.errors import checked, warn_caller, whole
 from ripple_sim.solver.operator.plate_rim import Rim
 
 from .energy import Energy, body_energy
@@ -32,7 +32,6 @@ from .stepping import (
     followed,
     missed_warning,
     physics_errors,
-    warn_caller,
 )
 from .target_warnings import AmplitudeCheck, collision_warnings
 from .targets import Targets

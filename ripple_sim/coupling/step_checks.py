@@ -14,10 +14,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Floats, Ints
 
 from .model import SPECULATIVE, CoupledModel
-from .stepping import warn_caller
 
 _SAFE = 0.85
 # Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import inspect
 import random
 import re
 import threading
-import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -22,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import RippleWarning, SimulationError
+from ripple_sim.solver.errors import warn_caller
 
 _FWDINV = int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 # nothing that is computed depends on the marks, so they may differ from run to run
@@ -188,14 +187,6 @@ def _following(function: Callable[..., None]) -> Callable[..., None]:
 def _count(nstep: int = 1) -> int:
     """How many steps a call asks for."""
     return nstep
-
-
-def warn_caller(message: str) -> None:
-    """Give a `RippleWarning` with the line of the user's that led here, through however many of this package's."""
-    frame, level = inspect.currentframe(), 1
-    while frame and frame.f_globals.get("__name__", "").split(".")[0] in ("ripple_sim", "contextlib"):
-        frame, level = frame.f_back, level + 1
-    warnings.warn(message, RippleWarning, stacklevel=level)
 
 
 def adopt_warnings() -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, Mesh
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.operator.presets import (
     BOUNCE,
     FOOTPRINT,
@@ -29,7 +30,6 @@ from ripple_sim.solver.texels.thickness import half_thickness_at
 from .geoms import find_target
 from .model import CoupledModel
 from .soft import SoftSurface, is_soft
-from .stepping import warn_caller
 from .target_mesh import target_mesh
 
 # Waves cross the target in the first time and fall to a tenth in the second [s].

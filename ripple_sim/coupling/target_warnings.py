@@ -17,12 +17,12 @@ import trimesh
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas, Material, WaveSolver
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.texels.thickness import half_thickness
 
 from .geoms import TARGET_TYPES
 from .model import CoupledModel, flex_thickness
-from .stepping import warn_caller
 from .suited import Extent, bearing_density
 from .target_mesh import mesh_arrays, primitive_triangles
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, SolverError, WaveSolver
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.operator.assembly import hold
 from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.texels.atlas import check_points
@@ -20,7 +21,6 @@ from ripple_sim.solver.waves.footprint import Footprint, footprint
 
 from .geoms import ByGeom, GeomKey, by_name, find_any, find_target, for_each, rotation_in_body, target_name
 from .soft import is_soft, target_pose
-from .stepping import warn_caller
 from .suited import suited_targets
 from .target_mesh import target_atlas
 

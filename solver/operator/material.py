@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import warnings
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import POSITIVE, RippleWarning, SolverError, is_finite, shown
+from ..errors import POSITIVE, SolverError, is_finite, shown, warn_caller
 from ..texels.atlas import Atlas
 from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, require_positive
 from .presets import PRESETS, suited_coefficients
@@ -439,4 +438,4 @@ def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
         )
     else:
         return
-    warnings.warn(message, RippleWarning, stacklevel=4)
+    warn_caller(message)

@@ -6,7 +6,6 @@ to the other side, or to what lies inside.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..cache import kept_with
-from ..errors import AtlasError, RippleWarning, Valid, checked, instance
+from ..errors import AtlasError, Valid, checked, instance, warn_caller
 from ..kernel import Bools, Floats
 from ..mesh.mesh import Mesh
 from ..mesh.queries import RayScene
@@ -157,12 +156,12 @@ def thickness_map(
         )
     if out.any() and limits[0] == 0:
         message = f"what lies inside comes out of the surface at {out.mean():.1%} of the texels: no layer is left"
-        warnings.warn(message, RippleWarning, stacklevel=3)
+        warn_caller(message)
     way = np.clip(way, max(limits[0], _LEAST_THICKNESS * size), limits[1])
     if np.isinf(way).any():
         greatest = float(way[met].max())
         message = f"{1 - met.mean():.1%} of the texels have nothing below them; they get the greatest: {greatest:.3g} m"
-        warnings.warn(message, RippleWarning, stacklevel=3)
+        warn_caller(message)
         way = np.where(met, way, greatest)
     return smoothed(atlas.texels.topology, way.reshape(atlas.areas.shape))
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import functools
-import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RippleWarning, SolverError, shown
+from ..errors import SolverError, shown, warn_caller
 from ..kernel import Floats, Floats32, Ints, kernel
 from ..mesh.mesh import Mesh
 from ..mesh.topology import Folds, edges_of
@@ -76,11 +75,9 @@ class Motion:
         count = self._folds.count(self.V)
         if count:
             self._warned = True
-            warnings.warn(
+            warn_caller(
                 f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over or without area; "
-                "waves there are wrong: move the vertices less, or use a stiffer body",
-                RippleWarning,
-                stacklevel=3,
+                "waves there are wrong: move the vertices less, or use a stiffer body"
             )
         return self._now
 
