@@ -222,6 +222,17 @@ def test_gymnasium_finds_no_fault_with_its_own_ant_which_is_made_anew_by_spec_or
         assert again.ripples["torso_geom"].time == 0.0 < env.ripples["torso_geom"].time
 
 
+def test_gymnasium_finds_no_fault_where_a_target_is_touched_at_the_first_step(path: Path) -> None:
+    """It compares what two equal runs have in `info`."""
+    path.write_text(MODEL.replace("0.02 0.06", "0.02 0.049"))
+    ball = BallEnv(path)
+    ball.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (8,), np.float64)
+    env = RippleWrapper(ball, MATERIALS, **OPTIONS)
+    env.reset(seed=0)
+    assert env.step(env.action_space.sample())[-1]["impulses"]
+    check_env(env, skip_render_check=True)
+
+
 def test_environments_without_a_model_are_refused() -> None:
     with pytest.raises(RippleError, match=r"CartPole.* has no `model` and `data`; valid are MuJoCo environments"):
         RippleWrapper(gymnasium.make("CartPole-v1"), MATERIALS)

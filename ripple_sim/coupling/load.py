@@ -98,6 +98,8 @@ class SleepingContacts:
 class Impulse:
     """The impulse that one geom gave to one target in one physics step; one at each place where it is wedged.
 
+    Two are equal if all their values are.
+
     Attributes
     ----------
     geom, other : str
@@ -119,6 +121,18 @@ class Impulse:
     impulse: float
     texel: tuple[int, int, int]
     inner: bool = False
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Impulse):
+            return NotImplemented
+        return self._values() == other._values()
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+    def _values(self) -> tuple[object, ...]:
+        """All fields, with the point as a tuple, since NumPy compares arrays entry by entry."""
+        return self.geom, self.other, tuple(self.point.tolist()), self.impulse, self.texel, self.inner
 
 
 class StepContacts(NamedTuple):

@@ -23,10 +23,12 @@ from .model import CoupledModel
 from .soft import HighPass
 from .step_checks import TunnellingCheck
 from .stepping import (
+    IN_TURN_WARNING,
     NO_RESET,
     SolvedForces,
     StepClock,
     adopt_warnings,
+    disabled_warning,
     divergence,
     divergence_warning,
     followed,
@@ -263,6 +265,8 @@ class Ripples(Targets):
             self._flatten()
             self._warn_once("divergence", divergence_warning(self.model, data))
         self._warn_once("missed", missed_warning(passed.missed))
+        self._warn_once("in turn", IN_TURN_WARNING if passed.in_turn else None)
+        self._warn_once("disabled", disabled_warning(self.model))
         if broken or not passed.elapsed:
             return
         solved, unsolved = self._solved.of(data)

@@ -12,6 +12,7 @@ import copy
 import random
 import re
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -39,11 +40,14 @@ class Passed(NamedTuple):
         Physics steps before the latest one, whose contact forces are gone.
     reset : bool
         Whether the simulation began anew.
+    in_turn : bool
+        Whether this is another simulation than at the last look, which was looked at before that.
     """
 
     elapsed: float
     missed: int = 0
     reset: bool = False
+    in_turn: bool = False
 
 
 class StepClock:
@@ -57,6 +61,10 @@ class StepClock:
     a negative number in `data.solver_fwdinv[0]`: a step leaves it alone, `copy` keeps it, and `mj_resetData`, a
     keyframe and the automatic reset of a simulation that diverges all wipe it out. MuJoCo's own values there are not
     negative, and written only where the flag `fwdinv` is enabled: then no mark is made.
+
+    A clock follows one simulation, in whichever data that is copied to. Data of two simulations in turn shows as data
+    that was looked at before the last look's, carries a mark, so that nobody has reset it, and does not go on from
+    where the last one was.
     """
 
     def __init__(self) -> None:
@@ -67,25 +75,33 @@ class StepClock:
         self._mark: float | None = None
         self._time: float | None = None
         self._timestep = 0.0
+        self._looked_at = weakref.WeakSet[mujoco.MjData]()
+        self._latest: weakref.ref[mujoco.MjData] | None = None
 
     def __getstate__(self) -> dict[str, object]:
         # MuJoCo's data loses the mark when it is pickled; that is no reset
-        return {**vars(self), "_mark": None}
+        return {**vars(self), "_mark": None, "_looked_at": weakref.WeakSet(), "_latest": None}
 
     def look(self, model: mujoco.MjModel, data: mujoco.MjData) -> Passed:
         """What happened since the last look."""
         time, timestep = float(data.time), float(model.opt.timestep)
         before, longest = self._time, max(timestep, self._timestep)
         reset = before is not None and time < before
+        was_reset_by_user = True
         if not model.opt.enableflags & _FWDINV:
             found = float(data.solver_fwdinv[0])
+            was_reset_by_user = not found < 0
             if not found < 0:  # a mark is made where there is none, and one that others made is taken over
                 found = data.solver_fwdinv[0] = -1.0 - _random.random()
             reset = reset or self._mark not in (None, found)
             self._mark = found
+        goes_on = before is not None and not reset and time > before
+        in_turn = self._is_back_at(data) and not was_reset_by_user and not goes_on
         self._time, self._timestep = time, timestep
         if before is None or reset:
-            return Passed(timestep if time else 0.0, reset=reset)
+            return Passed(timestep if time else 0.0, reset=reset, in_turn=in_turn)
+        if in_turn:
+            return Passed(0.0, in_turn=True)
         elapsed = time - before
         # a step that equals the last one to the last bit saves the solver new coefficients
         if abs(elapsed - timestep) < _ROUND_OFF * timestep:
@@ -93,6 +109,34 @@ class StepClock:
         steps = round(elapsed / timestep)
         elapsed = steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
         return Passed(elapsed, max(round(elapsed / longest) - 1, 0))
+
+    def _is_back_at(self, data: mujoco.MjData) -> bool:
+        """Whether this data was looked at, but not at the last look."""
+        is_latest = self._latest is not None and self._latest() is data
+        is_back = data in self._looked_at and not is_latest
+        self._looked_at.add(data)
+        self._latest = weakref.ref(data)
+        return is_back
+
+
+IN_TURN_WARNING = (
+    "`Ripples.step` was given two MjData in turn, as of two simulations: its waves belong to one, and begin anew each "
+    "time the other one comes; make one Ripples for each MjData, Ripples(model, materials)"
+)
+_NO_CONTACTS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT}
+
+
+def disabled_warning(model: mujoco.MjModel) -> str | None:
+    """What to warn of where the model's flags let no contact have a force, else None."""
+    disabled = [name for name, flag in _NO_CONTACTS.items() if model.opt.disableflags & flag]
+    if not disabled:
+        return None
+    flags = " ".join(f'{name}="disable"' for name in disabled)
+    constants = " | ".join(f"mujoco.mjtDisableBit.{_NO_CONTACTS[name].name}" for name in disabled)
+    return (
+        f"nothing will ripple by contacts: the model has <flag {flags}/>, with which MuJoCo finds no contact forces; "
+        f"remove it from the MJCF's <option>, or call model.opt.disableflags &= ~int({constants})"
+    )
 
 
 def missed_warning(missed: int) -> str | None:

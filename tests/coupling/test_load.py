@@ -1,5 +1,6 @@
 """The load on a target gives the impulse of its contacts, no more and no less, where they are, and it is told of."""
 
+import dataclasses
 from typing import NamedTuple
 
 import mujoco
@@ -8,7 +9,7 @@ import pytest
 from hits import Run
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling import Contacts, StepContacts, TargetLoad
+from ripple_sim.coupling import Contacts, Impulse, StepContacts, TargetLoad
 from ripple_sim.solver import WaveSolver, sphere_atlas
 
 DT = 0.002
@@ -206,3 +207,14 @@ def test_a_wedged_ball_is_told_of_where_it_touches() -> None:
     assert wedged > 100
     gained = run.data.qvel[2] + 9.81 * run.data.time
     assert run.given() * np.sqrt(0.5) == pytest.approx(gained, rel=1e-3)
+
+
+def test_impulses_are_equal_where_all_their_values_are() -> None:
+    values = {"geom": "block", "other": "ball", "impulse": 0.25, "texel": (2, 0, 1), "inner": False}
+    impulse = Impulse(point=np.array([0.1, -0.0, 3.0]), **values)
+    same = Impulse(point=np.array([0.1, 0.0, 3.0]), **values)
+    assert impulse == same and hash(impulse) == hash(same) and len({impulse, same}) == 1
+    others = {"geom": "floor", "other": "box", "impulse": 0.5, "texel": (2, 0, 2), "inner": True}
+    for name, value in [*others.items(), ("point", np.array([0.1, 0.0, 3.1]))]:
+        assert dataclasses.replace(impulse, **{name: value}) != impulse
+    assert impulse != values

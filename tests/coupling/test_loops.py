@@ -1,5 +1,6 @@
 """The loops that people write: whatever way the steps are taken, the waves get each impulse once, and resets reset."""
 
+import copy
 import types
 import warnings
 from collections.abc import Callable
@@ -254,3 +255,59 @@ def test_a_teleported_body_is_no_reset() -> None:
     mujoco.mj_step(model, data)
     ripples.step(data)
     assert ripples["block"].velocity.any()
+
+
+def said_by(run: Callable[[], None]) -> list[str]:
+    """The warnings of a run."""
+    with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as said:
+        run()
+    return [str(each.message) for each in said]
+
+
+@pytest.mark.parametrize("copied", [False, True])
+def test_two_data_in_turn_are_warned_of_once(copied: bool) -> None:
+    """Copies carry the mark of what they were copied from, and others marks of their own."""
+    ripples, model, data = bounce()
+    ripples.mj_step(data)
+    other = copy.copy(data) if copied else mujoco.MjData(model)
+
+    def in_turn() -> None:
+        for _ in range(4):
+            ripples.mj_step(other)
+            ripples.mj_step(data)
+
+    assert [message for message in said_by(in_turn) if "make one Ripples for each MjData" in message] != []
+    assert said_by(in_turn) == []
+
+
+def test_data_of_one_simulation_are_not_warned_of() -> None:
+    """A new MjData for each episode, one that is reset, and two between which the simulation goes back and forth."""
+    ripples, model, first = bounce()
+    second = mujoco.MjData(model)
+
+    def episodes() -> None:
+        for data in (first, second):
+            ripples.mj_step(data, nstep=3)
+        mujoco.mj_resetData(model, first)
+        ripples.mj_step(first, nstep=3)
+        for here, there in 2 * [(first, second), (second, first)]:
+            mujoco.mj_copyData(there, model, here)
+            ripples.mj_step(there)
+
+    assert said_by(episodes) == []
+    assert ripples["block"].time == pytest.approx(7 * model.opt.timestep)
+
+
+@pytest.mark.parametrize("flag", ["contact", "constraint"])
+@pytest.mark.parametrize("at_run_time", [False, True])
+def test_contacts_that_the_model_disables_are_warned_of(flag: str, at_run_time: bool) -> None:
+    ripples, model, data = bounce()
+    bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}"))
+    if at_run_time:
+        assert said_by(lambda: ripples.mj_step(data, nstep=3)) == []
+    model.opt.disableflags |= bit
+    (message,) = said_by(lambda: ripples.mj_step(data, nstep=60))
+    assert f'<flag {flag}="disable"/>' in message
+    exec(message.split("or call ")[1], {"model": model, "mujoco": mujoco})
+    ripples.mj_step(data, nstep=60)
+    assert model.opt.disableflags == 0 and ripples["block"].height.any()
