@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import mujoco
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.errors import RenderError, RippleWarning
+from ripple_sim.errors import RenderError
 from ripple_sim.export.renderer import RippleRenderer
 from ripple_sim.solver import Material
+from ripple_sim.solver.errors import warn_caller
 
 
 def couple(physics: Any, materials: ByGeom[Material], *, looks: ByGeom[str] | None = None, **options: Any) -> Ripples:
@@ -23,7 +24,7 @@ def couple(physics: Any, materials: ByGeom[Material], *, looks: ByGeom[str] | No
     `physics.step(nstep)` couples every one of its steps, also where dm_control begins the next one already
     (`legacy_step`), so that tasks and environments of dm_control need no change; `physics.reset` flattens the surfaces.
     `physics.render` takes what it took before, and draws with the ripples, through `RippleRenderer`; text (`overlays`)
-    is not drawn, and render flags have no effect.
+    is not drawn.
 
     An environment of `composer` makes a new physics for each episode: give the environment, and the ripples are made
     anew with it, in the same `Ripples`.
@@ -62,6 +63,35 @@ def couple(physics: Any, materials: ByGeom[Material], *, looks: ByGeom[str] | No
     return ripples
 
 
+def _render_flag(flag: Any) -> int:
+    """Number of a flag of `mujoco.mjtRndFlag`, which may be named as dm_control does: "wireframe"."""
+    if not isinstance(flag, str):
+        return int(flag)
+    number = getattr(mujoco.mjtRndFlag, f"mjRND_{flag.upper()}", None)
+    if number is None:
+        names = [name for name in mujoco.mjtRndFlag.__members__ if name.startswith("mjRND_")]
+        valid = ", ".join(repr(name.removeprefix("mjRND_").lower()) for name in names)
+        raise RenderError(f"render flag {flag!r} is unknown; valid are {valid}")
+    return int(number)
+
+
+@contextlib.contextmanager
+def _overridden(scene: mujoco.MjvScene, flags: Mapping[Any, bool]) -> Iterator[None]:
+    """Give some of a scene's flags other values for a while."""
+    usual = scene.flags.copy()
+    for flag, value in flags.items():
+        scene.flags[_render_flag(flag)] = value
+    yield
+    scene.flags[:] = usual
+
+
+def _refuse_with_surfaces(**options: Any) -> None:
+    """Raise if an option is given that dm_control takes for colours alone."""
+    for name, value in options.items():
+        if value:
+            raise RenderError(f"{name} are not supported with depth or segmentation; leave {name} empty")
+
+
 def _follow(physics: Any, ripples: Ripples, looks: ByGeom[str] | None) -> None:
     """Have a physics drive the ripples and draw with them."""
     step, reset = physics.step, physics.reset
@@ -91,10 +121,12 @@ def _follow(physics: Any, ripples: Ripples, looks: ByGeom[str] | None) -> None:
     ) -> NDArray:
         if depth and segmentation:
             raise RenderError("both depth and segmentation are True; valid is one of them")
+        if depth or segmentation:
+            _refuse_with_surfaces(overlays=overlays, render_flag_overrides=render_flag_overrides)
         renderer = renderer_of(height, width)
         renderer.update_scene(physics.data, camera_id, getattr(scene_option, "ptr", scene_option))
-        if overlays or render_flag_overrides:
-            warnings.warn("overlays and render_flag_overrides are not drawn", RippleWarning, stacklevel=2)
+        if overlays:
+            warn_caller("overlays are not drawn")
         if scene_callback is not None:
             scene_callback(physics, renderer.scene)
         renderer.disable_depth_rendering()
@@ -103,6 +135,7 @@ def _follow(physics: Any, ripples: Ripples, looks: ByGeom[str] | None) -> None:
             renderer.enable_depth_rendering()
         if segmentation:
             renderer.enable_segmentation_rendering()
-        return renderer.render()
+        with _overridden(renderer.scene, render_flag_overrides or {}):
+            return renderer.render()
 
     physics.step, physics.reset, physics.render = rippling_step, rippling_reset, rippling_render

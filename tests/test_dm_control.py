@@ -81,8 +81,26 @@ def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
     assert np.abs(physics.render(**size, scene_callback=added).astype(int) - plain).max() > 50
     with pytest.raises(ValueError, match="both depth and segmentation are True; valid is one"):
         physics.render(depth=True, segmentation=True)
-    with pytest.warns(RippleWarning, match="overlays and render_flag_overrides are not drawn"):
+    with pytest.warns(RippleWarning, match="overlays are not drawn"):
+        physics.render(**size, overlays=["text"])
+    with pytest.warns(RippleWarning, match="flags have no effect: mjRND_WIREFRAME"):
         physics.render(**size, render_flag_overrides={"wireframe": True})
+    with warnings.catch_warnings(action="error"):  # the flag is the usual one again
+        np.testing.assert_array_equal(physics.render(**size), physics.render(**size))
+    with pytest.raises(ValueError, match="'lines' is unknown; valid are 'shadow', 'wireframe'"):
+        physics.render(**size, render_flag_overrides={"lines": True})
+
+
+@pytest.mark.parametrize("make", KINDS)
+@pytest.mark.parametrize("shown", ["depth", "segmentation"])
+@pytest.mark.parametrize("option", [{"overlays": ["text"]}, {"render_flag_overrides": {"shadow": False}}])
+def test_what_only_colours_have_is_refused_with_depth_and_segmentation_as_in_dm_control(
+    make: Any, shown: str, option: dict[str, Any]
+) -> None:
+    physics = make(MODEL)
+    couple(physics, MATERIALS, **OPTIONS)
+    with pytest.raises(ValueError, match=f"{next(iter(option))} are not supported with depth or segmentation"):
+        physics.render(24, 32, **{shown: True}, **option)
 
 
 class Composed:

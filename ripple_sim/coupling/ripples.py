@@ -143,7 +143,7 @@ class Ripples(Targets):
             for target, surface in coupled.soft.items()
             if surface.flex >= 0 and fine[target_name(self.model, target)]
         }
-        if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        if self._waves and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
             warn_caller(
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
                 'impulses are off by some per cent; use integrator="implicitfast", or a short time step'

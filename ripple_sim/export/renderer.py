@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-import warnings
 from pathlib import Path
 from typing import Self, TypeAlias
 
@@ -16,12 +15,12 @@ from ripple_sim.capture.frame_source import surface_of
 from ripple_sim.capture.snapshot import ShownWaves, drawn_heights
 from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.errors import RenderError, RippleWarning, SceneError
+from ripple_sim.errors import RenderError, SceneError
 from ripple_sim.render import AnyHeightMap, Camera, FixedCamera, Renderer
 from ripple_sim.render.camera import Viewpoint, find_viewpoint
 from ripple_sim.render.visuals.visual import paint_of
 from ripple_sim.scene.scene_file import CameraEntry
-from ripple_sim.solver.errors import GLError, checked, instance, whole
+from ripple_sim.solver.errors import GLError, checked, instance, warn_caller, whole
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .exporter import Exporter, camera_entry, framed
@@ -108,7 +107,9 @@ class RippleRenderer:
         }
         self.height, self.width, self._looks, self._limit = int(height), int(width), named, limit
         self.scene = mujoco.MjvScene(self.model, max_geom)
-        self._flags, self._shows = self.scene.flags.copy(), "colours"
+        self._own_geoms = 0  # entries of the scene that MuJoCo made
+        self._usual_flags, self._told_flags = self.scene.flags.copy(), set[int]()
+        self._shows = "colours"
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
         self._renderer: Renderer | None = Renderer(
@@ -191,38 +192,34 @@ class RippleRenderer:
         array
             Colours, uint8 [height, width, 3]; or depth, float32 [height, width]: distance along the camera's axis [m],
             that of the far plane where nothing is; or segmentation, int32 [height, width, 2]: id and type (of
-            `mujoco.mjtObj`) of what is seen, -1 where nothing is.
+            `mujoco.mjtObj`) of what is seen, -1 where nothing is. Before the first `update_scene` there is nothing.
 
         Raises
         ------
         RippleError
-            As `update_scene` does; if there is nothing to render, or `out` has another shape (both a ValueError, too);
-            or after `close` (a RuntimeError, too).
+            As `update_scene` does; if `out` has another shape (a ValueError, too); or after `close` (a RuntimeError,
+            too).
         """
         if self._renderer is None:
             raise GLError("the renderer is closed: render cannot be called after close; make another one")
         if data is not None:
             self.update_scene(data, -1 if camera is None else camera)
-        if self._drawn is None:
-            raise RenderError("there is nothing to render; call update_scene(data) before, or render(data)")
         shape = self.height, self.width, *{"colours": (3,), "depth": (), "segmentation": (2,)}[self._shows]
         if out is not None and out.shape != shape:
             raise RenderError(f"out has shape {list(out.shape)}; valid is {list(shape)}, that of the {self._shows}")
-        changed = np.flatnonzero(self.scene.flags != self._flags)
-        if len(changed):
-            self._flags = self.scene.flags.copy()
-            names = ", ".join(mujoco.mjtRndFlag(int(flag)).name for flag in changed)
-            warnings.warn(f"the scene's flags have no effect: {names}", RippleWarning, stacklevel=2)
+        self._warn_of_flags()
         for added in self.scene.geoms[self._own_geoms : self.scene.ngeom]:  # mjv_initGeom leaves chance values there
             added.objtype, added.objid, added.segid = int(mujoco.mjtObj.mjOBJ_UNKNOWN), -1, -1
-        if self._shows == "colours":
+        if self._drawn is None:
+            frame = self._empty_frame()
+        elif self._shows == "colours":
             frame = self._renderer.render(*self._drawn, scene=self.scene)
         else:
             image = self._renderer.surfaces(*self._drawn, scene=self.scene)
-            far = np.float32(self.model.vis.map.zfar * self.model.stat.extent)
-            nothing = (image.geom == -1) & (image.depth == 0) | (image.depth > far)  # beyond the far plane as in MuJoCo
+            beyond = image.depth > self._far  # where MuJoCo shows nothing
+            nothing = (image.geom == -1) & (image.depth == 0) | beyond
             if self._shows == "depth":
-                frame = np.where(nothing, far, image.depth)
+                frame = np.where(nothing, self._far, image.depth)
             else:
                 frame = np.where(nothing[..., None], np.int32(-1), image.identity)
         if out is None:
@@ -245,6 +242,28 @@ class RippleRenderer:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+    @property
+    def _far(self) -> np.float32:
+        """Distance of MuJoCo's far plane [m]."""
+        return np.float32(self.model.vis.map.zfar * self.model.stat.extent)
+
+    def _empty_frame(self) -> NDArray:
+        """What `render` returns where nothing is."""
+        size = self.height, self.width
+        if self._shows == "colours":
+            return np.zeros((*size, 3), np.uint8)
+        if self._shows == "depth":
+            return np.full(size, self._far, np.float32)
+        return np.full((*size, 2), -1, np.int32)
+
+    def _warn_of_flags(self) -> None:
+        """Warn once of each flag of the scene that differs from MuJoCo's default and has no effect here."""
+        changed = set(np.flatnonzero(self.scene.flags != self._usual_flags).tolist())
+        if new := changed - self._told_flags:
+            self._told_flags |= new
+            names = ", ".join(mujoco.mjtRndFlag(flag).name for flag in sorted(new))
+            warn_caller(f"the scene's flags have no effect: {names}")
 
     def _own(self, camera: AnyCamera) -> mujoco.MjvCamera:
         """A camera of MuJoCo's for its scene; the free one where ours has no such words."""

@@ -158,6 +158,11 @@ def test_integrator_that_does_not_is_warned_of() -> None:
         Ripples(ball_on_sphere(0.002, SOLREF[0.5], "RK4"), {"target": Material()}, resolution=8, backend="cpu")
 
 
+@pytest.mark.filterwarnings("error")
+def test_without_targets_no_integrator_is_warned_of() -> None:
+    Ripples(ball_on_sphere(0.002, SOLREF[0.5], "RK4"), {})
+
+
 def test_answer_does_not_depend_on_the_frame_rate(tmp_path: Path) -> None:
     mujoco.mj_saveLastXML(str(tmp_path / "scene.xml"), ball_on_sphere(0.002, "0.02 1"))
     table = 'model = "scene.xml"\n[[ripple]]\ngeom = "target"\nresolution = 32\nmaterial = {density = 50.0}\n'

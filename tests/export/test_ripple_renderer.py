@@ -164,8 +164,6 @@ def test_a_program_written_for_mujocos_renderer_runs(egg):
     model, data, ripples, _ = egg
     with RippleRenderer(model, ripples, 30, 40) as renderer:
         assert (renderer.model, renderer.height, renderer.width) == (model, 30, 40)
-        with pytest.raises(ValueError, match=r"nothing to render; call update_scene"):
-            renderer.render()
         renderer.update_scene(data)
         assert renderer.scene.ngeom == 1
         colours, given = renderer.render(), np.zeros((30, 40, 3))
@@ -186,6 +184,20 @@ def test_a_program_written_for_mujocos_renderer_runs(egg):
     renderer.close()
     with pytest.raises(RuntimeError, match="closed: render cannot be called after close"):
         renderer.render()
+
+
+def test_before_the_first_scene_there_is_nothing_to_see(egg):
+    model, _, ripples, _ = egg
+    with RippleRenderer(model, ripples, 30, 40) as renderer:
+        colours = renderer.render()
+        renderer.enable_depth_rendering()
+        depth = renderer.render()
+        renderer.enable_segmentation_rendering()
+        segmentation = renderer.render()
+    assert (colours.shape, colours.dtype, depth.shape, depth.dtype) == ((30, 40, 3), np.uint8, (30, 40), np.float32)
+    assert (segmentation.shape, segmentation.dtype) == ((30, 40, 2), np.int32)
+    assert not colours.any() and (segmentation == -1).all()
+    np.testing.assert_allclose(depth, model.vis.map.zfar * model.stat.extent)
 
 
 SHOWN = """<mujoco><statistic meansize=".3"/><worldbody><geom name="egg" size=".3" pos="-.4 0 0"/>
