@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom, own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.export.renderer import RippleRenderer
+from ripple_sim.errors import RippleError, RippleWarning, SceneError
 from ripple_sim.solver import Material
 
 try:
     import gymnasium
     from gymnasium.utils import EzPickle, RecordConstructorArgs
+
+    from ripple_sim.export.environment_renders import DRAWN_MODES, RenderedInPlace, frames_of
 except ImportError as error:
     raise ImportError(
         "ripple_sim.gymnasium needs Gymnasium, which is not installed; install it with: "
@@ -68,15 +69,6 @@ def environment_camera(env: Any, model: mujoco.MjModel, lookat: NDArray[np.float
     return camera
 
 
-def depth_buffer(model: mujoco.MjModel, depth: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What Gymnasium returns for depths [m]: MuJoCo's depth buffer, 0 at the near plane and 1 at the far one."""
-    near, far = model.stat.extent * np.array([model.vis.map.znear, model.vis.map.zfar])
-    return np.clip((1 / near - 1 / depth.astype(np.float64)) / (1 / near - 1 / far), 0, 1).astype(np.float32)
-
-
-_DRAWN = ("rgb_array", "depth_array", "rgbd_tuple")
-
-
 class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
     """A MuJoCo environment with ripples on some of its geoms.
 
@@ -87,8 +79,10 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
     - `"heights"`: geom name to the heights of its ripples [m], float32 [C, n, n].
 
     With the modes "rgb_array", "depth_array" and "rgbd_tuple", `render` returns what Gymnasium's own would, with the
-    ripples, drawn by ripple-sim. Other modes draw without them. Observation, reward and their spaces are those of the
-    environment. A pickled or copied environment begins anew, as Gymnasium's own ones do.
+    ripples: the environment's own `render` runs, with its camera and its markers, and ripple-sim draws in place of
+    Gymnasium's `MujocoRenderer` or `mujoco.Renderer`. Where it uses neither, the model is drawn with MuJoCo's free
+    camera, and a warning says so. Other modes draw without ripples. Observation, reward and their spaces are those of
+    the environment. A pickled or copied environment begins anew, as Gymnasium's own ones do.
 
     Parameters
     ----------
@@ -119,7 +113,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         its name is taken, or as `Ripples` does.
     """
 
-    _renderer: RippleRenderer | None
+    _in_place: RenderedInPlace | None
 
     def __init__(
         self,
@@ -133,15 +127,17 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         RecordConstructorArgs.__init__(self, materials=materials, looks=looks, sensors=sensors, **options)
         EzPickle.__init__(self, env, materials, looks=looks, sensors=sensors, **options)
         gymnasium.Wrapper.__init__(self, env)
-        if self.render_mode not in (None, *_DRAWN):
+        if self.render_mode not in (None, *DRAWN_MODES):
             warnings.warn(
-                f"render_mode is {self.render_mode!r}, which shows no ripples; with {', '.join(map(repr, _DRAWN))} "
-                "`render` returns frames with them",
+                f"render_mode is {self.render_mode!r}, which shows no ripples; with "
+                f"{', '.join(map(repr, DRAWN_MODES))} `render` returns frames with them",
                 RippleWarning,
                 stacklevel=2,
             )
         self._materials, self._looks, self._options = materials, looks, options
         self._lookat: NDArray[np.float64] | None = None
+        self._renders_by_itself = True
+        self._in_place = None
         self._given, self._counts = sensors or {}, dict[str, int]()  # samples of each sensor in a control step
         self._blocks: dict[str, NDArray[np.float32]] = {}
         self._couple()
@@ -186,36 +182,64 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
 
         The depth buffer is 0 at MuJoCo's near plane and 1 at its far one. Other modes are the environment's.
         """
-        if self.render_mode not in _DRAWN:
+        if self.render_mode not in DRAWN_MODES:
             return self.env.render()
-        model, data = model_and_data(self.unwrapped)
-        if self._renderer is None:
-            width, height = frame_size(self.unwrapped)
-            self._renderer = RippleRenderer(model, self.ripples, width=width, height=height, looks=self._looks)
-        if self._lookat is None:
-            self._lookat = np.median(data.geom_xpos, axis=0)
-        renderer, option = self._renderer, mujoco.MjvOption()
-        for flag, value in (getattr(getattr(self.unwrapped, "mujoco_renderer", None), "_vopt", None) or {}).items():
-            option.flags[flag] = value
-        renderer.update_scene(data, environment_camera(self.unwrapped, model, self._lookat), option)
-        frames = [] if self.render_mode == "depth_array" else [renderer.render()]
-        if self.render_mode != "rgb_array":
-            renderer.enable_depth_rendering()
-            frames.append(depth_buffer(model, renderer.render()))
-            renderer.disable_depth_rendering()
-        return frames[0] if len(frames) == 1 else tuple(frames)
+        model, _ = model_and_data(self.unwrapped)
+        if self._in_place is None:
+            self._in_place = RenderedInPlace(model, self.ripples, self._looks)
+        if not self._renders_by_itself:
+            return self._drawn_from_outside(self._in_place)
+        before = self._in_place.frames
+        problem: str | None = "returns frames that neither Gymnasium's MujocoRenderer nor mujoco.Renderer has drawn"
+        try:
+            with self._in_place.replacing():
+                frame = self.env.render()
+        except (gymnasium.error.Error, RippleError):
+            raise
+        except NotImplementedError:  # it has none
+            problem = None
+        except Exception as error:
+            if self._in_place.frames > before:
+                raise
+            problem = f"fails ({type(error).__name__}: {error})"
+        if self._in_place.frames > before:
+            return frame
+        self._renders_by_itself = False
+        if problem is not None:
+            warnings.warn(
+                f"the environment's own render {problem}; the model is drawn with MuJoCo's free camera in its place, "
+                "without what that render adds",
+                RippleWarning,
+                stacklevel=2,
+            )
+        return self._drawn_from_outside(self._in_place)
 
     def close(self) -> None:
         """Close the environment, and release what drawing needs."""
-        if self._renderer is not None:
-            self._renderer.close()
-        self._renderer = None
+        if self._in_place is not None:
+            self._in_place.close()
+        self._in_place = None
         self.env.close()
+
+    def _drawn_from_outside(self, in_place: RenderedInPlace) -> Any:
+        """A frame of an environment whose own `render` cannot be drawn for."""
+        model, data = model_and_data(self.unwrapped)
+        if self._lookat is None:
+            self._lookat = np.median(data.geom_xpos, axis=0)
+        option = mujoco.MjvOption()
+        flags = getattr(getattr(self.unwrapped, "mujoco_renderer", None), "_vopt", None) or {}
+        for flag, value in flags.items():
+            option.flags[flag] = value
+        renderer = in_place.renderer(*frame_size(self.unwrapped))
+        renderer.update_scene(data, environment_camera(self.unwrapped, model, self._lookat), option)
+        return frames_of(renderer, self.render_mode)
 
     def _couple(self) -> None:
         model, _ = model_and_data(self.unwrapped)
         self.ripples = Ripples(model, self._materials, **self._options)
-        self._renderer = None
+        if self._in_place is not None:
+            self._in_place.close()
+        self._in_place = None
         self._sensors = {
             name: self.ripples[given["geom"]].sensor(**{key: value for key, value in given.items() if key != "geom"})
             for name, given in self._given.items()

@@ -18,8 +18,9 @@ gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.envs.mujoco import MujocoEnv  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from ripple_sim import Material, RippleError, Ripples, RippleWarning  # noqa: E402
-from ripple_sim.gymnasium import RippleWrapper, depth_buffer, environment_camera, frame_size, model_and_data  # noqa: E402
+from ripple_sim import Material, RippleError, RippleRenderer, Ripples, RippleWarning  # noqa: E402
+from ripple_sim.export.environment_renders import depth_buffer  # noqa: E402
+from ripple_sim.gymnasium import RippleWrapper, environment_camera, frame_size, model_and_data  # noqa: E402
 from ripple_sim.render import find_viewpoint  # noqa: E402
 
 N = 16
@@ -27,7 +28,7 @@ MASS, GRAVITY = 0.3, 9.81
 MODEL = f"""<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 <geom name="block" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" solref="0.01 0.3"/>
 <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
-<body pos="0 0 2"><joint name="idle"/><geom size="0.01"/></body></worldbody>
+<body pos="0 0 2"><joint name="idle"/><geom name="idle" size="0.01"/></body></worldbody>
 <actuator><motor joint="idle" ctrlrange="-1 1"/></actuator></mujoco>"""
 MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 OPTIONS: dict[str, Any] = {"resolution": N, "backend": "cpu"}
@@ -135,6 +136,121 @@ def test_frames_show_the_ripples_in_the_size_of_the_environment(path: Path, mode
             assert before.shape == after.shape == (48, 64) and before.dtype == np.float32
             assert 1e-5 < np.abs(after - before).max() < 0.1
     assert len(flat) == 1 + (mode == "rgbd_tuple")
+    env.close()
+
+
+GOAL, MARKER = [0.2, 0.0, 0.3], [-0.2, 0.0, 0.2]
+
+
+class MarkedEnv(BallEnv):
+    """As those of Gymnasium-Robotics: its render moves a body and adds a marker."""
+
+    def render(self) -> Any:
+        self.data.geom("idle").xpos[:] = GOAL
+        if self.mujoco_renderer.viewer is not None:
+            self.mujoco_renderer.viewer.add_marker(pos=MARKER, size=[0.05] * 3)
+        return super().render()
+
+
+class HoldingEnv(gymnasium.Env):
+    """As mazes and kitchens: the environment with the camera is inside."""
+
+    observation_space, action_space = SPACE, gymnasium.spaces.Box(-1, 1, (1,))
+    metadata, model, data = BallEnv.metadata, property(lambda e: e.inner.model), property(lambda e: e.inner.data)
+
+    def __init__(self, path: Path, render_mode: str, **options: Any) -> None:
+        self.inner = BallEnv(path, render_mode=render_mode, **options)
+        self.render_mode = render_mode
+
+    def reset(self, **_: Any) -> Any:
+        return self.inner.reset()
+
+    def render(self) -> Any:
+        return self.inner.render()
+
+
+class RendererEnv(HoldingEnv):
+    """With MuJoCo's own renderer, and a geom of its own in the scene."""
+
+    def __init__(self, path: Path, render_mode: str, **options: Any) -> None:
+        super().__init__(path, render_mode, **options)
+        # without MuJoCo's OpenGL context, which the tests' driver may lack
+        self.renderer = mujoco.Renderer.__new__(mujoco.Renderer)
+        fields = {"model": self.model, "width": 64, "height": 48, "segmentation_rendering": False}
+        fields |= {"depth_rendering": True, "gl_context": None, "mjr_context": None}
+        for name, value in fields.items():
+            setattr(self.renderer, f"_{name}", value)
+
+    def render(self) -> Any:
+        self.data.geom("idle").xpos[:] = GOAL
+        self.renderer.update_scene(self.data, camera_with(CAMERA))
+        add_ball(self.renderer.scene)
+        return depth_buffer(self.model, self.renderer.render())
+
+
+CAMERA = {"distance": 0.9, "azimuth": 90.0, "elevation": -20.0, "lookat": np.array([0.0, 0.0, 0.1])}
+
+
+def camera_with(config: dict[str, Any]) -> mujoco.MjvCamera:
+    camera = mujoco.MjvCamera()
+    for name, value in config.items():
+        setattr(camera, name, value)
+    return camera
+
+
+def add_ball(scene: mujoco.MjvScene) -> None:
+    ball, turned, white = mujoco.mjtGeom.mjGEOM_SPHERE, np.eye(3).ravel(), np.ones(4, np.float32)
+    mujoco.mjv_initGeom(scene.geoms[scene.ngeom], ball, np.full(3, 0.05), np.array(MARKER), turned, white)
+    scene.ngeom += 1
+
+
+@pytest.mark.parametrize("kind", [BallEnv, MarkedEnv, HoldingEnv, RendererEnv])
+def test_an_environment_draws_by_its_own_render_and_with_its_own_camera(kind: type, path: Path) -> None:
+    env = RippleWrapper(kind(path, render_mode="depth_array", default_camera_config=CAMERA), {})
+    env.reset()
+    mujoco.mj_forward(env.unwrapped.model, env.unwrapped.data)
+    with warnings.catch_warnings(action="error", category=RippleWarning):
+        frame = [env.render() for _ in range(2)][-1]
+    model, data = env.unwrapped.model, mujoco.MjData(env.unwrapped.model)
+    mujoco.mj_forward(model, data)
+    marked = kind in (MarkedEnv, RendererEnv)
+    if marked:
+        data.geom("idle").xpos[:] = GOAL
+    with RippleRenderer(model, Ripples(model, {}), 48, 64) as renderer:
+        renderer.update_scene(data, camera_with(CAMERA))
+        if marked:
+            add_ball(renderer.scene)
+        renderer.enable_depth_rendering()
+        expected = depth_buffer(model, renderer.render())
+    np.testing.assert_array_equal(frame, expected)
+    assert np.ptp(frame) > 0.01
+    env.close()
+
+
+def test_the_renderers_of_others_stay_as_they_were(path: Path) -> None:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer
+
+    before = MujocoRenderer._get_viewer, mujoco.Renderer.render, mujoco.Renderer.scene
+    env = RippleWrapper(BallEnv(path, render_mode="rgb_array"), MATERIALS, **OPTIONS)
+    env.reset()
+    env.render()
+    assert (MujocoRenderer._get_viewer, mujoco.Renderer.render, mujoco.Renderer.scene) == before
+    assert not env.unwrapped.mujoco_renderer._viewers
+    env.close()
+
+
+class PaintingEnv(HoldingEnv):
+    def render(self) -> Any:
+        return np.zeros((48, 64, 3), np.uint8)
+
+
+def test_a_render_that_cannot_be_drawn_for_is_told_of(path: Path) -> None:
+    env = RippleWrapper(PaintingEnv(path, "rgb_array"), MATERIALS, **OPTIONS)
+    env.reset()
+    with pytest.warns(RippleWarning, match="neither Gymnasium's MujocoRenderer nor mujoco.Renderer has drawn; the mod"):
+        assert np.ptp(env.render()) > 0
+    with warnings.catch_warnings(action="error", category=RippleWarning):
+        env.render()
     env.close()
 
 
