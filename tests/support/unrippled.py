@@ -36,6 +36,8 @@ WORLDS = {
         <body pos=".3 0 .2"><freejoint/><geom size=".05"/><site name="b" type="capsule" size=".03 .1"/></body>""",
     "flex and skin": """<flexcomp name="cloth" type="grid" count="5 5 1" spacing=".1 .1 .1" dim="2" radius=".001"
         pos="0 0 .2"><edge equality="true"/></flexcomp>""",
+    "edges and vertices of a flex": """<flexcomp name="cloth" type="grid" count="4 4 1" spacing=".15 .15 .1" dim="2"
+        radius=".03" pos="0 0 .2" euler="20 0 0"><edge equality="true"/></flexcomp>""",
     "contacts and joints": """<geom type="plane" size="1 1 1"/><body pos="0 0 .099"><freejoint/>
         <geom type="box" size=".1 .1 .1"/></body>
         <body pos=".5 0 .5"><joint/><geom type="capsule" size=".03 .1"/></body>""",
@@ -57,6 +59,9 @@ def drawn(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> tuple[np
     if "contacts" in name:
         shown = (flag.mjVIS_CONTACTPOINT, flag.mjVIS_CONTACTFORCE, flag.mjVIS_JOINT, flag.mjVIS_TRANSPARENT)
         option.flags[list(map(int, shown))] = 1
+    if "edges" in name:
+        option.flags[[int(flag.mjVIS_FLEXVERT), int(flag.mjVIS_FLEXFACE)]] = 1
+        option.flags[int(flag.mjVIS_FLEXSKIN)] = 0
     renderer.update_scene(data, camera="side", scene_option=option)
     renderer.enable_depth_rendering()
     depth = renderer.render()

@@ -192,7 +192,8 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
         own = visual.corners.astype(np.float64)
         points, normals, uv = own[:, :3], own[:, 3:6], own[:, 6:]
         faces = np.arange(len(own)).reshape(-1, 3)
-        return f"{kind} {visual.identity[0]}", lambda _: Shape(np.zeros_like(points), points, normals, faces, uv)
+        name = f"{kind} {visual.part} {visual.identity[0]}"
+        return name, lambda _: Shape(np.zeros_like(points), points, normals, faces, uv)
     if kind == _GEOM.mjGEOM_HFIELD and asset >= 0:
         return f"hfield {asset}", lambda _: height_field(model, asset)
     return _SHAPES.get(kind)

@@ -16,6 +16,8 @@ from ripple_sim.coupling.soft import first_flex, first_skin, is_soft
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
 
+from .flexes import flex_parts
+
 # The look that takes colour, texture and gloss from the geom's MuJoCo material.
 MODEL_LOOK = "model"
 
@@ -107,6 +109,8 @@ class Visual:
         Where it is [m], and its rotation, of anything but geoms and sites.
     corners : float32 [3 m, 8], optional
         Points, normals and texture coordinates of the corners of a flex's or a skin's triangles.
+    part : str
+        Which part of a flex they are, see `flex_parts`.
     """
 
     site: bool
@@ -121,6 +125,7 @@ class Visual:
     identity: tuple[int, int] = (-1, -1)
     pose: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
     corners: NDArray[np.float32] | None = None
+    part: str = ""
 
     @property
     def visible(self) -> bool:
@@ -199,8 +204,8 @@ def content_of(drawn: mujoco.MjvGeom) -> tuple[Any, ...]:
 
 
 def visuals_in(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> list[Visual]:
-    """What an entry of a scene shows that MuJoCo made: one visual, or the edges of a flex without faces, cylinders."""
-    identity, kind, corners = (int(drawn.objid), int(drawn.objtype)), int(drawn.type), None
+    """What an entry of a scene shows that MuJoCo made: one visual, but of a flex its faces, edges and vertices."""
+    identity, kind = (int(drawn.objid), int(drawn.objtype)), int(drawn.type)
     paint: dict[str, Any] = {"rgba": np.array(drawn.rgba, dtype=np.float64), "material": int(drawn.matid)}
     if identity[1] == _SITE_OBJECT:
         return [replace(site_visual(model, identity[0]), **paint)]
@@ -208,42 +213,26 @@ def visuals_in(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> lis
         hull = kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and bool(drawn.dataid % 2)
         return [replace(geom_visual(model, identity[0]), hull=hull, **paint)]
     pose = np.array(drawn.pos), np.array(drawn.mat)
-    if kind in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN):
-        corners, pose = _corners_of(model, scene, drawn), (np.zeros(3, np.float32), np.eye(3, dtype=np.float32))
     size = np.array(drawn.size, dtype=np.float64)
-    visual = Visual(False, -1, kind, size, -1, **paint, group=0, identity=identity, pose=pose, corners=corners)
-    if corners is None or len(corners):
+    visual = Visual(False, -1, kind, size, -1, **paint, group=0, identity=identity, pose=pose)
+    if kind not in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN):
         return [visual]
-    edges = []
-    first, count, vertex = (int(n[identity[0]]) for n in (scene.flexedgeadr, scene.flexedgenum, scene.flexvertadr))
-    V = scene.flexvert.reshape(-1, 3)[vertex:]
-    for a, b in V[scene.flexedge.reshape(-1, 2)[first : first + count]]:
-        length, turn, rotation = float(np.linalg.norm(b - a)), np.zeros(4), np.zeros(9)
-        mujoco.mju_quatZ2Vec(turn, (b - a).astype(np.float64))
-        mujoco.mju_quat2Mat(rotation, turn)
-        half, pose = np.array([size[0], size[0], length / 2]), ((a + b) / 2, rotation.reshape(3, 3).astype(np.float32))
-        edges.append(replace(visual, kind=int(_GEOM.mjGEOM_CYLINDER), size=half, material=-1, pose=pose, corners=None))
-    return edges
+    in_world = replace(visual, pose=(np.zeros(3, np.float32), np.eye(3, dtype=np.float32)))
+    if kind == _GEOM.mjGEOM_SKIN:
+        return [replace(in_world, corners=_skin_corners(model, scene, identity[0]))]
+    return [
+        replace(in_world, corners=corners, part=part, material=in_world.material if part == "faces" else -1)
+        for part, corners in flex_parts(model, scene, drawn).items()
+    ]
 
 
-def _corners_of(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> NDArray[np.float32]:
-    """Corners of the triangles of a scene's flex or skin, see `Visual`."""
-    index = drawn.objid
-    if drawn.type == _GEOM.mjGEOM_FLEX:
-        first, count = int(scene.flexfaceadr[index]), int(scene.flexfaceused[index])
-        corners = slice(3 * first, 3 * (first + count))
-        points, normals, uv = (
-            array.reshape(-1, width)[corners]
-            for array, width in ((scene.flexface, 3), (scene.flexnormal, 3), (scene.flextexcoord, 2))
-        )
-        if model.flex_texcoordadr[index] < 0:
-            uv = np.zeros_like(uv)  # MuJoCo leaves there what was in memory
-    else:
-        face, vertex = model.skin_faceadr[index], scene.skinvertadr[index]
-        F = model.skin_face[face : face + model.skin_facenum[index]].ravel()
-        points, normals = (array.reshape(-1, 3)[vertex + F] for array in (scene.skinvert, scene.skinnormal))
-        start = model.skin_texcoordadr[index]
-        uv = model.skin_texcoord[start + F] if start >= 0 else np.zeros((len(F), 2))
+def _skin_corners(model: Any, scene: mujoco.MjvScene, index: int) -> NDArray[np.float32]:
+    """Corners of the triangles of a scene's skin, see `Visual`."""
+    face, vertex = model.skin_faceadr[index], scene.skinvertadr[index]
+    F = model.skin_face[face : face + model.skin_facenum[index]].ravel()
+    points, normals = (array.reshape(-1, 3)[vertex + F] for array in (scene.skinvert, scene.skinnormal))
+    start = model.skin_texcoordadr[index]
+    uv = model.skin_texcoord[start + F] if start >= 0 else np.zeros((len(F), 2))
     return np.concatenate([points, normals, uv], axis=1, dtype=np.float32)
 
 

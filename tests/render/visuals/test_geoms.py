@@ -187,6 +187,36 @@ def test_a_flex_without_texture_coordinates_has_none():
     np.testing.assert_array_equal(visual.corners[:, 6:], 0.0)
 
 
+@pytest.mark.parametrize(
+    ("flags", "parts"),
+    [
+        ({}, {"faces"}),  # its smooth skin
+        ({"FLEXFACE": 1}, {"faces"}),
+        ({"FLEXFACE": 1, "FLEXSKIN": 0}, {"faces", "edges"}),
+        ({"FLEXSKIN": 0}, {"edges"}),
+        ({"FLEXSKIN": 0, "FLEXVERT": 1, "FLEXEDGE": 0}, {"vertices"}),
+        ({"FLEXSKIN": 0, "FLEXVERT": 1, "FLEXFACE": 1}, {"faces", "edges", "vertices"}),
+    ],
+)
+def test_a_flex_has_the_parts_that_the_options_show(flags, parts):
+    thick = SHEET.replace("dim=", 'radius=".02" dim=')
+    model, data = posed(f"<mujoco><worldbody>{thick}</worldbody></mujoco>")
+    scene, option, camera = mujoco.MjvScene(model, 9), mujoco.MjvOption(), mujoco.MjvCamera()
+    for flag, value in flags.items():
+        option.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = value
+    mujoco.mjv_updateScene(model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    visuals = {visual.part: visual for visual in visuals_in(model, scene, scene.geoms[0])}
+    assert set(visuals) == parts
+    for part in parts - {"faces"}:  # tubes and balls of the flex's radius, facing outwards
+        points, normals = visuals[part].corners[:, :3].astype(float), visuals[part].corners[:, 3:6]
+        V = data.flexvert_xpos.reshape(-1, 3)
+        apart = np.linalg.norm(points[:, None] - 0.02 * normals[:, None] - V, axis=2)
+        np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-6)
+        triangles = points.reshape(-1, 3, 3)
+        outwards = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        assert (np.einsum("ti,tci->t", outwards, normals.reshape(-1, 3, 3)) >= -1e-12).all()
+
+
 def test_flexes_that_stand_for_geoms_are_not_drawn(gl):
     V, F = peanut(0.06)
     spec = mesh_spec((V, F))

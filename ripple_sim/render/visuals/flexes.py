@@ -1,0 +1,96 @@
+"""Flexes as a scene of MuJoCo's shows them: the corners of the triangles of their faces, edges and vertices.
+
+Corners are float32 [3 m, 8], three for each triangle: point, normal and texture coordinates. Edges are cylinders
+without caps, vertices balls, both as thick as the flex's radius.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from .corners import normalized
+
+_SIDES = 20  # of the cylinder of an edge, and round the ball of a vertex
+_STACKS = 10  # of that ball, from pole to pole
+
+
+def flex_parts(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> dict[str, NDArray[np.float32]]:
+    """Corners of what MuJoCo draws of a flex, as far as there is any: of its "faces", "edges" and "vertices".
+
+    The smooth skin of a flex replaces edges and vertices.
+    """
+    flex, radius = int(drawn.objid), float(drawn.size[0])
+    smooth = bool(scene.flexskinopt and scene.flexfaceused[flex])
+    parts = {}
+    if scene.flexfaceused[flex]:
+        parts["faces"] = _faces(model, scene, flex)
+    if scene.flexedgeopt and radius > 0 and not smooth:
+        parts["edges"] = _edges(scene, flex, radius)
+    if scene.flexvertopt and radius > 0 and not smooth:
+        parts["vertices"] = _balls(_vertices(scene, flex), radius)
+    return {name: corners for name, corners in parts.items() if len(corners)}
+
+
+def _vertices(scene: mujoco.MjvScene, flex: int) -> NDArray[np.float64]:
+    first, count = int(scene.flexvertadr[flex]), int(scene.flexvertnum[flex])
+    return scene.flexvert.reshape(-1, 3)[first : first + count].astype(np.float64)
+
+
+def _faces(model: Any, scene: mujoco.MjvScene, flex: int) -> NDArray[np.float32]:
+    first, count = int(scene.flexfaceadr[flex]), int(scene.flexfaceused[flex])
+    corners = slice(3 * first, 3 * (first + count))
+    points = scene.flexface.reshape(-1, 3)[corners]
+    normals = scene.flexnormal.reshape(-1, 3)[corners]
+    uv = scene.flextexcoord.reshape(-1, 2)[corners]
+    if model.flex_texcoordadr[flex] < 0:
+        uv = np.zeros_like(uv)  # MuJoCo leaves there what was in memory
+    return np.concatenate([points, normals, uv], axis=1, dtype=np.float32)
+
+
+def _edges(scene: mujoco.MjvScene, flex: int, radius: float) -> NDArray[np.float32]:
+    first, count = int(scene.flexedgeadr[flex]), int(scene.flexedgenum[flex])
+    ends = _vertices(scene, flex)[scene.flexedge.reshape(-1, 2)[first : first + count]]
+    along = normalized(ends[:, 1] - ends[:, 0])
+    helper = np.where(np.abs(along[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    across = normalized(np.cross(helper, along))
+    turn = 2 * np.pi * np.arange(_SIDES + 1) / _SIDES
+    outwards = (
+        np.cos(turn)[:, None] * across[:, None] + np.sin(turn)[:, None] * np.cross(along, across)[:, None]
+    )  # [edge, side, 3]
+    lower = ends[:, :1] + radius * outwards
+    upper = ends[:, 1:] + radius * outwards
+    return _strips(lower, upper, outwards, outwards)
+
+
+def _balls(centres: NDArray[np.float64], radius: float) -> NDArray[np.float32]:
+    turn = 2 * np.pi * np.arange(_SIDES + 1) / _SIDES
+    rise = np.pi * (np.arange(_STACKS + 1) / _STACKS - 0.5)
+    flat = np.cos(rise)[:, None, None] * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    directions = flat + np.sin(rise)[:, None, None] * [0.0, 0.0, 1.0]  # [ring, side, 3]
+    rings = centres[:, None, None] + radius * directions
+    normals = np.broadcast_to(directions, rings.shape)
+    return np.concatenate(
+        [_strips(rings[:, ring], rings[:, ring + 1], normals[:, ring], normals[:, ring + 1]) for ring in range(_STACKS)]
+    )
+
+
+def _strips(
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    lower_normals: NDArray[np.float64],
+    upper_normals: NDArray[np.float64],
+) -> NDArray[np.float32]:
+    """Corners of the bands between pairs of rings [k, sides + 1, 3], counter-clockwise as seen from outside."""
+
+    def corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+        a, b = low[:, :-1], low[:, 1:]
+        c, d = high[:, 1:], high[:, :-1]
+        return np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3)
+
+    points = corners(lower, upper)
+    normals = corners(lower_normals, upper_normals)
+    return np.concatenate([points, normals, np.zeros((len(points), 2))], axis=1, dtype=np.float32)
