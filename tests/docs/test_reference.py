@@ -13,6 +13,7 @@ import pytest
 
 import ripple_sim
 import ripple_sim.solver
+from ripple_sim.cli import COMMANDS
 from ripple_sim.encode import MARK
 from ripple_sim.render import LOOKS
 from ripple_sim.scene import SceneFile
@@ -94,6 +95,22 @@ def test_the_page_on_scene_files_has_every_table_and_the_words_of_a_look() -> No
 def test_the_tables_of_a_plan_that_take_any_key_are_told_as_tables() -> None:
     text = hook("scene_tables").plan_tables()
     assert all(f"| `{name}` | table |" in text for name in ("vary", "model"))
+
+
+def test_the_page_on_commands_has_the_help_of_every_command_in_a_column_that_fits() -> None:
+    text = hook("command_help").all_help()
+    assert re.findall(r"^## (\w+)$", text, re.MULTILINE) == list(COMMANDS)
+    assert all(f"usage: ripple-sim {name}" in text for name in COMMANDS)
+    assert max(map(len, text.splitlines())) <= 88
+
+
+def test_links_of_the_readme_lead_to_files_and_stay_inside_the_documentation() -> None:
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#]+)[^)]*\)", text)
+    assert len(links) > 20
+    assert not [link for link in links if not (DOCS.parent / link).is_file()]
+    inside = re.findall(r"\]\(([^)#]+)[^)]*\)", hook("readme").for_documentation(text))
+    assert not [link for link in inside if not (DOCS / link).is_file()]
 
 
 QUOTED = re.findall(r"(?<![*\w])\*([^*|]+)\*(?![*\w])", (DOCS / "troubleshooting.md").read_text(encoding="utf-8"))
