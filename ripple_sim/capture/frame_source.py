@@ -60,21 +60,13 @@ class Sighting:
     @property
     def positions_seen(self) -> NDArray[np.float64]:
         """Points in the world [m], [height, width, 3]; 0 where nothing is."""
-        height, width = self.image.depth.shape
-        half = np.tan(np.radians(self.pose.fovy) / 2)
-        x = half * (2 * (np.arange(width) + 0.5) - width) / height
-        y = half * (1 - 2 * (np.arange(height) + 0.5) / height)
-        way = np.stack([*np.meshgrid(x, y), np.full((height, width), -1.0)], axis=-1) @ self.pose.rotation.T
-        depth = self.image.depth[..., None].astype(np.float64)
-        return np.where(depth > 0, self.pose.position + depth * way, 0.0)
+        depth = self.image.depth
+        return np.where(depth[..., None] > 0, self.pose.points(depth), 0.0)
 
     def pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where points [..., 3] of the world [m] are in the frame: columns and rows, 0.5 in the first one's middle."""
         height, width = self.image.depth.shape
-        local = (points - self.pose.position) @ self.pose.rotation
-        scale = height / (2 * np.tan(np.radians(self.pose.fovy) / 2))
-        away = np.maximum(-local[..., 2], 1e-12)[..., None]
-        return np.array([width, height]) / 2 + scale * local[..., :2] * [1, -1] / away
+        return self.pose.pixels(points, (width, height))[0]
 
     def flow_to(self, later: Sighting) -> NDArray[np.float32]:
         """How far each pixel's surface point moves in the frame [pixels], to the right and down, [height, width, 2].
@@ -251,7 +243,8 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
         angle = np.radians(entry.orbit) * time  # around the vertical through its aim
         turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
         focus = fixed.pose().focus
-        return FixedCamera(focus + turn @ (fixed.position - focus), turn @ fixed.rotation, fixed.distance, fixed.fovy)
+        position = focus + turn @ (fixed.position - focus)
+        return dataclasses.replace(fixed, position=position, rotation=turn @ fixed.rotation)
     base = np.zeros(3) if tracked is not None else model.stat.center
     aim = base if entry.lookat is None else entry.lookat
     x, y, z = (float(value) for value in (aim if tracked is None else tracked + aim))
@@ -287,7 +280,8 @@ def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:
         return camera
     right /= np.linalg.norm(right)
     back = back / distance
-    return FixedCamera(camera.position, np.stack([right, np.cross(back, right), back], axis=1), distance, camera.fovy)
+    rotation = np.stack([right, np.cross(back, right), back], axis=1)
+    return dataclasses.replace(camera, rotation=rotation, distance=distance)
 
 
 class FrameSource:

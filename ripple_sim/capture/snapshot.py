@@ -145,7 +145,7 @@ class ShownWaves:
             if geom < model.ngeom:  # what is soft has no place of its own
                 away = float(np.linalg.norm(data.geom_xpos[geom] - pose.position)) - float(model.geom_rbound[geom])
                 distance = max(away, 0.1 * distance)
-            pixel = 2 * distance * float(np.tan(np.radians(pose.fovy) / 2)) / self._height
+            pixel = pose.pixel_height(distance, self._height)
             peak = height.peak if isinstance(height, DeviceField) else float(np.abs(height).max())
             self._highest[name] = max(self._highest[name], (peak / pixel, peak, pixel))
 

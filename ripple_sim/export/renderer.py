@@ -17,7 +17,14 @@ from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, 
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RenderError, SceneError
 from ripple_sim.render import AnyHeightMap, Camera, FixedCamera, Renderer
-from ripple_sim.render.camera import Viewpoint, find_viewpoint
+from ripple_sim.render.camera import (
+    Viewpoint,
+    find_viewpoint,
+    mujoco_camera,
+    pose_of_scene,
+    set_scene_camera,
+    with_camera_poses,
+)
 from ripple_sim.render.visuals.visual import paint_of
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.solver.errors import GLError, checked, instance, warn_caller, whole
@@ -155,13 +162,15 @@ class RippleRenderer:
         """
         now = own_data(self.model, data, drawn=True)
         state = mujoco.MjData(self.model) if self._drawn is None else self._drawn[0]
-        mujoco.mj_copyData(state, self.model, posed(self.model, now))
+        mujoco.mj_copyData(state, self.model, with_camera_poses(self.model, posed(self.model, now)))
         try:
             seen = find_viewpoint(self.model, state, camera)
+            own = self._own(camera)
         except SceneError as error:
             raise RenderError(str(error)) from None
         option, everything = scene_option or mujoco.MjvOption(), int(mujoco.mjtCatBit.mjCAT_ALL)
-        mujoco.mjv_updateScene(self.model, state, option, None, self._own(camera), everything, self.scene)
+        mujoco.mjv_updateScene(self.model, state, option, None, own, everything, self.scene)
+        seen = dataclasses.replace(seen.pose(), clip=pose_of_scene(self.scene.camera, 1.0).clip)
         self._own_geoms = self.scene.ngeom
         heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
         self._shown.look(state, heights, seen.pose())
@@ -169,11 +178,7 @@ class RippleRenderer:
             self._ripples.geom_ids[name]: height_map(heights[name], state)
             for name, height_map in self._height_maps.items()
         }
-        if isinstance(seen, Camera) and not isinstance(camera, str):
-            entry = CameraEntry(**dataclasses.asdict(seen))
-        else:  # MuJoCo's free camera where `[camera]` of a scene file has no words for it
-            entry = camera_entry(self.model, camera if isinstance(camera, str) else None)
-        self._drawn, self._seen = (state, height_maps, seen), (now, entry)
+        self._drawn, self._seen = (state, height_maps, seen), (now, self._entry(camera, own))
 
     def render(
         self, data: mujoco.MjData | None = None, camera: AnyCamera | None = None, *, out: NDArray | None = None
@@ -266,18 +271,29 @@ class RippleRenderer:
             warn_caller(f"the scene's flags have no effect: {names}")
 
     def _own(self, camera: AnyCamera) -> mujoco.MjvCamera:
-        """A camera of MuJoCo's for its scene; the free one where ours has no such words."""
-        if isinstance(camera, mujoco.MjvCamera):
-            return camera
+        """A camera of MuJoCo's for its scene; for ours the scene's own, which is set to what ours sees."""
+        pose_of_ours = getattr(camera, "pose", None)
+        if not callable(pose_of_ours):
+            return mujoco_camera(self.model, camera)
+        set_scene_camera(self.scene.camera, pose_of_ours(), self.model)
         own = mujoco.MjvCamera()
-        mujoco.mjv_defaultFreeCamera(self.model, own)
-        if isinstance(camera, Camera):
-            own.lookat, own.distance, own.azimuth, own.elevation = dataclasses.astuple(camera)[:4]
-        elif isinstance(camera, str | int) and camera != -1:
-            kind = mujoco.mjtObj.mjOBJ_CAMERA
-            own.fixedcamid = mujoco.mj_name2id(self.model, kind, camera) if isinstance(camera, str) else camera
-            own.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        own.type = mujoco.mjtCamera.mjCAMERA_USER
         return own
+
+    def _entry(self, camera: AnyCamera, own: mujoco.MjvCamera) -> CameraEntry:
+        """What `[camera]` of a scene file says of a camera; MuJoCo's free one where it has no words."""
+        if isinstance(camera, Camera):
+            return CameraEntry(**dataclasses.asdict(camera))
+        if own.type == mujoco.mjtCamera.mjCAMERA_FIXED:
+            name = self.model.camera(own.fixedcamid).name
+            return camera_entry(self.model, name or None)
+        if own.type == mujoco.mjtCamera.mjCAMERA_USER:
+            return camera_entry(self.model, None)
+        x, y, z = map(float, own.lookat)
+        fovy = 45.0 if self.model.vis.global_.orthographic else float(self.model.vis.global_.fovy)
+        return CameraEntry(
+            lookat=(x, y, z), distance=own.distance, azimuth=own.azimuth, elevation=own.elevation, fovy=fovy
+        )
 
     def _repr_html_(self) -> str | None:
         """HTML for a notebook: the present state of what was rendered last, to turn and to zoom."""

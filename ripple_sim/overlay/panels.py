@@ -94,23 +94,28 @@ class Projection:
     """
 
     def __init__(self, pose: Pose, width: int, height: int) -> None:
-        self._pose, self._middle = pose, np.array([width / 2, height / 2])
-        self._focal = height / 2 / np.tan(np.radians(pose.fovy) / 2)
+        self._pose = pose
+        self._size = width, height
 
     def pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Pixels [k, 2] of points [k, 3] in the world: x to the right, y down; NaN behind the camera."""
-        local = (points - self._pose.position) @ self._pose.rotation
-        depth = np.where(local[:, 2:] < 0, -local[:, 2:], np.nan)
-        return self._middle + self._focal * local[:, :2] * [1.0, -1.0] / depth
+        pixels, depth = self._pose.pixels(points, self._size)
+        return np.where(depth[:, None] > 0, pixels, np.nan)
 
     def metres(self, point: NDArray[np.float64]) -> float:
         """Length [m] of a pixel at a point's distance."""
-        return float((self._pose.position - point) @ self._pose.rotation[:, 2]) / self._focal
+        distance = float((self._pose.position - point) @ self._pose.rotation[:, 2])
+        return self._pose.pixel_height(distance, self._size[1])
 
     def seen(self, model: Any, data: Any, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether no geom of a MuJoCo model, its targets undeformed, hides points [k, 3] in the world."""
-        eye, hit = self._pose.position, np.zeros(1, np.int32)
-        reach = np.array([mujoco.mj_ray(model, data, eye, way, _SHOWN_GROUPS, 1, -1, hit) for way in points - eye])
+        ways, hit = self._pose.ways(points), np.zeros(1, np.int32)
+        reach = np.array(
+            [
+                mujoco.mj_ray(model, data, point - way, way, _SHOWN_GROUPS, 1, -1, hit)
+                for point, way in zip(points, ways, strict=True)
+            ]
+        )
         return (reach < 0) | (reach > 1 - _TOUCHING)
 
 

@@ -7,9 +7,12 @@ from .camera import (
     boxes_of as boxes_of,
     enclosing as enclosing,
     find_viewpoint as find_viewpoint,
+    mujoco_camera as mujoco_camera,
     orthographic as orthographic,
     perspective as perspective,
+    pose_of_scene as pose_of_scene,
     scissor_of as scissor_of,
+    set_scene_camera as set_scene_camera,
     view_matrix as view_matrix,
     within as within,
 )

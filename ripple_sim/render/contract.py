@@ -156,10 +156,10 @@ FRAME = Struct(
     "Frame",
     view_projection="mat4",
     eye="vec4",  # xyz [m]; w: distance of the focus [m]
-    focus="vec4",  # the point that the camera is about [m]
+    focus="vec4",  # the point that the camera is about [m]; w: how far away the floor begins to show [m]
     ray="vec4",  # through the middle of the frame, one metre along the camera's axis; w: near plane [m]
     ray_right="vec4",  # from there to the frame's right edge; w: far plane [m]
-    ray_up="vec4",
+    ray_up="vec4",  # likewise; w: 1 where rays are parallel and start beside each other, 0 in perspective
     zenith="vec4",  # radiance of the background overhead
     horizon="vec4",
     sky="vec4",  # ambient radiance from above; w: share of the soft boxes in it

@@ -293,9 +293,8 @@ class DrawnScene:
         for target in self.targets:
             origin, rotation = target_pose(data, target.geom)
             target.update(rotation, origin, self._occluders)
-        pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
         for instances in self._instances:
-            instances.update(data, pose.position, pixels, self._occluders, sharp)
+            instances.update(data, pose, self._height, self._occluders, sharp)
         self._assets.objects.bind()
 
     def balls(self, data: Any) -> NDArray[np.float64]:
@@ -327,4 +326,9 @@ class DrawnScene:
     def layers(self, data: Any, pose: Pose) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
         """Everything transparent with the balls about it, the furthest first."""
         layers = [(each.bounds(data), each) for each in self.transparent]
-        return sorted(layers, key=lambda layer: -np.linalg.norm(layer[0][:, :3].mean(axis=0) - pose.eye))
+
+        def distance(layer: tuple[NDArray[np.float64], SurfaceMesh | Instances]) -> float:
+            offset = layer[0][:, :3].mean(axis=0) - pose.eye
+            return float(-offset @ pose.rotation[:, 2] if pose.orthographic else np.linalg.norm(offset))
+
+        return sorted(layers, key=lambda layer: -distance(layer))

@@ -23,7 +23,7 @@ from ripple_sim.solver.gl import GLContext
 from ripple_sim.solver.texels.topology import ChartPage
 from ripple_sim.solver.waves.height_map import DeviceHeightMap
 
-from .camera import Pose, perspective, view_matrix
+from .camera import Pose, view_matrix
 from .contract import DEFINES, FRAME, Binding, Unit
 
 _PACKAGE = "ripple_sim.render"
@@ -97,9 +97,6 @@ def _release(gl: GLContext, created: list[Any]) -> None:
         created.clear()
 
 
-_NEAR, _FAR = 0.02, 200.0  # clip planes, in camera distances
-
-
 class FrameUniforms:
     """The block's values and its buffer.
 
@@ -121,15 +118,15 @@ class FrameUniforms:
 
     def set_camera(self, pose: Pose, aspect: float) -> None:
         """Set whatever depends on the camera only; `aspect` is width over height."""
-        near, far = _NEAR * pose.distance, _FAR * pose.distance
-        matrix = perspective(pose.fovy, aspect, near, far, pose.shear) @ view_matrix(pose)
-        half = np.tan(np.radians(pose.fovy) / 2)
+        near, far = pose.clip_planes
+        half_width, half_height = pose.half_sizes(aspect)
+        matrix = pose.projection(aspect) @ view_matrix(pose)
         self.values["view_projection"] = matrix.T  # column by column
         self.set_vector("eye", pose.eye, pose.distance)
-        self.set_vector("focus", pose.focus)
+        self.set_vector("focus", pose.focus, 0.0 if pose.clip is None else near)
         self.set_vector("ray", pose.rotation @ [*pose.shear, -1.0], near)
-        self.set_vector("ray_right", half * aspect * pose.rotation[:, 0], far)
-        self.set_vector("ray_up", half * pose.rotation[:, 1])
+        self.set_vector("ray_right", half_width * pose.rotation[:, 0], far)
+        self.set_vector("ray_up", half_height * pose.rotation[:, 1], float(pose.orthographic))
 
     def bind(self) -> None:
         """Upload the values and bind the block for all programs."""

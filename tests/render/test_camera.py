@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import render
-from ripple_sim.errors import SceneError
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.render import Camera, Pose, linear_to_srgb, srgb_to_linear
 from ripple_sim.solver import RippleError
 
@@ -37,11 +37,12 @@ def default_camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
         (1, lambda model: mujoco_camera("FIXED", fixedcamid=1)),
         ("side", lambda model: mujoco_camera("FIXED", fixedcamid=0)),
         (mujoco_camera(), lambda model: mujoco_camera()),
+        (mujoco_camera(orthographic=1), lambda model: mujoco_camera(orthographic=1)),  # the model's word counts there
         (Camera((0.3, -0.2, 0.1), 2.5, 37.0, -28.0, 35.0), lambda model: mujoco_camera(**FREE)),
         (mujoco_camera("TRACKING", trackbodyid=1), lambda model: mujoco_camera("TRACKING", trackbodyid=1)),
         (mujoco_camera("FIXED", fixedcamid=1), lambda model: mujoco_camera("FIXED", fixedcamid=1)),
     ],
-    ids=["-1", "id", "name", "free", "ours", "tracking", "fixed"],
+    ids=["-1", "id", "name", "free", "free with a flag", "ours", "tracking", "fixed"],
 )
 def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look_and_open_as_mujocos(given, theirs):
     model = mujoco.MjModel.from_xml_string(MJCF)
@@ -68,7 +69,6 @@ def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look
         (mujoco_camera("USER"), "type is 3; valid are mjCAMERA_FREE"),
         (mujoco_camera("TRACKING"), "trackbodyid is -1; valid are 0 to 1"),
         (mujoco_camera("FIXED"), "no camera -1"),
-        (mujoco_camera(orthographic=1), "orthographic"),
     ],
 )
 def test_what_is_no_camera_is_refused(given, message: str):
@@ -187,3 +187,86 @@ def test_the_orthographic_box_is_clip_space(half_width, depth):
     shown, w = projected(render.orthographic(half_width, depth), points)
     np.testing.assert_allclose(shown, corners, atol=1e-12)
     np.testing.assert_array_equal(w, 1.0)
+
+
+SENSED = """<mujoco><statistic center="0 0 0" extent="3"/><worldbody><geom size=".1"/>
+<camera name="plain" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" fovy="30"/>
+<camera name="orthographic" pos="1 -5 1" xyaxes="1 0 0 0 .2 1" projection="orthographic" fovy="3"/>
+<camera name="off centre" pos="0 -5 1" xyaxes="1 .1 0 0 .2 1" resolution="200 120" sensorsize="8e-3 4.8e-3"
+  focal="6e-3 6e-3" principal="1e-3 .5e-3"/>
+<camera name="two focal lengths" pos="0 -5 1" xyaxes="1 0 0 0 .2 1" resolution="200 120" sensorsize="8e-3 4.8e-3"
+  focal="3e-3 6e-3"/></worldbody></mujoco>"""
+
+
+def in_opengl(camera: mujoco.MjvGLCamera, aspect: float, points: np.ndarray) -> np.ndarray:
+    """Points in clip space as glFrustum and glOrtho define it, by OpenGL's manual."""
+    bottom, top, near, far = (float(getattr(camera, f"frustum_{name}")) for name in ("bottom", "top", "near", "far"))
+    half = float(camera.frustum_width) or aspect * (top - bottom) / 2
+    left, right = camera.frustum_center - half, camera.frustum_center + half
+    forward, up = np.array(camera.forward, float), np.array(camera.up, float)
+    x, y, z = np.stack([np.cross(forward, up), up, -forward]) @ (points - camera.pos).T
+    if camera.orthographic:
+        clip = [(2 * x - right - left) / (right - left), (2 * y - top - bottom) / (top - bottom)]
+        return np.stack([*clip, -(2 * z + far + near) / (far - near)], axis=1)
+    clip = [(2 * near * x + (right + left) * z) / (right - left), (2 * near * y + (top + bottom) * z) / (top - bottom)]
+    return np.stack([*clip, (-(far + near) * z - 2 * far * near) / (far - near)], axis=1) / -z[:, None]
+
+
+@pytest.mark.parametrize("name", ["plain", "orthographic", "off centre", "two focal lengths"])
+def test_cameras_of_all_projections_show_points_and_clip_where_opengl_does_with_mujocos_frustum(name):
+    model = mujoco.MjModel.from_xml_string(SENSED)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    scene, aspect = mujoco.MjvScene(), SIZE[0] / SIZE[1]
+    mujoco.mjv_updateCamera(model, data, render.mujoco_camera(model, name), scene)
+    points = np.random.default_rng(3).normal(size=(30, 3))
+    theirs = in_opengl(mujoco.mjv_averageCamera(*scene.camera), aspect, points)
+    for pose in (render.find_viewpoint(model, data, name), render.pose_of_scene(scene.camera, 2.0)):
+        ours, _ = projected(pose.projection(aspect) @ render.view_matrix(pose), points)
+        np.testing.assert_allclose(ours, theirs, atol=2e-5)
+        shown, depth = pose.pixels(points, SIZE)
+        np.testing.assert_allclose(shown, (0.5 + 0.5 * theirs[:, :2] * [1, -1]) * SIZE, atol=1e-2)
+        np.testing.assert_allclose(depth, -((points - pose.position) @ pose.rotation)[:, 2])
+        copied = mujoco.MjvScene()
+        render.set_scene_camera(copied.camera, pose, model)
+        again = in_opengl(copied.camera[0], aspect, points)
+        np.testing.assert_allclose(again, theirs, atol=2e-5)
+
+
+@pytest.mark.parametrize("name", ["plain", "orthographic", "off centre", "two focal lengths"])
+def test_points_of_a_depth_image_lie_where_their_pixels_are(name):
+    model = mujoco.MjModel.from_xml_string(SENSED)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    pose = render.find_viewpoint(model, data, name)
+    depth = np.random.default_rng(4).uniform(1.0, 9.0, (6, 10))
+    shown, away = pose.pixels(pose.points(depth), (10, 6))
+    middles = np.stack(np.meshgrid(np.arange(10) + 0.5, np.arange(6) + 0.5), axis=-1)
+    np.testing.assert_allclose(shown, middles, atol=1e-9)
+    np.testing.assert_allclose(away, depth)
+
+
+def test_scenes_whose_camera_sees_nothing_are_refused():
+    with pytest.raises(SceneError, match="the scene's camera sees nothing: its frustum is 0 m to 0 m high"):
+        render.pose_of_scene(mujoco.MjvScene().camera, 1.0)
+
+
+def test_a_camera_whose_pose_was_never_computed_gets_it_with_a_warning():
+    model = mujoco.MjModel.from_xml_string(MJCF)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    with pytest.warns(RippleWarning, match="the data has no poses of cameras"):
+        pose = render.find_viewpoint(model, data, "side")
+    np.testing.assert_allclose(pose.position, [0, -5, 1])
+    assert not data.cam_xmat.any()
+
+
+def test_a_camera_that_rides_along_stays_about_what_carries_it():
+    model = mujoco.MjModel.from_xml_string(MJCF)
+    data = mujoco.MjData(model)
+    distances = []
+    for x in (0.0, 200.0):
+        data.qpos[0] = x
+        mujoco.mj_forward(model, data)
+        distances.append(render.find_viewpoint(model, data, 1).distance)
+    assert distances[0] == pytest.approx(distances[1]) == pytest.approx(np.hypot(2.0, 0.2), rel=0.2)

@@ -42,14 +42,29 @@ WORLDS = {
         <geom type="box" size=".1 .1 .1"/></body>
         <body pos=".5 0 .5"><joint/><geom type="capsule" size=".03 .1"/></body>""",
 }
+_SEVERAL = """<geom type="plane" size="0 0 1" pos="0 0 -.2"/><geom type="box" size=".3 .2 .1" euler="20 30 40"/>
+    <geom size=".2" pos=".4 .2 .2"/><geom type="capsule" size=".05 .2" pos="0 -.4 .1" euler="30 60 0"/>"""
+_SENSOR = 'resolution="128 96" sensorsize="8e-3 6e-3"'
+_SHALLOW = '<statistic extent="1"/><visual><map znear="1.75" zfar="2.2"/></visual>'
+# by world: attributes of its camera, and what else the model says of cameras
+CAMERAS = {
+    "orthographic camera": ('projection="orthographic" fovy="1.6"', ""),
+    "camera off its centre": (f'{_SENSOR} focal="6e-3 6e-3" principal="1e-3 .5e-3"', ""),
+    "camera with two focal lengths": (f'{_SENSOR} focal="4e-3 7e-3"', ""),
+    "camera with near clip planes": ('fovy="50"', _SHALLOW),
+    "orthographic camera with near clip planes": ('projection="orthographic" fovy="1.6"', _SHALLOW),
+    "orthographic free camera": ("", '<visual><global orthographic="true" fovy="2.5"/></visual>'),
+}
+WORLDS |= dict.fromkeys(CAMERAS, _SEVERAL)
 _TENDON = '<tendon><spatial width=".02"><site site="a"/><site site="b"/></spatial></tendon>'
 
 
 def state_of(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A model with a sphere called "target" beside the rest, in its first state."""
-    return posed(f"""<mujoco>{_FINE}<asset><mesh name="rock" vertex="{_CORNERS}"/>
+    camera, view = CAMERAS.get(name, ('fovy="50"', ""))
+    return posed(f"""<mujoco>{_FINE}{view}<asset><mesh name="rock" vertex="{_CORNERS}"/>
         <hfield name="hills" nrow="8" ncol="8" size=".5 .5 .3 .1" elevation="{_BUMPS}"/></asset><worldbody>
-        {_TARGET}{WORLDS[name]}<camera name="side" pos="1.2 -1.2 .9" xyaxes="1 1 0 -.3 .3 1" fovy="50"/>
+        {_TARGET}{WORLDS[name]}<camera name="side" pos="1.2 -1.2 .9" xyaxes="1 1 0 -.3 .3 1" {camera}/>
         </worldbody>{_TENDON if "tendon" in name else ""}</mujoco>""")
 
 
@@ -62,7 +77,7 @@ def drawn(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> tuple[np
     if "edges" in name:
         option.flags[[int(flag.mjVIS_FLEXVERT), int(flag.mjVIS_FLEXFACE)]] = 1
         option.flags[int(flag.mjVIS_FLEXSKIN)] = 0
-    renderer.update_scene(data, camera="side", scene_option=option)
+    renderer.update_scene(data, camera=-1 if "free" in name else "side", scene_option=option)
     renderer.enable_depth_rendering()
     depth = renderer.render()
     renderer.disable_depth_rendering()

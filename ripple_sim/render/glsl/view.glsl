@@ -4,10 +4,13 @@
 #include "glsl/held_uniforms.glsl"
 
 VARYING vec2 screen;          // position in the frame, from -1 to 1
+VARYING vec3 start;           // of the ray: the eye, unless rays are parallel
+VARYING vec3 eye_local;       // the same along the floor's axes from its origin, and up; below it where there is no floor
 VARYING vec3 way;             // along the ray, one metre along the camera's axis
 VARYING vec3 way_local;       // the same along the floor's axes, and down to it
-flat VARYING vec3 eye_local;  // along the floor's axes from its origin, and up; below it where there is no floor
 flat VARYING vec4 limits;     // half sizes of the floor, near and far plane [m]
+flat VARYING float parallel;  // 1 where rays are parallel
+flat VARYING float nearest;   // how far away the floor begins to show [m]
 flat VARYING vec3 focus_local;
 flat VARYING vec3 around;   // ambient light on the open floor, without the soft box of the key light
 flat VARYING vec3 key_box;  // and that
@@ -43,11 +46,19 @@ void main()
     vec2 corner = 4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2), drawn = corner / reach - 1.0;
     screen = corner * span - 1.0;
 #endif
-    way = ray.xyz + screen.x * ray_right.xyz + screen.y * ray_up.xyz;
+    parallel = ray_up.w;
+    way = ray.xyz;
+    start = eye.xyz;
+    vec3 beside = screen.x * ray_right.xyz, above = screen.y * ray_up.xyz;
+    if (parallel > 0.0)
+        start = start + beside + above;
+    else
+        way = way + beside + above;
     way_local = along_floor(way) * vec3(1.0, 1.0, -1.0);
-    eye_local = along_floor(eye.xyz - floor_origin.xyz);
+    eye_local = along_floor(start - floor_origin.xyz);
     eye_local.z = floor_origin.w > 0.0 ? eye_local.z : -1.0;
     limits = vec4(floor_u.w, floor_v.w, ray.w, ray_right.w);
+    nearest = focus.w;
     focus_local = along_floor(focus.xyz - floor_origin.xyz);
     around = ambient(floor_normal.xyz, vec3(0.0), vec3(0.0));
     key_box = diffuse_box(0, floor_normal.xyz);
@@ -68,11 +79,12 @@ vec2 beside_edges()
     return abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy) - way_local.z * limits.xy;
 }
 
-// Negative where the ray meets the floor's upper side; varies linearly across the edges.
+// Negative where the ray meets the floor's upper side beyond the near plane; varies linearly across the edges.
 float beside_floor()
 {
     vec2 beside = beside_edges();
-    return max(max(beside.x, beside.y), 1e-6 * eye_local.z - way_local.z);
+    float too_near = nearest * way_local.z - eye_local.z;
+    return max(max(max(beside.x, beside.y), 1e-6 * eye_local.z - way_local.z), too_near);
 }
 
 bool meets_floor()
@@ -89,12 +101,14 @@ float floor_distance()
 // Distance along the camera's axis of a depth in the buffer.
 float eye_distance(float depth)
 {
-    return limits.z * limits.w / (limits.w - depth * (limits.w - limits.z));
+    float range = limits.w - limits.z;
+    return parallel > 0.0 ? limits.z + depth * range : limits.z * limits.w / (limits.w - depth * range);
 }
 
 // Depth of the floor in the buffer; 1 where the ray misses it.
 float floor_depth()
 {
     float met = (limits.w - limits.z * limits.w * way_local.z / eye_local.z) / (limits.w - limits.z);
-    return meets_floor() ? met : 1.0;
+    float met_parallel = (floor_distance() - limits.z) / (limits.w - limits.z);
+    return meets_floor() ? parallel > 0.0 ? met_parallel : met : 1.0;
 }

@@ -62,7 +62,7 @@ void main()
 #else
     vec3 albedo = floor_albedo.rgb;
 #endif
-    vec3 world = eye.xyz + at * way;
+    vec3 world = start + at * way;
     vec2 place = floor_map_position(plane);
     // the blocks of 2 x 2 that share their light are texels of the next level
     float level = 1.0;

@@ -76,7 +76,7 @@ struct SurfaceSample {
 // What lies behind the point where a ray, refracted as in water, leaves the object; blurred where that is turbid.
 vec3 seen_through(vec3 position, vec3 normal, float thickness, float size, float turbidity)
 {
-    vec3 bent = refract(normalize(position - eye.xyz), normal, 0.75);
+    vec3 bent = refract(normalize(position - start), normal, 0.75);
     vec4 exit = view_projection * vec4(position + thickness * size * bent, 1.0);
     vec3 shown = textureLod(frame_behind, 0.5 + 0.5 * exit.xy / exit.w, 6.0 * turbidity).rgb;
     vec3 boxes = environment(bent, 0.1 + 0.5 * turbidity, vec3(0.0)) - environment(bent, 1.0, vec3(0.0));
@@ -91,7 +91,7 @@ vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, fl
     float roughness = object.base.x, metallic = object.base.y, sheen = object.base.z, coat = object.base.w;
     float translucency = object.volume.x, transparency = object.volume.y, emission = object.volume.z;
     float size = object.place.y, bumps = object.place.z;  // those that the shading normal accounts for
-    vec3 normal = surface.rippled, flat_normal = surface.normal, view = normalize(eye.xyz - position);
+    vec3 normal = surface.rippled, flat_normal = surface.normal, view = normalize(start - position);
     // interpolated normals of bumpy silhouettes may look away from the camera
     normal = normalize(normal + max(0.1 - dot(normal, view), 0.0) * view);
     vec3 reflected = reflect(-view, normal);
@@ -238,7 +238,7 @@ void main()
         }
         alike &= left;
         left &= ~alike;
-        vec4 color = lit_solid(surface, eye.xyz + at * way, spread, block);
+        vec4 color = lit_solid(surface, start + at * way, spread, block);
         sum += float(bitCount(alike)) / float(SAMPLES) * vec4(dithered(color.rgb) * color.a, color.a);
         again = true;
     } while (left != 0);

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.camera import Pose
 from ripple_sim.render.contract import CasterMap
 from ripple_sim.render.resources import Resources
 
@@ -129,10 +130,8 @@ class Instances:
                 buffer.write(content)
         self.shadow_biases = np.zeros(len(members))
 
-    def update(
-        self, data: Any, eye: NDArray[np.float64], pixels: float, occluders: Occluders, sharp: bool = False
-    ) -> None:
-        """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye.
+    def update(self, data: Any, pose: Pose, height: int, occluders: Occluders, sharp: bool = False) -> None:
+        """Take the poses from MuJoCo's data; they are seen from a pose in frames of a height [pixels].
 
         With `sharp` edges are as MuJoCo has them, and what is round is so at any size.
         """
@@ -140,15 +139,16 @@ class Instances:
             position, rotation = (np.array(each) for each in zip(*self._poses, strict=True))
         else:
             poses = (data.site_xpos, data.site_xmat) if self._visual.site else (data.geom_xpos, data.geom_xmat)
-            position, rotation = (pose[self._indices] for pose in poses)
+            position, rotation = (each[self._indices] for each in poses)
         self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
         self._records["origin"] = position
         self._records["core_size"], self._records["shell_size"] = self._sizes[sharp].transpose(1, 0, 2)
         self._buffer.write(self._records.tobytes())
         half = self._records["core_size"] + self._records["shell_size"]
         balls, radius = np.column_stack([position, np.linalg.norm(half, axis=1)]), half.max(axis=1)
-        away = np.maximum(np.linalg.norm(position - eye, axis=1) - radius, 0.1 * radius)
-        largest = float((radius / away).max()) * pixels
+        away = np.maximum(np.linalg.norm(position - pose.position, axis=1) - radius, 0.1 * radius)
+        nearest = np.ones_like(radius) if pose.orthographic else away
+        largest = float((radius / nearest).max()) / pose.pixel_height(1.0, height)
         # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
         needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
         self._segments = _FINEST if sharp else next((n for n in _LEVELS if n >= needed), _LEVELS[-1])

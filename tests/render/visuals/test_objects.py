@@ -5,6 +5,7 @@ import pytest
 from mujoco_models import posed
 from shader_functions import evaluated
 
+from ripple_sim.render.camera import Pose
 from ripple_sim.render.visuals import LOOKS, Assets, Look, ObjectTable, Occluders, find_look, instances_of, visuals_of
 from ripple_sim.solver import RippleError
 
@@ -22,7 +23,7 @@ def visuals(resources):
 
     def update(eye, pixels):
         for each in drawn:
-            each.update(data, np.asarray(eye), pixels, occluders)
+            each.update(data, Pose(np.asarray(eye), np.eye(3), 1.0, fovy=90.0), 2 * pixels, occluders)
 
     return drawn, data, update
 
