@@ -1,4 +1,4 @@
-"""The line that imports each name of the Python page, under its heading."""
+"""The line that imports each name of the Python pages, under its heading."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ PUBLIC = ("ripple_sim", "ripple_sim.gymnasium", "ripple_sim.dm_control", "ripple
 
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:
-    """Put the line after each heading of the Python page that names something to import."""
-    if page.file.src_uri != "python.md":
+    """Put the line after each heading of a Python page that names something to import."""
+    if not page.file.src_uri.startswith("python"):
         return html
     heading = r'<h3 id="(ripple_sim\.[\w.]+)" class="doc doc-heading">.*?</h3>'
     return re.sub(heading, lambda m: f"{m[0]}\n{_code(import_line(m[1]))}", html, flags=re.DOTALL)

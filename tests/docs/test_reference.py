@@ -33,9 +33,10 @@ TABLES = dict(hook("scene_tables").tables(SceneFile))
 
 
 def objects() -> list[str]:
-    """What the page on Python shows, with all that its modules of errors define."""
+    """What the pages on Python show, with all that their modules of errors define."""
     found = []
-    for path in re.findall(r"^::: (\S+)$", (DOCS / "python.md").read_text(encoding="utf-8"), re.MULTILINE):
+    pages = "\n".join(page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("python*.md")))
+    for path in re.findall(r"^::: (\S+)$", pages, re.MULTILINE):
         if path.startswith(("ripple_sim.gymnasium", "ripple_sim.dm_control")):
             continue  # extras, which may be missing; their own tests import them
         if path.endswith(".errors"):
@@ -58,7 +59,7 @@ def test_the_import_line_of_a_name_imports_it(path: str) -> None:
     assert space[path.rsplit(".", 1)[1]] is named(path)
 
 
-def test_the_page_has_every_public_name() -> None:
+def test_the_pages_have_every_public_name() -> None:
     shown = {path.rsplit(".", 1)[1] for path in objects()}
     assert {*ripple_sim.__all__, *ripple_sim.solver.__all__, "SceneError"} <= shown
 
