@@ -2,9 +2,11 @@
 
     python examples/benchmarks/energy_ledger.py [SCENES] [SEED]
 
-A body falls on a target, or flies at it. Masses, time steps, materials, geom types, joints of the target, friction
-cones and contact damping are random. What counts is the greatest rise of the energy of bodies and waves together over
-its largest value so far, as a share of that; potential energy counts from where the body touches. No actuators act.
+A body falls on a target, or flies at it. Masses, time steps, materials, geom types, joints of the target, contact
+damping and MuJoCo's options are random: its solver, integrator, cone, Jacobian, noslip iterations, and all flags but
+those that leave nothing to see, as without contacts or gravity. What counts is the greatest rise of the energy of
+bodies and waves together over its largest value so far, as a share of that; potential energy counts from where the
+body touches. No actuators act.
 """
 
 from __future__ import annotations
@@ -47,6 +49,40 @@ PRISM = "-.5 -.4 -.1  .5 -.4 -.1  .5 .4 -.1  -.5 .4 -.1  -.4 -.3 .1  .4 -.3 .1  
 STONE = "-1 -1 -1  1 -1 -1  1 1 -1  -1 1 -1  0 0 1.2"
 
 
+SOLVERS = ("Newton", "CG", "PGS")
+JACOBIANS = ("dense", "sparse", "auto")
+CONES = ("pyramidal", "elliptic")
+# RK4 is refused; "discrete" came with MuJoCo 3.17, and does not take PGS
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
+# those that do not change what a scene is about, as far as this MuJoCo has them
+FLAGS = [
+    flag
+    for flag in (
+        "equality", "frictionloss", "limit", "damper", "spring", "clampctrl", "warmstart", "filterparent",
+        "actuation", "refsafe", "sensor", "midphase", "eulerdamp", "autoreset", "nativeccd", "island", "multiccd",
+        "override", "energy", "fwdinv", "invdiscrete", "sleep", "diagexact",
+    )
+    if hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag.upper()}") or hasattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}")
+]  # fmt: skip
+
+
+def random_options(rng: np.random.Generator) -> tuple[str, str]:
+    """Attributes of <option> and of <flag>: of flags half are named."""
+    solver, jacobian, cone = (str(rng.choice(each)) for each in (SOLVERS, JACOBIANS, CONES))
+    known = hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE") and solver != "PGS"
+    integrator = str(rng.choice(INTEGRATORS if known else INTEGRATORS[:-1]))
+    noslip, impratio = rng.choice([0, 0, 5]), rng.choice([1, 1, 10])
+    options = (
+        f'solver="{solver}" jacobian="{jacobian}" cone="{cone}" integrator="{integrator}" '
+        f'noslip_iterations="{noslip}" impratio="{impratio}"'
+    )
+    chosen = {flag: str(rng.choice(["disable", "enable"])) for flag in FLAGS if rng.random() < 0.5}
+    if integrator == "discrete":
+        # it cannot do without islands
+        chosen["island"] = "enable"
+    return options, " ".join(f'{flag}="{value}"' for flag, value in chosen.items())
+
+
 class Scene(NamedTuple):
     """A model, its material, how long it runs [s], and what it is in words."""
 
@@ -69,13 +105,13 @@ def random_scene(rng: np.random.Generator) -> Scene:
     spring = JOINTS[joint].format(k=weight * 400, d=rng.choice([0.0, weight]))
     x, y = rng.uniform(-0.15, 0.15, 2)
     angles = " ".join(f"{each:.1f}" for each in rng.choice([0.0, 1.0]) * rng.uniform(-180, 180, 3))
-    cone, integrator = rng.choice(["pyramidal", "elliptic"]), rng.choice(["Euler", "implicitfast"])
+    options, flags = random_options(rng.spawn(1)[0])
     # a free target floats: the body flies at it
     free = joint == "free"
     gravity = 0.0 if free else -9.81
     above = TOPS[target] + 1.8 * radius
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{dt}" cone="{cone}" integrator="{integrator}" gravity="0 0 {gravity}"/>
+        f"""<mujoco><option timestep="{dt}" {options} gravity="0 0 {gravity}"><flag {flags}/></option>
         <asset><mesh name="prism" vertex="{PRISM}"/>
         <mesh name="stone" vertex="{STONE}" scale="{0.6 * radius} {0.6 * radius} {0.6 * radius}"/></asset>
         <default><geom {contact}/></default><worldbody>
@@ -99,7 +135,7 @@ def random_scene(rng: np.random.Generator) -> Scene:
         )
     words = (
         f"{shape} of {mass:.3g} kg, {joint} {target} of {weight:.3g} kg, dt {1e3 * dt:.2f} ms, "
-        f"{contact or 'default contact'}, {cone}, {integrator}"
+        f"{contact or 'default contact'}, {options}, {flags}"
     )
     return Scene(model, material, 0.8, words)
 

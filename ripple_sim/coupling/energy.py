@@ -172,6 +172,27 @@ class Pair(NamedTuple):
         return min(self.key), max(self.key)
 
 
+class DualDiagonal:
+    """The diagonal of A + R, the matrix of MuJoCo's dual problem, with A the inverse mass that each row feels.
+
+    The solver PGS and the noslip iterations read R from there and not from `efc_R`. Newton and CG make no such matrix.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self._rows = np.arange(data.nefc if len(data.efc_AR) else 0)
+        if mujoco.mj_isSparse(model) and len(self._rows):
+            row_of_entry = np.repeat(self._rows, data.efc_AR_rownnz)
+            self._entries = np.flatnonzero(data.efc_AR_colind[: len(row_of_entry)] == row_of_entry)
+            self._rows = row_of_entry[self._entries]
+        else:
+            self._entries = self._rows * (data.nefc + 1)
+        self._A = data.efc_AR[self._entries] - data.efc_R[self._rows]
+
+    def set_compliance(self, data: mujoco.MjData, R: Floats) -> None:
+        """Take other regularizations R [1/kg], one a row."""
+        data.efc_AR[self._entries] = self._A + R[self._rows]
+
+
 class ContactProblem:
     """MuJoCo's rows with gaps and velocities counted from surfaces that move as under the last force.
 
@@ -201,6 +222,7 @@ class ContactProblem:
                 rows_of[pair.key] += count
         # as they are without mobility, and what each row would add if all rows of its pairs bore alike [1/kg]
         self._R, self._aref, self._mobility = data.efc_R.copy(), data.efc_aref.copy(), np.zeros(data.nefc)
+        self._dual = DualDiagonal(model, data)
         # acceleration without contacts [m/s^2]
         self._smooth = self._along(data.qacc_smooth)
         for i, rows, whole, mine in self._contacts:
@@ -276,6 +298,7 @@ class ContactProblem:
         if data.nisland:
             # the solver takes `aref` from all rows, but these from the rows of islands
             data.iefc_R[:], data.iefc_D[:] = data.efc_R[data.map_iefc2efc], data.efc_D[data.map_iefc2efc]
+        self._dual.set_compliance(data, R)
         for i, rows, whole, _ in self._contacts:
             if rows != whole:
                 # an elliptic cone: friction stays what it is

@@ -7,7 +7,6 @@ Bodies that MuJoCo lets sleep have no contacts in its data; they still press on 
 from __future__ import annotations
 
 import collections
-import copy
 import dataclasses
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,37 +24,10 @@ from .hertz import Hits
 from .model import CoupledModel
 from .patches import Footprints, corners, load_points
 from .rest_filter import DEFAULT_TIME_CONSTANT, NO_FORCES, RestFilter, TexelForces
+from .sleep import SLEEP, at_rest
 from .soft import target_pose
 
-SLEEP, _STATE = int(mujoco.mjtEnableBit.mjENBL_SLEEP), int(mujoco.mjtState.mjSTATE_INTEGRATION)
-
-# Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their forces are those of
-# statics, however deep the bodies lie in each other.
-_NO_SPRING, _RIGID = (1e6, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
 _TINY = 1e-12
-# Geoms that are apart by this share of the smaller one's size are meant to touch.
-_NEAR = 1e-3
-
-
-def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData | None:
-    """Data with the contacts of all bodies as they lie, all awake and at rest; None where none of them sleeps."""
-    if (data.tree_asleep < 0).all():
-        return None
-    still = copy.copy(model)
-    still.opt.enableflags &= ~SLEEP
-    for kind in ("geom", "pair", "flex"):
-        getattr(still, f"{kind}_solref")[:] = _NO_SPRING
-        getattr(still, f"{kind}_solimp")[:] = _RIGID
-    # planes, which have no end, are given a radius of 0
-    still.geom_margin += _NEAR * np.minimum(still.geom_aabb[:, 3:].min(axis=1), still.geom_rbound)
-    state = np.empty(mujoco.mj_stateSize(model, _STATE))
-    mujoco.mj_getState(model, data, state, _STATE)
-    resting = mujoco.MjData(still)
-    mujoco.mj_setState(still, resting, state, _STATE)
-    resting.qvel[:], resting.qacc_warmstart[:] = 0.0, 0.0
-    mujoco.mj_forward(still, resting)
-    return resting
-
 
 # A body falls asleep after it was slow for this many steps: `mjMINAWAKE` of MuJoCo.
 _SLOW_STEPS = 10

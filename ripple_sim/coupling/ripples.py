@@ -37,7 +37,7 @@ from .stepping import (
 )
 from .target_warnings import AmplitudeCheck, collision_warnings
 from .targets import Targets
-from .two_way import TwoWay
+from .two_way import TwoWay, require_suited_options
 
 __all__ = ["Impulse", "Ripples"]
 
@@ -72,8 +72,8 @@ class Ripples(Targets):
     two_way : bool
         Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
         Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects
-        `data.qvel` and `data.qpos`; `xfrc_applied` and the other applied forces in `data` are yours alone. See
-        "Two-way coupling" in how-it-works.md.
+        `data.qvel` and `data.qpos`; `xfrc_applied` and the other applied forces in `data` are yours alone. The
+        integrator RK4 is refused. See "Two-way coupling" in how-it-works.md.
     contacts : mapping, optional
         Geom to the geoms that collide for it, where a visible geom ripples and others, on its body or on bodies welded
         to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
@@ -143,6 +143,8 @@ class Ripples(Targets):
             for target, surface in coupled.soft.items()
             if surface.flex >= 0 and fine[target_name(self.model, target)]
         }
+        if two_way:
+            require_suited_options(self.model)
         if self._waves and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
             warn_caller(
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "

@@ -60,7 +60,8 @@ class StepClock:
     nobody saw after a reset bring the time to where it was, or beyond; or a keyframe sets it to any value. The mark is
     a negative number in `data.solver_fwdinv[0]`: a step leaves it alone, `copy` keeps it, and `mj_resetData`, a
     keyframe and the automatic reset of a simulation that diverges all wipe it out. MuJoCo's own values there are not
-    negative, and written only where the flag `fwdinv` is enabled: then no mark is made.
+    negative, and written only where the flag `fwdinv` is enabled: then no mark is made, and of resets that time does
+    not tell only those round a divergence are seen, by MuJoCo's warning of it.
 
     A clock follows one simulation, in whichever data that is copied to. Data of two simulations in turn shows as data
     that was looked at before the last look's, carries a mark, so that nobody has reset it, and does not go on from
@@ -77,6 +78,7 @@ class StepClock:
         self._timestep = 0.0
         self._looked_at = weakref.WeakSet[mujoco.MjData]()
         self._latest: weakref.ref[mujoco.MjData] | None = None
+        self._diverged = False
 
     def __getstate__(self) -> dict[str, object]:
         # MuJoCo's data loses the mark when it is pickled; that is no reset
@@ -95,6 +97,11 @@ class StepClock:
                 found = data.solver_fwdinv[0] = -1.0 - _random.random()
             reset = reset or self._mark not in (None, found)
             self._mark = found
+        else:
+            # the automatic reset leaves its warning behind, and any other one wipes it out
+            diverged = divergence(data) is not None
+            reset = reset or (before is not None and diverged != self._diverged)
+            self._diverged = diverged
         goes_on = before is not None and not reset and time > before
         in_turn = self._is_back_at(data) and not was_reset_by_user and not goes_on
         self._time, self._timestep = time, timestep

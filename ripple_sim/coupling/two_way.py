@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
@@ -27,6 +28,7 @@ from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
 from .geoms import ENDLESS, TARGET_TYPES
 from .model import CoupledModel
 from .patches import MAX_CORNERS, SAME_PLACE
+from .sleep import SLEEP, at_rest, sleeping_dofs, wake
 
 _GEOM = mujoco.mjtGeom
 
@@ -140,6 +142,15 @@ class _Place(NamedTuple):
         return float(self.moving @ field.reshape(-1)[self.load.texels].astype(np.float64))
 
 
+def require_suited_options(model: mujoco.MjModel) -> None:
+    """Raise `SceneError` for options of a model with which contact forces cannot be found anew."""
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        raise SceneError(
+            'two_way cannot work with the integrator "RK4", which takes four contact forces in each step, of which '
+            'MuJoCo keeps the last alone; take integrator="implicitfast" (or "Euler", "implicit"), or two_way=False'
+        )
+
+
 class TwoWay:
     """Contacts with surfaces that give way.
 
@@ -178,6 +189,7 @@ class TwoWay:
         self._forces: dict[Key, float] = {}
         self._paid: dict[Key, float] = {}
         self._before: dict[int, NDArray[np.float32]] = {}
+        self._just_begun = True
         self._work: list[tuple[Pair, float, float]] = []
 
     def solve(self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, pending: bool) -> dict[int, Load]:
@@ -194,15 +206,17 @@ class TwoWay:
         pending : bool
             Whether `data` has yet to take the step.
         """
+        require_suited_options(self._coupled.model)
         dt = self._coupled.model.opt.timestep
         contacts = self._touching(solved)
         known, self._places = self._places, {}
         for key, touched in contacts.items():
             self._places[key] = self._place(key, touched, known.get(key))
-        reached = self._reached(solved)
         asleep = [key for key in known if key not in self._places and key in self._forces]
         asleep = [key for key in asleep if self._coupled.are_still(solved, key)]
         self._places |= {key: known[key] for key in asleep}
+        reached = self._reached(solved)
+        self._wake(data)
         self._heights = {target: self._waves[target].height for target, _ in self._places}
         pairs = self._surfaces(dt)
         forces, self._work = {key: self._forces[key] for key in asleep}, []
@@ -217,6 +231,8 @@ class TwoWay:
             self._move(data, self._velocity_change(solved, *old, pending=pending), dt, pending=pending)
             self._work = problem.works()
         for key, point, normal in reached:
+            if self._coupled.are_still(solved, key):
+                continue
             forces[key] = self._push(data, solved, pairs[key], point, normal, dt, pending=pending)
         self._forces = forces
         self._velocity_change.latest = data.qvel.copy()
@@ -300,6 +316,28 @@ class TwoWay:
     def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
 
+    # What wakes
+
+    def _wake(self, data: mujoco.MjData) -> None:
+        """Wake bodies that sleep where the surface moves faster than what MuJoCo lets sleep.
+
+        At the beginning all that sleep on a target are woken: what they press it with is not known.
+        """
+        model = self._coupled.model
+        if not model.opt.enableflags & SLEEP:
+            return
+        tolerance = float(model.opt.sleep_tolerance)
+        keys = [key for key, place in self._places.items() if self._speed_under(key, place) > tolerance]
+        if self._just_begun:
+            resting = at_rest(model, data)
+            keys += [] if resting is None else list(self._touching(resting))
+            self._just_begun = False
+        wake(model, data, (int(self._coupled.bodies[geom]) for key in keys for geom in key))
+
+    def _speed_under(self, key: Key, place: _Place) -> float:
+        """Of the surface at a place [m/s]."""
+        return abs(place.mean(self._waves[key[0]].velocity))
+
     # How the surfaces move
 
     def _surfaces(self, dt: float) -> dict[Key, Pair]:
@@ -344,7 +382,8 @@ class TwoWay:
     # What happens to the bodies
 
     def _move(self, data: mujoco.MjData, change: NDArray[np.float64], dt: float, *, pending: bool) -> None:
-        """Change velocities [m/s] as the step would have, and positions with them."""
+        """Change velocities [m/s] as the step would have, and positions with them; what sleeps stays."""
+        change = np.where(sleeping_dofs(self._coupled.model, data), 0.0, change)
         data.qvel += change
         if not pending:
             mujoco.mj_integratePos(self._coupled.model, data.qpos, change, dt)

@@ -148,6 +148,16 @@ def test_there_is_none_where_mujoco_writes_there() -> None:
     assert (data.solver_fwdinv >= 0).all()
 
 
+@pytest.mark.filterwarnings("ignore:MuJoCo")
+def test_automatic_resets_are_seen_where_there_is_no_mark() -> None:
+    model, data, clock = made(fwdinv="enable")
+    data.qvel[:] = np.nan
+    mujoco.mj_step(model, data)
+    assert not goes_on(clock, model, data)
+    mujoco.mj_step(model, data)
+    assert goes_on(clock, model, data)
+
+
 TUMBLING = """<mujoco><option solver="{}" integrator="{}" noslip_iterations="{}"><flag sleep="{}"/></option><worldbody>
 <geom type="plane" size="2 2 1"/><geom type="box" size="0.6 0.1 0.1" pos="0 0.2 0.1"/>
 <body pos="0 0 0.2"><freejoint/><geom type="box" size="0.1 0.08 0.06"/></body>

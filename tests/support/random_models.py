@@ -36,6 +36,15 @@ HITTERS = ("free", "free", "free", "driven", "mocap", "second target", "link")
 # a direct current motor without load is so many times as fast as geoms meet
 NO_LOAD = 3.0
 INTEGRATORS = {"Euler": 0.3, "implicit": 0.15, "implicitfast": 0.35, "RK4": 0.1, "discrete": 0.1}
+# MuJoCo's flags with which the same happens but for numerics, as far as this MuJoCo has them
+FLAGS = [
+    flag
+    for flag in (
+        "equality", "frictionloss", "limit", "damper", "spring", "clampctrl", "filterparent", "refsafe", "sensor",
+        "midphase", "eulerdamp", "autoreset", "energy", "fwdinv", "invdiscrete", "diagexact",
+    )
+    if hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag.upper()}") or hasattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}")
+]  # fmt: skip
 SCALES = (1e-3, 0.03, 1.0, 30.0, 1e3)
 
 
@@ -207,11 +216,16 @@ class RandomModel:
         # share of the models with each of them
         shares = {"override": 0.1, "multiccd": 0.5, "nativeccd": 0.8, "warmstart": 0.8, "island": 0.8}
         flags = {flag: rng.random() < share for flag, share in shares.items()} | {"sleep": self.sleeps}
+        more = rng.spawn(1)[0]
+        flags |= {flag: more.random() < 0.5 for flag in FLAGS}
+        flags["invdiscrete"] &= integrator != "RK4"
+        jacobian, noslip = more.choice(["dense", "sparse", "auto"]), more.choice([0, 0, 5])
         text = " ".join(f'{flag}="{"enable" if on else "disable"}"' for flag, on in flags.items())
         overrides = f'o_solref="{self._solref()}" o_solimp="0.9 0.95 0.001 0.5 2"' if flags["override"] else ""
         gravity = vector(0.1 * self.speed / self.stopping * rng.standard_normal(3) * (rng.random() < 0.5))
         return f"""<option timestep="{self.timestep:.6g}" integrator="{integrator}" solver="{solver}" cone="{cone}"
-            gravity="{gravity}" sdf_initpoints="50" impratio="{rng.choice([1, 1, 10])}" {overrides}>
+            jacobian="{jacobian}" noslip_iterations="{noslip}" gravity="{gravity}"
+            sdf_initpoints="50" impratio="{rng.choice([1, 1, 10])}" {overrides}>
             <flag {text}/></option>"""
 
 

@@ -1,0 +1,62 @@
+"""MuJoCo's sleep: what sleeps where, and what wakes it.
+
+MuJoCo stops the bodies of an island that were slow for some steps, and leaves out their contacts. It does not know
+that a rippling surface below them may move.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+
+from ripple_sim.solver.kernel import Bools
+
+SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+# Velocity that wakes a sleeping tree and moves nothing [m/s or rad/s]: MuJoCo wakes what has any.
+_NUDGE = 1e-200
+
+# Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their forces are those of
+# statics, however deep the bodies lie in each other.
+_NO_SPRING, _RIGID = (1e6, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
+# Geoms that are apart by this share of the smaller one's size are meant to touch.
+_NEAR = 1e-3
+
+
+def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData | None:
+    """Data with the contacts of all bodies as they lie, all awake and at rest; None where none of them sleeps."""
+    if (data.tree_asleep < 0).all():
+        return None
+    still = copy.copy(model)
+    still.opt.enableflags &= ~SLEEP
+    for kind in ("geom", "pair", "flex"):
+        getattr(still, f"{kind}_solref")[:] = _NO_SPRING
+        getattr(still, f"{kind}_solimp")[:] = _RIGID
+    # planes, which have no end, are given a radius of 0
+    still.geom_margin += _NEAR * np.minimum(still.geom_aabb[:, 3:].min(axis=1), still.geom_rbound)
+    state = np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+    resting = mujoco.MjData(still)
+    mujoco.mj_setState(still, resting, state, _STATE)
+    resting.qvel[:], resting.qacc_warmstart[:] = 0.0, 0.0
+    mujoco.mj_forward(still, resting)
+    return resting
+
+
+def sleeping_dofs(model: mujoco.MjModel, data: mujoco.MjData) -> Bools:
+    """Whether each degree of freedom belongs to a tree that sleeps, [nv]."""
+    if not model.opt.enableflags & SLEEP:
+        return np.zeros(model.nv, dtype=np.bool_)
+    return np.asarray(data.tree_asleep[model.dof_treeid] >= 0)
+
+
+def wake(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int]) -> None:
+    """Wake bodies in the coming step, with all that fell asleep together with them."""
+    for body in bodies:
+        tree = int(model.body_treeid[body])
+        if tree >= 0 and data.tree_asleep[tree] >= 0:
+            data.qvel[model.tree_dofadr[tree]] = _NUDGE
