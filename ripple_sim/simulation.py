@@ -50,6 +50,12 @@ class Simulation:
 
     Attributes
     ----------
+    scene : Scene
+    model : mujoco.MjModel
+        A copy of the scene's, with its own time step.
+    data : mujoco.MjData
+    ripples : Ripples
+        The waves on the scene's targets.
     steps_per_frame : int
         Physics steps in a frame.
     limited : dict of str to bool

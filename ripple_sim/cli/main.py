@@ -8,6 +8,7 @@ Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number af
 from __future__ import annotations
 
 import contextlib
+import difflib
 import io
 import logging
 import os
@@ -15,7 +16,7 @@ import re
 import resource
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,7 +25,7 @@ import tyro.extras
 from tyro.conf import Positional, arg
 
 from ripple_sim import __version__
-from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.errors import RippleError, shown
 
 from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
 from .reports import BatchCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
@@ -84,7 +85,7 @@ def _run(command: Any) -> int:
         log.addHandler(_Log())
 
     from ripple_sim.errors import DisplayError, EncodingError
-    from ripple_sim.solver.errors import GLError, shown
+    from ripple_sim.solver.errors import GLError
     from ripple_sim.solver.files import OF_THE_DISK, OF_THE_NAME
 
     end_in_good_order()
@@ -196,6 +197,10 @@ def parse(argv: Sequence[str]) -> Any:
     if list(argv) == ["--version"]:
         print(f"ripple-sim {__version__}")
         return None
+    if argv and not argv[0].startswith("-") and argv[0] not in COMMANDS:
+        near = _nearest(argv[0], COMMANDS)
+        names = ", ".join(COMMANDS)
+        raise RippleError(f"there is no command {shown(argv[0])}{near}; commands are {names}; see ripple-sim --help")
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
@@ -215,5 +220,20 @@ def parse(argv: Sequence[str]) -> Any:
     parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
     part = parts[1] if len(parts) > 1 else text
     said = " ".join(line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)).strip()
-    command = f" {argv[0]}" if argv and argv[0] in COMMANDS else ""
-    raise RippleError(f"{said.rstrip('.')}; see ripple-sim{command} --help")
+    command = f" {argv[0]}" if argv else ""
+    unknown = re.match(r"Unrecognized options: (--[\w-]+)", said)
+    near = _nearest(unknown[1], _options_of(argv[0])) if unknown and argv else ""
+    raise RippleError(f"{said.rstrip('.')}{near}; see ripple-sim{command} --help")
+
+
+def _nearest(word: str, words: Iterable[str]) -> str:
+    """A question that names the word that was probably meant, or nothing."""
+    near = difflib.get_close_matches(word, list(words), n=1)
+    return f" (did you mean {near[0]}?)" if near else ""
+
+
+def _options_of(command: str) -> list[str]:
+    """The options of a command, from its help."""
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        parse([command, "--help"])
+    return re.findall(r"(?<![\w-])--[a-z][a-z-]*", text.getvalue())

@@ -1,7 +1,7 @@
 """Commands that show a scene or write it to a file: `render`, `drop`, `export` and `view`.
 
-On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log gets a line
-where that takes long.
+On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log gets lines where
+the job takes long.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -27,6 +28,10 @@ from . import arguments
 if TYPE_CHECKING:
     from ripple_sim.scene.scene import Scene
     from ripple_sim.viewer.window import Window
+
+
+# A job that is over within this time [s] prints no progress into a pipe or a log.
+_SILENT_TIME = 10.0
 
 
 # Fields, defaults and help of commands are those of the options; what is not here is read as its type says.
@@ -122,14 +127,30 @@ def _stage(module: str) -> str:
     return _STAGES[max(fitting, key=len)] if fitting else module
 
 
-@contextlib.contextmanager
-def frame_progress(title: str, total: int | None = None) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a title, and below it frames done of a total, rate and remaining time, on stderr while the block runs.
+def _progress_lines() -> Callable[[int, int], None]:
+    """A function of the frames done and of all frames that prints a line at each tenth, once the job takes long."""
+    start = time.monotonic()
+    told = 0
 
-    Yields a function of the number of frames done and of all frames, or None if stderr is not a terminal.
+    def report(done: int, total: int) -> None:
+        nonlocal told
+        tenths = 10 * done // total if total else 0
+        if tenths > told and time.monotonic() - start > _SILENT_TIME:
+            told = tenths
+            print(f"ripple-sim: {10 * tenths} % done, {done} of {total} frames", file=sys.stderr, flush=True)
+
+    return report
+
+
+@contextlib.contextmanager
+def frame_progress(title: str, total: int | None = None) -> Iterator[Callable[[int, int], None]]:
+    """Show how far a job is on stderr while the block runs; yields a function of the frames done and of all frames.
+
+    A terminal gets a title, and below it frames done of a total, rate and remaining time. A pipe or a log gets a line
+    at each tenth of a job that takes long.
     """
     if not sys.stderr.isatty():
-        yield None
+        yield _progress_lines()
         return
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("frames"), _Rate(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:

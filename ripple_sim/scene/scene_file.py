@@ -235,7 +235,21 @@ def converted(table: Any, schema: type[Entry], what: str) -> Entry:
     try:
         return msgspec.convert(table, schema)
     except msgspec.ValidationError as error:
-        raise SceneError(f"{what}: {str(error).replace('`$.', '`')}") from error
+        message = str(error).replace("`$.", "`")
+        words = _words_at(schema, message)
+        advice = f"; it must be {', '.join(map(repr, words[:-1]))} or {words[-1]!r}" if words else ""
+        raise SceneError(f"{what}: {message}{advice}") from error
+
+
+def _words_at(schema: type[msgspec.Struct], message: str) -> tuple[str, ...]:
+    """The words that a field takes whose path stands at the end of a message of msgspec's, if it takes only some."""
+    found = re.search(r" - at `(.*)`$", message)
+    kind: Any = schema
+    for name in re.findall(r"\w+", found[1] if found else ""):
+        table = table_of(kind)
+        fields = {field.name: field.type for field in msgspec.structs.fields(table)} if table else {}
+        kind = fields.get(name)
+    return typing.get_args(kind) if typing.get_origin(kind) is typing.Literal else ()
 
 
 # Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not overflow.

@@ -30,7 +30,8 @@ def test_keys_may_be_written_as_tables_or_with_quotes(tmp_path):
         ('scenes = ["scene.toml"]', 'meshes = {files = ["*.obj"]}', r"no mesh fits '\*.obj'"),
         ("uniform = [0, 360]", "uniform = 360", "camera.azimuth: Expected `array"),
         ("fps = 20", "fsp = 20", r"unknown key 'fsp' in \[store\]; valid are video, size, fps"),
-        ("fps = 20", 'video = "avi"', "Invalid enum value 'avi'"),
+        ("fps = 20", 'video = "avi"', "Invalid enum value 'avi'.*must be 'mp4', .* or 'none'"),
+        ("fps = 20", "video = false", "got `bool`.*store.video`; it must be 'mp4', .* or 'none'"),
     ],
     ids=lambda value: value[:30] or "none",
 )

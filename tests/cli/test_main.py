@@ -35,7 +35,9 @@ def test_the_version_is_that_of_the_package(capsys):
     ("argv", "named"),
     [
         ([], "render, drop, export, batch, atlas, modes, info"),
-        (["fly"], "fly"),
+        (["fly"], "there is no command 'fly'; commands are render, drop"),
+        (["rendr"], r"there is no command 'rendr' \(did you mean render\?\)"),
+        (["render", "duck", "-o", "x.mp4", "--sise", "3"], r"--sise, 3 \(did you mean --size\?\)"),
         (["render", "duck"], "--output"),
         (["render", "-o", "x.mp4"], "SCENE"),
         (["render", "duck", "-o", "x.mp4", "--colour", "red"], "--colour"),

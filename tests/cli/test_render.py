@@ -7,9 +7,11 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 from scene_files import write_scene
 
@@ -29,12 +31,29 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
     return told
 
 
-def test_a_pipe_stays_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+def piped(monkeypatch: pytest.MonkeyPatch, seconds: float) -> list[str]:
+    """What a pipe gets of a job of 200 frames that takes some seconds."""
     pipe = io.StringIO()
+    clock = iter(np.linspace(0.0, seconds, 201))
     monkeypatch.setattr(sys, "stderr", pipe)
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    now = [next(clock)]
     with frame_progress("renderer") as report:
-        assert report is None
-    assert pipe.getvalue() == ""
+        for done in range(1, 201):
+            now[0] = next(clock)
+            report(done, 200)
+    return pipe.getvalue().splitlines()
+
+
+def test_a_pipe_stays_silent_while_a_job_is_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert piped(monkeypatch, 9.0) == []
+
+
+def test_a_pipe_gets_a_line_at_each_tenth_of_a_long_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = piped(monkeypatch, 100.5)
+    assert lines[0] == "ripple-sim: 10 % done, 20 of 200 frames"
+    assert lines[-1] == "ripple-sim: 100 % done, 200 of 200 frames"
+    assert len(lines) == 10
 
 
 def test_a_terminal_shows_title_and_frames_done(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
