@@ -1,7 +1,10 @@
 """Keep the tests' atlases out of the user's cache; what tests of several rooms need."""
 
 import os
+import select
+import shutil
 import signal
+import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,9 +15,9 @@ import pytest
 if TYPE_CHECKING:
     from ripple_sim.solver import Atlas
 
-# reasons to skip a test that hold on a machine that has everything else: extras under another licence, and data that
-# is not shipped
-_ALLOWED_SKIPS = ("pymeshfix", "bpy", "known meshes")
+# reasons to skip a test that hold on a machine that has everything else: extras under another licence, data that is not
+# shipped, and what new systems do not have any more
+_ALLOWED_SKIPS = ("pymeshfix", "bpy", "known meshes", "OSMesa")
 
 # of the first process: those that it starts find atlases there
 if "RIPPLE_SIM_TESTS" not in os.environ:
@@ -65,3 +68,21 @@ def animal() -> "Atlas":
     from ripple_sim.solver import Mesh, build_atlas
 
     return build_atlas(Mesh.from_arrays(*limbed()), 32)
+
+
+@pytest.fixture
+def screen() -> Iterator[str]:
+    """Name of a display on a virtual screen."""
+    if shutil.which("Xvfb") is None:
+        pytest.skip("needs Xvfb (on Debian and Ubuntu: apt-get install xvfb)")
+    reading, writing = os.pipe()
+    words = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(words, pass_fds=[writing], stderr=subprocess.DEVNULL)
+    os.close(writing)
+    try:
+        assert select.select([reading], [], [], 20)[0], "Xvfb does not start"
+        yield f":{os.read(reading, 16).decode().strip()}"
+    finally:
+        os.close(reading)
+        server.terminate()
+        server.wait()

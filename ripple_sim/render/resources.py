@@ -6,7 +6,6 @@ targets.
 
 from __future__ import annotations
 
-import contextlib
 import warnings
 import weakref
 from collections.abc import Sequence
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext
 from ripple_sim.solver.texels.topology import ChartPage
 from ripple_sim.solver.waves.height_map import DeviceHeightMap
@@ -47,7 +45,7 @@ class Resources:
     def __init__(self, gl: GLContext, owner: object) -> None:
         self.gl = gl
         self._created: list[Any] = []
-        self._finalizer = weakref.finalize(owner, _release, gl, self._created)
+        self._finalizer = weakref.finalize(owner, gl.discard, self._created)
         self._finalizer.atexit = False
 
     def __getattr__(self, name: str) -> Any:
@@ -80,21 +78,13 @@ class Resources:
         return texture
 
     def release(self) -> None:
-        """Release everything; a second time does nothing."""
+        """Release everything, at once or when the context is next entered; a second time does nothing."""
         self._finalizer()
+        self.gl.free()
 
     def _own(self, created: Any) -> Any:
         self._created.append(created)
         return created
-
-
-def _release(gl: GLContext, created: list[Any]) -> None:
-    with contextlib.suppress(GLError), gl as ctx:  # nothing is left of a lost context
-        # a deleted framebuffer must not stay bound
-        ctx.detect_framebuffer(0).use()
-        for each in reversed(created):
-            gl.release(each)
-        created.clear()
 
 
 class FrameUniforms:

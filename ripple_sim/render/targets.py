@@ -133,6 +133,7 @@ class FramePass:
         """Run over a framebuffer, at a depth."""
         width, height = framebuffer.size
         framebuffer.viewport = (0, 0, self._reach * width, self._reach * height)
+        framebuffer.use()
         self.program["level"] = level
         self.program["reach"] = self._reach
         self._triangle.render(moderngl.TRIANGLES, vertices=3)

@@ -1,10 +1,12 @@
 from .context import (
     GLContext as GLContext,
     create_context as create_context,
-    current_context as current_context,
     is_software as is_software,
-    load_egl as load_egl,
     load_shader as load_shader,
     select_device as select_device,
     shared_context as shared_context,
+)
+from .current import (
+    current_context as current_context,
+    load_egl as load_egl,
 )

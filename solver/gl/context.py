@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
+import gc
 import importlib.resources
 import os
 import re
@@ -19,6 +20,7 @@ import shutil
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -27,6 +29,7 @@ from typing import Any
 import moderngl
 
 from ..errors import GLError
+from .current import EGLCurrent, Restore, current_kept, leave_current, load_egl, release_current
 
 
 def load_shader(package: str, name: str, stage: str = "", **defines: object) -> str:
@@ -121,9 +124,22 @@ def _spare_full_disks() -> None:
 
 
 def create_context(device: int | None) -> moderngl.Context:
-    """Create a headless context on a device, or the first that yields one: OpenGL 4.3, or else 4.1; raises GLError."""
+    """Create a headless context on a device, or the first that yields one: OpenGL 4.3, or else 4.1; raises GLError.
+
+    What is current in this thread stays so.
+    """
+    _check_system()
+    with current_kept():
+        return _create_current(device)
+
+
+def _check_system() -> None:
     if not sys.platform.startswith("linux"):
         raise GLError(f"no OpenGL over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'")
+
+
+def _create_current(device: int | None) -> moderngl.Context:
+    """Create a context as `create_context` does, and leave it current."""
     _spare_full_disks()
     devices = range(8) if device is None else [device]
     reason = "no device"
@@ -151,30 +167,6 @@ def create_context(device: int | None) -> moderngl.Context:
     raise GLError(f"no OpenGL 4.1 context on any EGL device ({reason}); {advice}")
 
 
-def current_context() -> int | None:
-    """Handle of the EGL context that is current in this thread; None if there is none."""
-    return load_egl().eglGetCurrentContext()
-
-
-def release_current() -> None:
-    """Leave this thread without a current context, so that another thread may take it."""
-    egl = load_egl()
-    egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)
-
-
-@functools.cache
-def load_egl() -> ctypes.CDLL:
-    """The EGL library that moderngl has loaded already."""
-    for libraries in _LIBRARIES:
-        with contextlib.suppress(OSError):
-            egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
-            for function in (egl.eglGetCurrentContext, egl.eglGetCurrentDisplay, egl.eglGetProcAddress):
-                function.restype = ctypes.c_void_p
-            egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
-            return egl
-    raise GLError("the EGL library is gone since the context was created; see `ripple-sim info`")
-
-
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
 _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
@@ -192,9 +184,12 @@ _TURN, _PAUSE = 1e-3, 1e-4
 class GLContext:
     """One headless OpenGL context on EGL, shared by the GPU wave solver and the renderer.
 
-    Use it as a context manager: entering makes the context current, frees the objects that Python has collected, and
-    returns the `moderngl.Context`; leaving the outermost block restores the previous context and raises `GLError` if
-    the driver recorded an error meanwhile. Any thread may enter: one at a time, the others wait.
+    Use it as a context manager: entering makes the context current, frees the objects that nobody needs any more, and
+    returns the `moderngl.Context`; leaving the outermost block restores what the program had current, and raises
+    `GLError` if the driver recorded an error meanwhile. Any thread may enter: one at a time, the others wait.
+
+    Python collects objects at any time, in any thread, also in the middle of somebody's frame. So finalizers call no
+    OpenGL: they `discard` objects, which are freed when the context is next entered from outside.
 
     Parameters
     ----------
@@ -209,29 +204,43 @@ class GLContext:
     """
 
     def __init__(self, device: int | None = None) -> None:
-        self._process, self._lock, self._owner = os.getpid(), threading.RLock(), ""
-        self._ctx = create_context(device)
-        # objects may be collected in any thread, at any time; they are freed when the context is next entered
+        self._process = os.getpid()
+        self._lock = threading.RLock()
+        self._owner = ""  # name of the thread that is in
+        self._depth = 0  # of its `with` blocks
+        self._restore: Restore = release_current
+        self._collects = True  # whether Python looked for garbage before
+        # batches of objects to free
+        self._discarded: deque[list[Any]] = deque()
+        self._shaders: dict[str, moderngl.ComputeShader] = {}
+        # programs that nobody uses, by their number in OpenGL, the longest idle first; of all, the sources and the
+        # uniforms that they began with
+        self._idle: dict[int, Any] = {}
+        self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
+        _check_system()
+        with current_kept():
+            self._ctx = _create_current(device)
+            self._find_driver()
+
+    def _find_driver(self) -> None:
+        """Take in what the new context, which is current, says of itself."""
+        own = EGLCurrent.of_thread()
+        if own is None:
+            raise GLError("a new OpenGL context does not become current in this thread; see `ripple-sim info`")
+        self._current = own
+        # moderngl's objects wait in `objects` once they are collected
         self._ctx.gc_mode = "context_gc"
-        self._handle = current_context()
+        self._no_framebuffer = self._ctx.detect_framebuffer(0)
         info = self._ctx.info
         self.renderer: str = info["GL_RENDERER"]
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self.computes = self._ctx.version_code >= COMPUTE
-        self._depth = 0
         # fences, which moderngl lacks; ctypes lets go of the interpreter's lock while they are waited for
         pointer, number, address = ctypes.c_void_p, ctypes.c_uint, load_egl().eglGetProcAddress
         self._create_fence = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
         self._client_wait = ctypes.CFUNCTYPE(number, pointer, number, ctypes.c_uint64)(address(b"glClientWaitSync"))
         self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
-        self._shaders: dict[str, moderngl.ComputeShader] = {}
-        self._before: int | None = None
-        # programs that nobody uses, by their number in OpenGL, the longest idle first; of all, the sources and the
-        # uniforms that they began with
-        self._idle: dict[int, Any] = {}
-        self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
-        release_current()
 
     @property
     def software(self) -> bool:
@@ -260,10 +269,15 @@ class GLContext:
         try:
             if self._depth:
                 return
-            recorded = self._ctx.error
-            self._ctx.__exit__(None, None, None)
-            if self._before is None:
-                release_current()
+            taken = not self._current.is_current()
+            recorded = "GL_NO_ERROR" if taken else self._ctx.error
+            self._leave()
+            if taken and error is None:
+                raise GLError(
+                    f"the OpenGL context on {self.renderer} was left while it drew: something else, such as the "
+                    "finalizer of a mujoco.Renderer, made another context current; what was drawn is incomplete. "
+                    "Close other renderers instead of leaving them to be collected"
+                )
             if recorded == "GL_OUT_OF_MEMORY":
                 raise GLError(
                     f"{self.renderer} is out of memory: take a lower resolution or smaller frames, or backend 'cpu'"
@@ -284,18 +298,58 @@ class GLContext:
             )
 
     def _take(self) -> None:
-        self._owner, self._before = threading.current_thread().name, current_context()
-        self._ctx.__enter__()
-        if current_context() != self._handle:
-            raise GLError(
-                f"the OpenGL context on {self.renderer} is lost; something else in this process has shut EGL "
-                "down (a pyvista or VTK window does): run one of the two in a process of its own"
-            )
-        # what Python has collected; `moderngl.Context.gc` fails on objects released by hand
-        while self._ctx.objects:
-            collected = self._ctx.objects.popleft()
-            if hasattr(collected, "release"):
-                collected.release()
+        """Make the context current, and free what nobody needs any more."""
+        self._owner = threading.current_thread().name
+        self._restore = leave_current()
+        # finalizers of others leave the context under our feet, in any line: MuJoCo's call eglReleaseThread
+        self._collects = gc.isenabled()
+        gc.disable()
+        try:
+            if not self._current.make_current():
+                raise GLError(
+                    f"the OpenGL context on {self.renderer} is lost; something else in this process has shut EGL "
+                    "down (a pyvista or VTK window does): run one of the two in a process of its own"
+                )
+            self._free_discarded()
+        except BaseException:
+            self._leave()
+            raise
+
+    def _leave(self) -> None:
+        self._restore()
+        if self._collects:
+            gc.enable()
+
+    def discard(self, objects: list[Any]) -> None:
+        """Have objects of moderngl's freed when the context is next entered from outside.
+
+        It calls no OpenGL and waits for nobody: finalizers may call it, in any thread and in the middle of a frame.
+        """
+        self._discarded.append(objects)
+
+    def free(self) -> None:
+        """Free what was discarded at once, unless somebody is using the context; then it is freed later."""
+        if os.getpid() != self._process or not self._lock.acquire(blocking=False):
+            return
+        try:
+            if self._depth == 0:
+                with contextlib.suppress(GLError), self:  # nothing is left of a lost context
+                    pass
+        finally:
+            self._lock.release()
+
+    def _free_discarded(self) -> None:
+        collected = self._ctx.objects
+        if not (self._discarded or collected):
+            return
+        self._no_framebuffer.use()  # a framebuffer that is deleted must not stay bound
+        while self._discarded:
+            for discarded in reversed(self._discarded.popleft()):
+                self._release(discarded)
+        while collected:  # `moderngl.Context.gc` fails on objects released by hand
+            last = collected.popleft()
+            if hasattr(last, "release"):
+                last.release()
 
     def barrier(self) -> None:
         """Make what compute shaders have written visible to later commands."""
@@ -385,14 +439,17 @@ class GLContext:
     def release(self, created: Any) -> None:
         """Release an object; programs are kept for whoever asks for the same ones next, up to a number."""
         with self:
-            if isinstance(created, moderngl.Program) and created.glo in self._begun:
-                self._idle[created.glo] = created
-                if len(self._idle) <= _MOST:
-                    return
-                oldest = next(iter(self._idle))
-                del self._begun[oldest]
-                created = self._idle.pop(oldest)
-            created.release()
+            self._release(created)
+
+    def _release(self, created: Any) -> None:
+        if isinstance(created, moderngl.Program) and created.glo in self._begun:
+            self._idle[created.glo] = created
+            if len(self._idle) <= _MOST:
+                return
+            oldest = next(iter(self._idle))
+            del self._begun[oldest]
+            created = self._idle.pop(oldest)
+        created.release()
 
 
 def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
@@ -405,6 +462,16 @@ def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
 _shared: dict[int | None, GLContext] = {}
 _selected: int | None = None
 _lock = threading.Lock()
+
+
+def _begin_fork() -> None:
+    """Leave a fork no lock that another thread held, which does not exist there."""
+    global _lock
+    _lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_begin_fork)
 
 
 def select_device(device: int | None) -> None:

@@ -1,6 +1,7 @@
 """Resources of the GPU are released, uniforms read as they were set, textures as linear light."""
 
 import gc
+import sys
 
 import moderngl
 import mujoco
@@ -11,6 +12,7 @@ from shader_functions import evaluated
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Camera, Pose, Renderer, fitted, srgb_cube, srgb_texture, srgb_to_linear
+from ripple_sim.render.targets import FramePass
 
 
 def test_renderers_leave_nothing_behind(gl):
@@ -30,6 +32,41 @@ def test_renderers_leave_nothing_behind(gl):
     others, programs = zip(*(make() for _ in range(8)), strict=True)
     assert others == (0,) * 8
     assert programs == programs[:1] * 8
+
+
+def test_a_renderer_that_is_collected_while_another_draws_changes_no_pixel(gl):
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{FLOOR}{BALL}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = Camera((0.0, 0.0, 0.5), 4.0, 90.0, -10.0, 40.0)
+
+    def frame_while(end_another, moment):
+        """A frame of ours, in which another one ends at a pass."""
+        forgotten = [Renderer(gl, model, {}, size=(16, 12), samples=0)]
+        forgotten[0].render(data, {}, camera)
+        calls = 0
+
+        def at_call(frame, event, argument):
+            nonlocal calls
+            calls += event == "call" and frame.f_code is FramePass.run.__code__
+            if forgotten and calls == moment:
+                end_another(forgotten)
+
+        sys.setprofile(at_call)
+        try:
+            return drawing.render(data, {}, camera)
+        finally:
+            sys.setprofile(None)
+            assert not forgotten
+
+    def close(forgotten):
+        forgotten.pop().close()
+
+    with Renderer(gl, model, {}, size=(16, 12), samples=0) as drawing:
+        expected = drawing.render(data, {}, camera)
+        for moment in (1, 2):
+            for end_another in (list.clear, close):
+                np.testing.assert_array_equal(frame_while(end_another, moment), expected)
 
 
 POSE = Camera((0.3, -1.2, 0.7), 5.0, 130.0, -35.0, 50.0).pose()

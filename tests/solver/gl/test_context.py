@@ -1,5 +1,6 @@
 """The OpenGL context: what it frees, its devices, drivers and sources, and how it says what went wrong."""
 
+import gc
 import os
 import re
 import sys
@@ -8,6 +9,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -117,7 +119,9 @@ def test_a_fork_is_told_to_be_spawned_and_auto_takes_the_cpu(opengl: None) -> No
     script = """
         import os, sys
         from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
+        from ripple_sim.solver.gl import context
         waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
+        context._lock.acquire()  # as if another thread made a context
         if os.fork():
             os.wait()
             sys.exit(0)
@@ -201,6 +205,71 @@ def test_the_context_that_is_entered_is_the_current_one(opengl: None) -> None:
         with ThreadPoolExecutor(1) as threads:
             assert threads.submit(current_context).result() is None
     assert inside
+
+
+def is_freed(created: Any) -> bool:
+    return type(created.mglo).__name__ == "InvalidObject"
+
+
+def test_what_is_discarded_in_the_middle_of_a_frame_is_freed_at_the_next_entry_from_outside(opengl: None) -> None:
+    gl = shared_context()
+    with gl as ctx:
+        drawn, forgotten = (ctx.simple_framebuffer((2, 2)) for _ in range(2))
+        forgotten.use()  # one that is freed while it is bound must not stay so
+        gl.discard([forgotten])
+        with gl:
+            gl.free()  # somebody is drawing
+        assert not is_freed(forgotten)
+        drawn.use()
+        drawn.clear(0.2, 0.4, 0.6, 1.0)
+        assert drawn.read() == bytes([51, 102, 153] * 4)
+        forgotten.use()
+    gl.free()
+    assert is_freed(forgotten)
+    with gl as ctx:
+        drawn.clear(1.0, 0.0, 0.0, 1.0)
+        assert drawn.read() == bytes([255, 0, 0] * 4)
+
+
+def test_freeing_in_a_thread_does_not_wait_for_another_that_draws(opengl: None) -> None:
+    gl = shared_context()
+    with ThreadPoolExecutor(1) as threads, gl as ctx:
+        buffer = ctx.buffer(reserve=16)
+        gl.discard([buffer])
+        threads.submit(gl.free).result(timeout=20)
+        assert not is_freed(buffer)
+    with gl:
+        assert is_freed(buffer)
+
+
+def test_python_looks_for_no_garbage_in_a_frame_so_that_no_finalizer_of_others_leaves_the_context(opengl: None) -> None:
+    """MuJoCo's contexts release all that the thread has current, when they are collected."""
+    collected = []
+
+    class Cycle:
+        def __init__(self) -> None:
+            self.itself = self
+
+        def __del__(self) -> None:
+            collected.append(current_context())
+
+    assert gc.isenabled()
+    for _ in range(3):
+        with shared_context():
+            for _ in range(3000):  # more than enough for a look at the youngest
+                Cycle()
+            assert not collected
+        assert gc.isenabled()
+        gc.collect()
+        assert collected and set(collected) == {None}
+        collected.clear()
+    gc.disable()
+    try:
+        with shared_context():
+            pass
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
 
 
 _SHADER = """#version 410

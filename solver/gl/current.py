@@ -1,0 +1,176 @@
+"""What is current in a thread: a program's own OpenGL context is left for ours, and made current again afterwards.
+
+OpenGL draws with the one context that is current in a thread, whichever window system made it: EGL, GLX (windows on
+X11), or OSMesa (pictures in memory). Programs make theirs current once and rely on that, as robosuite and Gymnasium do.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import os
+import sys
+from collections.abc import Callable, Iterator
+from typing import NamedTuple, TypeAlias
+
+from ..errors import GLError
+
+Restore: TypeAlias = Callable[[], object]
+
+# Names that runtime packages install, and moderngl loads. A name that loads another file would hide a damaged library.
+_EGL_LIBRARY = "libEGL.so.1"
+_GLX_LIBRARY = "libGL.so.1"
+_OSMESA_LIBRARIES = "libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6"
+
+_EGL_DRAW, _EGL_READ = 0x3059, 0x305A
+_OSMESA_TYPE = 0x23
+
+_pointer = ctypes.c_void_p
+
+
+@functools.cache
+def load_egl() -> ctypes.CDLL:
+    """The EGL library, the same that moderngl loads."""
+    try:
+        egl = ctypes.CDLL(_EGL_LIBRARY)
+    except OSError as error:
+        raise GLError(f"the library {_EGL_LIBRARY} cannot be loaded ({error}); see `ripple-sim info`") from error
+    egl.eglGetCurrentContext.restype = egl.eglGetCurrentDisplay.restype = _pointer
+    egl.eglGetCurrentSurface.restype = egl.eglGetProcAddress.restype = _pointer
+    egl.eglGetCurrentSurface.argtypes = [ctypes.c_int]
+    egl.eglMakeCurrent.restype = egl.eglQueryAPI.restype = egl.eglBindAPI.restype = ctypes.c_uint
+    egl.eglMakeCurrent.argtypes = [_pointer] * 4
+    egl.eglBindAPI.argtypes = [ctypes.c_uint]
+    return egl
+
+
+class EGLCurrent(NamedTuple):
+    """A context of EGL with its display, and the surfaces that it draws to and reads from; 0 where there is none."""
+
+    display: int
+    draw: int
+    read: int
+    context: int
+
+    @classmethod
+    def of_thread(cls) -> EGLCurrent | None:
+        """What is current in this thread, or None."""
+        egl = load_egl()
+        context = egl.eglGetCurrentContext()
+        if not context:
+            return None
+        draw, read = (egl.eglGetCurrentSurface(which) or 0 for which in (_EGL_DRAW, _EGL_READ))
+        return cls(egl.eglGetCurrentDisplay(), draw, read, context)
+
+    def make_current(self) -> bool:
+        """Make it current in this thread, and return whether that worked."""
+        return bool(load_egl().eglMakeCurrent(*self)) and self.is_current()
+
+    def is_current(self) -> bool:
+        """Whether it is the one that is current in this thread."""
+        return current_context() == self.context
+
+
+def current_context() -> int | None:
+    """Handle of the EGL context that is current in this thread; None if there is none."""
+    return load_egl().eglGetCurrentContext()
+
+
+def release_current() -> None:
+    """Leave this thread without a current EGL context, so that another thread may take it."""
+    egl = load_egl()
+    egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)
+
+
+def leave_current() -> Restore:
+    """Leave whatever is current in this thread, so that an EGL context can be made current.
+
+    What is returned makes it current again, in place of whatever EGL context is current by then.
+    """
+    previous = EGLCurrent.of_thread()
+    if previous is None:
+        return _leave_glx() or _leave_osmesa() or release_current
+
+    def restore() -> None:
+        if not previous.make_current():  # the program has destroyed it meanwhile
+            release_current()
+
+    return restore  # EGL itself replaces one context by another
+
+
+@contextlib.contextmanager
+def current_kept() -> Iterator[None]:
+    """What is current in this thread when the block begins is so again at its end, whatever the block makes current."""
+    try:
+        egl = load_egl()
+    except GLError:  # without the library no context can be made
+        yield
+        return
+    api = egl.eglQueryAPI()
+    restore = leave_current()
+    try:
+        yield
+    finally:
+        restore()
+        egl.eglBindAPI(api)  # a thread's next EGL contexts are of this kind
+
+
+@functools.cache
+def _load_glx() -> ctypes.CDLL | None:
+    """The library of GLX, which moderngl loads, too; None if there is none."""
+    try:
+        glx = ctypes.CDLL(_GLX_LIBRARY)
+        glx.glXGetCurrentContext.restype = glx.glXGetCurrentDisplay.restype = _pointer
+        glx.glXGetCurrentDrawable.restype = glx.glXGetCurrentReadDrawable.restype = ctypes.c_ulong
+        glx.glXMakeContextCurrent.argtypes = [_pointer, ctypes.c_ulong, ctypes.c_ulong, _pointer]
+    except (OSError, AttributeError):
+        return None
+    return glx
+
+
+def _leave_glx() -> Restore | None:
+    """Leave a window's context; None if none is current."""
+    glx = _load_glx()
+    if glx is None or not (context := glx.glXGetCurrentContext()):
+        return None
+    display = glx.glXGetCurrentDisplay()
+    draw, read = glx.glXGetCurrentDrawable(), glx.glXGetCurrentReadDrawable()
+    glx.glXMakeContextCurrent(display, 0, 0, None)
+
+    def restore() -> None:
+        release_current()
+        glx.glXMakeContextCurrent(display, draw, read, context)
+
+    return restore
+
+
+@functools.cache
+def _load_osmesa() -> ctypes.CDLL | None:
+    """The library of OSMesa that the program has loaded."""
+    for name in _OSMESA_LIBRARIES:
+        with contextlib.suppress(OSError):
+            osmesa = ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
+            osmesa.OSMesaGetCurrentContext.restype = _pointer
+            osmesa.OSMesaGetColorBuffer.argtypes = [_pointer] * 5
+            osmesa.OSMesaMakeCurrent.argtypes = [_pointer, _pointer, ctypes.c_uint, ctypes.c_int, ctypes.c_int]
+            return osmesa
+    return None
+
+
+def _leave_osmesa() -> Restore | None:
+    """Leave a context that draws into memory; None if none is current. Python programs have these from PyOpenGL."""
+    osmesa = _load_osmesa() if "OpenGL.osmesa" in sys.modules else None
+    if osmesa is None or not (context := osmesa.OSMesaGetCurrentContext()):
+        return None
+    width, height, layout, kind = (ctypes.c_int() for _ in range(4))
+    picture = _pointer()
+    osmesa.OSMesaGetColorBuffer(context, *map(ctypes.byref, (width, height, layout, picture)))
+    osmesa.OSMesaGetIntegerv(_OSMESA_TYPE, ctypes.byref(kind))
+    osmesa.OSMesaMakeCurrent(None, None, 0, 0, 0)
+
+    def restore() -> None:
+        release_current()
+        osmesa.OSMesaMakeCurrent(context, picture, kind.value, width.value, height.value)
+
+    return restore
