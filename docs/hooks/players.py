@@ -20,7 +20,8 @@ _STYLE = (
     "details.player>summary{padding:0;margin:0;background:none;cursor:pointer}"
     "details.player>summary::before,details.player>summary::after{display:none}</style>\n\n"
 )
-_PICTURE = re.compile(rf"!\[(.*?)\]\(pictures/({'|'.join(PLAYED)})\.webp\)")
+# A picture on a line of its own; those in tables stay pictures.
+_PICTURE = re.compile(rf"^!\[([^\]]*)\]\(pictures/({'|'.join(PLAYED)})\.webp\)$", re.MULTILINE)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
