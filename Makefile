@@ -1,6 +1,7 @@
 # make demo   sets up what running needs, then renders out/demo.mp4
 # make test   sets everything up, then runs the tests
 # make test-mujoco  runs the tests of the coupling with each version of MuJoCo that is supported
+# make check-bounds  runs the tests of the solver with every index in a kernel checked
 # make fuzz   10,000 strange inputs for each of the tests in tests/fuzz
 # make lint   ruff, mypy and the layers of packages
 # make docs   the documentation, into build/docs
@@ -14,7 +15,7 @@ ALL := .venv/.installed
 TYPES := build/types
 MUJOCOS := mujoco==3.16.0 mujoco==3.17.0 mujoco-core==4.0.1
 
-.PHONY: setup demo test test-mujoco fuzz lint docs package sphere-maps types clean
+.PHONY: setup demo test test-mujoco check-bounds fuzz lint docs package sphere-maps types clean
 
 # what running needs; the targets for which that is too little set up the rest
 setup: $(RUNNING)
@@ -45,6 +46,12 @@ test-mujoco: $(ALL)
 	    PYTHONPATH=$$folder OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal -q \
 	        tests/coupling || exit 1; \
 	done
+
+# in an empty folder of their own, since compiled kernels are loaded from there; an index out of bounds is an IndexError
+check-bounds: $(ALL)
+	rm -rf build/bounds
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/build/bounds OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
+	    $(BIN)/python -m pytest -n 2 --dist worksteal tests/solver
 
 # much more of tests/fuzz, by chance; what it finds is kept in .hypothesis, and tried first the next time
 fuzz: $(ALL)

@@ -5,7 +5,8 @@ units. Arrays that belong together travel as one NamedTuple. Each thread runs ke
 There is no fast-math unless a kernel asks for it: the same input gives the same output, bit for bit.
 
 Compiled kernels are kept on disk, each with a checksum and a fingerprint of its module and of all that this imports:
-one that is damaged, or older than a source, is compiled anew.
+one that is damaged, or older than a source, is compiled anew. Those compiled under other settings of numba, such as
+NUMBA_BOUNDSCHECK, lie beside them under other names.
 
 A kernel is compiled at its first call, which takes seconds, once a machine: `compile_times` and `work_clock` tell that
 from work.
@@ -140,6 +141,29 @@ def _plain(kind: Any) -> Any:
     return numba.types.int64 if kind in (numba.types.int8, numba.types.int16, numba.types.int32) else kind
 
 
+# Settings of numba, by their names in `numba.config`, that change what a kernel is compiled to. Those of the processor
+# are in numba's own key.
+_CODE_SETTINGS = (
+    "BOUNDSCHECK",
+    "DEBUGINFO_DEFAULT",
+    "EXTEND_VARIABLE_LIFETIMES",
+    "ENABLE_PROFILING",
+    "DEBUG_JIT",
+    "DEBUG_NRT",
+    "DEBUG_NRT_STACK_LIMIT",
+    "NRT_STATS",
+    "DEBUG_ARRAY_OPT_RUNTIME",
+    "PARFOR_MAX_TUPLE_SIZE",
+    "DIFF_IR",
+    "OPT",
+    "LOOP_VECTORIZE",
+    "SLP_VECTORIZE",
+    "USING_SVML",
+    "LLVM_REFPRUNE_PASS",
+    "LLVM_REFPRUNE_FLAGS",
+)
+
+
 class _KernelCache(FunctionCache):
     """Compiled versions of one kernel on disk, in place of numba's own cache, which trusts whatever its files hold."""
 
@@ -187,7 +211,8 @@ class _KernelCache(FunctionCache):
 
     def _path(self, key: Any) -> Path:
         name = f"{self._py_func.__module__}.{self._py_func.__qualname__}".replace("<", "").replace(">", "")
-        version = hashlib.sha256(f"{sys.version} {numba.__version__} {key}".encode()).hexdigest()[:16]
+        settings = [getattr(numba.config, setting, None) for setting in _CODE_SETTINGS]
+        version = hashlib.sha256(f"{sys.version} {numba.__version__} {settings} {key}".encode()).hexdigest()[:16]
         return kernel_folder() / f"{name}-{version}.kernel"
 
 

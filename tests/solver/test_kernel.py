@@ -93,6 +93,10 @@ def sum_of(x):
     for each in x:
         total += each
     return total
+
+@kernel
+def value_at(x, i):
+    return x[i]
 """
 
 
@@ -135,6 +139,32 @@ def test_a_kernel_is_compiled_once_and_again_when_its_source_changes(library, tm
     source.write_text(LIBRARY.replace("total = 0.0", "total = 1.0"))
     assert library().sum_of(np.array([1.0, 2.0, 4.0])) == 8.0
     assert len(list((tmp_path / "kernels").iterdir())) == 1  # the older one is replaced
+
+
+def test_kernels_with_checks_of_bounds_and_without_never_mix(library, monkeypatch: pytest.MonkeyPatch) -> None:
+    values = np.zeros(4)
+    for checks in (None, 1, None, 1):
+        monkeypatch.setattr(numba.config, "BOUNDSCHECK", checks)
+        value_at = library().value_at
+        if checks:
+            with pytest.raises(IndexError):
+                value_at(values, 5)
+        else:
+            value_at(values, 5)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [("OPT", 0), ("DEBUGINFO_DEFAULT", 1), ("DEBUG_JIT", 1), ("LOOP_VECTORIZE", 0), ("LLVM_REFPRUNE_FLAGS", "none")],
+)
+def test_a_kernel_compiled_under_another_setting_is_another_file(
+    library, monkeypatch, setting: str, value: Any
+) -> None:
+    cache = library().sum_of._cache
+    usual = cache._path("key")
+    monkeypatch.setattr(numba.config, setting, value)
+    assert cache._path("key") != usual
+    monkeypatch.undo()
 
 
 WAVES = """
