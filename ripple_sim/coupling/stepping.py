@@ -82,7 +82,11 @@ class StepClock:
 
     def __getstate__(self) -> dict[str, object]:
         # MuJoCo's data loses the mark when it is pickled; that is no reset
-        return {**vars(self), "_mark": None, "_looked_at": weakref.WeakSet(), "_latest": None}
+        return {"_time": self._time, "_timestep": self._timestep}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.restart()
+        vars(self).update(state)
 
     def look(self, model: mujoco.MjModel, data: mujoco.MjData) -> Passed:
         """What happened since the last look."""
