@@ -102,6 +102,7 @@ class Simulation:
             resolution={entry.geom: resolution or entry.resolution for entry in scene.targets},
             layout={entry.geom: layout or entry.layout for entry in scene.targets},
             rim={entry.geom: rim or rim_of(self.model, entry.geom, entry.rim) for entry in scene.targets},
+            conserve_volume={entry.geom: entry.conserve_volume for entry in scene.targets},
             backend=backend,
             operator=operator,
             two_way=scene.two_way,

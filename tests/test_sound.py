@@ -65,7 +65,7 @@ def test_partials_of_the_drums_are_at_their_modes(name: str, radius: float, dura
     mesh = load_mesh(Path(__file__).parents[1] / "scenes" / "meshes" / "drum_skin.obj")
     atlas = build_atlas(type(mesh)(radius / 0.4 * mesh.V, mesh.F), entry.resolution, cache=False)
     material = uniform_material(entry)
-    waves = WaveSolver(atlas, material, rim=entry.rim, backend="cpu")
+    waves = WaveSolver(atlas, material, rim=entry.rim, backend="cpu", conserve_volume=entry.conserve_volume)
     center = atlas.mesh.V.mean(axis=0)
     ear = Ear(waves, duration)
     ear.stand(waves, center + np.array([0.3, 0, 0.5]))

@@ -91,7 +91,9 @@ class Ripples(Targets):
     backend : str
         As for `WaveSolver`; so are the next two.
     operator : str
-    conserve_volume : bool
+    conserve_volume : bool or mapping, optional
+        For all targets or by geom: whether the mean of every push is taken out. By default on closed surfaces, and on
+        open ones that no rim, clamp or stiffness holds.
 
     Raises
     ------
@@ -116,10 +118,10 @@ class Ripples(Targets):
         modulus: float | ByGeom[float | None] | None = None,
         backend: str = "auto",
         operator: str = "fem",
-        conserve_volume: bool = True,
+        conserve_volume: bool | ByGeom[bool | None] | None = None,
     ) -> None:
-        options = {"backend": backend, "operator": operator, "conserve_volume": conserve_volume}
-        super().__init__(own_model(model), materials, resolution, layout, rim, options)
+        options = {"backend": backend, "operator": operator}
+        super().__init__(own_model(model), materials, resolution, layout, rim, conserve_volume, options)
         adopt_warnings()
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}

@@ -99,6 +99,8 @@ class Targets:
         Of the atlases, for all targets or by geom. None: chosen by the model, see `suited_resolution`.
     layout, rim : str or mapping
         Of the atlases and their waves, likewise.
+    conserve_volume : bool, None or mapping
+        Of the waves, likewise.
     options : mapping
         Further keyword arguments of `WaveSolver`.
     """
@@ -110,6 +112,7 @@ class Targets:
         resolution: int | ByGeom[int | None] | None,
         layout: str | ByGeom[str],
         rim: Rim | ByGeom[Rim],
+        conserve_volume: bool | ByGeom[bool | None] | None,
         options: Mapping[str, Any],
     ) -> None:
         if not isinstance(materials, Mapping):
@@ -121,11 +124,12 @@ class Targets:
         named = by_name(model, materials, "materials")
         given = for_each(model, named, "resolution", resolution)
         layouts, rims = for_each(model, named, "layout", layout), for_each(model, named, "rim", rim)
+        conserves = for_each(model, named, "conserve_volume", conserve_volume)
         named, texels = suited_targets(model, named, given)
         self.model = model
         self._targets = {}
         for name, material in named.items():
-            geom, own = find_target(model, name), {**options, "rim": rims[name]}
+            geom, own = find_target(model, name), {**options, "rim": rims[name], "conserve_volume": conserves[name]}
             atlas = target_atlas(model, geom, texels[name], layouts[name])
             self._targets[name] = Target(geom, material, own, WaveSolver(atlas, material, **own))
             self[name].listeners.find_points = functools.partial(site_on, model, geom)

@@ -348,11 +348,10 @@ class TwoWay:
             waves = self._waves[target]
             of, *trials = self._trials.get(target, (None,))
             # what moves gets another operator
-            if of is not waves or trials[0].operator is not waves.operator:
+            changed = of is not waves or trials[0].operator is not waves.operator
+            if changed or trials[0].conserve_volume != waves.conserve_volume:
                 trials = [copy.copy(waves), copy.copy(waves)]
                 self._trials[target], self._mobilities = (waves, *trials), {}
-            for each in trials:
-                each.conserve_volume = waves.conserve_volume
             trial, rest = trials
             trial.state = waves.state
             loads = [Load(place.load.texels, held[key] * place.load.forces) for key, place in places.items()]

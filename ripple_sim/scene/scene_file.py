@@ -119,6 +119,9 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     """Rims of an open surface: waves come back upright from a free one, inverted from one that is held. By region, a
     table such as `rim = {clamped = "x < -0.24"}`: conditions as in `ripple.height`, of which the first that holds
     counts; the rest is free."""
+    conserve_volume: bool | None = None
+    """Whether the mean of every push is taken out, so that the surface keeps its volume; by default on closed surfaces,
+    and on open ones that no rim, clamp or stiffness holds."""
     look: str = "rubber"
     """What the surface looks made of; `model` as the MJCF's material says."""
     color: Color | None = None

@@ -45,7 +45,7 @@ class FluidBackend(FieldBackend):
     name = "cpu"
     _operator: FluidOperator
 
-    def __init__(self, operator: FluidOperator, *, keeps_volume: bool = False) -> None:
+    def __init__(self, operator: FluidOperator, *, keeps_volume: bool | None = False) -> None:
         self._operator, self.keeps_volume = operator, keeps_volume
         self._fields = RowLayout(operator.topology)
         self._h, self._v = self._fields.zeros(), self._fields.zeros()
@@ -98,7 +98,7 @@ class FluidBackend(FieldBackend):
 Backend: TypeAlias = CPUBackend | GLBackend | FluidBackend
 
 
-def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool = False) -> Backend:
+def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool | None = False) -> Backend:
     """Backend by name; "auto" takes the faster one, see `auto_backend`. Deep fluid is always on the CPU.
 
     Raises

@@ -143,9 +143,9 @@ def part_runs(operator: WaveOperator, fields: RowLayout) -> tuple[NDArray[np.int
     return np.append(begins, beside.size), beside[begins].astype(np.int64)
 
 
-def volume_balance(operator: WaveOperator, dt: float, fields: RowLayout) -> Balance | None:
+def volume_balance(operator: WaveOperator, dt: float, conserve: bool | None, fields: RowLayout) -> Balance | None:
     """What keeps the volume over a substep of dt [s], if anything needs to; see `volume_rate`."""
-    rate = volume_rate(operator, dt)
+    rate = volume_rate(operator, dt, conserve)
     if rate is None:
         return None
     begins, texels, heights, velocities = rate
@@ -164,7 +164,7 @@ class CPUBackend(FieldBackend):
 
     name = "cpu"
 
-    def __init__(self, operator: WaveOperator, *, keeps_volume: bool = False) -> None:
+    def __init__(self, operator: WaveOperator, *, keeps_volume: bool | None = False) -> None:
         self.keeps_volume = keeps_volume
         self._fields = fields = RowLayout(operator.topology)
         # the processor takes a store to one field and a load from another at the same place of a page for a conflict:
@@ -264,7 +264,7 @@ class CPUBackend(FieldBackend):
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
         new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
-            self._balance = volume_balance(self._operator, dt, self._fields) if self.keeps_volume else None
+            self._balance = volume_balance(self._operator, dt, self.keeps_volume, self._fields)
             self._features = self._features._replace(balance=self._balance or NO_BALANCE)
             k = step_coefficients(self._operator, dt)
             varied = any(np.ndim(each) for each in (k.decay, k.spring, k.span))

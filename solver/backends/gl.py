@@ -213,7 +213,9 @@ class GLBackend(FieldBackend):
 
     name = "gl"
 
-    def __init__(self, operator: WaveOperator, gl: GLContext | None = None, *, keeps_volume: bool = False) -> None:
+    def __init__(
+        self, operator: WaveOperator, gl: GLContext | None = None, *, keeps_volume: bool | None = False
+    ) -> None:
         self.keeps_volume = keeps_volume
         self._gl = gl if gl is not None else shared_context()
         self._operator = operator
@@ -360,7 +362,7 @@ class GLBackend(FieldBackend):
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
             self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
-            rate = volume_rate(self._operator, dt) if self.keeps_volume else None
+            rate = volume_rate(self._operator, dt, self.keeps_volume)
             several = rate is not None or self._operator.parts is not None
             self._held = Pressure(self._fields, self._operator, rate) if several else None
             self._prepared = (dt, self.keeps_volume)

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 from scipy.special import ellipj, ellipk
 
 from ..errors import SolverError
-from ..kernel import Floats
+from ..kernel import Bools, Floats
 from ..texels.stencil import Stencil, largest_eigenvalue, stiffness_matrix
 from .wave_operator import WaveOperator
 
@@ -100,6 +100,11 @@ class FluidOperator(WaveOperator):
     deep: float
     geometry: Stencil
     areas: Floats
+
+    @functools.cached_property
+    def keeps_volume(self) -> Bools:
+        """All parts keep it, since a fluid does."""
+        return np.ones_like(super().keeps_volume)
 
     @functools.cached_property
     def root(self) -> HalfLaplacian:

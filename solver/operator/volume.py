@@ -12,8 +12,17 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..kernel import Floats, Floats32, Ints
+from ..errors import SolverError, shown
+from ..kernel import Bools, Floats, Floats32, Ints
 from .wave_operator import WaveOperator, damped_step
+
+
+def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
+    """Whether each part of the surface keeps its volume, [p]: all, none, or, for None, those that do by themselves."""
+    if conserve not in (None, True, False):
+        raise SolverError(f"conserve_volume is {shown(conserve)}; it must be True, False or None, the default")
+    kept = operator.keeps_volume
+    return kept if conserve is None else np.full_like(kept, conserve)
 
 
 class VolumeBalance:
@@ -21,10 +30,17 @@ class VolumeBalance:
 
     A pressure moves each texel by one over its density. Taking that much of it out of a momentum leaves the sum of area
     times velocity unchanged, and is the orthogonal projection with masses as weights: it adds no energy.
+
+    Parameters
+    ----------
+    operator : WaveOperator
+    conserve : bool, optional
+        Of all parts or of none; see `kept_parts`.
     """
 
-    def __init__(self, operator: WaveOperator) -> None:
+    def __init__(self, operator: WaveOperator, conserve: bool | None = None) -> None:
         self._operator = operator
+        self._kept = kept_parts(operator, conserve)
         self._parts = None if operator.parts is None else operator.parts.reshape(-1)
         self._inverse_density = operator.inverse_density.reshape(-1)
         self._least = self._sum(operator.mass * operator.inverse_density * operator.response)
@@ -51,11 +67,11 @@ class VolumeBalance:
         return field - self._operator.movable * self._ratio(areas * field, self._sum(areas))
 
     def _sum(self, field: Floats) -> Floats:
-        """Sum over the movable texels of each part, [p]; a number where there is one."""
+        """Sum over the movable texels of each part, [p]; a number where there is one. 0 where no volume is kept."""
         movable = self._operator.movable
         if self._parts is None:
-            return field[movable].sum()
-        return np.bincount(self._parts, (field * movable).reshape(-1)).astype(np.float64)
+            return field[movable].sum() * self._kept[0]
+        return np.bincount(self._parts, (field * movable).reshape(-1)).astype(np.float64) * self._kept
 
     def _ratio(self, field: Floats, total: Floats) -> Floats | float:
         """Sum of a field over each part, over a total of that part: at every texel, [C, n, n]."""
@@ -72,7 +88,7 @@ _NOTHING = 1e-12
 VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]  # begins, texels, heights, velocities; see `volume_rate`
 
 
-def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
+def volume_rate(operator: WaveOperator, dt: float, conserve: bool | None = None) -> VolumeRate | None:
     """What keeps the volume over a substep of dt [s]; None where nothing changes it, or it is not kept anyway.
 
     It is not where a clamp holds a part of the surface, or the stiffness varies: those take up momentum themselves.
@@ -90,8 +106,8 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
         return None
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
     count = int(parts.max()) + 1
-    kept = np.zeros(count, bool)
-    for part in range(count):
+    kept = kept_parts(operator, conserve).copy()
+    for part in np.flatnonzero(kept):
         own = parts == part
         movable = own & operator.movable
         kept[part] = movable.any() and not operator.anchored[own].any() and not np.ptp(operator.stiffness[movable])

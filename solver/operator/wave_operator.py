@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SolverError
-from ..kernel import Bools, Floats, Floats32, Ints32
+from ..kernel import Bools, Floats, Floats32, Ints, Ints32
 from ..mesh.topology import labels
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
 from ..texels.topology import TexelTopology
@@ -144,12 +144,9 @@ class WaveOperator:
         clamp holds count as one, however zero wave speeds cut them up: what holds them brings them back to where they
         were. Those that are not movable are rigid, and belong to any part.
         """
-        topology = self.topology
+        topology, of_chart = self.topology, self._part_of_chart
         # what joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours
         ties: list[tuple[Stencil, Floats | None]] = [(self.stencil, None), *([self.bending] if self.bending else [])]
-        chart, side = np.nonzero(topology.glued[..., 0] >= 0)
-        # part of the mesh to which each chart belongs, [C], from 0
-        of_chart = labels(np.stack([chart, topology.glued[chart, side, 0]], axis=1), len(topology.glued))
         for stencil, rigidity in ties:
             sides = (stencil.weights[:, link][link_exists(topology, link)] for link in range(2))
             # where the sides of all quads are links, every part of the mesh is one
@@ -172,12 +169,35 @@ class WaveOperator:
         filled = np.where(charts < 0, charts.max(axis=1, keepdims=True).clip(0), charts)
         return filled.astype(np.int32).reshape(topology.shape)
 
+    @functools.cached_property
+    def keeps_volume(self) -> Bools:
+        """Whether each part keeps its volume unless told otherwise, [p]: it is closed, or nothing holds it.
+
+        A closed surface is as that of an incompressible body, whatever springs or clamps it has. An open one encloses
+        nothing. Its mean height is kept where nothing else would stop it: no rim, clamp or spring.
+        """
+        part = np.zeros(self.mass.shape, np.int32) if self.parts is None else self.parts
+        is_open_chart = (self.topology.glued[..., 0] < 0).any(axis=1)
+        is_open = np.bincount(self._part_of_chart, is_open_chart) > 0
+        open_texels = is_open[self._part_of_chart][:, None, None] & self.movable
+        held_texels = ((self.stiffness > 0) | self.anchored) & self.movable
+        opens, held = (np.bincount(part.reshape(-1), each.reshape(-1)) > 0 for each in (open_texels, held_texels))
+        return ~(opens & held)
+
+    @functools.cached_property
+    def _part_of_chart(self) -> Ints:
+        """Part of the mesh to which each chart belongs, [C], from 0."""
+        glued = self.topology.glued
+        chart, side = np.nonzero(glued[..., 0] >= 0)
+        return labels(np.stack([chart, glued[chart, side, 0]], axis=1), len(glued))
+
     def moved(self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | None) -> WaveOperator:
         """The same surface with its texels elsewhere: masses, and what holds or parts it, stay."""
         moved = dataclasses.replace(
             self, stencil=stencil, viscosity_stencil=viscosity_stencil, bending=bending, bounded=True
         )
-        for name in ("free", "movable", "anchored", "source_share", "inverse_density", "response", "parts"):
+        kept = "free", "movable", "anchored", "source_share", "inverse_density", "response", "parts", "keeps_volume"
+        for name in kept:
             object.__setattr__(moved, name, getattr(self, name))
         return moved
 

@@ -107,16 +107,18 @@ class HeldLoad:
     share : float64 [C, n, n]
         Of a force that sets a texel in motion.
     balance : VolumeBalance
-        Of the forces, where the backend keeps the volume.
+        Of the forces.
 
     Attributes
     ----------
     load : Load
         What is held; assign to change it.
+    balance : VolumeBalance
+        Likewise.
     """
 
     def __init__(self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance) -> None:
-        self._backend, self._balance, self._share = backend, balance, share
+        self._backend, self.balance, self._share = backend, balance, share
         self.load = self._uploaded = Load.none()
 
     def forces(self) -> NDArray[np.float64]:
@@ -130,7 +132,7 @@ class HeldLoad:
 
     def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
         """What balances the momenta of a source on some texels, or forces, outwards, where volume is conserved."""
-        return self._balance.counterpart(texels, momenta) if self._backend.keeps_volume else 0.0
+        return self.balance.counterpart(texels, momenta)
 
     def upload(self, extra: Load | None) -> float | None:
         """Hand the backend the load of the coming step, with `extra` for that step alone, unless it has it already.

@@ -15,7 +15,7 @@ from ..files import require_memory
 from ..operator.assembly import build_operator
 from ..operator.material import Material, warn_of_wavelengths
 from ..operator.plate_rim import Rim
-from ..operator.volume import VolumeBalance
+from ..operator.volume import VolumeBalance, kept_parts
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from .finite import FiniteGuard, as_field, check_kick, count_substeps, require_finite
@@ -47,12 +47,14 @@ class WaveSolver:
         height is 0, as on a drum skin) and a "clamped" one (nor does a surface that bends have a slope). A function of
         points on the rim [k, 3] gives a name for each, or whether it is clamped, else free. "fixed": as "supported",
         but plates are held as if Poisson's ratio were 1, which is the same at straight edges.
-    conserve_volume : bool
-        Remove the mean of every source, so that a net push does not move the surface as a whole. On a closed surface
-        without stiffness nothing else would stop it; there, the mean is the volume. On an open surface it is the mean
-        height. Each part of a mesh, and each region that rigid texels cut off, has a mean of its own. Where the density
-        varies, a uniform pressure keeps the volume while the waves run as well, unless something holds the surface: a
-        clamp, a fixed rim, or stiffness that varies.
+    conserve_volume : bool, optional
+        Remove the mean of every source, so that a net push does not move the surface as a whole. By default it is
+        removed from closed surfaces, where it is the volume of an incompressible body, and from open ones that nothing
+        holds, whose mean height nothing else would stop. It stays on open ones that a rim, a clamp, or stiffness
+        anywhere holds. True and False: from all surfaces or from none. Each part of a mesh, and each region that rigid
+        texels cut off, has a mean of its own, and is held or not by itself. Where the density varies, a uniform
+        pressure keeps the volume while the waves run as well, unless something holds the surface: a clamp, a fixed rim,
+        or stiffness that varies. Deep fluid always keeps its volume.
 
     Attributes
     ----------
@@ -86,7 +88,7 @@ class WaveSolver:
         backend: str = "auto",
         operator: str = "fem",
         rim: Rim = "free",
-        conserve_volume: bool = True,
+        conserve_volume: bool | None = None,
     ) -> None:
         self.material = material if material is not None else Material()
         what = f"a wave solver of {atlas.areas.size:,} texels"
@@ -95,13 +97,13 @@ class WaveSolver:
         self._kind = operator
         self._begin(atlas, build_operator(atlas, self.material, operator, rim), backend, conserve_volume)
 
-    def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool) -> None:
+    def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool | None) -> None:
         """At rest, at time 0."""
         self.rest, self.operator = atlas, operator
         self._motion: Motion | None = None
         self.time, self.substeps_taken, self._substep = 0.0, 0, 0.0
         self._backend = make_backend(backend, operator, keeps_volume=conserve_volume)
-        self._balance = VolumeBalance(operator)
+        self._balance = VolumeBalance(operator, conserve_volume)
         self._held = HeldLoad(self._backend, operator.source_share, self._balance)
         self._guard = FiniteGuard(atlas.positions)
         self.listeners = Listeners(self._backend)
@@ -225,12 +227,16 @@ class WaveSolver:
 
     @property
     def conserve_volume(self) -> bool:
-        """Whether sources are rid of their mean; may be changed while the waves run."""
-        return self._backend.keeps_volume
+        """Whether sources are rid of their mean, on any part of the surface; may be changed while the waves run.
+
+        Assign True or False for all parts, or None for the default of each.
+        """
+        return bool(kept_parts(self.operator, self._backend.keeps_volume).any())
 
     @conserve_volume.setter
-    def conserve_volume(self, value: bool) -> None:
+    def conserve_volume(self, value: bool | None) -> None:
         self._backend.keeps_volume = value
+        self._held.balance = self._balance = VolumeBalance(self.operator, value)
 
     @property
     def pressure(self) -> NDArray[np.float64]:
@@ -309,16 +315,14 @@ class WaveSolver:
     def add_height(self, height: ArrayLike) -> None:
         """Raise the surface by a field [m], [C, n, n]; where volume is conserved its mean over the area is removed."""
         field = as_field(height, "height", self.operator.mass.shape).astype(np.float64) * self.operator.free
-        if self.conserve_volume:
-            field = self._balance.balanced_height(field, self._areas)
+        field = self._balance.balanced_height(field, self._areas)
         self._note("height", field)
         self._backend.set_height(self._backend.elastic() + field.astype(np.float32), self._backend.dent())
 
     def add_velocity(self, velocity: ArrayLike) -> None:
         """Add a field [m/s], [C, n, n], to the velocity; where volume is conserved its volume rate is removed."""
         field = as_field(velocity, "velocity", self.operator.mass.shape).astype(np.float64) * self.operator.movable
-        if self.conserve_volume:
-            field = self._balance.balanced_velocity(field)
+        field = self._balance.balanced_velocity(field)
         self._note("velocity", field)
         self._backend.set_velocity(self._backend.velocity() + field.astype(np.float32))
 
@@ -398,7 +402,7 @@ class WaveSolver:
     def __getstate__(self) -> tuple[Any, ...]:
         """What `copy` and `pickle` keep: a copy goes on as the original does, bit for bit."""
         made_of = self.rest, self.material, self._kind, self.operator, copy.copy(self._motion)
-        return made_of, self.backend, self.conserve_volume, self.state
+        return made_of, self.backend, self._backend.keeps_volume, self.state
 
     def __setstate__(self, kept: tuple[Any, ...]) -> None:
         (atlas, self.material, self._kind, operator, motion), backend, conserve_volume, state = kept

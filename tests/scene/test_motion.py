@@ -149,6 +149,16 @@ def simulation(folder: Path, script: str, **options) -> Simulation:
     return Simulation(scene, fps=100, backend="cpu", **options)
 
 
+def test_a_target_keeps_its_volume_unless_its_scene_says_not(tmp_path: Path) -> None:
+    poke = '[[poke]]\ngeom = "egg"\ntime = 0\npoint = [0.3, 0, 0]\nimpulse = 0.02\n'
+    for line, conserves in (("", True), ("conserve_volume = true\n", True), ("conserve_volume = false\n", False)):
+        run = simulation(tmp_path, line + poke)
+        run.advance_frame()
+        waves = run.ripples["egg"]
+        assert waves.conserve_volume == conserves
+        assert (abs(waves.momentum()) < 1e-6) == conserves
+
+
 def test_changed_material_keeps_the_waves_and_changes_what_follows(tmp_path: Path) -> None:
     poke = '[[poke]]\ngeom = "egg"\ntime = 0\npoint = [0.3, 0, 0]\nimpulse = 0.02\n'
     change = '[[change]]\ngeom = "egg"\ntime = 0.1\nmaterial = {damping = 50.0}\n'
