@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
 
@@ -25,7 +26,6 @@ from ripple_sim.render.camera import (
     set_scene_camera,
     with_camera_poses,
 )
-from ripple_sim.render.visuals.visual import paint_of
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.solver.errors import GLError, checked, instance, warn_caller, whole
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -33,6 +33,17 @@ from ripple_sim.solver.gl import GLContext, shared_context
 from .exporter import Exporter, camera_entry, framed
 
 AnyCamera: TypeAlias = Camera | FixedCamera | str | int | mujoco.MjvCamera
+
+# Numbers of the scene's cameras, beside their poses.
+_CAMERA = (
+    "orthographic",
+    "frustum_bottom",
+    "frustum_center",
+    "frustum_far",
+    "frustum_near",
+    "frustum_top",
+    "frustum_width",
+)
 
 
 class RippleRenderer:
@@ -69,7 +80,8 @@ class RippleRenderer:
     ----------
     model : mujoco.MjModel
     scene : mujoco.MjvScene
-        What the latest `update_scene` took in. Geoms may be added to it before `render`, to be seen in colours.
+        What the latest `update_scene` took in. `render` draws what stands in it: whatever is changed, added or taken
+        away before is seen, in depth and segmentation too.
     height : int
         [pixels].
     width : int
@@ -109,16 +121,16 @@ class RippleRenderer:
         self._shown = ShownWaves(ripples, height)
         named = by_name(self.model, looks or {}, "looks")
         surfaces = {
-            geom: surface_of(ripples[name], *paint_of(self.model, geom, named.get(name)))
+            geom: dataclasses.replace(surface_of(ripples[name], named.get(name, "rubber")), grey=name not in named)
             for name, geom in ripples.geom_ids.items()
         }
         self.height, self.width, self._looks, self._limit = int(height), int(width), named, limit
         self.scene = mujoco.MjvScene(self.model, max_geom)
-        self._own_geoms = 0  # entries of the scene that MuJoCo made
         self._usual_flags, self._told_flags = self.scene.flags.copy(), set[int]()
         self._shows = "colours"
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
+        self._camera_taken: list[object] = []
         self._renderer: Renderer | None = Renderer(
             gl or shared_context(), self.model, surfaces, size=(self.width, self.height)
         )
@@ -171,7 +183,7 @@ class RippleRenderer:
         option, everything = scene_option or mujoco.MjvOption(), int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self.model, state, option, None, own, everything, self.scene)
         seen = dataclasses.replace(seen.pose(), clip=pose_of_scene(self.scene.camera, 1.0).clip)
-        self._own_geoms = self.scene.ngeom
+        self._camera_taken = _content(self.scene.camera)
         heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
         self._shown.look(state, heights, seen.pose())
         height_maps = {
@@ -213,16 +225,14 @@ class RippleRenderer:
         if out is not None and out.shape != shape:
             raise RenderError(f"out has shape {list(out.shape)}; valid is {list(shape)}, that of the {self._shows}")
         self._warn_of_flags()
-        for added in self.scene.geoms[self._own_geoms : self.scene.ngeom]:  # mjv_initGeom leaves chance values there
-            added.objtype, added.objid, added.segid = int(mujoco.mjtObj.mjOBJ_UNKNOWN), -1, -1
         if self._drawn is None:
             frame = self._empty_frame()
         elif self._shows == "colours":
-            frame = self._renderer.render(*self._drawn, scene=self.scene)
+            frame = self._renderer.render(*self._now(), scene=self.scene)
         else:
-            image = self._renderer.surfaces(*self._drawn, scene=self.scene)
-            beyond = image.depth > self._far  # where MuJoCo shows nothing
-            nothing = (image.geom == -1) & (image.depth == 0) | beyond
+            segmented = self._shows == "segmentation"
+            image = self._renderer.surfaces(*self._now(), scene=self.scene, segmented=segmented)
+            nothing = (image.depth == 0) | (image.depth > self._far)  # beyond the far plane as in MuJoCo
             if self._shows == "depth":
                 frame = np.where(nothing, self._far, image.depth)
             else:
@@ -247,6 +257,18 @@ class RippleRenderer:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+    def _now(self) -> tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint]:
+        """What is to be drawn: bodies and waves as they were taken in, seen with the scene's camera as it is."""
+        if self._drawn is None:
+            raise RenderError("there is nothing to render; call update_scene(data) before, or render(data)")
+        state, height_maps, seen = self._drawn
+        if _content(self.scene.camera) != self._camera_taken:
+            try:
+                seen = pose_of_scene(self.scene.camera, seen.pose().distance)
+            except SceneError as error:
+                raise RenderError(str(error)) from None
+        return state, height_maps, seen
 
     @property
     def _far(self) -> np.float32:
@@ -307,3 +329,12 @@ class RippleRenderer:
             ) as exporter:
                 exporter.write(data)
             return framed(page, self.width / self.height)
+
+
+def _content(cameras: Sequence[mujoco.MjvGLCamera]) -> list[object]:
+    """What the cameras of a scene say, to be compared."""
+    content: list[object] = []
+    for camera in cameras:
+        content += [camera.pos.tobytes(), camera.forward.tobytes(), camera.up.tobytes()]
+        content += [getattr(camera, name) for name in _CAMERA]
+    return content

@@ -19,7 +19,7 @@ from ripple_sim.render.surfaces.vertices import mapped_coordinates, surface_vert
 from ripple_sim.render.visuals.geoms import Instances, instances_of
 from ripple_sim.render.visuals.objects import Assets, Occluders
 from ripple_sim.render.visuals.shapes import NamedShape
-from ripple_sim.render.visuals.visual import Visual, ball_of, geom_visual
+from ripple_sim.render.visuals.visual import Visual, ball_of, box_of, geom_visual
 from ripple_sim.solver.errors import RippleError
 
 from .camera import Pose, balls_about
@@ -69,20 +69,21 @@ class SurfaceMesh:
     ) -> None:
         resources, page = assets.resources, surface.charts.page
         self.geom, self._open, self._gl, self._resources = geom, surface.open, resources.gl, resources
+        self._assets = assets
         self._objects, self._height_maps, self._layer = assets.objects, height_maps, index
         self._page, self._shape = page, (page.charts, page.block, page.block, 4)
         self._middle = np.zeros(3)  # of what is soft its own, of a geom that of its frame
         if is_soft(assets.model, geom):
             self._middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
         self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
-        look, rgb, mapping = appearance(assets.model, geom, surface)
+        visual = geom_visual(assets.model, geom)
+        look, _, mapping = appearance(assets.model, visual, surface)
         self.transparent, self.occludes, self.casts = look.transparency > 0.0, True, True
-        colors, identity = surface.heatmap_colors, geom_visual(assets.model, geom).identity
-        heatmap = colors is not None
+        heatmap = surface.heatmap_colors is not None
         number = assets.objects.add(
-            look, geom, identity=identity, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block
+            look, geom, identity=visual.identity, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block
         )
-        self.numbers, self._color = [number], (*rgb, float(number))
+        self.numbers = [number]
         pixel = 2 * self._radius / size[1]
         self._vertices = vertices = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
         self._balls = vertices.balls
@@ -96,31 +97,51 @@ class SurfaceMesh:
         self._mesh = surface.moving or (surface.V, surface.F)
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
-        self._unit, self._image = mapping.unit, None if mapping.texture < 0 else assets.texture(mapping.texture)
+        colors = surface.heatmap_colors
         self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
-        options = {"MAPPING": mapping.kind, "HEATMAP": int(heatmap), "GRID": int(surface.grid > 0)}
-        self._program = resources.program("surfaces/surface", **options)
-        self._program["resolution"] = float(page.resolution)
-        if surface.grid:
-            self._program["grid_spacing"] = float(surface.grid)
-        if mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
-            self._program["tiling"] = mapping.tiling
+        self._programs: dict[MappingKind, tuple[moderngl.Program, moderngl.VertexArray]] = {}
         moved = (displacement.moved, "4f", "in_moved")
-        # what a program does not use is optimised away
-        self._solid = resources.vertex_array(
-            self._program, [moved, (displacement.vertices, *displacement.KEPT)], self._indices, skip_errors=True
-        )
         # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
         whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse))
-        solid, passing = int(not self._open), look.transparency * rgb  # linear colour of the light that passes
+        solid = int(not self._open)
         self._casters = {
             seen: resources.vertex_array(
                 resources.program("passes/casters", MOVED=1, MAP=seen, SOLID=solid), [moved], triangles
             )
             for seen, triangles in zip(CasterMap, (whole, coarse, self._indices), strict=True)
         }
+        self._surface, self._mapping = surface, mapping
+        self.paint(visual)
+
+    def paint(self, visual: Visual) -> None:
+        """Be painted as what it stands for."""
+        look, rgb, mapping = appearance(self._assets.model, visual, self._surface)
+        self._objects.paint(self.numbers[0], look)
+        self._color = (*rgb, float(self.numbers[0]))
+        passing = look.transparency * rgb  # linear colour of the light that passes
         self._casters[CasterMap.ALBEDO].program["color"] = tuple(rgb - passing)
         self._casters[CasterMap.TRANSMISSION].program["transmission"] = tuple(passing)
+        if mapping.key != self._mapping.key:
+            self._displacement.lay(mapped_coordinates(self._vertices.attributes, mapping))
+        self._mapping = mapping
+        self._image = None if mapping.texture < 0 else self._assets.texture(mapping.texture)
+        if mapping.kind not in self._programs:
+            self._programs[mapping.kind] = self._program_of(mapping.kind)
+        self._program, self._solid = self._programs[mapping.kind]
+        if mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
+            self._program["tiling"] = mapping.tiling
+
+    def _program_of(self, kind: MappingKind) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        """What the surface is drawn with into the G-buffer where its texture lies so."""
+        resources, surface, displacement = self._resources, self._surface, self._displacement
+        heatmap, grid = int(self._heatmap is not None), int(surface.grid > 0)
+        program = resources.program("surfaces/surface", MAPPING=kind, HEATMAP=heatmap, GRID=grid)
+        program["resolution"] = float(self._page.resolution)
+        if grid:
+            program["grid_spacing"] = float(surface.grid)
+        content = [(displacement.moved, "4f", "in_moved"), (displacement.vertices, *displacement.KEPT)]
+        # what a program does not use is optimised away
+        return program, resources.vertex_array(program, content, self._indices, skip_errors=True)
 
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
         """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.
@@ -204,7 +225,7 @@ class SurfaceMesh:
     def draw(self) -> None:
         """Draw into the G-buffer."""
         if self._image is not None:
-            self._image.use(self._unit)
+            self._image.use(self._mapping.unit)
         if self._heatmap is not None:
             self._heatmap.use(self._program)
         self._program["rotation"] = tuple(self._pose[0].T.ravel())
@@ -257,13 +278,23 @@ class DrawnScene:
         self._made: dict[tuple[Any, ...], Instances] = {}
         self.show([])
 
-    def show(self, visuals: list[tuple[Visual, NamedShape]], hidden: Sequence[int] = ()) -> None:
-        """Draw these from now on, without the floor, and all targets but the hidden ones."""
+    def show(
+        self,
+        visuals: list[tuple[Visual, NamedShape]],
+        paints: Mapping[int, Visual] | None = None,
+        hidden: Sequence[int] = (),
+    ) -> None:
+        """Draw these from now on, without the floor, and all targets but the hidden ones, painted as they stand for."""
         of_geoms = [visual for visual, _ in visuals if visual.index >= 0 and not visual.site]
         plane = mujoco.mjtGeom.mjGEOM_PLANE
         self._planes = [visual for visual in of_geoms if visual.kind == plane]
         self._others = [visual for visual, _ in visuals if visual.site or visual.index < 0]
-        self._occluders.hold(np.array([visual.index for visual in of_geoms if visual.kind != plane], dtype=np.int64))
+        solids = [visual for visual in of_geoms if visual.kind != plane]
+        boxes = np.array([np.concatenate(box_of(self._model, visual)) for visual in solids])
+        self._occluders.hold(np.array([visual.index for visual in solids], dtype=np.int64), boxes.reshape(-1, 6))
+        for target in self.targets:
+            if paints is not None and target.geom in paints:
+                target.paint(paints[target.geom])
         self._assets.objects.keep(len(self.targets))
         self._instances = instances_of(self._assets, visuals, self._made)
         surfaces = [target for target in self.targets if target.geom not in hidden]

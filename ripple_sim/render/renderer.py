@@ -5,31 +5,27 @@ The passes of one frame in their order: shadow maps, floor map, reflection, G-bu
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import moderngl
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model import find_flex_colliders
-from ripple_sim.errors import RippleWarning
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
 from ripple_sim.render.passes.shadows import Floor, FloorOcclusion, ShadowMaps, TransmissionMaps, find_floor
 from ripple_sim.render.surfaces.surface import Surface
-from ripple_sim.render.visuals.geoms import shaped
 from ripple_sim.render.visuals.lights import SceneLight
 from ripple_sim.render.visuals.objects import Assets
-from ripple_sim.render.visuals.visual import content_of, geom_visual, visuals_in
-from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.errors import RippleError, warn_caller
 from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
 
 from .camera import Pose, Viewpoint, boxes_of, enclosing, within
 from .drawn_scene import DrawnScene
 from .resources import AnyHeightMap, FrameUniforms, Resources
+from .shown_scene import ShownScene
 from .targets import FrameFormat, Readback, SurfaceBuffers, SurfaceImage
 
 _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
@@ -37,6 +33,16 @@ _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera dista
 _MOST_GEOMS = 10_000  # of a scene, as of mujoco.Renderer
 # Memory for a pixel and for each of its samples, at least [bytes].
 _PIXEL, _SAMPLE = 8, 20
+
+
+class _Passes(NamedTuple):
+    """The passes of a frame that depend on what there is; those that nothing needs are None."""
+
+    occlusion: FloorOcclusion
+    shading: DeferredShading
+    transmission: TransmissionMaps | None
+    layers: TransparentLayers | None
+    mirror: Mirror | None
 
 
 class Renderer:
@@ -96,71 +102,60 @@ class Renderer:
             plane = find_floor(model, targets)
             self._floor = None if plane is None else Floor(assets, plane)
             self._scene = DrawnScene(assets, targets, size)
-            self._targets = {target: geom_visual(model, target) for target in targets}
-            # what is not drawn as MuJoCo has it, with its opacity
-            replaced = [*self._targets.values(), *(geom_visual(model, each) for each in (plane,) if each is not None)]
-            self._replaced = {visual.identity: visual.opacity for visual in replaced}
-            colliders = find_flex_colliders(model).values()
-            self._replaced |= dict.fromkeys([(flex, int(mujoco.mjtObj.mjOBJ_FLEX)) for flex in colliders], 0.0)
+            self._shown = ShownScene(model, targets, plane)
             self._own_scene = mujoco.MjvScene(model, _MOST_GEOMS)
-            self._shown: list[tuple[Any, ...]] | None = None  # the content of the scene
             self._told: set[str] = set()
             self._frame = FrameUniforms(resources)
             self._shadows = ShadowMaps(resources, light.options["SHADOWS"], size[1])
-            self._make_passes()
+            self._made_passes: dict[tuple[bool, ...], _Passes] = {}
+            self._choose_passes()
             self._buffers: SurfaceBuffers | None = None
         self._readback = Readback(resources, frame_format)
 
-    def _make_passes(self) -> None:
+    def _choose_passes(self) -> None:
+        """Take the passes for what is drawn; those that were made before are kept."""
+        floor = self._floor
+        kind = bool(self._scene.transparent), floor is not None and floor.tiled, floor is not None and floor.reflects
+        if kind not in self._made_passes:
+            self._made_passes[kind] = self._make_passes(transparent=kind[0])
+        self._occlusion, self._shading, self._transmission, self._layers, self._mirror = self._made_passes[kind]
+
+    def _make_passes(self, transparent: bool) -> _Passes:
         """Make the passes for what is drawn, with something transparent or without."""
-        resources, floor, transparent = self._resources, self._floor, bool(self._scene.transparent)
+        resources, floor = self._resources, self._floor
         options = {**self._light.options, "TRANSMISSION": int(transparent)}
-        self._occlusion = FloorOcclusion(resources, options, floor)
-        self._shading = DeferredShading(resources, self._format, floor, options)
-        self._transmission, self._layers = None, None
+        occlusion = FloorOcclusion(resources, options, floor)
+        shading = DeferredShading(resources, self._format, floor, options)
+        transmission, layers, mirror = None, None, None
         if transparent:
             texels = self._shadows.size // _TRANSMISSION_TEXEL
-            self._transmission = TransmissionMaps(resources, options["SHADOWS"], texels)
-            self._layers = TransparentLayers(resources, self._format, self._shading)
-        self._mirror = None
+            transmission = TransmissionMaps(resources, options["SHADOWS"], texels)
+            layers = TransparentLayers(resources, self._format, shading)
         if floor is not None and floor.reflects and not self._format.alpha:
-            self._mirror = Mirror(resources, self._format, floor, options)
+            mirror = Mirror(resources, self._format, floor, options)
+        return _Passes(occlusion, shading, transmission, layers, mirror)
 
-    def _show(self, data: Any, scene: mujoco.MjvScene | None, segmented: bool = False) -> None:
+    def _show(self, data: Any, scene: mujoco.MjvScene | None, segmented: bool = False) -> Any:
         """Draw what a scene of MuJoCo's has, by default all that it shows of the data, with surfaces for the targets.
 
         Surfaces of targets that MuJoCo shows by default are drawn only if the scene has the target. What is `segmented`
-        has a `segid`. What is not drawn is told once.
+        has a `segid`. What is not drawn is told once. Return where geoms and sites are, as the scene has them.
         """
+        shown, edited = self._shown, scene is not None
         if scene is None:
             scene, kinds = self._own_scene, int(mujoco.mjtCatBit.mjCAT_ALL)
             mujoco.mjv_updateScene(self._model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), kinds, scene)
-        drawn = [each for each in scene.geoms[: scene.ngeom] if each.segid >= 0 or not segmented]
-        contents = [content_of(each) for each in drawn]
-        if contents == self._shown:
-            return
-        self._shown, there, left_out, visuals = contents, set(), set(), []
-        for each in drawn:
-            identity = int(each.objid), int(each.objtype)
-            there.add(identity)
-            if each.label:
-                left_out.add("labels")
-            if identity not in self._replaced:
-                visuals += visuals_in(self._model, scene, each)
-            elif each.rgba[3] < self._replaced[identity]:
-                left_out.add("transparency of rippling surfaces and of the floor")
-        with_shape = shaped(self._model, visuals)
-        kinds_of = ({visual.kind for visual in each} for each in (visuals, [visual for visual, _ in with_shape]))
-        left_out |= {mujoco.mjtGeom(kind).name for kind in set.difference(*kinds_of)}
-        hidden = [target for target, each in self._targets.items() if each.visible and each.identity not in there]
-        self._scene.show(with_shape, hidden)
-        if self._scene.transparent and self._layers is None:
-            self._make_passes()
-        if self._floor is not None:
-            self._floor.shown = geom_visual(self._model, self._floor.geom).identity in there
-        if new := left_out - self._told:
-            self._told |= new
-            warnings.warn(f"not drawn: {', '.join(sorted(new))}; all else of the scene is", RippleWarning, stacklevel=5)
+        if shown.read(scene, segmented):
+            self._scene.show(shown.visuals, shown.targets, shown.hidden)
+            if self._floor is not None:
+                self._floor.shown = shown.floor is not None
+                if shown.floor is not None:
+                    self._floor.paint(shown.floor)
+            self._choose_passes()
+            if new := shown.left_out - self._told:
+                self._told |= new
+                warn_caller(f"not drawn: {', '.join(sorted(new))}; all else of the scene is")
+        return shown.poses(data) if edited else data
 
     def __enter__(self) -> Renderer:
         return self
@@ -259,11 +254,11 @@ class Renderer:
         """
         drawn, pose = self._scene, camera.pose()
         with self._gl as ctx:
-            self._show(data, scene)
+            poses = self._show(data, scene)
             shading = self._shading
-            drawn.update(ctx, data, height_maps, pose)
+            drawn.update(ctx, poses, height_maps, pose)
             shading.clear(ctx)  # which a software driver does during what follows
-            self._update(data, pose, exposure)
+            self._update(data, poses, pose, exposure)
             # what shading looks up; a software driver stops for each texture that it is still drawing to
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             ctx.depth_func = "<="
@@ -276,7 +271,7 @@ class Renderer:
             self._occlusion.shade(ctx, self._shadows)
             shading.begin(ctx)
             drawn.draw()
-            balls = drawn.balls(data)
+            balls = drawn.balls(poses)
             boxes = boxes_of(balls, pose, self._size)
             if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
                 self._gl.wait()
@@ -286,7 +281,7 @@ class Renderer:
             self._bind()
             shading.shade(ctx, boxes)
             if self._layers is not None:
-                for bounds, layer in drawn.layers(data, pose):
+                for bounds, layer in drawn.layers(poses, pose):
                     self._layers.add(ctx, layer.numbers[0], layer.draw, boxes_of(bounds, pose, self._size))
         return shading.frame
 
@@ -297,20 +292,21 @@ class Renderer:
         camera: Viewpoint,
         size: tuple[int, int] | None = None,
         scene: mujoco.MjvScene | None = None,
+        segmented: bool = False,
     ) -> SurfaceImage:
         """Draw what is seen at the middle of each pixel, without light: distances, normals, geoms.
 
         Transparent objects count as solid. Arguments are as for `render`; `size` (width, height) may be another than
-        that of the frames, of the same shape. Of a `scene` there is what MuJoCo would segment, in MuJoCo's shapes:
-        boxes and cylinders without round edges.
+        that of the frames, of the same shape. Of a `scene` there are MuJoCo's shapes: boxes and cylinders without round
+        edges; if `segmented`, only what MuJoCo would segment.
         """
         drawn, pose, size = self._scene, camera.pose(), size or self._size
         with self._gl as ctx:
             if self._buffers is None or self._buffers.size != size:
                 self._buffers = SurfaceBuffers(self._resources, size)
-            self._show(data, scene, segmented=scene is not None)
-            drawn.update(ctx, data, height_maps, pose, sharp=scene is not None)
-            self._update(data, pose, 0)
+            poses = self._show(data, scene, segmented)
+            drawn.update(ctx, poses, height_maps, pose, sharp=scene is not None)
+            self._update(data, poses, pose, 0)
             drawn.height_maps.bind()
 
             def draw() -> None:
@@ -319,14 +315,14 @@ class Renderer:
 
             return self._buffers.draw(ctx, draw, self._assets.objects, -1 if self._floor is None else self._floor.geom)
 
-    def _update(self, data: Any, pose: Pose, exposure: int) -> None:
-        """Bring the frame's uniforms up to date."""
+    def _update(self, data: Any, poses: Any, pose: Pose, exposure: int) -> None:
+        """Bring the frame's uniforms up to date; `poses` are those of geoms and sites."""
         frame, floor = self._frame, self._floor
         frame.set_camera(pose, self._format.aspect)
-        casters = within(self._scene.casters(data), pose.focus, _SHADOW_REACH * pose.distance)
+        casters = within(self._scene.casters(poses), pose.focus, _SHADOW_REACH * pose.distance)
         centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
         if floor is not None:
-            floor.place(frame, data, centre, radius)
+            floor.place(frame, poses, centre, radius)
             lights = self._light.set(frame, data, pose, floor.albedo, floor.normal)
         else:
             lights = self._light.set(frame, data, pose)

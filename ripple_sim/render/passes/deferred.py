@@ -58,17 +58,14 @@ class Background:
         ]
         for each in self._passes:
             each.program["span"] = tuple(block * pixels / of for pixels, of in zip(blocks, size, strict=True))
-            if floor is not None and options["TILED"]:
-                each.program["tint"] = tuple(floor.tint)
-                each.program["tiling"] = floor.tiling
-            if floor is not None and options["MIRROR"]:
-                each.program["reflectance"] = floor.reflectance
+        self._floor, self._options = floor, options
 
     def prepare(self, ctx: moderngl.Context) -> None:
         """Do what needs no frame."""
 
     def draw(self, ctx: moderngl.Context, frame: moderngl.Framebuffer) -> None:
         """Fill the framebuffer in use, but for pixels that show solids in all of their samples."""
+        self._paint_floor()
         ctx.depth_func = "<="
         self._passes[0].run(frame, 0.0)
         ctx.depth_func = "=="
@@ -76,6 +73,16 @@ class Background:
         for level in ("SHADED", "MIXED"):
             self._passes[1].run(frame, LEVELS[level])
         frame.depth_mask = True
+
+    def _paint_floor(self) -> None:
+        """Set how the floor looks now."""
+        floor = self._floor
+        for each in self._passes:
+            if floor is not None and self._options["TILED"]:
+                each.program["tint"] = tuple(floor.tint)
+                each.program["tiling"] = floor.tiling
+            if floor is not None and self._options["MIRROR"]:
+                each.program["reflectance"] = floor.reflectance
 
 
 class CoarseBackground:

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from ripple_sim.render.camera import orthographic, perspective, view_along
 from ripple_sim.render.contract import CasterMap, MappingKind, Unit
 from ripple_sim.render.resources import FrameUniforms, Resources
-from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.lights import Light
 from ripple_sim.render.visuals.objects import Assets
 from ripple_sim.render.visuals.texture_mapping import mapping_of
-from ripple_sim.render.visuals.visual import geom_visual, texture_pixels, visible_geoms
+from ripple_sim.render.visuals.visual import Visual, finish_of, geom_visual, visible_geoms
 
 # Texels along a side: as many as make one about as wide as a pixel, where the casters fill the frame.
 _LEAST, _MOST, _PER_PIXEL, _STEP = 512, 1536, 1.4, 256
@@ -182,7 +181,6 @@ class TransmissionMaps:
 
 _ENDLESS = 1e9  # half size of an infinite plane [m]
 _SOFT = 0.1  # margin about shadows for their penumbras, in half widths of the map
-_MOST_TEXELS = 2048  # of a texture, along a side, that its mean colour is taken from
 _LOWEST_SINE = 0.02  # elevation of a light at which shadows have no end
 
 _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # of a box about a ball
@@ -222,20 +220,22 @@ class Floor:
     """
 
     def __init__(self, assets: Assets, geom: int) -> None:
-        self.geom, model = geom, assets.model
-        visual = geom_visual(model, geom)
+        self.geom, self._assets = geom, assets
+        self.shown = True
+        self.paint(geom_visual(assets.model, geom))
+
+    def paint(self, visual: Visual) -> None:
+        """Be painted as this visual of the plane."""
+        assets, model = self._assets, self._assets.model
         mapping = mapping_of(model, visual)
         self.tiled = mapping.kind == MappingKind.FLAT_IMAGE
         self.tiling, self.albedo, self.tint = mapping.tiling, visual.color, visual.color
         self._image = assets.texture(mapping.texture) if self.tiled else None
         if self.tiled:
-            pixels = texture_pixels(model, mapping.texture)
-            apart = -(-max(pixels.shape) // _MOST_TEXELS)  # all of a large one would be gigabytes of numbers
-            self.albedo = self.tint * srgb_to_linear(pixels[::apart, ::apart] / 255.0).mean(axis=(0, 1))
-        self.reflectance = 0.0 if visual.material < 0 else float(model.mat_reflectance[visual.material])
-        half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
+            self.albedo = self.tint * assets.mean_color(mapping.texture)
+        self.reflectance = float(np.clip(finish_of(model, visual).reflectance, 0.0, 1.0))
+        half = np.asarray(model.geom_size[self.geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)
-        self.shown = True
 
     @property
     def reflects(self) -> bool:

@@ -288,6 +288,12 @@ class Displacement:
         self._framebuffer = resources.framebuffer([resources.renderbuffer((1, 1))])
         self._used: NDArray[np.int32] | None = None
 
+    def lay(self, mapped: NDArray[np.float64]) -> None:
+        """Replace the texture coordinates of all vertices, [n, 3]."""
+        self._content[:, -3:] = mapped
+        self.vertices.write(self._content[: self._base_count])
+        self._used = None
+
     def move(self, points: Floats32, directions: Floats32, normals: Floats32, baked: Floats32) -> None:
         """Replace where all vertices are at rest [m], the directions that they are displaced in, and more, [n, 3]."""
         self._content[:, :6] = np.hstack([points, directions])

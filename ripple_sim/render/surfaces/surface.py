@@ -16,7 +16,7 @@ from ripple_sim.render.contract import MappingKind, Unit
 from ripple_sim.render.resources import Resources, write_page
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
-from ripple_sim.render.visuals.visual import MODEL_LOOK, Look, find_look, geom_visual, look_of
+from ripple_sim.render.visuals.visual import MODEL_LOOK, Look, Visual, find_look, geom_visual, look_of
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.mesh.topology import undirected
@@ -164,6 +164,8 @@ class Surface:
         Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
     color : tuple, optional
         sRGB, 0 to 1. By default the texture or colour that the model gives the geom, or else the look's own.
+    grey : bool
+        Whether MuJoCo's grey takes the place of the look's own colour.
     uv : array, optional
         Texture coordinates, shape [n, 2] or per corner [m, 3, 2].
     heatmap_colors : array of uint8, shape [k, 3], optional
@@ -179,6 +181,7 @@ class Surface:
     charts: Charts
     look: str = "rubber"
     color: tuple[float, float, float] | None = None
+    grey: bool = False
     uv: NDArray[np.float64] | None = None
     heatmap_colors: NDArray[np.uint8] | None = None
     grid: int = 0
@@ -191,31 +194,43 @@ class Surface:
         return bool((np.unique(edges, return_counts=True)[1] == 1).any())
 
 
-def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], TextureMapping]:
-    """Look, linear colour under the texture, and how the texture lies on the surface."""
+def appearance(model: Any, visual: Visual, surface: Surface) -> tuple[Look, NDArray[np.float64], TextureMapping]:
+    """Look, linear colour under the texture, and how the texture lies on a surface that stands for a visual."""
     if surface.heatmap_colors is not None:
         return UNDER_HEATMAP, np.ones(3), TextureMapping()
-    return painted(model, geom, surface.look, surface.color, surface.uv is not None)
+    color = surface.color
+    if color is None and surface.grey and not visual.colored:
+        red, green, blue = visual.rgba[:3].tolist()
+        color = red, green, blue
+    return _painted(model, visual, surface.look, color, surface.uv is not None)
 
 
 def painted(
     model: Any, geom: int, look: str, color: tuple[float, float, float] | None, has_uv: bool
 ) -> tuple[Look, NDArray[np.float64], TextureMapping]:
     """The same for a target of a look, with an sRGB colour if it is given one, and texture coordinates or none."""
-    visual, found = geom_visual(model, geom), find_look(look)
-    mapping = mapping_of(model, visual)
+    return _painted(model, geom_visual(model, geom), look, color, has_uv)
+
+
+def _painted(
+    model: Any, visual: Visual, look: str, color: tuple[float, float, float] | None, has_uv: bool
+) -> tuple[Look, NDArray[np.float64], TextureMapping]:
+    found, mapping = find_look(look), mapping_of(model, visual)
     if mapping.own and not has_uv:
         mapping = TextureMapping()
     if look == MODEL_LOOK:
         return look_of(model, visual), visual.color if color is None else srgb_to_linear(color), mapping
     if color is None and mapping.kind != MappingKind.NO_IMAGE:
         return found, visual.color, mapping
-    return found, srgb_to_linear(target_color(model, geom, look, color)), TextureMapping()
+    return found, srgb_to_linear(_own_color(model, visual, look, color)), TextureMapping()
 
 
 def target_color(model: Any, geom: int, look: str, given: tuple[float, float, float] | None) -> NDArray[np.float64]:
     """Colour of a target without its texture, sRGB [3]: the given one, or else the model's own, or else the look's."""
-    visual = geom_visual(model, geom)
+    return _own_color(model, geom_visual(model, geom), look, given)
+
+
+def _own_color(model: Any, visual: Visual, look: str, given: tuple[float, float, float] | None) -> NDArray[np.float64]:
     if given is not None:
         return np.array(given)
     plain = mapping_of(model, visual).kind == MappingKind.NO_IMAGE

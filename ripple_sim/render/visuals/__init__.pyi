@@ -26,6 +26,7 @@ from .lights import (
     studio_lighting as studio_lighting,
 )
 from .objects import Assets as Assets, ObjectTable as ObjectTable, Occluders as Occluders
+from .scene_entries import visuals_in as visuals_in
 from .shapes import shape_of as shape_of, sizes as sizes
 from .texture_mapping import TextureMapping as TextureMapping, mapping_of as mapping_of
 from .visual import (
@@ -41,5 +42,4 @@ from .visual import (
     texture_pixels as texture_pixels,
     visible_geoms as visible_geoms,
     visible_sites as visible_sites,
-    visuals_in as visuals_in,
 )

@@ -16,6 +16,7 @@ from ripple_sim.render.tone_mapping import srgb_to_linear
 from .visual import Look, texture_pixels
 
 _ROW = OBJECT.dtype
+_MOST_TEXELS = 2048  # of a texture, along a side, that its mean colour is taken from
 
 
 class ObjectTable:
@@ -53,13 +54,20 @@ class ObjectTable:
         side of a chart with its halo in it [texels].
         """
         row = np.zeros((), dtype=_ROW)
-        row["base"] = look.roughness, look.metallic, look.sheen, look.coat
-        row["volume"] = look.translucency, look.transparency, look.emission, opacity
+        row["volume"][3] = opacity
         row["place"] = geom, size, 0.0, heatmap
         row["height_map"] = 0 if height_map is None else (height_map, 1, 0, chart)
         self._rows.append(row)
         self.identities.append(identity)
-        return len(self._rows) - 1
+        number = len(self._rows) - 1
+        self.paint(number, look)
+        return number
+
+    def paint(self, number: int, look: Look) -> None:
+        """Give a row another look."""
+        row = self._rows[number]
+        row["base"] = look.roughness, look.metallic, look.sheen, look.coat
+        row["volume"][:3] = look.translucency, look.transparency, look.emission
 
     def place(
         self, number: int, bias: float, *, occluders: int = 0, rotation: NDArray[np.float64] | None = None
@@ -118,6 +126,7 @@ class Assets:
         self.model, self.resources = model, resources
         self.objects = ObjectTable(resources)
         self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
+        self._mean_colors: dict[int, NDArray[np.float64]] = {}
         self.levels: dict[str, Any] = {}
 
     def texture(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
@@ -127,6 +136,14 @@ class Assets:
             flat = self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
             self._uploaded[texture] = (srgb_texture if flat else srgb_cube)(self.resources, pixels)
         return self._uploaded[texture]
+
+    def mean_color(self, texture: int) -> NDArray[np.float64]:
+        """Mean linear colour [3] of the texture of an id."""
+        if texture not in self._mean_colors:
+            pixels = texture_pixels(self.model, texture)
+            apart = -(-max(pixels.shape) // _MOST_TEXELS)  # all of a large one would be gigabytes of numbers
+            self._mean_colors[texture] = srgb_to_linear(pixels[::apart, ::apart] / 255.0).mean(axis=(0, 1))
+        return self._mean_colors[texture]
 
     def skybox(self) -> tuple[moderngl.TextureCube, NDArray[np.float64]] | None:
         """Return the model's skybox and its mean linear colour, or None."""
@@ -156,11 +173,15 @@ class Occluders:
         self._bound, self._bound_geoms = np.zeros((0, 2, 4)), np.zeros(0, np.int64)
         self.hold(geoms)
 
-    def hold(self, geoms: NDArray[np.int64]) -> None:
-        """Be the capsules of these geoms from now on."""
-        self._geoms, half = geoms, self._model.geom_aabb[geoms, 3:]
+    def hold(self, geoms: NDArray[np.int64], boxes: NDArray[np.float64] | None = None) -> None:
+        """Be the capsules of these geoms from now on.
+
+        `boxes`, centres and half sizes [k, 6] [m], hold them; by default they are the model's.
+        """
+        boxes = self._model.geom_aabb[geoms] if boxes is None else boxes
+        self._geoms, half = geoms, boxes[:, 3:]
         across = np.arange(3) != half.argmax(axis=1)[:, None]  # a capsule lies along its geom's longest axis
-        self._centre, self._bounds = self._model.geom_aabb[geoms, :3], np.linalg.norm(half, axis=1)
+        self._centre, self._bounds = boxes[:, :3], np.linalg.norm(half, axis=1)
         self._radius = np.sqrt(np.prod(half, axis=1, where=across))
         self._half_axis = np.where(across, 0.0, np.maximum(half - self._radius[:, None], 0.0))
 

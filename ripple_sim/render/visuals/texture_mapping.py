@@ -65,6 +65,11 @@ class TextureMapping:
         """Texture unit that shaders read the texture from."""
         return Unit.CUBE_IMAGE if self.kind == MappingKind.CUBE_IMAGE else Unit.FLAT_IMAGE
 
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """Equal for equal mappings."""
+        return self.kind, self.texture, self.scale.tobytes(), self.own, self.tiling, self.straight, self.stretch
+
     def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates [n, 3] of points [n, 3] of the visual, in its frame [m]."""
         coordinates = points * self.scale
@@ -82,12 +87,17 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     height fields, and on meshes without texture coordinates, they are projected from above.
     """
     material, half = visual.material, visual.half_sizes
-    roles = [] if material < 0 else [int(model.mat_texid[material, role]) for role in _ROLES]
-    texture = next((each for each in roles if each >= 0), -1)
+    given = visual.texture
+    if given is None:
+        roles = [] if material < 0 else [int(model.mat_texid[material, role]) for role in _ROLES]
+        texture = next((each for each in roles if each >= 0), -1)
+    else:
+        texture = given.number
     if texture < 0 or model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
         return TextureMapping()
-    uniform, cube = bool(model.mat_texuniform[material]), model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE
-    repeat = np.array(model.mat_texrepeat[material], dtype=np.float64)
+    cube = model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE
+    uniform = bool(model.mat_texuniform[material]) if given is None else given.uniform
+    repeat = np.array(model.mat_texrepeat[material] if given is None else given.repeat, dtype=np.float64)
     times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
     factor = np.where(half > 0, half, 1.0) if cube and uniform else np.ones(3)
     if visual.kind in _WRAPPED:  # by coordinates from -factor to factor

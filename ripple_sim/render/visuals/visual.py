@@ -5,8 +5,8 @@ Looks are named sets of parameters for the surface of a target.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.soft import first_flex, first_skin, is_soft
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
-
-from .flexes import flex_parts
 
 # The look that takes colour, texture and gloss from the geom's MuJoCo material.
 MODEL_LOOK = "model"
@@ -75,10 +73,26 @@ def find_look(name: str) -> Look:
 
 
 _GEOM = mujoco.mjtGeom
-_GEOM_OBJECT, _SITE_OBJECT = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_SITE)
-_SOLID = {*(int(getattr(mujoco.mjtObj, f"mjOBJ_{name}")) for name in ("GEOM", "SITE", "TENDON", "FLEX", "SKIN"))}
+GEOM_OBJECT, SITE_OBJECT = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_SITE)
 _VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
 _UNSET = [0.5, 0.5, 0.5, 1.0]  # a geom's or site's colour where the MJCF gives none
+
+
+class Finish(NamedTuple):
+    """How a surface answers light, as MuJoCo's materials say it; by default as without a material."""
+
+    emission: float = 0.0
+    specular: float = 0.5
+    shininess: float = 0.5
+    reflectance: float = 0.0
+
+
+class SceneTexture(NamedTuple):
+    """A texture of the model, by its id, and how it is repeated; see `mapping_of`."""
+
+    number: int
+    repeat: tuple[float, float]
+    uniform: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +125,16 @@ class Visual:
         Points, normals and texture coordinates of the corners of a flex's or a skin's triangles.
     part : str
         Which part of a flex they are, see `flex_parts`.
+    finish : Finish, optional
+        As a scene has it; by default the material's.
+    texture : SceneTexture, optional
+        That a scene gives in place of the material's.
+    decor : bool
+        Whether it explains a scene, and casts no shadow.
+    half_size : float64 [3], optional
+        Half sizes along its axes that a scene gives in place of `size` [m].
+    box : (float64 [3], float64 [3]), optional
+        Centre and half sizes of the box about it in its own frame [m], of what has an asset and is no geom.
     """
 
     site: bool
@@ -126,6 +150,11 @@ class Visual:
     pose: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
     corners: NDArray[np.float32] | None = None
     part: str = ""
+    finish: Finish | None = None
+    texture: SceneTexture | None = None
+    decor: bool = False
+    half_size: NDArray[np.float64] | None = None
+    box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @property
     def visible(self) -> bool:
@@ -134,8 +163,8 @@ class Visual:
 
     @property
     def casts(self) -> bool:
-        """Whether it casts shadows, as a geom, site, tendon, flex or skin does, and what explains a scene does not."""
-        return self.identity[1] in _SOLID
+        """Whether it casts shadows: as in MuJoCo all does but what explains a scene."""
+        return not self.decor
 
     @property
     def color(self) -> NDArray[np.float64]:
@@ -155,12 +184,14 @@ class Visual:
     @property
     def half_sizes(self) -> NDArray[np.float64]:
         """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane is infinite."""
+        if self.half_size is not None:
+            return self.half_size
         match self.kind:
-            case _GEOM.mjGEOM_SPHERE if self.pose is None:
+            case _GEOM.mjGEOM_SPHERE:
                 return np.full(3, self.size[0])
-            case _GEOM.mjGEOM_CAPSULE | _GEOM.mjGEOM_CYLINDER if self.pose is None:
+            case _GEOM.mjGEOM_CAPSULE | _GEOM.mjGEOM_CYLINDER:
                 return self.size[[0, 0, 1]]
-            case _:  # as a scene has those of all kinds
+            case _:
                 return self.size
 
 
@@ -174,7 +205,7 @@ def geom_visual(model: Any, geom: int) -> Visual:
         return Visual(False, geom, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, *paint, identity=identity)
     kind, size = int(model.geom_type[geom]), np.array(model.geom_size[geom], dtype=np.float64)
     asset, paint = int(model.geom_dataid[geom]), _paint(model, "geom", geom)
-    return Visual(False, geom, kind, size, asset, *paint, identity=(geom, _GEOM_OBJECT))
+    return Visual(False, geom, kind, size, asset, *paint, identity=(geom, GEOM_OBJECT))
 
 
 def paint_of(model: Any, geom: int, look: str | None) -> tuple[str, tuple[float, float, float] | None]:
@@ -190,50 +221,7 @@ def paint_of(model: Any, geom: int, look: str | None) -> tuple[str, tuple[float,
 def site_visual(model: Any, site: int) -> Visual:
     """Site of a model."""
     kind, size = int(model.site_type[site]), np.array(model.site_size[site], dtype=np.float64)
-    return Visual(True, site, kind, size, -1, *_paint(model, "site", site), identity=(site, _SITE_OBJECT))
-
-
-def content_of(drawn: mujoco.MjvGeom) -> tuple[Any, ...]:
-    """What an entry of a scene shows, but for the pose of a geom or site; a flex or skin always shows something new."""
-    arrays = drawn.rgba.tobytes(), drawn.size.tobytes()
-    content = drawn.objid, drawn.objtype, drawn.type, drawn.dataid, drawn.matid, *arrays
-    if drawn.objtype in (_GEOM_OBJECT, _SITE_OBJECT):
-        return content
-    moving = object() if drawn.type in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN) else drawn.mat.tobytes()
-    return *content, drawn.pos.tobytes(), moving
-
-
-def visuals_in(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> list[Visual]:
-    """What an entry of a scene shows that MuJoCo made: one visual, but of a flex its faces, edges and vertices."""
-    identity, kind = (int(drawn.objid), int(drawn.objtype)), int(drawn.type)
-    paint: dict[str, Any] = {"rgba": np.array(drawn.rgba, dtype=np.float64), "material": int(drawn.matid)}
-    if identity[1] == _SITE_OBJECT:
-        return [replace(site_visual(model, identity[0]), **paint)]
-    if identity[1] == _GEOM_OBJECT:  # of a mesh there is the convex hull, too, with the next id
-        hull = kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and bool(drawn.dataid % 2)
-        return [replace(geom_visual(model, identity[0]), hull=hull, **paint)]
-    pose = np.array(drawn.pos), np.array(drawn.mat)
-    size = np.array(drawn.size, dtype=np.float64)
-    visual = Visual(False, -1, kind, size, -1, **paint, group=0, identity=identity, pose=pose)
-    if kind not in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN):
-        return [visual]
-    in_world = replace(visual, pose=(np.zeros(3, np.float32), np.eye(3, dtype=np.float32)))
-    if kind == _GEOM.mjGEOM_SKIN:
-        return [replace(in_world, corners=_skin_corners(model, scene, identity[0]))]
-    return [
-        replace(in_world, corners=corners, part=part, material=in_world.material if part == "faces" else -1)
-        for part, corners in flex_parts(model, scene, drawn).items()
-    ]
-
-
-def _skin_corners(model: Any, scene: mujoco.MjvScene, index: int) -> NDArray[np.float32]:
-    """Corners of the triangles of a scene's skin, see `Visual`."""
-    face, vertex = model.skin_faceadr[index], scene.skinvertadr[index]
-    F = model.skin_face[face : face + model.skin_facenum[index]].ravel()
-    points, normals = (array.reshape(-1, 3)[vertex + F] for array in (scene.skinvert, scene.skinnormal))
-    start = model.skin_texcoordadr[index]
-    uv = model.skin_texcoord[start + F] if start >= 0 else np.zeros((len(F), 2))
-    return np.concatenate([points, normals, uv], axis=1, dtype=np.float32)
+    return Visual(True, site, kind, size, -1, *_paint(model, "site", site), identity=(site, SITE_OBJECT))
 
 
 def _paint(model: Any, which: str, index: int) -> tuple[NDArray[np.float64], int, int]:
@@ -264,6 +252,20 @@ def host_of(model: Any, visual: Visual) -> int:
     return int(near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[visual.index], axis=1))])
 
 
+def box_of(model: Any, visual: Visual) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centre and half sizes of the box about a visual that is no plane, in its own frame [m]."""
+    half = visual.half_sizes
+    match visual.kind:
+        case _GEOM.mjGEOM_SPHERE | _GEOM.mjGEOM_ELLIPSOID | _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX:
+            return np.zeros(3), half
+        case _GEOM.mjGEOM_CAPSULE:
+            return np.zeros(3), half + np.array([0.0, 0.0, half[0]])
+    if visual.box is not None:
+        return visual.box
+    box = model.geom_aabb[visual.index]
+    return box[:3], box[3:]
+
+
 def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
     """Bounding ball [1, 4] of a visual in the world; that of a plane is infinite."""
     if visual.corners is not None:
@@ -271,33 +273,52 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
         middle = points.mean(axis=0)
         return np.array([[*middle, np.linalg.norm(points - middle, axis=1).max(initial=0.0)]])
     if visual.pose is not None:
-        return np.array([[*visual.pose[0], 2 * np.linalg.norm(visual.size)]])
+        position, rotation = visual.pose
+        if visual.kind == _GEOM.mjGEOM_PLANE:
+            return np.array(
+                [[*position, np.linalg.norm(visual.half_sizes[:2]) if visual.half_sizes[:2].all() else np.inf]]
+            )
+        centre, half = np.zeros(3), 2 * visual.half_sizes
+        if visual.box is not None:
+            centre, half = visual.box
+        return np.array([[*(position + rotation @ centre), np.linalg.norm(half)]])
     if visual.site:
         half = visual.half_sizes
         radius = float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
         return np.array([[*data.site_xpos[visual.index], radius]])
-    box, position = model.geom_aabb[visual.index], data.geom_xpos[visual.index]
+    position = data.geom_xpos[visual.index]
     if visual.kind == _GEOM.mjGEOM_PLANE:
         return np.array([[*position, np.inf]])
-    centre = position + data.geom_xmat[visual.index].reshape(3, 3) @ box[:3]
-    return np.array([[*centre, np.linalg.norm(box[3:])]])
+    middle, half = box_of(model, visual)
+    centre = position + data.geom_xmat[visual.index].reshape(3, 3) @ middle
+    return np.array([[*centre, np.linalg.norm(half)]])
+
+
+def finish_of(model: Any, visual: Visual) -> Finish:
+    """Finish of a visual: that of the scene's entry, or else of its material."""
+    material = visual.material
+    if visual.finish is not None or material < 0:
+        return visual.finish or Finish()
+    return Finish(*(float(getattr(model, f"mat_{name}")[material]) for name in Finish._fields))
 
 
 def look_of(model: Any, visual: Visual) -> Look:
     """Look of a visual's material; roughness is derived from MuJoCo's shininess where the material gives none."""
     red, green, blue = visual.color.tolist()
-    rgb, material = (red, green, blue), visual.material
-    if material < 0:
+    rgb, material, finish = (red, green, blue), visual.material, finish_of(model, visual)
+    if material < 0 and finish == Finish():
         return Look(color=rgb, roughness=0.42, coat=0.2)
-    roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
+    roughness, metallic = -1.0, 0.0
+    if material >= 0:
+        roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
     if roughness < 0:
-        roughness = 0.15 + 0.55 * (1.0 - float(model.mat_shininess[material]))
+        roughness = 0.15 + 0.55 * (1.0 - finish.shininess)
     return Look(
         color=rgb,
         roughness=float(np.clip(roughness, 0.05, 1.0)),
         metallic=max(metallic, 0.0),
-        coat=min(0.4 * float(model.mat_specular[material]) + float(model.mat_reflectance[material]), 1.0),
-        emission=float(model.mat_emission[material]),
+        coat=float(np.clip(0.4 * finish.specular + finish.reflectance, 0.0, 1.0)),
+        emission=finish.emission,
     )
 
 

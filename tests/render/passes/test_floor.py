@@ -1,7 +1,7 @@
 """The floor and the background: texture, edges, alpha, occlusion of the sky, and interpolation of coarse pixels."""
 
 import tracemalloc
-from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import mujoco
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.ndimage import binary_erosion
 from ripple_sim.render import Camera
 from ripple_sim.render.passes import deferred
 from ripple_sim.render.passes.shadows import Floor, find_floor
+from ripple_sim.render.visuals import Assets
 
 CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="{0}" height="{0}"/>
 <material name="c" texture="c" {1}/>"""
@@ -153,8 +154,10 @@ def test_the_colour_of_a_large_image_takes_little_memory() -> None:
     """All its texels as numbers would take 2 GB; some of them, of what is mixed evenly, have the same mean."""
     body = '<worldbody><geom type="plane" size="1 1 1" material="c"/></worldbody>'
     model = mujoco.MjModel.from_xml_string(f"<mujoco><asset>{CHECKER.format(4096, '')}</asset>{body}</mujoco>")
+    assets = Assets(model, MagicMock())
+    assets.texture = MagicMock()
     tracemalloc.start()
-    floor = Floor(SimpleNamespace(model=model, texture=lambda _: None), 0)
+    floor = Floor(assets, 0)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     np.testing.assert_allclose(floor.albedo, 0.5, atol=1e-3)

@@ -1,0 +1,230 @@
+"""What the entries of a scene of MuJoCo's show: geoms and sites of the model, and all that is added to these.
+
+An entry says everything of what it shows: type, size, pose, colour and finish, whoever wrote it. The first entry of a
+geom or a site is that geom or site; others of the same id are shown beside it, as ghosts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.coupling.target_mesh import height_field_triangles, mesh_arrays
+
+from .flexes import flex_parts
+from .visual import GEOM_OBJECT, SITE_OBJECT, Finish, SceneTexture, Visual, geom_visual, site_visual
+
+_GEOM = mujoco.mjtGeom
+_MESHES = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF)
+_SOFT = (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN)
+_DECOR = int(mujoco.mjtCatBit.mjCAT_DECOR)
+# How far a scene's rounded pose of an infinite plane may be off the plane, over the distance from the origin.
+_IN_PLANE = 1e-5
+
+
+def content_of(entry: mujoco.MjvGeom) -> tuple[Any, ...]:
+    """What an entry shows, but for its pose; a flex or skin always shows something new."""
+    return (
+        entry.objid,
+        entry.objtype,
+        entry.type,
+        entry.dataid,
+        entry.matid,
+        entry.category,
+        entry.emission,
+        entry.specular,
+        entry.shininess,
+        entry.reflectance,
+        entry.texid,
+        entry.texuniform,
+        entry.texrepeat.tobytes(),
+        entry.rgba.tobytes(),
+        entry.size.tobytes(),
+        object() if entry.type in _SOFT else None,
+    )
+
+
+def identity_of(entry: mujoco.MjvGeom) -> tuple[int, int]:
+    """Id and type, of `mujoco.mjtObj`, of what an entry shows."""
+    return int(entry.objid), int(entry.objtype)
+
+
+def is_of_model(model: Any, entry: mujoco.MjvGeom) -> bool:
+    """Whether an entry may be a geom or a site of the model."""
+    count = {GEOM_OBJECT: model.ngeom, SITE_OBJECT: model.nsite}.get(int(entry.objtype), 0)
+    return 0 <= entry.objid < count
+
+
+def visuals_in(model: Any, scene: mujoco.MjvScene, entry: mujoco.MjvGeom, ghost: bool = False) -> list[Visual]:
+    """What an entry of a scene shows: one visual, but of a flex its faces, edges and vertices.
+
+    A `ghost` of a geom or a site is none of the model's, but something beside them.
+    """
+    if not ghost and is_of_model(model, entry):
+        return [own_visual(model, entry)]
+    size, asset = np.array(entry.size, dtype=np.float64), _asset_of(model, entry)
+    visual = Visual(
+        False,
+        -1,
+        int(entry.type),
+        size,
+        asset,
+        group=0,
+        hull=_is_hull(entry),
+        identity=identity_of(entry),
+        pose=(np.array(entry.pos), np.array(entry.mat)),
+        half_size=size,
+        box=asset_box(model, int(entry.type), asset),
+        **_paint_of(entry),
+    )
+    if entry.type not in _SOFT:
+        return [visual]
+    in_world = replace(visual, pose=(np.zeros(3, np.float32), np.eye(3, dtype=np.float32)))
+    if entry.type == _GEOM.mjGEOM_SKIN:
+        return [replace(in_world, corners=_skin_corners(model, scene, int(entry.objid)))]
+    return [
+        replace(in_world, corners=corners, part=part, material=in_world.material if part == "faces" else -1)
+        for part, corners in flex_parts(model, scene, entry).items()
+    ]
+
+
+def own_visual(model: Any, entry: mujoco.MjvGeom) -> Visual:
+    """The geom or site of the model that an entry shows; its pose is that of the model's data, see `ScenePoses`."""
+    site = entry.objtype == SITE_OBJECT
+    visual = (site_visual if site else geom_visual)(model, int(entry.objid))
+    kind, size, asset, half_size, box = int(entry.type), np.array(entry.size), _asset_of(model, entry), None, None
+    # the scene's sizes are those of the model, rounded
+    if kind != visual.kind or not np.array_equal(visual.half_sizes.astype(np.float32), size):
+        half_size = size.astype(np.float64)
+    if not site and (kind, asset) != (visual.kind, visual.asset):
+        box = asset_box(model, kind, asset)
+    return replace(
+        visual, kind=kind, asset=asset, hull=_is_hull(entry), half_size=half_size, box=box, **_paint_of(entry)
+    )
+
+
+def asset_box(model: Any, kind: int, asset: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Centre and half sizes [m] of the box about a mesh or a height field, in the frame of its geom; else None."""
+    if asset < 0:
+        return None
+    if kind in _MESHES:
+        points = mesh_arrays(model, asset)[0]
+    else:
+        points = height_field_triangles(model, asset)[0]
+        points = np.concatenate([points, points[:1] * [1, 1, 0] - [0, 0, model.hfield_size[asset, 3]]])
+    least, most = points.min(axis=0), points.max(axis=0)
+    return (least + most) / 2, (most - least) / 2
+
+
+def _asset_of(model: Any, entry: mujoco.MjvGeom) -> int:
+    """Id of an entry's mesh or height field, -1 without; a mesh has a number for itself and one for its hull."""
+    data = int(entry.dataid)
+    if entry.type in _MESHES and 0 <= data < 2 * model.nmesh:
+        return data // 2
+    if entry.type == _GEOM.mjGEOM_HFIELD and 0 <= data < model.nhfield:
+        return data
+    return -1
+
+
+def _is_hull(entry: mujoco.MjvGeom) -> bool:
+    return entry.type in _MESHES and bool(entry.dataid % 2)
+
+
+def _paint_of(entry: mujoco.MjvGeom) -> dict[str, Any]:
+    """Colour, material, finish and texture of an entry, as `Visual` has them."""
+    texture = None
+    if entry.texid >= 0:
+        x, y = (float(times) for times in entry.texrepeat)
+        texture = SceneTexture(int(entry.texid), (x, y), bool(entry.texuniform))
+    return {
+        "rgba": np.array(entry.rgba, dtype=np.float64),
+        "material": int(entry.matid),
+        "finish": Finish(*(float(getattr(entry, name)) for name in Finish._fields)),
+        "texture": texture,
+        "decor": int(entry.category) == _DECOR,
+    }
+
+
+def _skin_corners(model: Any, scene: mujoco.MjvScene, index: int) -> NDArray[np.float32]:
+    """Corners of the triangles of a scene's skin, see `Visual`."""
+    face, vertex = model.skin_faceadr[index], scene.skinvertadr[index]
+    F = model.skin_face[face : face + model.skin_facenum[index]].ravel()
+    points, normals = (array.reshape(-1, 3)[vertex + F] for array in (scene.skinvert, scene.skinnormal))
+    start = model.skin_texcoordadr[index]
+    uv = model.skin_texcoord[start + F] if start >= 0 else np.zeros((len(F), 2))
+    return np.concatenate([points, normals, uv], axis=1, dtype=np.float32)
+
+
+class ScenePoses(NamedTuple):
+    """Where geoms and sites are, called as in MuJoCo's data: as a scene says."""
+
+    model: mujoco.MjModel
+    geom_xpos: NDArray[np.float64]
+    geom_xmat: NDArray[np.float64]
+    site_xpos: NDArray[np.float64]
+    site_xmat: NDArray[np.float64]
+
+
+class EntryPoses:
+    """Poses of the entries of a scene that are geoms and sites of a model, against those in MuJoCo's data.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    entries : sequence of mujoco.MjvGeom
+        One at most for each geom and site.
+    """
+
+    def __init__(self, model: Any, entries: Sequence[mujoco.MjvGeom]) -> None:
+        self._model = model
+        self._geoms = [each for each in entries if each.objtype == GEOM_OBJECT]
+        self._sites = [each for each in entries if each.objtype == SITE_OBJECT]
+        self._geom_ids = np.array([each.objid for each in self._geoms], dtype=np.int64)
+        self._site_ids = np.array([each.objid for each in self._sites], dtype=np.int64)
+
+    def of(self, data: Any) -> Any:
+        """Where everything is: the data itself where the scene agrees with it, but for rounding, else `ScenePoses`."""
+        geom = self._differing(self._geoms, self._geom_ids, data.geom_xpos, data.geom_xmat, planes=True)
+        site = self._differing(self._sites, self._site_ids, data.site_xpos, data.site_xmat)
+        if geom is site is None:
+            return data
+        geom_poses, site_poses = geom or (data.geom_xpos, data.geom_xmat), site or (data.site_xpos, data.site_xmat)
+        return ScenePoses(self._model, *geom_poses, *site_poses)
+
+    def _differing(
+        self,
+        entries: list[mujoco.MjvGeom],
+        ids: NDArray[np.int64],
+        positions: NDArray[np.float64],
+        rotations: NDArray[np.float64],
+        planes: bool = False,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Positions and rotations of all geoms or sites as the entries have them; None if those are the given ones."""
+        if not entries:
+            return None
+        position = np.array([each.pos for each in entries])
+        rotation = np.array([each.mat for each in entries]).reshape(-1, 9)
+        moved = (position != positions[ids].astype(np.float32)).any(axis=1)
+        turned = (rotation != rotations[ids].astype(np.float32)).any(axis=1)
+        if planes and moved.any():
+            moved &= ~self._recentred(ids, position, positions[ids], rotations[ids]) | turned
+        differs = moved | turned
+        if not differs.any():
+            return None
+        positions, rotations = positions.copy(), rotations.copy()
+        positions[ids[differs]], rotations[ids[differs]] = position[differs], rotation[differs]
+        return positions, rotations
+
+    def _recentred(
+        self, ids: NDArray[np.int64], position: NDArray, own: NDArray[np.float64], rotation: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Which of the geoms are infinite planes that MuJoCo has moved along themselves, to be below the camera."""
+        endless = (self._model.geom_size[ids, :2] <= 0).any(axis=1)
+        endless &= self._model.geom_type[ids] == _GEOM.mjGEOM_PLANE
+        off = np.abs(np.einsum("ij,ij->i", position - own, rotation[:, 2::3]))
+        return endless & (off <= _IN_PLANE * (1.0 + np.abs(position).max(axis=1)))
