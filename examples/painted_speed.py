@@ -36,7 +36,7 @@ def main() -> None:
     ripples.change_material("egg", speed=speed)
 
     ripples.poke("egg", (0.02, -0.05, 0.6), 0.6, radius=0.05)  # in the frame of its body, the world
-    renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "clay"})
+    renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "clay"}, lighting="studio")
     camera = Camera(lookat=(0.0, 0.0, 0.3), distance=1.7, azimuth=90.0, elevation=-50.0)
     frames = []
     for _ in range(3):

@@ -74,7 +74,7 @@ def main() -> None:
     skin = Material(speed=0.8, damping=1.5, stiffness=3000.0, viscosity=2e-4, density=220.0)
     ripples = Ripples(model, {"upper cover": skin, "lower cover": skin}, resolution=96)
     looks = {"upper cover": "rubber", "lower cover": "jelly"}
-    renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks)
+    renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks, lighting="studio")
     camera = Camera(lookat=(0.22, 0.0, 0.66), distance=0.95, azimuth=115.0, elevation=-38.0)
 
     frames, given = [], dict.fromkeys(ripples, 0.0)

@@ -32,7 +32,7 @@ def main() -> None:
     soft = Material(speed=0.6, damping=2.0, stiffness=1500.0, viscosity=3e-4, density=1600.0)
     ripples = Ripples(model, dict.fromkeys(("red", "blue", "yellow"), soft), resolution=64)
     looks = {"red": "rubber", "blue": "jelly", "yellow": "clay"}
-    renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks)
+    renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks, lighting="studio")
     camera = Camera(lookat=(0.0, 0.0, 0.36), distance=1.75, azimuth=80.0, elevation=-38.0)
 
     frames = []

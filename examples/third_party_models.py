@@ -132,7 +132,7 @@ def run(case: Case, model: mujoco.MjModel, material: Material, camera: Camera) -
     option = mujoco.MjvOption()
     option.geomgroup[list(case.hidden)] = 0
     ripples = Ripples(model, {case.geom: material})  # the one line
-    with RippleRenderer(model, ripples, 360, 480) as renderer:
+    with RippleRenderer(model, ripples, 360, 480, lighting="auto") as renderer:
         while data.time < DURATION:
             ripples.mj_step(data)
             given += sum(hit.impulse for hit in ripples.last_impulses)

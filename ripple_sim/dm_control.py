@@ -18,7 +18,14 @@ from ripple_sim.solver import Material
 from ripple_sim.solver.errors import warn_caller
 
 
-def couple(physics: Any, materials: ByGeom[Material], *, looks: ByGeom[str] | None = None, **options: Any) -> Ripples:
+def couple(
+    physics: Any,
+    materials: ByGeom[Material],
+    *,
+    looks: ByGeom[str] | None = None,
+    lighting: str = "model",
+    **options: Any,
+) -> Ripples:
     """Make a dm_control `Physics` or environment ripple: from now on each of its physics steps drives the ripples.
 
     `physics.step(nstep)` couples every one of its steps, also where dm_control begins the next one already
@@ -37,6 +44,8 @@ def couple(physics: Any, materials: ByGeom[Material], *, looks: ByGeom[str] | No
         Geom to its `Material`, as for `Ripples`.
     looks : mapping, optional
         Geom to its look, as for `RippleRenderer`.
+    lighting : str
+        What lights the frames, likewise: "model", "studio" or "auto".
     **options
         Keyword arguments of `Ripples`.
 
@@ -52,12 +61,12 @@ def couple(physics: Any, materials: ByGeom[Material], *, looks: ByGeom[str] | No
     """
     environment, physics = physics, getattr(physics, "physics", physics)
     ripples = Ripples(physics.model, materials, **options)
-    _follow(physics, ripples, looks)
+    _follow(physics, ripples, looks=looks, lighting=lighting)
     if hasattr(environment, "add_extra_hook"):
 
         def begin_anew(physics: Any, _: Any) -> None:
             Ripples.__init__(ripples, physics.model, materials, **options)
-            _follow(physics, ripples, looks)
+            _follow(physics, ripples, looks=looks, lighting=lighting)
 
         environment.add_extra_hook("after_compile", begin_anew)
     return ripples
@@ -92,8 +101,8 @@ def _refuse_with_surfaces(**options: Any) -> None:
             raise RenderError(f"{name} are not supported with depth or segmentation; leave {name} empty")
 
 
-def _follow(physics: Any, ripples: Ripples, looks: ByGeom[str] | None) -> None:
-    """Have a physics drive the ripples and draw with them."""
+def _follow(physics: Any, ripples: Ripples, **looks: Any) -> None:
+    """Have a physics drive the ripples and draw with them; `looks` are keyword arguments of `RippleRenderer`."""
     step, reset = physics.step, physics.reset
 
     def rippling_step(*args: Any, **kwargs: Any) -> None:
@@ -106,7 +115,7 @@ def _follow(physics: Any, ripples: Ripples, looks: ByGeom[str] | None) -> None:
 
     @functools.cache
     def renderer_of(height: int, width: int) -> RippleRenderer:
-        return RippleRenderer(physics.model, ripples, height, width, looks=looks)
+        return RippleRenderer(physics.model, ripples, height, width, **looks)
 
     def rippling_render(
         height: int = 240,

@@ -5,6 +5,7 @@ It reads the environment's model and data, the size of its frames, and its camer
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,9 +15,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom, own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.errors import RippleError, SceneError
+from ripple_sim.errors import RippleError, RippleWarning, SceneError
 from ripple_sim.solver import Material
-from ripple_sim.solver.errors import warn_caller
 
 try:
     import gymnasium
@@ -93,6 +93,8 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         Geom to its `Material`, as for `Ripples`.
     looks : mapping, optional
         Geom to its look, as for `RippleRenderer`.
+    lighting : str
+        What lights the frames, as for `RippleRenderer`: "model", "studio" or "auto".
     sensors : mapping, optional
         Name to the arguments of a sensor: its `geom`, and those of `WaveSolver.sensor`, as in
         `{"tap": {"geom": "board", "at": "site", "rate": 2000}}`. The observation is then a `Dict`: what it was, under
@@ -121,18 +123,23 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         materials: ByGeom[Material],
         *,
         looks: ByGeom[str] | None = None,
+        lighting: str = "model",
         sensors: Mapping[str, Mapping[str, Any]] | None = None,
         **options: Any,
     ) -> None:
-        RecordConstructorArgs.__init__(self, materials=materials, looks=looks, sensors=sensors, **options)
-        EzPickle.__init__(self, env, materials, looks=looks, sensors=sensors, **options)
+        given = {"looks": looks, "lighting": lighting, "sensors": sensors, **options}
+        RecordConstructorArgs.__init__(self, materials=materials, **given)
+        EzPickle.__init__(self, env, materials, **given)
         gymnasium.Wrapper.__init__(self, env)
         if self.render_mode not in (None, *DRAWN_MODES):
-            warn_caller(
+            warnings.warn(
                 f"render_mode is {self.render_mode!r}, which shows no ripples; with "
-                f"{', '.join(map(repr, DRAWN_MODES))} `render` returns frames with them"
+                f"{', '.join(map(repr, DRAWN_MODES))} `render` returns frames with them",
+                RippleWarning,
+                stacklevel=2,
             )
         self._materials, self._looks, self._options = materials, looks, options
+        self._lighting = lighting
         self._lookat: NDArray[np.float64] | None = None
         self._renders_by_itself = True
         self._in_place = None
@@ -184,7 +191,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             return self.env.render()
         model, _ = model_and_data(self.unwrapped)
         if self._in_place is None:
-            self._in_place = RenderedInPlace(model, self.ripples, self._looks)
+            self._in_place = RenderedInPlace(model, self.ripples, self._looks, self._lighting)
         if not self._renders_by_itself:
             return self._drawn_from_outside(self._in_place)
         before = self._in_place.frames
@@ -204,9 +211,11 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             return frame
         self._renders_by_itself = False
         if problem is not None:
-            warn_caller(
+            warnings.warn(
                 f"the environment's own render {problem}; the model is drawn with MuJoCo's free camera in its place, "
-                "without what that render adds"
+                "without what that render adds",
+                RippleWarning,
+                stacklevel=2,
             )
         return self._drawn_from_outside(self._in_place)
 

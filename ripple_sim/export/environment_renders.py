@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.solver.errors import warn_caller
+from ripple_sim.errors import RippleWarning
 
 from .renderer import RippleRenderer
 
@@ -93,7 +94,7 @@ class RippleViewer(OffScreenViewer):
         self._markers.clear()
         if self._overlays and not self._warned_of_overlays:
             self._warned_of_overlays = True
-            warn_caller("overlays, which are text, are not drawn with ripples")
+            warnings.warn("overlays, which are text, are not drawn with ripples", RippleWarning, stacklevel=2)
         if not segmentation:
             return frames_of(self._renderer, render_mode or "rgb_array")
         self._renderer.enable_segmentation_rendering()
@@ -121,6 +122,8 @@ class RenderedInPlace:
     ripples : Ripples
     looks : mapping, optional
         As for `RippleRenderer`.
+    lighting : str
+        Likewise.
 
     Attributes
     ----------
@@ -128,10 +131,13 @@ class RenderedInPlace:
         How many frames were drawn so far.
     """
 
-    def __init__(self, model: mujoco.MjModel, ripples: Ripples, looks: ByGeom[str] | None) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, ripples: Ripples, looks: ByGeom[str] | None, lighting: str = "model"
+    ) -> None:
         self._model = model
         self._ripples = ripples
         self._looks = looks
+        self._lighting = lighting
         self._renderers: dict[tuple[int, int], RippleRenderer] = {}
         self._viewers = weakref.WeakKeyDictionary[MujocoRenderer, dict[str, RippleViewer]]()
         self._taken_in = weakref.WeakSet[mujoco.Renderer]()
@@ -141,7 +147,9 @@ class RenderedInPlace:
         """The renderer of frames of a size [pixels]."""
         size = width, height
         if size not in self._renderers:
-            self._renderers[size] = RippleRenderer(self._model, self._ripples, height, width, looks=self._looks)
+            self._renderers[size] = RippleRenderer(
+                self._model, self._ripples, height, width, looks=self._looks, lighting=self._lighting
+            )
         return self._renderers[size]
 
     @contextlib.contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
 
@@ -25,6 +26,8 @@ from ripple_sim.render.camera import (
     set_scene_camera,
     with_camera_poses,
 )
+from ripple_sim.render.visuals.lights import in_studio
+from ripple_sim.render.visuals.surroundings import followed_flags
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.solver.errors import GLError, checked, instance, warn_caller, whole
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -43,10 +46,6 @@ _CAMERA = (
     "frustum_top",
     "frustum_width",
 )
-
-# Of the scene's lights, what is drawn.
-_LIGHT_ARRAYS = ("pos", "dir", "attenuation", "ambient", "diffuse", "specular")
-_LIGHT = ("type", "cutoff", "exponent", "castshadow", "bulbradius")
 
 
 class RippleRenderer:
@@ -78,6 +77,9 @@ class RippleRenderer:
     limit : bool
         Whether heights that are too large for the object are drawn smaller, so that its surface does not pass through
         itself; see `DisplacementLimit`.
+    lighting : str
+        "model": MuJoCo's own lights, the headlight among them, before the skybox or black; "studio": a photo studio in
+        their place; "auto": the studio where the model has no `<light>`.
 
     Attributes
     ----------
@@ -117,6 +119,7 @@ class RippleRenderer:
         looks: ByGeom[str] | None = None,
         gl: GLContext | None = None,
         limit: bool = True,
+        lighting: str = "model",
     ) -> None:
         self.model, self._ripples = own_model(model), ripples
         check_targets(self.model, ripples.model, ripples.geom_ids)
@@ -128,15 +131,20 @@ class RippleRenderer:
             for name, geom in ripples.geom_ids.items()
         }
         self.height, self.width, self._looks, self._limit = int(height), int(width), named, limit
+        self._lighting = lighting
         self.scene = mujoco.MjvScene(self.model, max_geom)
         self._usual_flags, self._told_flags = self.scene.flags.copy(), set[int]()
         self._shows = "colours"
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
         self._camera_taken: list[object] = []
-        self._lights_taken: list[object] = []
         self._renderer: Renderer | None = Renderer(
-            gl or shared_context(), self.model, surfaces, size=(self.width, self.height)
+            gl or shared_context(),
+            self.model,
+            surfaces,
+            size=(self.width, self.height),
+            lighting=lighting,
+            backdrop=in_studio(self.model, lighting),
         )
 
     def enable_depth_rendering(self) -> None:
@@ -187,7 +195,7 @@ class RippleRenderer:
         option, everything = scene_option or mujoco.MjvOption(), int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self.model, state, option, None, own, everything, self.scene)
         seen = dataclasses.replace(seen.pose(), clip=pose_of_scene(self.scene.camera, 1.0).clip)
-        self._camera_taken, self._lights_taken = _camera_content(self.scene), _light_content(self.scene)
+        self._camera_taken = _content(self.scene.camera)
         heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
         self._shown.look(state, heights, seen.pose())
         height_maps = {
@@ -228,13 +236,12 @@ class RippleRenderer:
         shape = self.height, self.width, *{"colours": (3,), "depth": (), "segmentation": (2,)}[self._shows]
         if out is not None and out.shape != shape:
             raise RenderError(f"out has shape {list(out.shape)}; valid is {list(shape)}, that of the {self._shows}")
-        self._warn_of_flags()
+        if self._shows == "colours":  # MuJoCo has none of them in the others
+            self._warn_of_flags()
         if self._drawn is None:
             frame = self._empty_frame()
         elif self._shows == "colours":
-            lights = self.scene.lights[: self.scene.nlight]
-            edited = _light_content(self.scene) != self._lights_taken
-            frame = self._renderer.render(*self._now(), scene=self.scene, lights=lights if edited else None)
+            frame = self._renderer.render(*self._now(), scene=self.scene)
         else:
             segmented = self._shows == "segmentation"
             image = self._renderer.surfaces(*self._now(), scene=self.scene, segmented=segmented)
@@ -269,7 +276,7 @@ class RippleRenderer:
         if self._drawn is None:
             raise RenderError("there is nothing to render; call update_scene(data) before, or render(data)")
         state, height_maps, seen = self._drawn
-        if _camera_content(self.scene) != self._camera_taken:
+        if _content(self.scene.camera) != self._camera_taken:
             try:
                 seen = pose_of_scene(self.scene.camera, seen.pose().distance)
             except SceneError as error:
@@ -293,10 +300,12 @@ class RippleRenderer:
     def _warn_of_flags(self) -> None:
         """Warn once of each flag of the scene that differs from MuJoCo's default and has no effect here."""
         changed = set(np.flatnonzero(self.scene.flags != self._usual_flags).tolist())
-        if new := changed - self._told_flags:
+        followed = followed_flags(backdrop=in_studio(self.model, self._lighting))
+        if new := changed - followed - self._told_flags:
             self._told_flags |= new
             names = ", ".join(mujoco.mjtRndFlag(flag).name for flag in sorted(new))
-            warn_caller(f"the scene's flags have no effect: {names}")
+            valid = ", ".join(mujoco.mjtRndFlag(flag).name for flag in sorted(followed))
+            warn_caller(f"the scene's flags have no effect: {names}; those that have some here are {valid}")
 
     def _own(self, camera: AnyCamera) -> mujoco.MjvCamera:
         """A camera of MuJoCo's for its scene; for ours the scene's own, which is set to what ours sees."""
@@ -331,25 +340,23 @@ class RippleRenderer:
         with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
             page = Path(folder) / "now.html"
             with Exporter(
-                self.model, self._ripples, page, camera=camera, looks=self._looks, size=size, limit=self._limit
+                self.model,
+                self._ripples,
+                page,
+                camera=camera,
+                looks=self._looks,
+                size=size,
+                limit=self._limit,
+                lighting=self._lighting,
             ) as exporter:
                 exporter.write(data)
             return framed(page, self.width / self.height)
 
 
-def _camera_content(scene: mujoco.MjvScene) -> list[object]:
+def _content(cameras: Sequence[mujoco.MjvGLCamera]) -> list[object]:
     """What the cameras of a scene say, to be compared."""
     content: list[object] = []
-    for camera in scene.camera:
+    for camera in cameras:
         content += [camera.pos.tobytes(), camera.forward.tobytes(), camera.up.tobytes()]
         content += [getattr(camera, name) for name in _CAMERA]
-    return content
-
-
-def _light_content(scene: mujoco.MjvScene) -> list[object]:
-    """What the lights of a scene say, to be compared."""
-    content: list[object] = [scene.nlight]
-    for light in scene.lights[: scene.nlight]:
-        content += [getattr(light, name).tobytes() for name in _LIGHT_ARRAYS]
-        content += [getattr(light, name) for name in _LIGHT]
     return content

@@ -42,6 +42,7 @@ class Unit(IntEnum):
     OBJECTS = 19  # the table of objects
     FLOOR_SEEN = 20  # the floor's light as solids see it
     TILE_KINDS = 21  # how each tile of the background is filled
+    HORIZON = 22  # colours of the skybox along its horizon
 
 
 class Binding(IntEnum):
@@ -176,6 +177,11 @@ FRAME = Struct(
     floor_fade="vec4",  # x, y: where it begins and ends to fade into the background, in distances of the focus
     lights=(LIGHT, MAX_LIGHTS),  # the first ones cast shadows
     shadows=(SHADOW, MAX_SHADOWS),
+    # without a backdrop, colours in sRGB
+    fog="vec4",  # its colour; w: 1 with fog
+    haze="vec4",  # the colour of the haze over the floor's horizon; w: 1 with haze
+    haze_ring="vec4",  # x: its width, y: how high it is densest (see background.glsl), z: how far the skybox is [m]
+    shown_far="vec4",  # x, y: where fog begins and is complete [m]; z: 1 where the skybox is shown
     counts="vec4",  # y: lights, z: number of the exposure, w: lights that cast shadows
 )
 OBJECT = Struct(
@@ -199,6 +205,8 @@ DEFINES: dict[str, object] = {
     **numbered(CasterMap, "_MAP"),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
     **{f"{each.name.upper()}_MEMBERS": each.members for each in (LIGHT, SHADOW, FRAME, OBJECT)},
+    "BACKDROP": 1,  # unless a pass is told otherwise, as the next
+    "HORIZON": 0,
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,
     **CURVES,

@@ -5,7 +5,7 @@ The passes of one frame in their order: shadow maps, floor map, reflection, G-bu
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import moderngl
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
 from ripple_sim.render.passes.shadows import Floor, FloorOcclusion, ShadowMaps, TransmissionMaps, find_floor
 from ripple_sim.render.surfaces.surface import Surface
-from ripple_sim.render.visuals.lights import SceneLight
+from ripple_sim.render.visuals.lights import SceneLight, in_studio
 from ripple_sim.render.visuals.objects import Assets
+from ripple_sim.render.visuals.surroundings import RenderFlags
 from ripple_sim.solver.errors import RippleError, warn_caller
 from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
@@ -61,6 +62,8 @@ class Renderer:
     lighting : str
         "model": the lights and the skybox of the MJCF; "studio": a photo studio in their place; "auto": the studio
         where the MJCF has no light.
+    backdrop : bool
+        Whether the floor fades into a backdrop or the horizon of the skybox; see `SceneLight`.
     alpha : bool
         Frames have an alpha channel: the background is transparent, and only the shadows are left of the floor.
     linear : bool
@@ -82,6 +85,7 @@ class Renderer:
         size: tuple[int, int],
         samples: int = 4,
         lighting: str = "auto",
+        backdrop: bool = True,
         alpha: bool = False,
         linear: bool = False,
     ) -> None:
@@ -98,7 +102,8 @@ class Renderer:
             require_memory(RippleError, need, f"drawing frames of {width}x{height} pixels", "take smaller frames")
         with gl:
             self._assets = assets = Assets(model, resources)
-            self._light = SceneLight(assets, lighting)
+            self._backdrop = backdrop or in_studio(model, lighting)
+            self._light = light = SceneLight(assets, lighting, backdrop)
             plane = find_floor(model, targets)
             self._floor = None if plane is None else Floor(assets, plane)
             self._scene = DrawnScene(assets, targets, size)
@@ -106,8 +111,8 @@ class Renderer:
             self._own_scene = mujoco.MjvScene(model, _MOST_GEOMS)
             self._told: set[str] = set()
             self._frame = FrameUniforms(resources)
-            self._shadow_maps: dict[int, ShadowMaps] = {}
-            self._made_passes: dict[tuple[int, ...], _Passes] = {}
+            self._shadows = ShadowMaps(resources, light.options["SHADOWS"], size[1])
+            self._made_passes: dict[tuple[bool, ...], _Passes] = {}
             self._choose_passes()
             self._buffers: SurfaceBuffers | None = None
         self._readback = Readback(resources, frame_format)
@@ -115,14 +120,9 @@ class Renderer:
     def _choose_passes(self) -> None:
         """Take the passes for what is drawn; those that were made before are kept."""
         floor = self._floor
-        transparent, options = bool(self._scene.transparent), self._light.options
-        floor_kind = floor is not None and floor.tiled, floor is not None and floor.reflects
-        kind = transparent, *floor_kind, *options.values()
-        if options["SHADOWS"] not in self._shadow_maps:
-            self._shadow_maps[options["SHADOWS"]] = ShadowMaps(self._resources, options["SHADOWS"], self._size[1])
-        self._shadows = self._shadow_maps[options["SHADOWS"]]
+        kind = bool(self._scene.transparent), floor is not None and floor.tiled, floor is not None and floor.reflects
         if kind not in self._made_passes:
-            self._made_passes[kind] = self._make_passes(transparent)
+            self._made_passes[kind] = self._make_passes(transparent=kind[0])
         self._occlusion, self._shading, self._transmission, self._layers, self._mirror = self._made_passes[kind]
 
     def _make_passes(self, transparent: bool) -> _Passes:
@@ -156,15 +156,11 @@ class Renderer:
                 self._floor.shown = shown.floor is not None
                 if shown.floor is not None:
                     self._floor.paint(shown.floor)
-            self._warn_of(shown.left_out)
-        self._choose_passes()
+            self._choose_passes()
+            if new := shown.left_out - self._told:
+                self._told |= new
+                warn_caller(f"not drawn: {', '.join(sorted(new))}; all else of the scene is")
         return shown.poses(data) if edited else data
-
-    def _warn_of(self, left_out: set[str]) -> None:
-        """Say what is not drawn as the scene has it, once each."""
-        if new := left_out - self._told:
-            self._told |= new
-            warn_caller(f"not drawn: {', '.join(sorted(new))}; all else of the scene is")
 
     def __enter__(self) -> Renderer:
         return self
@@ -203,7 +199,6 @@ class Renderer:
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
-        lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> NDArray:
         """Draw one frame and return its pixels.
 
@@ -220,8 +215,6 @@ class Renderer:
             Number of this exposure among those whose mean is a frame: each has another noise in its shadows.
         scene : mujoco.MjvScene, optional
             What is drawn beside the targets, and which of them; by default what MuJoCo shows of the data.
-        lights : sequence of mujoco.MjvLight, optional
-            Those of the scene, where they are to replace the model's.
 
         Returns
         -------
@@ -229,7 +222,7 @@ class Renderer:
             Top row first; a new array for every frame. uint8 in sRGB, alpha straight; or, of linear light, float16,
             with ITU-R BT.709's primaries, multiplied by alpha.
         """
-        self.submit(data, height_maps, camera, exposure, scene, lights)
+        self.submit(data, height_maps, camera, exposure, scene)
         return self.fetch()
 
     def submit(
@@ -239,11 +232,10 @@ class Renderer:
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
-        lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> None:
         """Draw one frame as `render` does without waiting for it; `fetch` returns frames in the order of submission."""
         with self._gl:
-            self._readback.submit(self.draw(data, height_maps, camera, exposure, scene, lights))
+            self._readback.submit(self.draw(data, height_maps, camera, exposure, scene))
 
     def fetch(self) -> NDArray:
         """Wait for the earliest submitted frame, and return it as `render` does."""
@@ -256,7 +248,6 @@ class Renderer:
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
-        lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> moderngl.Framebuffer:
         """Draw one frame and leave it on the GPU.
 
@@ -268,12 +259,12 @@ class Renderer:
         """
         drawn, pose = self._scene, camera.pose()
         with self._gl as ctx:
-            self._light.make_room(lights)
             poses = self._show(data, scene)
             shading = self._shading
             drawn.update(ctx, poses, height_maps, pose)
             shading.clear(ctx)  # which a software driver does during what follows
-            self._update(data, poses, pose, exposure, lights)
+            flags = RenderFlags.of(scene)
+            self._update(data, poses, pose, exposure, flags)
             # what shading looks up; a software driver stops for each texture that it is still drawing to
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             ctx.depth_func = "<="
@@ -291,7 +282,9 @@ class Renderer:
             if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
                 self._gl.wait()
             self._occlusion.average()
-            if self._mirror is not None and self._floor is not None and self._floor.shown:
+            if self._mirror is not None and not flags.reflection and not self._backdrop:
+                self._mirror.hide()
+            elif self._mirror is not None and self._floor is not None and self._floor.shown:
                 self._mirror.draw(ctx, self._frame, pose, balls, drawn.draw, self._bind)
             self._bind()
             shading.shade(ctx, boxes)
@@ -321,7 +314,7 @@ class Renderer:
                 self._buffers = SurfaceBuffers(self._resources, size)
             poses = self._show(data, scene, segmented)
             drawn.update(ctx, poses, height_maps, pose, sharp=scene is not None)
-            self._update(data, poses, pose)
+            self._update(data, poses, pose, 0, RenderFlags())
             drawn.height_maps.bind()
 
             def draw() -> None:
@@ -330,14 +323,7 @@ class Renderer:
 
             return self._buffers.draw(ctx, draw, self._assets.objects, -1 if self._floor is None else self._floor.geom)
 
-    def _update(
-        self,
-        data: Any,
-        poses: Any,
-        pose: Pose,
-        exposure: int = 0,
-        lights: Sequence[mujoco.MjvLight] | None = None,
-    ) -> None:
+    def _update(self, data: Any, poses: Any, pose: Pose, exposure: int, flags: RenderFlags) -> None:
         """Bring the frame's uniforms up to date; `poses` are those of geoms and sites."""
         frame, floor = self._frame, self._floor
         frame.set_camera(pose, self._format.aspect)
@@ -345,15 +331,14 @@ class Renderer:
         centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
         if floor is not None:
             floor.place(frame, poses, centre, radius)
-            shining = self._light.set(frame, data, pose, floor.albedo, floor.normal, lights)
+            endless = floor.endless and floor.shown
+            lights = self._light.set(frame, data, pose, floor.albedo, floor.normal, flags=flags, endless=endless)
         else:
-            shining = self._light.set(frame, data, pose, lights=lights)
-        if lights is not None and self._light.studio:
-            self._warn_of({"lights of the scene, which the studio replaces"})
-        casting = self._shadows.fit(frame, shining, centre, radius)
+            lights = self._light.set(frame, data, pose, flags=flags)
+        casting = self._shadows.fit(frame, lights, centre, radius)
         if floor is not None and len(casters):
             floor.shade(frame, casting, casters)
-        frame.set_vector("counts", [0, len(shining), exposure], len(casting))
+        frame.set_vector("counts", [0, len(lights), exposure], len(casting))
         frame.bind()
 
     def _bind(self) -> None:

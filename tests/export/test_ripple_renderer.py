@@ -143,6 +143,29 @@ def test_without_ripples_depth_and_segmentation_are_mujocos(mujocos, name):
     np.testing.assert_allclose(depth[inside & ~seen], theirs[inside & ~seen], rtol=1e-3)
 
 
+@pytest.mark.parametrize("name", unrippled.LIT)
+@pytest.mark.filterwarnings("error::ripple_sim.RippleWarning")
+def test_lights_and_surroundings_are_mujocos(mujocos, name):
+    model, data = unrippled.lit_state(name)
+    with RippleRenderer(model, Ripples(model, {}), *unrippled.SIZE) as renderer:
+        colours, shown = unrippled.lit_frame(renderer, data, name)
+    theirs, there = mujocos[f"colours {name}"].astype(float), mujocos[f"shown {name}"]
+    same = (shown == there).all(axis=2)
+    around = same & (shown[..., 0] == -1)
+    assert around.sum() > 2000
+    np.testing.assert_allclose(colours[around].mean(axis=0), theirs[around].mean(axis=0), atol=3.0)
+    if name in ("headlight", "lamp", "no skybox"):
+        assert not colours[around].any()
+    if name in ("haze", "fog"):
+        at_horizon = slice(24, 36)
+        rows = np.abs(colours[at_horizon].mean(axis=1) - theirs[at_horizon].mean(axis=1))
+        assert rows.max() < 30.0
+    for geom in range(3):  # light adds up in linear light here, so that what faces it aslant is brighter
+        ours, other = (each[same & (shown[..., 0] == geom)].mean(axis=0) for each in (colours, theirs))
+        np.testing.assert_allclose(ours, other, atol=60.0)
+        assert (ours[other < 1.0] < 8.0).all()  # no light of a colour that the lamps lack
+
+
 def test_ripples_show_in_depth_and_segmentation(egg):
     _, data, ripples, renderer = egg
     renderer.update_scene(data, "side")
@@ -227,13 +250,15 @@ def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
         assert seen() == set()
         option = mujoco.MjvOption()
         option.label = mujoco.mjtLabel.mjLABEL_GEOM
-        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        renderer.disable_segmentation_rendering()
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_WIREFRAME] = 1
         with pytest.warns(RippleWarning) as told:
-            seen()
-        lost = {"not drawn: labels; all else of the scene is", "the scene's flags have no effect: mjRND_SHADOW"}
-        assert {str(each.message) for each in told} == lost
+            renderer.update_scene(data, scene_option=option)
+            renderer.render()
+        lost = {"not drawn: labels; all else of the scene is", "the scene's flags have no effect: mjRND_WIREFRAME"}
+        assert {str(each.message).split("; those")[0] for each in told} == lost
         with warnings.catch_warnings(action="error"):
-            seen()
+            renderer.render()
 
 
 def test_geoms_that_are_added_to_the_scene_are_seen(egg):

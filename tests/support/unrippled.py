@@ -59,6 +59,49 @@ WORLDS |= dict.fromkeys(CAMERAS, _SEVERAL)
 _TENDON = '<tendon><spatial width=".02"><site site="a"/><site site="b"/></spatial></tendon>'
 
 
+# What lights a scene and what is around it: an MJCF's `<visual>`, skybox and lamp, and flags of the scene that are set.
+_STARS = """<texture type="skybox" builtin="gradient" rgb1=".5 .6 .7" rgb2=".1 .2 .3" width="256" height="256"
+    mark="random" markrgb="1 1 1"/>"""
+_LAMP = '<light pos="0 0 6" dir="0 0 -1"/>'
+_FOGGY = '<rgba fog=".6 .3 .2 1" haze=".2 .9 .3 1"/><map fogstart="1" fogend="8"/>'
+LIT: dict[str, tuple[str, str, str, dict[str, int]]] = {
+    "headlight": ("", "", "", {}),
+    "red headlight": ('<headlight diffuse="1 0 0" ambient=".1 0 0" specular="0 0 0"/>', "", "", {}),
+    "dark headlight": ('<headlight diffuse="0 0 0" ambient="0 0 0" specular="0 0 0"/>', "", "", {}),
+    "no light": ('<headlight active="0"/>', "", "", {}),
+    "lamp": ("", "", _LAMP, {}),
+    "stars": ("", _STARS, _LAMP, {}),
+    "no skybox": ("", _STARS, _LAMP, {"SKYBOX": 0}),
+    "haze": (_FOGGY, _STARS, _LAMP, {}),
+    "no haze": (_FOGGY, _STARS, _LAMP, {"HAZE": 0}),
+    "fog": (_FOGGY, _STARS, _LAMP, {"FOG": 1}),
+    "no shadow": ("", "", _LAMP, {"SHADOW": 0}),
+    "no reflection": ("", "", _LAMP, {"REFLECTION": 0}),
+}
+
+
+def lit_state(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A ball and a box over a floor that mirrors, in one of those lights."""
+    visual, asset, lamp, _ = LIT[name]
+    return posed(f"""<mujoco><visual>{visual}</visual><asset>{asset}
+        <material name="floor" rgba=".4 .5 .4 1" reflectance=".3"/></asset><worldbody>{lamp}
+        <geom type="plane" size="0 0 1" material="floor"/><geom size=".4" pos="-.3 0 .5" rgba=".8 .5 .3 1"/>
+        <geom type="box" size=".3 .3 .3" pos=".8 .4 .6" rgba=".3 .7 .4 1"/>
+        <camera name="side" pos="0 -4 1.2" xyaxes="1 0 0 0 .2 1"/></worldbody></mujoco>""")
+
+
+def lit_frame(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Colours and what each pixel shows."""
+    renderer.update_scene(data, camera="side")
+    usual = renderer.scene.flags.copy()
+    for flag, value in LIT[name][3].items():
+        renderer.scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = value
+    colours = renderer.render()
+    renderer.scene.flags[:] = usual
+    renderer.enable_segmentation_rendering()
+    return colours, renderer.render()
+
+
 def state_of(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A model with a sphere called "target" beside the rest, in its first state."""
     camera, view = CAMERAS.get(name, ('fovy="50"', ""))
@@ -91,4 +134,8 @@ if __name__ == "__main__":
         model, data = state_of(name)
         with mujoco.Renderer(model, *SIZE) as renderer:
             found[f"depth {name}"], found[f"segmentation {name}"] = drawn(renderer, data, name)
+    for name in LIT:
+        model, data = lit_state(name)
+        with mujoco.Renderer(model, *SIZE) as renderer:
+            found[f"colours {name}"], found[f"shown {name}"] = lit_frame(renderer, data, name)
     np.savez(sys.argv[1], **found)

@@ -29,7 +29,12 @@ vec3 sky_at(vec3 direction, float roughness)
 {
 #if SKYBOX
     // in MuJoCo's skyboxes +y is up
-    return textureLod(skybox, vec3(direction.x, direction.z, -direction.y), 8.0 * sqrt(roughness)).rgb;
+    vec3 radiance = textureLod(skybox, vec3(direction.x, direction.z, -direction.y), 8.0 * sqrt(roughness)).rgb;
+#if BACKDROP
+    return radiance;
+#else
+    return shown_far.z * radiance;
+#endif
 #else
     return mix(horizon.rgb, zenith.rgb, smoothstep(-0.1 - 0.2 * roughness, 0.8 + 0.2 * roughness, direction.z));
 #endif

@@ -1,6 +1,17 @@
 // From linear radiance to the frame's colours; with LINEAR these are the radiance itself.
 #include "glsl/sampling.glsl"
 
+// Linear colour, 0 to 1, to sRGB.
+vec3 encoded(vec3 color)
+{
+#if LINEAR
+    return color;
+#else
+    vec3 above = (1.0 + SRGB_OFFSET) * pow(color, vec3(1.0 / SRGB_EXPONENT)) - SRGB_OFFSET;
+    return mix(SRGB_SLOPE * color, above, step(SRGB_BREAK, color));
+#endif
+}
+
 // Linear radiance to sRGB: values below the shoulder keep hue and contrast, brighter ones roll off towards white;
 // `tone_mapped` in tone_mapping.py is the same.
 vec3 tone_mapped(vec3 radiance)
@@ -13,8 +24,7 @@ vec3 tone_mapped(vec3 radiance)
     float compressed = min(peak, SHOULDER) + (1.0 - SHOULDER) * excess / (excess + 1.0 - SHOULDER);
     vec3 color = radiance * (compressed / max(peak, 1e-4));
     color = mix(color, vec3(compressed), 1.0 - 1.0 / (1.0 + BLEACHING * excess));
-    vec3 above = (1.0 + SRGB_OFFSET) * pow(color, vec3(1.0 / SRGB_EXPONENT)) - SRGB_OFFSET;
-    return mix(SRGB_SLOPE * color, above, step(SRGB_BREAK, color));
+    return encoded(color);
 #endif
 }
 

@@ -6,6 +6,7 @@
 
 #stage fragment
 #include "glsl/floor_map.glsl"
+#include "glsl/fog.glsl"
 #include "glsl/lights.glsl"
 #include "glsl/soft_shadows.glsl"
 #include "glsl/tone_mapping.glsl"
@@ -29,7 +30,21 @@ const float HIGHEST_LEVEL = 4.0;  // of the floor map
 const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
 const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
 
-const float HORIZON = SKYBOX > 0 ? 0.0 : -1.0;  // a skybox continues below it, which the floor hides
+const float LOWEST = SKYBOX > 0 ? 0.0 : -1.0;  // a skybox continues below the horizon, which the floor hides
+
+#if HORIZON
+layout(binding = HORIZON_UNIT) uniform sampler2D horizon_colors;  // of the skybox, by the azimuth
+#endif
+
+// What the floor fades into: details of a skybox would be drawn out downwards.
+vec3 horizon_at(vec3 direction)
+{
+#if HORIZON
+    return textureLod(horizon_colors, vec2(atan(direction.y, direction.x) / TWO_PI, 0.5), 0.0).rgb;
+#else
+    return sky_at(vec3(direction.xy, max(direction.z, LOWEST)), 0.0);
+#endif
+}
 
 #if !SHADOW
 // Whether a shadow may fall on a point of the floor; `near` is its texel of the floor map.
@@ -42,6 +57,19 @@ bool may_be_shaded(vec2 place, vec2 near)
         boxed = boxed || counts.w > float(i) && all(greaterThan(place, box.xy)) && all(lessThan(place, box.zw));
     }
     return boxed && (max(off.x, off.y) > 0.5 || near.g > 0.0);
+}
+#endif
+
+#if !BACKDROP
+// Haze as in MuJoCo: a cone about the eye, where the skybox is, from the floor up to the height of the eye. Its foot is
+// nearer by the ring's width, a share of that distance. It is densest at some height, and clear at its foot and its top.
+vec3 hazed(vec3 shown)
+{
+    float slope = way_local.z / max(length(way_local.xy), 1e-9), height = eye_local.z / haze_ring.z;
+    float below = slope / max(height + haze_ring.x * slope, 1e-9);  // the eye, in heights of it, where the ray meets the ring
+    float up = 1.0 - below, dense = haze_ring.y;
+    float share = min(up / dense, below / (1.0 - dense));
+    return mix(shown, fogged(haze.rgb, haze_ring.z), haze.w * (eye_local.z > 0.0 ? clamp(share, 0.0, 1.0) : 0.0));
 }
 #endif
 
@@ -120,11 +148,21 @@ void main()
     fragment = vec4(vec3(0.0), (1.0 - fade) * (1.0 - light.g / max(unshaded.g, 1e-6)));
 #else
     vec3 direction = normalize(way);
-    vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
+#if BACKDROP
+    vec3 far = met && edge == 0.0 ? horizon_at(direction) : sky_at(direction, 0.0);
     vec3 shown = tone_mapped(mix(albedo * (light + bounce), far, fade));
 #if MIRROR
     // as in MuJoCo, the reflectance does not depend on the angle
     shown = mix(shown, textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb, reflectance * (1.0 - fade));
+#endif
+#else
+    vec3 shown = tone_mapped(albedo * (light + bounce));
+#if MIRROR
+    shown += reflectance * textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb;
+#endif
+    vec3 far = encoded(sky_at(direction, 0.0));
+    far = mix(far, fogged(far, haze_ring.z), shown_far.z);  // black has none
+    shown = hazed(mix(fogged(shown, at), far, fade));
 #endif
 #if BLOCK > 1
     vec2 margin = -beside_edges(), near_edge = RIM * fwidth(margin);

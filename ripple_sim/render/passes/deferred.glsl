@@ -6,6 +6,7 @@
 
 #stage fragment
 #include "glsl/floor_map.glsl"
+#include "glsl/fog.glsl"
 #include "glsl/g_buffer_samples.glsl"
 #include "glsl/height_maps.glsl"
 #include "glsl/lights.glsl"
@@ -239,6 +240,9 @@ void main()
         alike &= left;
         left &= ~alike;
         vec4 color = lit_solid(surface, start + at * way, spread, block);
+#if !BACKDROP
+        color.rgb = fogged(color.rgb, at);
+#endif
         sum += float(bitCount(alike)) / float(SAMPLES) * vec4(dithered(color.rgb) * color.a, color.a);
         again = true;
     } while (left != 0);

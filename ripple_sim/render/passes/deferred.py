@@ -341,6 +341,7 @@ class Mirror:
         self, resources: Resources, frame_format: FrameFormat, floor: Floor, light_options: Mapping[str, int]
     ) -> None:
         self._floor, self._aspect = floor, frame_format.aspect
+        self._backdrop = bool(light_options["BACKDROP"])
         width, height = frame_format.size
         half = dataclasses.replace(frame_format, size=(max(width // 2, 1), max(height // 2, 1)))
         self._size = half.size
@@ -376,6 +377,9 @@ class Mirror:
         mirrored = dataclasses.replace(pose, position=position, rotation=flip @ pose.rotation)
         self._frame.set_camera(mirrored, self._aspect)
         self._frame.set_vector("floor_origin", floor.origin, 0.0)
+        if not self._backdrop:  # as in MuJoCo only solids are reflected
+            for name in ("fog", "haze", "shown_far"):
+                self._frame.set_vector(name, [0.0, 1.0, 0.0])
         self._frame.bind()
         ctx.front_face = "cw"
         self._shading.clear(ctx)
@@ -386,6 +390,10 @@ class Mirror:
         self._shading.shade(ctx, boxes_of(balls, mirrored, self._size))
         ctx.copy_framebuffer(self._framebuffer, self._shading.frame)
         frame.bind()
+
+    def hide(self) -> None:
+        """Show no reflection in the coming frames."""
+        self._framebuffer.clear()
 
     def bind(self) -> None:
         """Bind the reflection for the floor's shader."""

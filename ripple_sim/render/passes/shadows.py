@@ -243,6 +243,11 @@ class Floor:
         return self.reflectance > 0.0
 
     @property
+    def endless(self) -> bool:
+        """Whether it is an infinite plane."""
+        return bool((self._half == _ENDLESS).all())
+
+    @property
     def normal(self) -> NDArray[np.float64]:
         """Unit vector, as placed last."""
         return self.rotation[:, 2]

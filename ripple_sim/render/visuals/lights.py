@@ -7,7 +7,6 @@ and a backdrop; it stands in where the MJCF has no lights.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,11 +21,12 @@ from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
 
 from .objects import Assets
+from .surroundings import RenderFlags, set_surroundings
 
 _KIND = mujoco.mjtLightType
 _SUN_TANGENT = 0.05  # of the angular radius of a directional light, which MJCF does not give
+_UNLIT = 0.3  # ambient light in sRGB where there is no light at all, as in MuJoCo
 _GAMMA = 2.2  # of sRGB, about: factor of a beam's exponent from sRGB to linear light
-_WITHOUT_LIGHTS = 0.3  # ambient light in sRGB of a scene without any light, as MuJoCo has it
 _BRIGHTEST = 1.3  # sum of all lights above which exposure is reduced, as MuJoCo's frames saturate
 
 
@@ -82,12 +82,14 @@ class Light:
 class Lighting:
     """All light of a frame: the lights, of which the first may cast shadows, and the ambient light.
 
-    `ambient` is the radiance from all around, shape [3]; with `studio` the studio replaces the MJCF's lights.
+    `ambient` is the radiance from all around, shape [3]; with `studio` the studio replaces the MJCF's lights. Without a
+    `backdrop` nothing is around the scene but a skybox, as in MuJoCo.
     """
 
     lights: list[Light]
     ambient: NDArray[np.float64]
     studio: bool
+    backdrop: bool = True
 
     def on(self, point: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
         """Irradiance over pi of a small patch by all lights, shape [3]."""
@@ -99,13 +101,9 @@ def in_studio(model: Any, lighting: str) -> bool:
     return lighting == "studio" or (lighting == "auto" and not model.nlight)
 
 
-def lighting_of(
-    model: Any, data: Any, pose: Pose, lighting: str, lights: Sequence[mujoco.MjvLight] | None = None
-) -> Lighting:
-    """All light of a frame, as the renderer has it; see `SceneLight`. A scene's `lights` replace those of the model."""
-    if in_studio(model, lighting):
-        return studio_lighting(pose)
-    return model_lighting(model, data, pose) if lights is None else scene_lighting(lights)
+def lighting_of(model: Any, data: Any, pose: Pose, lighting: str) -> Lighting:
+    """All light of a frame, as the renderer has it; see `SceneLight`."""
+    return studio_lighting(pose) if in_studio(model, lighting) else model_lighting(model, data, pose)
 
 
 def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
@@ -124,21 +122,8 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
         if model.light_active[index] and model.light_type[index] != _KIND.mjLIGHT_IMAGE:
             ambient += model.light_ambient[index]
             lights.append(_light(model, data, index))
-    return _in_linear_light(lights, ambient)
-
-
-def scene_lighting(lights: Sequence[mujoco.MjvLight]) -> Lighting:
-    """Lights as a scene of MuJoCo's has them, the headlight too; see `model_lighting`."""
-    ambient, lamps = np.zeros(3), []
-    for light in lights:
-        if light.type != _KIND.mjLIGHT_IMAGE:
-            ambient += light.ambient
-            lamps.append(_scene_light(light))
-    return _in_linear_light(lamps, ambient if len(lights) else np.full(3, _WITHOUT_LIGHTS))
-
-
-def _in_linear_light(lights: list[Light], ambient: NDArray[np.float64]) -> Lighting:
-    """Lights and ambient light that add up in linear light, of those that add up in sRGB."""
+    if not (head.active or model.light_active.any()):
+        ambient += _UNLIT
     lights = [light for light in lights if light.radiance.any()]
     # lights that cast shadows come before the others, the brightest first
     lights.sort(key=lambda light: (not light.shadow, -light.radiance.sum()))
@@ -172,23 +157,6 @@ def _light(model: Any, data: Any, index: int) -> Light:
     )
 
 
-def _scene_light(light: mujoco.MjvLight) -> Light:
-    """A light of a scene, with its radiance in sRGB."""
-    directional, spot = light.type == _KIND.mjLIGHT_DIRECTIONAL, light.type == _KIND.mjLIGHT_SPOT
-    direction = np.array(light.dir, dtype=np.float64)
-    return Light(
-        direction=-direction / max(float(np.linalg.norm(direction)), 1e-9),
-        radiance=np.array(light.diffuse, dtype=np.float64),
-        position=None if directional else np.array(light.pos, dtype=np.float64),
-        size=_SUN_TANGENT if directional else float(light.bulbradius),
-        cutoff=np.radians(min(float(light.cutoff), 180.0)) if spot else np.pi,
-        exponent=_GAMMA * float(light.exponent) if spot else 0.0,
-        falloff=np.array(light.attenuation if spot else [1.0, 0.0, 0.0], dtype=np.float64),
-        gloss=_gloss(light.specular),
-        shadow=bool(light.castshadow),
-    )
-
-
 _KEY_RADIANCE = np.array([1.34, 1.28, 1.19])
 _KEY_TANGENT = 0.10
 _KEY_AZIMUTH, _KEY_ELEVATION = 92.0, 44.0
@@ -217,6 +185,8 @@ def sky_colors(
 
     Parameters as for `set_lighting`.
     """
+    if not lighting.backdrop:
+        return np.zeros(3), np.zeros(3), lighting.ambient
     tint = np.array([0.40, 0.42, 0.46])
     if floor_albedo is not None:
         # irradiance over pi of the floor far away, as far as it tints the background
@@ -242,6 +212,10 @@ def set_lighting(
     sky : array, optional
         Mean linear colour of a skybox.
     """
+    boxes = np.full(3, 1.0 if lighting.studio else BESIDE_LIGHTS)
+    if not lighting.backdrop:  # what a surface reflects besides the lamps is as dark and of the colour as these
+        total = sum((light.radiance for light in lighting.lights), lighting.ambient)
+        boxes = boxes * np.minimum(total, 1.0)
     frame.values["lights"] = 0  # where there are fewer, the others are dark
     for record, light in zip(frame.values["lights"], lighting.lights, strict=False):
         record["position"] = [0, 0, 0, 0] if light.position is None else [*light.position, 1]
@@ -254,13 +228,13 @@ def set_lighting(
         tangent = np.cross([0.0, 0.0, 1.0], normal)
         frame.values["soft_box_normal"][index] = [*normal, half_width]
         frame.values["soft_box_tangent"][index] = [*tangent / np.linalg.norm(tangent), half_height]
-        strength = 1.0 if lighting.studio else BESIDE_LIGHTS
-        frame.values["soft_box_radiance"][index][:3] = strength * np.array(brightness)
+        frame.values["soft_box_radiance"][index][:3] = boxes * np.array(brightness)
     horizon, zenith, light_above = sky_colors(lighting, pose, floor_albedo, sky)
     frame.set_vector("horizon", horizon)
     frame.set_vector("zenith", zenith)
     frame.set_vector("sky", light_above, 1.0 if lighting.studio else 0.0)
-    frame.set_vector("floor_fade", [*(STUDIO_FADE if lighting.studio else FADE), 0.0])
+    if lighting.backdrop:
+        frame.set_vector("floor_fade", [*(STUDIO_FADE if lighting.studio else FADE), 0.0])
 
 
 def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float64]:
@@ -273,6 +247,7 @@ def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float
 
 
 LIGHTING = ("auto", "model", "studio")
+_AS_USUAL = RenderFlags()
 
 
 class SceneLight:
@@ -282,13 +257,14 @@ class SceneLight:
     ----------
     lighting : str
         One of `LIGHTING`; "auto": the studio where the MJCF has no light.
+    backdrop : bool
+        Whether the floor fades into a backdrop, or into the horizon of the skybox. Otherwise what is around the scene
+        is as in MuJoCo: black, or the skybox, with fog and haze. The studio always has its backdrop.
 
     Attributes
     ----------
-    studio : bool
-        Whether the studio replaces all lights.
     options : dict
-        Defines for the shaders, see `DeferredShading`: SKYBOX, NEAR_LIGHTS, LIGHTS and SHADOWS.
+        Defines for the shaders, see `DeferredShading`: BACKDROP, SKYBOX, HORIZON, NEAR_LIGHTS, LIGHTS and SHADOWS.
 
     Raises
     ------
@@ -296,37 +272,22 @@ class SceneLight:
         If the lighting is unknown.
     """
 
-    def __init__(self, assets: Assets, lighting: str) -> None:
+    def __init__(self, assets: Assets, lighting: str, backdrop: bool = True) -> None:
         if lighting not in LIGHTING:
             raise RippleError(f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
         self._model = model = assets.model
         self._lighting, studio = lighting, in_studio(model, lighting)
         self._sky = None if studio else assets.skybox()
-        self.studio = studio
+        self._backdrop = backdrop or studio
+        casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
         self.options = {
+            "BACKDROP": int(self._backdrop),
             "SKYBOX": int(self._sky is not None),
-            "NEAR_LIGHTS": 0,
-            "LIGHTS": 1,
-            "SHADOWS": 1,
+            "HORIZON": int(self._sky is not None and self._sky.horizon is not None),
+            "NEAR_LIGHTS": int(not studio and (model.light_type != _KIND.mjLIGHT_DIRECTIONAL).any()),
+            "LIGHTS": 1 if studio else int(np.clip(model.nlight + 1, 1, MAX_LIGHTS)),  # with the headlight
+            "SHADOWS": 1 if studio else int(np.clip(casting.sum(), 1, MAX_SHADOWS)),
         }
-        self.make_room(None)
-
-    def make_room(self, lights: Sequence[mujoco.MjvLight] | None) -> None:
-        """Have the options allow the lights of a scene, or else those of the model as they are now."""
-        if self.studio:
-            return
-        if lights is None:
-            kinds, casting = self._model.light_type, self._model.light_castshadow
-        else:
-            kinds, casting = np.array([(each.type, each.castshadow) for each in lights]).reshape(-1, 2).T
-        cast = np.count_nonzero(casting.astype(bool) & (kinds != _KIND.mjLIGHT_IMAGE))
-        needed = {
-            "NEAR_LIGHTS": int((kinds != _KIND.mjLIGHT_DIRECTIONAL).any()),
-            "LIGHTS": min(len(kinds) + 1, MAX_LIGHTS),  # with the headlight
-            "SHADOWS": min(int(cast), MAX_SHADOWS),
-        }
-        for name, least in needed.items():
-            self.options[name] = max(self.options[name], least)
 
     def set(
         self,
@@ -335,14 +296,23 @@ class SceneLight:
         pose: Pose,
         floor_albedo: NDArray | None = None,
         floor_normal: NDArray | None = None,
-        lights: Sequence[mujoco.MjvLight] | None = None,
+        *,
+        flags: RenderFlags = _AS_USUAL,
+        endless: bool = False,
     ) -> list[Light]:
         """Set the frame's light and background; return the lights.
 
-        The floor's colour and normal are [3] each; `lights` are those of a scene that replace the model's.
+        The floor's colour and normal are [3] each; whether it is `endless`, and the `flags`, see `set_surroundings`.
         """
-        lighting = lighting_of(self._model, data, pose, self._lighting, lights)
-        set_lighting(frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky[1])
+        lighting = lighting_of(self._model, data, pose, self._lighting)
+        lights = lighting.lights
+        if not flags.shadow:
+            lights = [dataclasses.replace(light, shadow=False) for light in lights]
+        lighting = dataclasses.replace(lighting, lights=lights, backdrop=self._backdrop)
+        if not self._backdrop:
+            sky = self._sky is not None
+            set_surroundings(frame, self._model, pose, flags, skybox=sky, endless=endless)
+        set_lighting(frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky.mean)
         if floor_normal is not None:
             frame.set_vector("floor_light", lighting.on(pose.focus, floor_normal))
         return lighting.lights
@@ -350,4 +320,6 @@ class SceneLight:
     def bind(self) -> None:
         """Bind the skybox."""
         if self._sky is not None:
-            self._sky[0].use(Unit.SKYBOX)
+            self._sky.cube.use(Unit.SKYBOX)
+            if self._sky.horizon is not None:
+                self._sky.horizon.use(Unit.HORIZON)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import moderngl
 import mujoco
@@ -13,6 +13,7 @@ from ripple_sim.render.contract import MAX_OCCLUDERS, OBJECT, OBJECT_COLUMNS, Bi
 from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture
 from ripple_sim.render.tone_mapping import srgb_to_linear
 
+from .surroundings import horizon_of
 from .visual import Look, texture_pixels
 
 _ROW = OBJECT.dtype
@@ -111,6 +112,23 @@ class ObjectTable:
         self._texture.use(Unit.OBJECTS)
 
 
+class Skybox(NamedTuple):
+    """A skybox on the GPU.
+
+    Attributes
+    ----------
+    cube : moderngl.TextureCube
+    mean : float64 [3]
+        Linear colour.
+    horizon : moderngl.Texture, optional
+        See `horizon_of`.
+    """
+
+    cube: moderngl.TextureCube
+    mean: NDArray[np.float64]
+    horizon: moderngl.Texture | None
+
+
 class Assets:
     """What all visuals of a model share on the GPU: its textures, each uploaded at its first use, and a table.
 
@@ -145,14 +163,24 @@ class Assets:
             self._mean_colors[texture] = srgb_to_linear(pixels[::apart, ::apart] / 255.0).mean(axis=(0, 1))
         return self._mean_colors[texture]
 
-    def skybox(self) -> tuple[moderngl.TextureCube, NDArray[np.float64]] | None:
-        """Return the model's skybox and its mean linear colour, or None."""
+    def skybox(self) -> Skybox | None:
+        """Return the model's skybox, or None."""
         for texture in range(self.model.ntex):
             if self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
                 pixels = texture_pixels(self.model, texture)
                 self._uploaded[texture] = cube = srgb_cube(self.resources, pixels)
-                return cube, srgb_to_linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
+                mean = srgb_to_linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
+                return Skybox(cube, mean, self._horizon(pixels))
         return None
+
+    def _horizon(self, pixels: NDArray[np.uint8]) -> moderngl.Texture | None:
+        colors = horizon_of(pixels)
+        if colors is None:
+            return None
+        texels = np.column_stack([colors, np.ones(len(colors))]).astype("f2")
+        texture = self.resources.texture((len(colors), 1), 4, texels.tobytes(), dtype="f2")
+        texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        return texture
 
 
 _REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky

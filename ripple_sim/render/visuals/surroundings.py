@@ -1,0 +1,112 @@
+"""What is around a scene: the skybox and its horizon; fog and haze as MuJoCo has them, by the flags of the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.camera import Pose
+from ripple_sim.render.resources import FrameUniforms
+from ripple_sim.render.tone_mapping import srgb_to_linear
+
+_FLAG = mujoco.mjtRndFlag
+_FADE = 0.9, 1.0  # of the floor into what is behind it, in distances of the far plane
+_SKYBOX = 0.7  # distance of MuJoCo's skybox, likewise
+
+
+_AZIMUTHS = 64  # of the horizon
+_BESIDE, _ABOVE = 16, 8  # directions whose median is the horizon's colour there
+_HIGHEST = 0.06  # of them, as a slope
+_SMOOTH = 0.03  # difference in linear colour from the median up to which a horizon is smooth
+
+
+def horizon_of(pixels: NDArray[np.uint8]) -> NDArray[np.float64] | None:
+    """Linear colours [n, 3] of a skybox along its horizon, by the azimuth, without stars and other details.
+
+    They begin at +x and go round counter-clockwise. None if the horizon is as smooth without.
+
+    Parameters
+    ----------
+    pixels : uint8 [6 size, size, 3]
+        Its faces below one another, as `srgb_cube` takes them, or one image for all of them.
+    """
+    size = pixels.shape[1]
+    faces = np.stack([pixels[:size]] * 6) if len(pixels) != 6 * size else pixels.reshape(6, size, size, -1)
+    azimuth = 2 * np.pi * (np.arange(_AZIMUTHS * _BESIDE) + 0.5) / (_AZIMUTHS * _BESIDE)
+    slope = _HIGHEST * np.arange(_ABOVE) / (_ABOVE - 1)
+    directions = np.stack(np.broadcast_arrays(np.cos(azimuth)[:, None], np.sin(azimuth)[:, None], slope), axis=-1)
+    seen = srgb_to_linear(_texels(faces, directions) / 255.0).reshape(_AZIMUTHS, -1, 3)
+    middle = np.median(seen, axis=1)
+    if np.abs(seen - middle[:, None]).max() < _SMOOTH:
+        return None
+    return (np.roll(middle, 1, axis=0) + 2 * middle + np.roll(middle, -1, axis=0)) / 4
+
+
+def _texels(faces: NDArray[np.uint8], directions: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """What a skybox, whose +y is up, shows in directions [..., 3] of the world that lie near the horizon."""
+    x, y, z = directions[..., 0], directions[..., 2], -directions[..., 1]
+    side = np.abs(x) >= np.abs(z)
+    along = np.where(side, np.abs(x), np.abs(z))
+    face = np.where(side, np.where(x > 0, 0, 1), np.where(z > 0, 4, 5))
+    across = np.select([face == 0, face == 1, face == 4], [-z, z, x], -x)
+    size = faces.shape[1]
+    column, row = (np.clip((0.5 * (each / along + 1) * size).astype(np.int64), 0, size - 1) for each in (across, -y))
+    return faces[face, row, column]
+
+
+@dataclass(frozen=True)
+class RenderFlags:
+    """Flags of a scene that the renderer follows, by default as MuJoCo has them."""
+
+    shadow: bool = True
+    reflection: bool = True
+    skybox: bool = True
+    fog: bool = False
+    haze: bool = True
+
+    @classmethod
+    def of(cls, scene: mujoco.MjvScene | None) -> RenderFlags:
+        """Those of a scene."""
+        if scene is None:
+            return cls()
+        names = cls.__dataclass_fields__
+        return cls(**{name: bool(scene.flags[getattr(_FLAG, f"mjRND_{name.upper()}")]) for name in names})
+
+
+def followed_flags(*, backdrop: bool) -> set[int]:
+    """Numbers of the flags, of `mujoco.mjtRndFlag`, that have an effect; before a backdrop those of shadows alone."""
+    names = ["shadow"] if backdrop else list(RenderFlags.__dataclass_fields__)
+    return {int(getattr(_FLAG, f"mjRND_{name.upper()}")) for name in names}
+
+
+def set_surroundings(
+    frame: FrameUniforms, model: Any, pose: Pose, flags: RenderFlags, *, skybox: bool, endless: bool
+) -> None:
+    """Set what is around a scene without a backdrop.
+
+    Parameters
+    ----------
+    skybox : bool
+        Whether the model has one.
+    endless : bool
+        Whether the floor is an infinite plane, the only one over whose horizon MuJoCo has haze.
+    """
+    shown = skybox and flags.skybox
+    far = pose.clip_planes[1]
+    frame.set_vector("floor_fade", [*(share * far / pose.distance for share in _FADE), 0.0])
+    frame.set_vector("fog", model.vis.rgba.fog[:3], float(flags.fog))
+    frame.set_vector("haze", model.vis.rgba.haze[:3], float(shown and flags.haze and endless))
+    width = float(model.vis.map.haze)
+    frame.set_vector("haze_ring", [width, _densest(width), _SKYBOX * far])
+    begins, ends = model.stat.extent * np.array([model.vis.map.fogstart, model.vis.map.fogend])
+    frame.set_vector("shown_far", [begins, ends, float(shown)])
+
+
+def _densest(width: float) -> float:
+    """How high MuJoCo's haze is densest, in heights of the ring: where its cone meets one of 45 degrees."""
+    steepness = np.arctan2(1.0, width)
+    return float(np.sqrt(0.5) * width * np.sin(steepness) / np.sin(0.75 * np.pi - steepness))
