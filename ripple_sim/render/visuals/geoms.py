@@ -36,11 +36,15 @@ INSTANCE = np.dtype(
 )
 _GEOM = mujoco.mjtGeom
 _ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
+# Kinds that are made of as many segments as they need; others are always the same.
+_WITH_LEVELS = (*_ROUND, _GEOM.mjGEOM_BOX, _GEOM.mjGEOM_ARROW, _GEOM.mjGEOM_ARROW1, _GEOM.mjGEOM_ARROW2)
 _LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
-_FINEST = 2 * _LEVELS[-1]  # where shapes are measured
+_MEASURED_LEVELS = (*_LEVELS, 2 * _LEVELS[-1])  # where shapes are measured, in depth and segmentation
 _BIAS = 3.0  # of shadows, in sagittas of the edges: where light grazes, one is not enough
 _SHARPEST = 1e-6  # bevel of sharp edges, in half sizes: normals need some
-_FLATNESS = 0.25  # how far the edges of a round shape may be off its surface [pixels]
+# How far the edges of a round shape may be off its surface [pixels]: in colours; and where shapes are measured. There
+# depths are off by as much of a pixel's width, and more only where a surface is seen at a slant.
+_FLATNESS, _MEASURED_FLATNESS = 0.25, 1 / 64
 
 # vertices (core, shell, normal, texture coordinates) and indices of a shape with so many segments to a right angle
 Levels: TypeAlias = Callable[[int], tuple[moderngl.Buffer, moderngl.Buffer]]
@@ -97,7 +101,8 @@ class Instances:
     ) -> None:
         self._assets, self._level, self._programs = assets, level, programs
         self._buffer = assets.resources.buffer(reserve=INSTANCE.itemsize * len(members), dynamic=True)
-        self._arrays: dict[tuple[CasterMap | None, int], moderngl.VertexArray] = {}
+        self._level_buffers: dict[int, moderngl.Buffer] = {}
+        self._arrays: dict[tuple[CasterMap | None, int, moderngl.Buffer], moderngl.VertexArray] = {}
         self._segments = _LEVELS[-1]
         self.hold(members)
 
@@ -133,7 +138,7 @@ class Instances:
     def update(self, data: Any, pose: Pose, height: int, occluders: Occluders, sharp: bool = False) -> None:
         """Take the poses from MuJoCo's data; they are seen from a pose in frames of a height [pixels].
 
-        With `sharp` edges are as MuJoCo has them, and what is round is so at any size.
+        With `sharp` edges are as MuJoCo has them, and each one that is round has as many segments as it needs itself.
         """
         if self._poses:
             position, rotation = (np.array(each) for each in zip(*self._poses, strict=True))
@@ -148,15 +153,30 @@ class Instances:
         balls, radius = np.column_stack([position, np.linalg.norm(half, axis=1)]), half.max(axis=1)
         away = np.maximum(np.linalg.norm(position - pose.position, axis=1) - radius, 0.1 * radius)
         nearest = np.ones_like(radius) if pose.orthographic else away
-        largest = float((radius / nearest).max()) / pose.pixel_height(1.0, height)
-        # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
-        needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
-        self._segments = _FINEST if sharp else next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
+        pixels = radius / nearest / pose.pixel_height(1.0, height)
+        self._segments = int(_segments(pixels.max(), _FLATNESS, _LEVELS))
+        self._draws = [(self._segments, self._buffer, len(self._records))]
+        if sharp and self._visual.kind in _WITH_LEVELS:
+            self._draws = self._by_level(_segments(pixels, _MEASURED_FLATNESS, _MEASURED_LEVELS))
         if self._visual.kind in _ROUND:
             self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
         near = occluders.near(balls, self._hosts)
         for number, bias, bits in zip(self.numbers, self.shadow_biases, near, strict=True):
             self._assets.objects.place(number, float(bias), occluders=int(bits))
+
+    def _by_level(self, segments: NDArray[np.int64]) -> list[tuple[int, moderngl.Buffer, int]]:
+        """Draw calls of the members by their segments [k]: segments, a buffer of the members, and their count."""
+        draws = []
+        for level in np.unique(segments).tolist():
+            records = self._records[segments == level]
+            if level not in self._level_buffers:
+                self._level_buffers[level] = self._assets.resources.buffer(reserve=records.nbytes, dynamic=True)
+            buffer = self._level_buffers[level]
+            if buffer.size < records.nbytes:
+                buffer.orphan(2 * records.nbytes)
+            buffer.write(records.tobytes())
+            draws.append((level, buffer, len(records)))
+        return draws
 
     def bounds(self, data: Any) -> NDArray[np.float64]:
         """Bounding ball [1, 4] of the first one, the only one of what is transparent, where the data says it is."""
@@ -166,7 +186,8 @@ class Instances:
         """Draw into the G-buffer."""
         if self._image is not None:
             self._image.use(self._unit)
-        self._render(None, self._segments)
+        for draw in self._draws:
+            self._render(None, *draw)
 
     def cast(self, seen: CasterMap, **uniforms: Any) -> None:
         """Draw into a map of a light or, coarsely, of the floor; see `DrawnScene.cast`."""
@@ -174,21 +195,32 @@ class Instances:
             uniforms["transmission"] = (1.0 - self._visual.opacity,) * 3
         for name, value in uniforms.items():
             self._programs[seen][name] = value
-        self._render(seen, _LEVELS[0] if seen == CasterMap.ALBEDO else self._segments)
+        segments = _LEVELS[0] if seen == CasterMap.ALBEDO else self._segments
+        self._render(seen, segments, self._buffer, len(self._records))
 
-    def _render(self, seen: CasterMap | None, segments: int) -> None:
-        segments = segments if self._corners < 0 else 0
-        if (seen, segments) not in self._arrays:
+    def _render(self, seen: CasterMap | None, segments: int, members: moderngl.Buffer, count: int) -> None:
+        """Render so many members, whose records are in a buffer."""
+        segments = segments if self._visual.kind in _WITH_LEVELS else 0
+        if (seen, segments, members) not in self._arrays:
             vertices, indices = self._level(segments)
             content = [
                 (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
-                (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
+                (members, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
             ]
             # what a program does not use is optimised away
-            self._arrays[seen, segments] = self._assets.resources.vertex_array(
+            self._arrays[seen, segments, members] = self._assets.resources.vertex_array(
                 self._programs[seen], content, indices, skip_errors=True
             )
-        self._arrays[seen, segments].render(vertices=self._corners, instances=len(self._records))
+        self._arrays[seen, segments, members].render(vertices=self._corners, instances=count)
+
+
+def _segments(radius: NDArray[np.float64], flatness: float, levels: tuple[int, ...]) -> NDArray[np.int64]:
+    """The level, segments to a right angle, at which circles of a radius [pixels] are so flat [pixels]; or the finest.
+
+    The sagitta of a chord over a right angle's nth part is r (1 - cos(pi / 4n)).
+    """
+    needed = np.pi / 4 / np.sqrt(2 * np.minimum(flatness / np.maximum(radius, 1e-9), 1.0))
+    return np.array(levels)[np.minimum(np.searchsorted(levels, needed), len(levels) - 1)]
 
 
 def visuals_of(model: Any, geoms: Iterable[int]) -> list[tuple[Visual, NamedShape]]:

@@ -21,9 +21,9 @@ def visuals(resources):
     drawn = instances_of(Assets(model, resources), visuals_of(model, range(model.ngeom)))
     occluders = Occluders(resources, model, np.arange(model.ngeom))
 
-    def update(eye, pixels):
+    def update(eye, pixels, sharp=False):
         for each in drawn:
-            each.update(data, Pose(np.asarray(eye), np.eye(3), 1.0, fovy=90.0), 2 * pixels, occluders)
+            each.update(data, Pose(np.asarray(eye), np.eye(3), 1.0, fovy=90.0), 2 * pixels, occluders, sharp)
 
     return drawn, data, update
 
@@ -68,6 +68,25 @@ def test_nearer_and_larger_frames_need_more_segments_and_then_edges_are_within_a
     assert segments[-1] > segments[0]
     update(data.geom_xpos[0], 1e6)  # from within a ball: the finest there is
     assert both._segments >= segments[-1]
+
+
+def test_where_shapes_are_measured_each_round_one_has_the_segments_that_it_needs_itself(resources):
+    balls = "".join(f'<geom size=".1" pos="{x} 0 0"/>' for x in (0.0, 1.0, 8.0, 60.0))
+    model, data = posed(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
+    (drawn,) = instances_of(Assets(model, resources), visuals_of(model, range(model.ngeom)))
+    eye, pixels = np.array([-0.4, 0.0, 0.0]), 300.0
+    pose = Pose(eye, np.eye(3), 1.0, fovy=90.0)
+    drawn.update(data, pose, 2 * int(pixels), Occluders(resources, model, np.arange(model.ngeom)), sharp=True)
+    segments = {}
+    for level, buffer, count in drawn._draws:
+        records = np.frombuffer(buffer.read(), dtype=drawn._records.dtype)[:count]
+        segments |= {float(x): level for x in records["origin"][:, 0]}
+    assert sorted(segments) == [0.0, 1.0, 8.0, 60.0]
+    for x, level in segments.items():
+        sagitta = 0.1 * (1 - np.cos(np.pi / 4 / level)) * pixels / (x + 0.4 - 0.1)
+        assert sagitta <= 1 / 64 or level == max(segments.values())
+    assert segments[0.0] > segments[1.0] > segments[8.0] >= segments[60.0]
+    assert segments[60.0] == 4
 
 
 def test_the_shadow_bias_covers_the_gap_between_chord_and_arc_and_flat_geoms_have_none(visuals):
