@@ -194,7 +194,9 @@ class RippleRenderer:
             raise RenderError(str(error)) from None
         option, everything = scene_option or mujoco.MjvOption(), int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self.model, state, option, None, own, everything, self.scene)
-        seen = dataclasses.replace(seen.pose(), clip=pose_of_scene(self.scene.camera, 1.0).clip)
+        pose = seen.pose()
+        in_scene = pose_of_scene(self.scene.camera, pose.distance)
+        seen = dataclasses.replace(in_scene, lens=pose.lens, focal_distance=pose.focal_distance)
         self._camera_taken = _content(self.scene.camera)
         heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
         self._shown.look(state, heights, seen.pose())

@@ -23,6 +23,7 @@ from ripple_sim.solver.errors import RippleError, shown, warn_caller
 
 # Clip planes of a camera that says nothing of them, in its distances.
 _NEAR, _FAR = 0.02, 200.0
+_SLACK = 0.99  # of the distance of the first thing, where the near plane may be
 # Least distance of the focus, in extents of the model: of a camera among what it shows; and of one that a body carries,
 # which looks at what is about it.
 _LEAST_FOCUS, _LEAST_FOCUS_RIDING = 0.05, 0.5
@@ -92,6 +93,19 @@ class Pose:
         """Distances of the near and the far plane [m]."""
         return self.clip or (_NEAR * self.distance, _FAR * self.distance)
 
+    def planes_about(self, balls: NDArray[np.float64]) -> tuple[float, float]:
+        """The clip planes, the near one moved on to the first of some balls [m].
+
+        Depths are the more precise the farther away it is, and MuJoCo's is very near by default.
+        """
+        near, far = self.clip_planes
+        if self.clip is None or not len(balls):
+            return near, far
+        depth = (self.eye - balls[:, :3]) @ self.rotation[:, 2]
+        ahead = depth + balls[:, 3] > 0
+        first = float((depth - balls[:, 3])[ahead].min(initial=far))
+        return float(np.clip(_SLACK * first, near, max(near, far / 2))), far
+
     @property
     def half_height(self) -> float:
         """Half the height of what is seen: a metre in front of the eye, or with parallel rays anywhere [m]."""
@@ -110,9 +124,9 @@ class Pose:
         """Itself: a pose is a viewpoint."""
         return self
 
-    def projection(self, aspect: float) -> NDArray[np.float64]:
-        """Eye to clip coordinates, shape [4, 4]; see `view_matrix`."""
-        near, far = self.clip_planes
+    def projection(self, aspect: float, planes: tuple[float, float] | None = None) -> NDArray[np.float64]:
+        """Eye to clip coordinates, shape [4, 4]; see `view_matrix`. The `planes` are the clip planes by default."""
+        near, far = planes or self.clip_planes
         if not self.orthographic and self.half_width is None:
             return perspective(self.fovy, aspect, near, far, self.shear)
         scale = 1 / self.half_sizes(aspect)

@@ -326,7 +326,7 @@ class Renderer:
     def _update(self, data: Any, poses: Any, pose: Pose, exposure: int, flags: RenderFlags) -> None:
         """Bring the frame's uniforms up to date; `poses` are those of geoms and sites."""
         frame, floor = self._frame, self._floor
-        frame.set_camera(pose, self._format.aspect)
+        frame.set_camera(pose, self._format.aspect, self._scene.balls(poses))
         casters = within(self._scene.casters(poses), pose.focus, _SHADOW_REACH * pose.distance)
         centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
         if floor is not None:

@@ -106,14 +106,14 @@ class FrameUniforms:
         self.values[name][:3] = xyz
         self.values[name][3] = w
 
-    def set_camera(self, pose: Pose, aspect: float) -> None:
-        """Set whatever depends on the camera only; `aspect` is width over height."""
-        near, far = pose.clip_planes
+    def set_camera(self, pose: Pose, aspect: float, balls: NDArray[np.float64] | None = None) -> None:
+        """Set whatever depends on the camera; `aspect` is width over height, and the `balls` contain all solids."""
+        near, far = planes = pose.clip_planes if balls is None else pose.planes_about(balls)
         half_width, half_height = pose.half_sizes(aspect)
-        matrix = pose.projection(aspect) @ view_matrix(pose)
+        matrix = pose.projection(aspect, planes) @ view_matrix(pose)
         self.values["view_projection"] = matrix.T  # column by column
         self.set_vector("eye", pose.eye, pose.distance)
-        self.set_vector("focus", pose.focus, 0.0 if pose.clip is None else near)
+        self.set_vector("focus", pose.focus, 0.0 if pose.clip is None else pose.clip[0])
         self.set_vector("ray", pose.rotation @ [*pose.shear, -1.0], near)
         self.set_vector("ray_right", half_width * pose.rotation[:, 0], far)
         self.set_vector("ray_up", half_height * pose.rotation[:, 1], float(pose.orthographic))

@@ -53,6 +53,7 @@ CAMERAS = {
     "camera with two focal lengths": (f'{_SENSOR} focal="4e-3 7e-3"', ""),
     "camera with near clip planes": ('fovy="50"', _SHALLOW),
     "orthographic camera with near clip planes": ('projection="orthographic" fovy="1.6"', _SHALLOW),
+    "camera with a very near clip plane": ('fovy="50"', '<visual><map znear="2e-4" zfar="3"/></visual>'),
     "orthographic free camera": ("", '<visual><global orthographic="true" fovy="2.5"/></visual>'),
 }
 WORLDS |= dict.fromkeys(CAMERAS, _SEVERAL)

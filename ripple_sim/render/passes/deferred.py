@@ -375,7 +375,7 @@ class Mirror:
         flip = np.eye(3) - 2 * np.outer(floor.normal, floor.normal)
         position = floor.origin + flip @ (pose.position - floor.origin)
         mirrored = dataclasses.replace(pose, position=position, rotation=flip @ pose.rotation)
-        self._frame.set_camera(mirrored, self._aspect)
+        self._frame.set_camera(mirrored, self._aspect, balls)
         self._frame.set_vector("floor_origin", floor.origin, 0.0)
         if not self._backdrop:  # as in MuJoCo only solids are reflected
             for name in ("fog", "haze", "shown_far"):
