@@ -5,7 +5,6 @@ It reads the environment's model and data, the size of its frames, and its camer
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,8 +14,9 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom, own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.errors import RippleError, RippleWarning, SceneError
+from ripple_sim.errors import RippleError, SceneError
 from ripple_sim.solver import Material
+from ripple_sim.solver.errors import warn_caller
 
 try:
     import gymnasium
@@ -132,11 +132,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         EzPickle.__init__(self, env, materials, **given)
         gymnasium.Wrapper.__init__(self, env)
         if self.render_mode not in (None, *DRAWN_MODES):
-            warnings.warn(
+            warn_caller(
                 f"render_mode is {self.render_mode!r}, which shows no ripples; with "
-                f"{', '.join(map(repr, DRAWN_MODES))} `render` returns frames with them",
-                RippleWarning,
-                stacklevel=2,
+                f"{', '.join(map(repr, DRAWN_MODES))} `render` returns frames with them"
             )
         self._materials, self._looks, self._options = materials, looks, options
         self._lighting = lighting
@@ -211,11 +209,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             return frame
         self._renders_by_itself = False
         if problem is not None:
-            warnings.warn(
+            warn_caller(
                 f"the environment's own render {problem}; the model is drawn with MuJoCo's free camera in its place, "
-                "without what that render adds",
-                RippleWarning,
-                stacklevel=2,
+                "without what that render adds"
             )
         return self._drawn_from_outside(self._in_place)
 

@@ -11,7 +11,6 @@ which its own lies. The sums of all delays are added up late, each by its delay,
 from __future__ import annotations
 
 import struct
-import warnings
 from pathlib import Path
 
 import mujoco
@@ -23,10 +22,10 @@ from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.coupling.soft import target_pose
 from ripple_sim.encode.images import riff_chunk
 from ripple_sim.encode.replace import MARK
-from ripple_sim.errors import RippleWarning
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.backends.kernels import Probes
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.waves.finite import count_substeps
 from ripple_sim.solver.waves.sensor import filtered, hertz
@@ -67,11 +66,9 @@ class Microphone:
             highest = max(hertz(material, texel, size / _PARTS) for texel in texels) / slow_motion
             if highest < _HEARD:
                 ringing = 200 * size / 0.77 * slow_motion
-                warnings.warn(
+                warn_caller(
                     f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound at {highest:.2g} Hz at "
-                    f"most, below hearing ({_HEARD:g} Hz); a speed of {ringing:.2g} m/s would ring at 200 Hz",
-                    RippleWarning,
-                    stacklevel=2,
+                    f"most, below hearing ({_HEARD:g} Hz); a speed of {ringing:.2g} m/s would ring at 200 Hz"
                 )
 
     def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:

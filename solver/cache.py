@@ -16,7 +16,6 @@ import re
 import shutil
 import stat
 import tempfile
-import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -27,7 +26,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from .errors import RippleError, RippleWarning
+from .errors import RippleError, warn_caller
 
 LIMIT = "RIPPLE_SIM_CACHE_LIMIT"  # the environment variable, in megabytes
 _USUAL_LIMIT = 500
@@ -62,11 +61,7 @@ def _private_folder(reason: str) -> Path:
     if not safe:  # somebody else's
         folder = Path(tempfile.mkdtemp(prefix="ripple-sim-"))
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    warnings.warn(
-        f"{reason}: kernels and atlases are kept in {folder}; set XDG_CACHE_HOME to a folder that lasts",
-        RippleWarning,
-        stacklevel=2,
-    )
+    warn_caller(f"{reason}: kernels and atlases are kept in {folder}; set XDG_CACHE_HOME to a folder that lasts")
     return folder
 
 

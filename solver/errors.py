@@ -11,9 +11,11 @@ import inspect
 import math
 import numbers
 import os
+import threading
 import typing
 import warnings
 from collections.abc import Callable, Sequence
+from types import FrameType
 from typing import Any, ParamSpec, TypeVar
 
 import msgspec
@@ -55,6 +57,15 @@ Result = TypeVar("Result")
 
 # Of a value in a message [characters].
 _LONGEST = 120
+
+# Packages whose frames are never the user's: this one, and what runs its context managers, threads and processes.
+_NOT_THE_USERS = ("ripple_sim", "contextlib", "threading", "concurrent", "multiprocessing")
+# `user_line`: the line that this thread works for.
+_thread = threading.local()
+# What a warning names where no thread said for whom it works.
+_NO_LINE = ("ripple_sim", 0)
+# Which warnings without a frame of the user's were shown, as Python keeps it for each module.
+_shown_warnings: dict[Any, Any] = {}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,17 +144,41 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
-def warn_caller(message: str) -> None:
-    """Give a `RippleWarning` with the line of the user's that led here, through however many of this package's."""
-    frame, level = inspect.currentframe(), 1
-    while frame and frame.f_globals.get("__name__", "").split(".")[0] in ("ripple_sim", "contextlib"):
-        frame, level = frame.f_back, level + 1
-    warnings.warn(message, RippleWarning, stacklevel=level)
+def user_line() -> tuple[str, int]:
+    """File and number of the line in the user's program that called into this package."""
+    frame, _ = _user_frame()
+    if frame is None:
+        return getattr(_thread, "user_line", _NO_LINE)
+    return frame.f_code.co_filename, frame.f_lineno
+
+
+def work_for(line: tuple[str, int]) -> None:
+    """Let warnings of this thread name a line of another thread or process: that of the call which gave it the work."""
+    _thread.user_line = line
+
+
+def warn_caller(message: str, category: type[Warning] = RippleWarning) -> None:
+    """Warn at the user's line that called into this package."""
+    frame, level = _user_frame()
+    if frame is None:
+        warnings.warn_explicit(message, category, *user_line(), registry=_shown_warnings)
+    else:
+        warnings.warn(message, category, stacklevel=level)
+
+
+def _user_frame() -> tuple[FrameType | None, int]:
+    """The innermost frame of the user's on this stack, and how many frames above the caller's it is; or None."""
+    frame = inspect.currentframe()
+    level = 0
+    while frame and frame.f_globals.get("__name__", "").split(".")[0] in _NOT_THE_USERS:
+        frame = frame.f_back
+        level += 1
+    return frame, level
 
 
 def deprecated(old: str, instead: str, goes: str) -> None:
     """Warn, from what the user calls, that it is deprecated: it still works, and goes with the version `goes`."""
-    warnings.warn(f"{old} is deprecated and goes with {goes}; use {instead}", DeprecationWarning, stacklevel=3)
+    warn_caller(f"{old} is deprecated and goes with {goes}; use {instead}", DeprecationWarning)
 
 
 def checked(

@@ -1,14 +1,19 @@
 """One `except RippleError` catches all that ripple-sim raises on purpose, and nothing else."""
 
+import functools
 import inspect
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import ripple_sim
 from ripple_sim import errors as of_application
-from ripple_sim.errors import RenderError, SceneError
+from ripple_sim.errors import RenderError, RippleWarning, SceneError
 from ripple_sim.solver import errors as of_solver
-from ripple_sim.solver.errors import GLError, RippleError, deprecated
+from ripple_sim.solver.errors import GLError, RippleError, deprecated, user_line, warn_caller, work_for
 
 MEMBERS = [each for module in (of_solver, of_application) for _, each in inspect.getmembers(module, inspect.isclass)]
 CLASSES = sorted({each for each in MEMBERS if issubclass(each, Exception)}, key=lambda each: each.__name__)
@@ -42,3 +47,37 @@ def test_what_is_deprecated_works_and_warns_where_it_is_used() -> None:
     with pytest.warns(DeprecationWarning, match=r"^old_name is deprecated and goes with 2.0; use new_name$") as told:
         assert old_name() == 1
     assert told[0].filename == __file__
+
+
+def in_a_thread(work: Callable[[], None], *begin: Any) -> None:
+    """Run work in a thread, with what begins it."""
+    initializer, *arguments = begin or (None,)
+    with ThreadPoolExecutor(1, initializer=initializer, initargs=tuple(arguments)) as pool:
+        pool.submit(work).result()
+
+
+def test_a_warning_of_a_thread_names_the_line_that_gave_it_the_work() -> None:
+    line = user_line()
+    # a function of the package's own, on whose thread no frame is the user's
+    warn = functools.partial(warn_caller, "the surface is still")
+    with pytest.warns(RippleWarning, match="the surface is still") as told:
+        in_a_thread(warn, work_for, line)
+    assert (told[0].filename, told[0].lineno) == line
+    assert line[0] == __file__
+
+
+def test_a_warning_of_a_users_function_in_a_thread_names_the_function() -> None:
+    def on_step() -> None:
+        warn_caller("the poke is far off")
+
+    with pytest.warns(RippleWarning, match="the poke is far off") as told:
+        in_a_thread(on_step, work_for, ("elsewhere.py", 1))
+    assert told[0].filename == __file__
+
+
+def test_no_module_counts_frames_for_a_warning_by_itself() -> None:
+    root = Path(of_solver.__file__).parents[1]
+    modules = [path for folder in ("ripple_sim", "solver") for path in (root / folder).rglob("*.py")]
+    assert len(modules) > 100
+    counting = [path.name for path in modules if "warnings.warn(" in path.read_text(encoding="utf-8")]
+    assert counting == ["errors.py"]

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ripple_sim.errors import BatchError
-from ripple_sim.solver.errors import shown
+from ripple_sim.solver.errors import shown, user_line, work_for
 
 _PER_THREAD = 2  # tasks a thread, so that none waits for the next one
 _COUNTED = 2.0  # between looks at how many threads there are [s]
@@ -120,6 +120,7 @@ class LocalExecutor(Executor):
         self.places = workers
         self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._cores = shares(available_cores(), workers)
+        self._user_line = user_line()
         self._pools: dict[int, tuple[ProcessPoolExecutor, Future[int]]] = {}  # with the number of its process
         for place in range(workers):
             self._free.put(place)
@@ -146,7 +147,8 @@ class LocalExecutor(Executor):
     def _pool(self, place: int) -> ProcessPoolExecutor:
         if place not in self._pools:
             spawn = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
-            pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin, initargs=(self._cores[place],))
+            arguments = self._cores[place], self._user_line
+            pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin, initargs=arguments)
             self._pools[place] = pool, pool.submit(os.getpid)
         return self._pools[place][0]
 
@@ -156,8 +158,9 @@ class LocalExecutor(Executor):
         self._free.put(place)
 
 
-def _begin(cores: list[int]) -> None:
-    """Begin a worker: before anything heavy is imported, it gets its share of the cores."""
+def _begin(cores: list[int], line: tuple[str, int]) -> None:
+    """Begin a worker: before anything heavy is imported, it gets its share of the cores; its warnings name a line."""
+    work_for(line)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes: the parent ends this one
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, cores)

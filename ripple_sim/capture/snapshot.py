@@ -11,7 +11,6 @@ import dataclasses
 import functools
 import hashlib
 import itertools
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
@@ -20,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Impulse, Ripples
-from ripple_sim.errors import RippleWarning
 from ripple_sim.render.camera import Pose
 from ripple_sim.render.resources import AnyHeightMap, MovedHeightMap
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap
 from ripple_sim.solver.backends.gl_fields import DeviceField
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.waves.motion import MovedGradients
 
 Field: TypeAlias = NDArray[np.float32] | DeviceField
@@ -155,23 +154,19 @@ class ShownWaves:
             if 0 < pixels < 1:
                 density, factor = np.asarray(self._ripples[name].material.density), _SEEN / pixels
                 lower = "" if density.ndim else f", {float(density) / factor:.2g} kg/m^2,"
-                warnings.warn(
+                warn_caller(
                     f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a pixel is {pixel:.2g} m"
                     f" wide. A density {factor:.2g} times lower{lower} would show {_SEEN:g} pixels; so may "
-                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in Python',
-                    RippleWarning,
-                    stacklevel=4,
+                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in Python'
                 )
 
     def warn_of_none(self) -> None:
         """Warn of targets without any wave."""
         for name, (pixels, _, _) in self._highest.items():
             if pixels == 0:
-                warnings.warn(
+                warn_caller(
                     f"there was no wave on {name!r}: nothing touched it. Drop or throw a body on it, or poke it, in a "
-                    "scene file by [[drop]], [[throw]] or [[poke]]; or let a geom ripple that is touched",
-                    RippleWarning,
-                    stacklevel=4,
+                    "scene file by [[drop]], [[throw]] or [[poke]]; or let a geom ripple that is touched"
                 )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.errors import RippleWarning
+from ripple_sim.solver.errors import warn_caller
 
 from .renderer import RippleRenderer
 
@@ -94,7 +93,7 @@ class RippleViewer(OffScreenViewer):
         self._markers.clear()
         if self._overlays and not self._warned_of_overlays:
             self._warned_of_overlays = True
-            warnings.warn("overlays, which are text, are not drawn with ripples", RippleWarning, stacklevel=2)
+            warn_caller("overlays, which are text, are not drawn with ripples")
         if not segmentation:
             return frames_of(self._renderer, render_mode or "rgb_array")
         self._renderer.enable_segmentation_rendering()

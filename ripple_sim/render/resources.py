@@ -6,7 +6,6 @@ targets.
 
 from __future__ import annotations
 
-import warnings
 import weakref
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ripple_sim.errors import RippleWarning
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.gl import GLContext
 from ripple_sim.solver.texels.topology import ChartPage
 from ripple_sim.solver.waves.height_map import DeviceHeightMap
@@ -156,11 +155,9 @@ def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
         return pixels
     scale = largest / max(height, width)
     size = max(1, round(scale * width)), max(1, round(scale * height))
-    warnings.warn(
+    warn_caller(
         f"a texture of {width}x{height} pixels is larger than the {largest} that the OpenGL driver takes: it is scaled "
-        f"down to {size[0]}x{size[1]}",
-        RippleWarning,
-        stacklevel=3,
+        f"down to {size[0]}x{size[1]}"
     )
     return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
 

@@ -25,8 +25,8 @@ from ripple_sim.coupling.geoms import find_target, named_collision_geoms, own_mo
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.coupling.suited import typical_hit
 from ripple_sim.coupling.targets import site_on
-from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.solver.errors import FUNCTION, PATH, checked
+from ripple_sim.errors import SceneError
+from ripple_sim.solver.errors import FUNCTION, PATH, checked, warn_caller
 from ripple_sim.solver.files import open_image
 from ripple_sim.solver.layouts.build import LAYOUTS
 
@@ -66,11 +66,9 @@ def check_scene(scene: Scene) -> None:
     Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
     for each in dataclasses.fields(scene.events):
         if late := [event.time for event in getattr(scene.events, each.name) if event.time >= scene.duration]:
-            warnings.warn(
+            warn_caller(
                 f"a [[{each.name}]] at {late[0]:g} s is not before the scene's end, {scene.duration:g} s; give the "
-                "scene a longer duration, or the event an earlier time",
-                RippleWarning,
-                stacklevel=4,
+                "scene a longer duration, or the event an earlier time"
             )
     check_camera(scene.model, scene.camera)
 
@@ -192,11 +190,9 @@ def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
     except ValueError:
         return  # MuJoCo says what is wrong
     if (seconds := _THEIR_SECONDS * (bodies / _BODIES) ** _GROWTH) > _LONG:
-        warnings.warn(
+        warn_caller(
             f"flexcomp {flex.get('name', '')!r} has {bodies} points, each a body of its own, which MuJoCo takes about "
-            f'{seconds:.0f} s to set up; dof="trilinear", or a count of at most 20 20 20, takes seconds',
-            RippleWarning,
-            stacklevel=4,
+            f'{seconds:.0f} s to set up; dof="trilinear", or a count of at most 20 20 20, takes seconds'
         )
 
 
@@ -318,7 +314,7 @@ def load_model(
                 f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid are finite numbers"
             )
     for each in told:
-        warnings.warn(each.message, stacklevel=2)
+        warn_caller(str(each.message), each.category)
     return model, shifts
 
 

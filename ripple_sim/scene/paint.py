@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging.handlers
 import sys
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,9 +15,10 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.errors import SceneError
 from ripple_sim.render.tone_mapping import linear_to_srgb
 from ripple_sim.solver import Mesh
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.files import read_image
 
 _SCENES = (".glb", ".gltf")
@@ -41,11 +41,9 @@ def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
         beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in (".png", ".jpg", ".jpeg")]
         found = named or [path for path in beside if path.is_file()][:1]
     if len(found) > 1:
-        warnings.warn(
+        warn_caller(
             f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: none is used; join "
-            "them into one image, or choose one with --texture",
-            RippleWarning,
-            stacklevel=3,
+            "them into one image, or choose one with --texture"
         )
     return load_image(found[0]) if len(found) == 1 else None
 

@@ -244,10 +244,10 @@ def converted(table: Any, schema: type[Entry], what: str) -> Entry:
         raise SceneError(f"{what}: {message}{advice}") from error
 
 
-def _words_at(schema: type[msgspec.Struct], message: str) -> tuple[str, ...]:
+def _words_at(schema: Any, message: str) -> tuple[str, ...]:
     """The words that a field takes whose path stands at the end of a message of msgspec's, if it takes only some."""
     found = re.search(r" - at `(.*)`$", message)
-    kind: Any = schema
+    kind = schema
     for name in re.findall(r"\w+", found[1] if found else ""):
         table = table_of(kind)
         fields = {field.name: field.type for field in msgspec.structs.fields(table)} if table else {}

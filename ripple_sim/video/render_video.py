@@ -32,7 +32,7 @@ from ripple_sim.overlay.panels import Layout, Painter, PlacedMark, Projection, d
 from ripple_sim.render import Surface
 from ripple_sim.scene.scene import Scene, parse_request, with_exposure
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance
+from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance, user_line, work_for
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.kernel import compile_times, work_clock
 from ripple_sim.sound import Microphone, gain
@@ -262,7 +262,8 @@ def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
     Items come in their order; the thread alone consumes them. An exception of the iterable is raised in place of its
     next item. Leaving the block stops the thread at its current item.
     """
-    iterator, pool = iter(items), ThreadPoolExecutor(1, "simulation")
+    iterator = iter(items)
+    pool = ThreadPoolExecutor(1, "simulation", initializer=work_for, initargs=(user_line(),))
     # one more than wait: it is held until there is room
     waiting = deque(pool.submit(next, iterator, _END) for _ in range(depth + 1))
 
