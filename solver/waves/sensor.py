@@ -255,13 +255,42 @@ def _around(topology: TexelTopology, center: int, rings: int) -> NDArray[np.int6
     return texels
 
 
+class _Fit(NamedTuple):
+    """Moving least squares (Lancaster and Salkauskas 1981) in the tangent plane: near texels count most.
+
+    Attributes
+    ----------
+    degree : int
+        Of the polynomial.
+    rings : int
+        Rings of texels that are fitted.
+    softening, power : float
+        The weight at a distance r, in texels, is 1 / (r^2 + softening)^power.
+    growth : float
+        Coefficients of a term are as cheap as its power of this: where texels do not suffice for all of them, as
+        beside rims, 0.1 makes terms of a low order do what they can.
+    """
+
+    degree: int
+    rings: int
+    softening: float
+    power: float
+    growth: float
+
+
+# The value at a point, and second derivatives there: the symbol of a quartic's is 0.7 dB low at five texels a wave,
+# that of a cubic's 4 dB.
+_VALUE = _Fit(degree=3, rings=2, softening=1e-3, power=1.0, growth=1.0)
+_CURVATURE = _Fit(degree=4, rings=3, softening=0.1, power=2.0, growth=0.1)
+
+
 def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> tuple[NDArray, NDArray]:
     """Texels round a point, and the weights that give a field there, or a factor times its Laplacian [1/m^2].
 
-    Those of a cubic in the tangent plane that fits the texels, near ones best: moving least squares (Lancaster and
-    Salkauskas 1981). It does not care where charts end.
+    Those of a polynomial that fits the texels, see `_Fit`. It does not care where charts end.
     """
-    texels = _around(atlas.texels.topology, center, 2)
+    fit = _VALUE if laplacian is None else _CURVATURE
+    texels = _around(atlas.texels.topology, center, fit.rings)
     away = atlas.positions.reshape(-1, 3)[texels] - point
     normal = atlas.normals.reshape(-1, 3)[center]
     u = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
@@ -269,12 +298,14 @@ def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> 
     v = np.cross(normal, u)
     size = np.sqrt(atlas.areas.reshape(-1)[center])
     x, y = away @ u / size, away @ v / size
-    near = 1 / (x * x + y * y + 1e-3)
-    powers = [x**i * y**j for i in range(4) for j in range(4 - i)]  # 1, y, y^2, y^3, x, xy, xy^2, x^2, ...
-    solved = np.linalg.pinv(near[:, None] * np.stack(powers, axis=1), rcond=1e-6) * near
+    near = 1 / (x * x + y * y + fit.softening) ** fit.power
+    orders = [(i, j) for i in range(fit.degree + 1) for j in range(fit.degree + 1 - i)]
+    growth = np.array([fit.growth ** (i + j) for i, j in orders])
+    powers = np.stack([x**i * y**j for i, j in orders], axis=1)
+    solved = growth[:, None] * np.linalg.pinv(near[:, None] * powers * growth, rcond=1e-6) * near
     if laplacian is None:
         return texels, solved[0]
-    return texels, laplacian * 2 * (solved[2] + solved[7]) / size**2
+    return texels, laplacian * 2 * (solved[orders.index((0, 2))] + solved[orders.index((2, 0))]) / size**2
 
 
 def _resolved(atlas: Atlas, material: Material, center: int) -> float:

@@ -77,6 +77,37 @@ def test_a_struck_sheet_against_modal_superposition(speed: float, bending: float
     assert np.abs(error).max() < 1.0
 
 
+@pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
+def test_strain_is_within_a_decibel_up_to_the_bandwidth_as_heights_are(share: float) -> None:
+    atlas, thickness = sphere_atlas(1.0, 24), 1e-2
+    rng = np.random.default_rng(0)
+    points, axis = rng.normal(size=(150, 3)), np.array([0.304, 0.507, 0.806])
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    waves = WaveSolver(atlas, Material(speed=1.0), backend="cpu")
+    sensor = waves.sensor(points, "strain", 60.0, thickness=thickness)
+    degree = round(share * 2 * np.pi * sensor.bandwidth)
+    omega = np.sqrt(degree * (degree + 1))
+    waves.velocity = eval_legendre(degree, atlas.positions @ axis)
+    sensor.begin(0.0, sensor.probes.of(waves.height, waves.velocity))
+    waves.step(12.0)
+    times, samples = (each[20:] for each in sensor.read())
+    exact = np.outer(np.sin(omega * times), thickness / 4 * omega * eval_legendre(degree, points @ axis))
+    assert abs(10 * np.log10((samples.astype(float) ** 2).sum() / (exact**2).sum())) < 1.0
+
+
+def test_strain_beside_a_rim_is_that_of_the_wave_there() -> None:
+    """One-sided fits of too few texels were three times too high."""
+    n = 24
+    atlas = texel_atlas(square(n))
+    rng = np.random.default_rng(1)
+    points = np.stack([rng.uniform(0.1, 0.9, 60), rng.uniform(0.0, 0.04, 60), np.zeros(60)], axis=1)
+    sensor = WaveSolver(atlas, backend="cpu").sensor(points, "strain", 100.0, thickness=4.0)
+    wave = 2 * np.pi * n / 20 * np.array([0.6, 0.8, 0.0])
+    found = sensor.probes.of(np.sin(atlas.positions @ wave), np.zeros(atlas.areas.shape))
+    exact = (wave @ wave) * np.sin(sensor.points @ wave)
+    assert np.sqrt(((found - exact) ** 2).mean()) < 0.1 * wave @ wave
+
+
 @pytest.mark.parametrize(
     "material",
     [Material(speed=1.0, viscosity=1e-3), Material.dent(1e-4, speed=1.0, stiffness=200.0)],
