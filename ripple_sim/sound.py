@@ -5,13 +5,15 @@ normal and r the way from y to x (Rayleigh 1896, section 278). It holds for plan
 that face away are left out instead. No air loads the surface, and there is no room.
 
 Texels of one delay act together: they are one sum of `Probes` after every substep, a texel on the two delays between
-which its own lies. The sums of all delays are added up late, each by its delay, in whole substeps.
+which its own lies. The sums of all delays are added up late, each by its delay, in whole substeps. A place that moves
+is interpolated to every sample; see `Ear`.
 """
 
 from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -27,6 +29,7 @@ from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.backends.kernels import Probes
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.files import atomic_write
+from ripple_sim.solver.kernel import Floats, Ints
 from ripple_sim.solver.waves.finite import count_substeps
 from ripple_sim.solver.waves.sensor import filtered, hertz
 
@@ -38,6 +41,7 @@ _HEARD = 20.0  # [Hz], the lowest tone
 _PARTS = 5.0  # a surface over the length of the shortest wave that counts as long
 _GRAZING = 0.1  # cosine from which on a texel counts in full: none appears at once
 _NEAREST = 0.01  # [m]: nearer texels count as if they were there
+_SAME = 1e-6  # [m]: a place that moves by less stays
 
 
 class Microphone:
@@ -88,54 +92,86 @@ class Microphone:
         return sum((ear.heard(at, self.rate) for ear in self._ears.values()), np.zeros(len(at)))
 
 
+class Placement(NamedTuple):
+    """How a surface is heard from one place.
+
+    Attributes
+    ----------
+    probes : Probes
+        The sums of texels that act together.
+    delays : int64 [k]
+        By which each of them comes late, in substeps, less what is common to all; see `Ear`.
+    """
+
+    probes: Probes
+    delays: Ints
+
+
 class Ear:
-    """A listener to one target; `series` is its sound at the place, one value a substep of `dt` [s]."""
+    """A listener to one target, from a place that may move.
+
+    What a texel gives is heard r / c_0 later, with r the way from it. Most of that is the way from the surface's
+    middle, which changes from sample to sample as the place moves: `heard` takes it off where the samples are made. So
+    tones rise and fall as they should (Doppler). What a texel's own way differs by is in the `Placement`. Over the
+    time between two placements sound fades from the one before the last to the last, so that nothing jumps.
+
+    Parameters
+    ----------
+    waves : WaveSolver
+    timestep : float
+        Of the steps that the waves take [s].
+    """
 
     def __init__(self, waves: WaveSolver, timestep: float) -> None:
         self._dt = timestep / count_substeps(timestep, waves.stable_timestep, None)
-        self._series = np.zeros(0)
-        self._here = np.full(3, np.inf)
+        self._series = np.zeros(0)  # what is heard at the surface's middle, one value a substep
+        self._now: Placement | None = None
+        self._before: Placement | None = None
+        # times of the placements [s], and the ways from the surface's middle [m]
+        self._times: list[float] = []
+        self._ways: list[Floats] = []
+        # no texel is further from the middle, even of a surface that stretches [m]
+        places = waves.atlas.positions.reshape(-1, 3)
+        self._reach = 2 * float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
 
     def stand(self, waves: WaveSolver, here: NDArray[np.float64]) -> None:
-        """Listen from a place in the target's frame [m], if it is another one."""
-        if waves.vertices is None and np.abs(here - self._here).max() < 1e-6:
+        """Be at a place in the target's frame now [m], and on a straight way to it since the last call."""
+        middle = waves.atlas.positions.reshape(-1, 3).mean(axis=0)
+        way = here - middle
+        has_moved = not self._ways or bool(np.abs(way - self._ways[-1]).max() >= _SAME)
+        self._times.append(waves.time)
+        self._ways.append(way)
+        if not (has_moved or waves.vertices is not None or self._before is not None):
             return
-        self._here, atlas = here, waves.atlas
-        way = here - atlas.positions.reshape(-1, 3)
-        distance = np.maximum(np.linalg.norm(way, axis=1), _NEAREST)
-        cosine = np.einsum("ij,ij->i", way, atlas.normals.reshape(-1, 3)) / distance
-        weight = DENSITY / (2 * np.pi) * atlas.areas.reshape(-1) / distance * np.clip(cosine / _GRAZING, 0, 1)
-        texels = np.flatnonzero(weight * waves.operator.movable.reshape(-1))
-        if not len(texels):
-            texels = np.zeros(1, np.int64)  # it faces away everywhere: a texel without weight
-        every = max(1, int(1 / (2 * RATE * self._dt)))  # substeps from one delay to the next
-        delay = distance[texels] / SPEED / (every * self._dt)
-        first = np.floor(delay).astype(np.int64)
-        slots, late = np.concatenate([first, first + 1]), delay - first
-        shares = np.concatenate([(1 - late) * weight[texels], late * weight[texels]])
-        order = np.argsort(slots, kind="stable")
-        delays, begins = np.unique(slots[order], return_index=True)
-        self._delays = every * delays
-        self.probes = Probes(
-            np.append(begins, len(slots)),
-            np.concatenate([texels, texels])[order],
-            shares[order].astype(np.float32),
-            np.zeros(len(begins), np.bool_),
-        )
+        self._before = self._now
+        if has_moved or waves.vertices is not None:
+            self._now = self._placement(waves, here, float(np.linalg.norm(way)))
+        else:
+            self._before = None  # it has faded
+        used = [each for each in (self._before, self._now) if each is not None]
+        self.probes = Probes.together([each.probes for each in used])
+        self._delays = np.concatenate([each.delays for each in used])
         waves.listeners.use([each for each in waves.listeners.all if each is not self])
         waves.listeners.add(self, waves.time)
 
     def begin(self, time: float, values: NDArray) -> None:
-        """Begin with the sums of velocities now."""
+        """Begin with the sums of velocities now; after a reset time has gone back."""
         self._last = values
+        self._times = [min(each, time) for each in self._times]
 
     def take(self, time: float, dt: float, sums: NDArray[np.float32]) -> None:
         """Add what the substeps of dt [s] from a time on give, later by their delays."""
         changes = np.diff(sums.astype(np.float64), axis=0, prepend=self._last[None]) / self._dt
         self._last = sums[-1].astype(np.float64)
         # a change happens in the middle of its substep, and so do the series' entries
-        when = (time + dt * (np.arange(len(sums)) + 0.5)) / self._dt - 0.5
-        size = int(when[-1] + self._delays[-1]) + 3
+        middles = time + dt * (np.arange(len(sums)) + 0.5)
+        when = middles / self._dt - 0.5
+        if self._before is not None:
+            count = len(self._before.delays)
+            faded = self._faded(middles)[:, None]
+            changes[:, :count] *= 1 - faded
+            changes[:, count:] *= faded
+        size = int(when[-1] + self._delays.max()) + 3
         if size > len(self._series):
             self._series = np.append(self._series, np.zeros(max(size, 2 * len(self._series)) - len(self._series)))
         if abs(dt - self._dt) < 1e-9 * dt:
@@ -149,17 +185,55 @@ class Ear:
             np.add.at(self._series, places + 1, changes * late)
 
     def heard(self, at: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-        """The series at other times [s], filtered for samples at a rate."""
-        reach = np.zeros(max(len(self._series), int(at[-1] / self._dt) + 2) + 64)
+        """The pressure at some times [s], filtered for samples at a rate; nothing, where it stood nowhere."""
+        if not self._ways:
+            return np.zeros(len(at))
+        ways = np.stack([np.interp(at, self._times, each) for each in np.transpose(self._ways)], axis=1)
+        left_at = at - (np.linalg.norm(ways, axis=1) - self._reach) / SPEED
+        reach = np.zeros(max(len(self._series), int(left_at.max() / self._dt) + 2) + 64)
         reach[: len(self._series)] = self._series
         times = (np.arange(len(reach)) + 0.5) * self._dt
         base = min(rate, 1 / self._dt)
-        return np.concatenate(
-            [
-                filtered(times, np.full(len(times), self._dt), reach[:, None], block, base)[:, 0]
-                for block in np.array_split(at, max(1, len(at) // 4096))
-            ]
+        # nothing is heard before the beginning
+        begun = left_at > times[0]
+        pressure = np.zeros(len(at))
+        if begun.any():
+            blocks = np.array_split(left_at[begun], max(1, len(at) // 4096))
+            spans = np.full(len(times), self._dt)
+            heard = [filtered(times, spans, reach[:, None], block, base)[:, 0] for block in blocks if len(block)]
+            pressure[begun] = np.concatenate(heard)
+        return pressure
+
+    def _placement(self, waves: WaveSolver, here: Floats, common: float) -> Placement:
+        """How the surface is heard from a place in its frame [m], whose way from the middle is common to all [m]."""
+        atlas = waves.atlas
+        way = here - atlas.positions.reshape(-1, 3)
+        distance = np.maximum(np.linalg.norm(way, axis=1), _NEAREST)
+        cosine = np.einsum("ij,ij->i", way, atlas.normals.reshape(-1, 3)) / distance
+        weight = DENSITY / (2 * np.pi) * atlas.areas.reshape(-1) / distance * np.clip(cosine / _GRAZING, 0, 1)
+        texels = np.flatnonzero(weight * waves.operator.movable.reshape(-1))
+        if not len(texels):
+            texels = np.zeros(1, np.int64)  # it faces away everywhere: a texel without weight
+        every = max(1, int(1 / (2 * RATE * self._dt)))  # substeps from one delay to the next
+        own = np.maximum(distance[texels] - common + self._reach, 0.0)
+        delay = own / SPEED / (every * self._dt)
+        first = np.floor(delay).astype(np.int64)
+        slots, late = np.concatenate([first, first + 1]), delay - first
+        shares = np.concatenate([(1 - late) * weight[texels], late * weight[texels]])
+        order = np.argsort(slots, kind="stable")
+        delays, begins = np.unique(slots[order], return_index=True)
+        probes = Probes(
+            np.append(begins, len(slots)),
+            np.concatenate([texels, texels])[order],
+            shares[order].astype(np.float32),
+            np.zeros(len(begins), np.bool_),
         )
+        return Placement(probes, every * delays)
+
+    def _faded(self, times: Floats) -> Floats:
+        """How much of the last placement is heard at some times [s], [k]: all after as long as the one before took."""
+        span = self._times[-1] - self._times[-2]
+        return np.clip((times - self._times[-1]) / span, 0.0, 1.0) if span > 0 else np.ones(len(times))
 
 
 def gain(pressure: NDArray[np.float64]) -> float:

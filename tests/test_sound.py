@@ -15,7 +15,7 @@ from ripple_sim import Material, VideoOptions, load_scene, render_video
 from ripple_sim.encode.clip import H264, Clip, Stream, join_clips
 from ripple_sim.errors import VideoError
 from ripple_sim.scene.scene_file import uniform_material
-from ripple_sim.solver import WaveSolver, build_atlas, load_mesh, texel_atlas
+from ripple_sim.solver import Mesh, WaveSolver, build_atlas, load_mesh, texel_atlas
 from ripple_sim.sound import DENSITY, RATE, SPEED, Ear, gain, write_wav
 
 
@@ -41,6 +41,42 @@ def test_a_piston_on_its_axis(opengl: None, backend: str) -> None:
     assert pressure[inside].std() < 0.05 * DENSITY * SPEED * speed
     assert np.abs(pressure[outside]).max() < 0.05 * DENSITY * SPEED * speed
     assert pressure.sum() / RATE == pytest.approx(DENSITY * speed * (edge - away), rel=5e-3)
+
+
+def square_mesh(side: float) -> Mesh:
+    """A flat square, triangles in rows."""
+    count = 13
+    x, y = np.meshgrid(*2 * [np.linspace(0, side, count)], indexing="ij")
+    node = np.arange(count**2).reshape(count, count)
+    a, b, c, d = (each.ravel() for each in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh.from_arrays(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), triangles)
+
+
+def test_a_place_that_moves_hears_a_tone_without_clicks_and_lower_as_it_recedes() -> None:
+    """Placed anew 30 times a second; delays that jumped then left nothing of a tone at each."""
+    side, tone, away, frames, fps = 0.2, 1000.0, 3.0, 12, 30
+    atlas = build_atlas(square_mesh(side), resolution=8, cache=False)
+    for speed in (0.0, 3.0):
+        waves = WaveSolver(atlas, Material(speed=math.sqrt(2) * side * tone), rim="fixed", backend="cpu")
+        x, y, _ = np.moveaxis(atlas.positions, -1, 0)
+        waves.velocity = np.sin(np.pi * x / side) * np.sin(np.pi * y / side)
+        ear = Ear(waves, 1e-3)
+        for frame in range(frames):
+            ear.stand(waves, np.array([side / 2, side / 2, away + speed * frame / fps]))
+            waves.step(1 / fps)
+        at = np.arange(int(0.05 * RATE), int(frames / fps * RATE)) / RATE
+        heard = ear.heard(at, RATE)[: -RATE // 50]
+        swing = 2 * np.pi * tone / RATE
+        assert np.abs(np.diff(heard, 2)).max() < 1.1 * swing**2 * np.abs(heard).max()
+        spectrum = np.abs(np.fft.rfft(heard * np.blackman(len(heard)), 1 << 18))
+        frequency = np.fft.rfftfreq(1 << 18, 1 / RATE)
+        peak = frequency[spectrum.argmax()]
+        near = np.abs(frequency - peak) < 30
+        assert 10 * np.log10((spectrum[~near] ** 2).sum() / (spectrum[near] ** 2).sum()) < -50
+        if not speed:
+            at_rest = peak
+    assert peak == pytest.approx(at_rest * (1 - 3.0 / SPEED), abs=0.3)
 
 
 def test_nothing_is_heard_from_behind() -> None:
