@@ -107,6 +107,11 @@ class FluidOperator(WaveOperator):
         return np.ones_like(super().keeps_volume)
 
     @functools.cached_property
+    def longest_timestep(self) -> float:
+        """The stable one: with so much of the fluid moving, long waves are slow, whatever pulls them back."""
+        return self.stable_timestep
+
+    @functools.cached_property
     def root(self) -> HalfLaplacian:
         """The surface's half Laplacian, factorised when it is first needed."""
         return HalfLaplacian(self.geometry, self.areas)

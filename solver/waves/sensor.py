@@ -146,7 +146,7 @@ class Sensor:
         of_heights = np.full(len(texels), kind in ("height", "strain"))
         self.probes = Probes(begins, np.concatenate(texels), np.concatenate(weights).astype(np.float32), of_heights)
         # where substeps are longer than samples there is nothing between them to filter out
-        self._base = min(self.rate, 1 / operator.stable_timestep)
+        self._base = min(self.rate, 1 / operator.longest_timestep)
         shortest = (_resolved(atlas, material, int(center)) for center in centers)
         self.bandwidth = min(*shortest, _PASSED * self._base)
         self.begin(0.0, np.zeros(len(texels)))

@@ -79,6 +79,17 @@ def test_in_time_a_mode_rings_down_at_its_frequency_and_decay(law: str, rim: str
     assert 1 / rate == pytest.approx(found.decay_times[4], rel=0.01)
 
 
+@pytest.mark.parametrize("texels", [1.3, 3.0])
+def test_a_layer_of_few_texels_rings_at_its_frequency_at_the_longest_substeps(texels: float) -> None:
+    """All its modes swing nearly as fast as stability allows: they were up to 9 % too high."""
+    atlas = texel_atlas(square(16))
+    material = Material.layer(1000.0, 0.0, thickness=texels / 16)
+    found = modes(atlas, material, 1)
+    waves = WaveSolver(atlas, material, backend="cpu", conserve_volume=False)
+    angular, _ = swing(waves, 1e-3 * found.shapes[0], waves.stable_timestep, 120)
+    assert angular / (2 * np.pi) == pytest.approx(found.frequencies[0], rel=0.005)
+
+
 def test_modes_of_one_frequency_are_those_that_uneven_damping_does_not_mix(ball: Atlas) -> None:
     uneven = 1 + (ball.positions[..., 0] / RADIUS) ** 2
     found = modes(ball, Material(speed=1.0, damping=0.1 * uneven), 3)
