@@ -230,7 +230,7 @@ class Ear:
         )
         return Placement(probes, every * delays)
 
-    def _faded(self, times: Floats) -> Floats:
+    def _faded(self, times: NDArray) -> NDArray:
         """How much of the last placement is heard at some times [s], [k]: all after as long as the one before took."""
         span = self._times[-1] - self._times[-2]
         return np.clip((times - self._times[-1]) / span, 0.0, 1.0) if span > 0 else np.ones(len(times))
