@@ -186,7 +186,7 @@ class Ear:
 
     def heard(self, at: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
         """The pressure at some times [s], filtered for samples at a rate; nothing, where it stood nowhere."""
-        if not self._ways:
+        if not self._ways or not len(at):
             return np.zeros(len(at))
         ways = np.stack([np.interp(at, self._times, each) for each in np.transpose(self._ways)], axis=1)
         left_at = at - (np.linalg.norm(ways, axis=1) - self._reach) / SPEED

@@ -88,6 +88,14 @@ def test_nothing_is_heard_from_behind() -> None:
     assert not ear.heard(np.arange(100) / RATE, RATE).any()
 
 
+def test_a_run_too_short_for_a_sample_is_an_empty_sound() -> None:
+    waves = WaveSolver(texel_atlas(square(12)), backend="cpu")
+    ear = Ear(waves, 0.01)
+    ear.stand(waves, np.array([0.5, 0.5, 1.0]))
+    waves.step(0.01)
+    assert ear.heard(np.zeros(0), RATE).shape == (0,)
+
+
 # wave numbers of a membrane with a fixed rim, times its radius: those with 0, 1 and 2 nodal lines
 SKIN = sorted(jn_zeros(0, 2)[:1].tolist() + jn_zeros(1, 1).tolist() + jn_zeros(2, 1).tolist())
 # of a free plate their squares (Leissa 1969, Poisson's ratio 0.3)
