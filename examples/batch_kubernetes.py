@@ -28,7 +28,7 @@ def main() -> None:
         image=options.image,
         n_workers=options.workers,
         worker_command=["dask", "worker", "--nthreads", "1"],
-        env={"LP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "MUJOCO_GL": "disable"},
+        env={"LP_NUM_THREADS": "0", "NUMBA_NUM_THREADS": "1", "MUJOCO_GL": "disable"},
         resources={"requests": {"cpu": "1", "memory": "2Gi"}, "limits": {"cpu": "1", "memory": "2Gi"}},
     )
     pod = spec["spec"]["worker"]["spec"]

@@ -28,7 +28,7 @@ def main() -> None:
         memory=f"{2 * options.cores} GB",
         walltime="08:00:00",
         worker_extra_args=["--lifetime", "7h50m", "--lifetime-stagger", "5m"],
-        job_script_prologue=["export LP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 MUJOCO_GL=disable"],
+        job_script_prologue=["export LP_NUM_THREADS=0 NUMBA_NUM_THREADS=1 MUJOCO_GL=disable"],
     )
     cluster.adapt(maximum_jobs=options.jobs)
     print(run_batch(read_plan(options.plan), options.folder, RunOptions(dask=cluster.scheduler_address)))

@@ -23,7 +23,7 @@ import mujoco
 from ripple_sim import __version__
 from ripple_sim.solver.backends.backend import auto_backend, measured
 from ripple_sim.solver.errors import GLError
-from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.gl import DRAWING_THREADS, shared_context
 
 _VENDOR_FOLDERS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
 _LIBRARIES = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"}
@@ -134,6 +134,17 @@ def _library_of(file: Path) -> str | None:
         return None
 
 
+def find_drawing_threads(renderer: str) -> list[str]:
+    """The problem of llvmpipe where the user has it draw in threads, if `renderer`, its GL_RENDERER, is llvmpipe."""
+    threads = os.environ.get(DRAWING_THREADS, "0")
+    if "llvmpipe" not in renderer.lower() or threads == "0":
+        return []
+    return [
+        f"{DRAWING_THREADS}={threads} has llvmpipe draw in threads, which may write into freed memory and so end the "
+        f"program: unset {DRAWING_THREADS}, or set it to 0"
+    ]
+
+
 PACKAGES = (
     "ripple-sim",
     "mujoco",
@@ -177,6 +188,8 @@ def collect() -> dict[str, Any]:
     else:
         opengl = {name: getattr(context, name) for name in ("renderer", "vendor", "version", "software", "computes")}
     findings = find_problems(opengl["software"] if opengl else None)
+    if opengl is not None:
+        findings += find_drawing_threads(opengl["renderer"])
     return {
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
         "system": platform.platform(),

@@ -14,7 +14,7 @@ from programs import ended
 
 from ripple_sim import diagnostics
 from ripple_sim.cli import main as cli
-from ripple_sim.diagnostics import find_problems
+from ripple_sim.diagnostics import find_drawing_threads, find_problems
 from ripple_sim.solver.backends import backend
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import context as gl
@@ -118,6 +118,25 @@ def test_an_nvidia_gpu_without_its_egl_library(tmp_path: Path, monkeypatch: pyte
 
 def test_on_a_gpu_there_is_nothing_to_say(devices: Path) -> None:
     assert find_problems(False, devices) == []
+
+
+@pytest.mark.parametrize(
+    ("threads", "renderer", "count"),
+    [
+        (None, "llvmpipe (LLVM 15.0.7, 256 bits)", 0),
+        ("0", "llvmpipe (LLVM 15.0.7, 256 bits)", 0),
+        ("1", "llvmpipe (LLVM 15.0.7, 256 bits)", 1),
+        ("8", "NVIDIA H200/PCIe/SSE2", 0),
+    ],
+)
+def test_threads_that_the_user_gives_llvmpipe_are_named(monkeypatch, threads, renderer, count) -> None:
+    if threads is None:
+        monkeypatch.delenv("LP_NUM_THREADS", raising=False)
+    else:
+        monkeypatch.setenv("LP_NUM_THREADS", threads)
+    problems = find_drawing_threads(renderer)
+    assert len(problems) == count
+    assert all(f"LP_NUM_THREADS={threads}" in each and "set it to 0" in each for each in problems)
 
 
 def report(capsys) -> dict:

@@ -164,7 +164,8 @@ def _begin(cores: list[int], line: tuple[str, int]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes: the parent ends this one
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, cores)
-    for variable in ("LP_NUM_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe with threads may end the process; see docs/stability.md
+    for variable in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, str(len(cores)))
     os.environ.setdefault("MUJOCO_GL", "disable")
     logging.getLogger("ripple_sim").setLevel(logging.ERROR)  # the parent tells how far the batch is

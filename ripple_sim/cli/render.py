@@ -173,7 +173,7 @@ class _VideoCommand(_SceneCommand, VideoOptions):
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file ending in .mp4, .webm, .gif or .webp, or a name without ending for a folder of frames."""
     device: arguments.Device = None
-    """EGL device to render on, by number, where there are several."""
+    """EGL device to render on, by number, where there are several; else that of MUJOCO_EGL_DEVICE_ID."""
     renderer: Literal["gl", "cycles"] = "gl"
     """Ours, with OpenGL, or Cycles, Blender's path tracer (needs bpy), which takes seconds to minutes a frame."""
     samples: arguments.Count = 64

@@ -262,19 +262,25 @@ class Renderer:
             poses = self._show(data, scene)
             shading = self._shading
             drawn.update(ctx, poses, height_maps, pose)
-            shading.clear(ctx)  # which a software driver does during what follows
+            shading.clear(ctx)
+            self._gl.flush()
             flags = RenderFlags.of(scene)
             self._update(data, poses, pose, exposure, flags)
             # what shading looks up; a software driver stops for each texture that it is still drawing to
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             ctx.depth_func = "<="
             self._shadows.draw(drawn.cast)
+            self._gl.flush()
             self._occlusion.look_up(ctx, drawn.cast)
+            self._gl.flush()
             self._shadows.find_blockers(ctx)
+            self._gl.flush()
             if self._transmission is not None:
                 self._transmission.draw(self._shadows.views, drawn.cast)
                 self._transmission.bind()
+                self._gl.flush()
             self._occlusion.shade(ctx, self._shadows)
+            self._gl.flush()
             shading.begin(ctx)
             drawn.draw()
             balls = drawn.balls(poses)

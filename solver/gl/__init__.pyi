@@ -1,4 +1,5 @@
 from .context import (
+    DRAWING_THREADS as DRAWING_THREADS,
     GLContext as GLContext,
     create_context as create_context,
     is_software as is_software,

@@ -106,6 +106,12 @@ _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl":
 # Versions of OpenGL that compute shaders need, and that rendering needs.
 COMPUTE, RENDERING = 430, 410
 
+# Environment variable: how many threads Mesa's llvmpipe draws with; 0: none.
+DRAWING_THREADS = "LP_NUM_THREADS"
+
+# Environment variable of MuJoCo's: number of the EGL device to draw on, where the program names none.
+_MUJOCO_DEVICE = "MUJOCO_EGL_DEVICE_ID"
+
 # What Mesa's shader cache may come to need while a process runs [bytes].
 _SHADER_CACHE = 64e6
 
@@ -123,14 +129,39 @@ def _spare_full_disks() -> None:
             os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
 
 
-def create_context(device: int | None) -> moderngl.Context:
-    """Create a headless context on a device, or the first that yields one: OpenGL 4.3, or else 4.1; raises GLError.
+def _draw_without_threads() -> None:
+    """Have Mesa's llvmpipe draw in the thread that calls it, unless the user has said how many threads it is to have.
 
-    What is current in this thread stays so.
+    It reads the variable when its first context is made. One of its threads may still unlock a fence that another has
+    freed: it writes into the program's memory, and glibc ends the program ("corrupted unsorted chunks"). See
+    docs/stability.md. Other drivers know no such variable.
+    """
+    os.environ.setdefault(DRAWING_THREADS, "0")
+
+
+def create_context(device: int | None) -> moderngl.Context:
+    """Create a headless context: OpenGL 4.3, or else 4.1; raises GLError. What is current in this thread stays so.
+
+    Without a `device` it is on the one that the environment variable MUJOCO_EGL_DEVICE_ID names, as MuJoCo's own
+    renderer is, and where that is not set either on the first that yields a context.
     """
     _check_system()
     with current_kept():
         return _create_current(device)
+
+
+def _device_of_environment() -> int | None:
+    """The device that the user has chosen for MuJoCo, or None."""
+    text = os.environ.get(_MUJOCO_DEVICE)
+    if text is None:
+        return None
+    try:
+        return int(text)
+    except ValueError:
+        raise GLError(
+            f"{_MUJOCO_DEVICE} must be the number of an EGL device, counted from 0, got {text!r}; "
+            "unset it to take the first that works"
+        ) from None
 
 
 def _check_system() -> None:
@@ -141,6 +172,12 @@ def _check_system() -> None:
 def _create_current(device: int | None) -> moderngl.Context:
     """Create a context as `create_context` does, and leave it current."""
     _spare_full_disks()
+    _draw_without_threads()
+    place = f"EGL device {device}"
+    if device is None and (device := _device_of_environment()) is not None:
+        place = f"EGL device {device}, which {_MUJOCO_DEVICE} names"
+    if device is not None and device < 0:
+        raise GLError(f"there is no {place}; devices are counted from 0")
     devices = range(8) if device is None else [device]
     reason = "no device"
     for version in (COMPUTE, RENDERING, 330):  # drivers may give the very version that is asked for
@@ -162,7 +199,7 @@ def _create_current(device: int | None) -> moderngl.Context:
                     "alone run with backend 'cpu'"
                 )
     if device is not None:
-        raise GLError(f"no OpenGL 4.1 context on EGL device {device} ({reason}); devices are counted from 0")
+        raise GLError(f"no OpenGL 4.1 context on {place} ({reason}); devices are counted from 0")
     advice = "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
     raise GLError(f"no OpenGL 4.1 context on any EGL device ({reason}); {advice}")
 
@@ -194,7 +231,8 @@ class GLContext:
     Parameters
     ----------
     device : int, optional
-        EGL device index. By default the first device that yields a context.
+        EGL device index. By default that of the environment variable MUJOCO_EGL_DEVICE_ID, or the first device that
+        yields a context.
 
     Raises
     ------
@@ -240,6 +278,7 @@ class GLContext:
         pointer, number, address = ctypes.c_void_p, ctypes.c_uint, load_egl().eglGetProcAddress
         self._create_fence = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
         self._client_wait = ctypes.CFUNCTYPE(number, pointer, number, ctypes.c_uint64)(address(b"glClientWaitSync"))
+        self._flush = ctypes.CFUNCTYPE(None)(address(b"glFlush"))
         self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
 
     @property
@@ -355,6 +394,15 @@ class GLContext:
         """Make what compute shaders have written visible to later commands."""
         with self as ctx:
             ctx.memory_barrier()
+
+    def flush(self) -> None:
+        """Have a software driver draw all commands so far, here and now, without blocking other Python threads.
+
+        Else it draws a pass when another one begins, in a call of moderngl's, which holds the interpreter's lock. Other
+        drivers begin when they like.
+        """
+        if self.software:
+            self._flush()
 
     def wait(self) -> None:
         """Wait until the driver has finished all commands, without blocking other Python threads.
@@ -475,7 +523,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def select_device(device: int | None) -> None:
-    """Select the EGL device of `shared_context`; None: the first that yields a context."""
+    """Select the EGL device of `shared_context`; None: as for `create_context`."""
     global _selected
     with _lock:
         _selected = device

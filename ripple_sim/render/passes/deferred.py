@@ -99,6 +99,7 @@ class CoarseBackground:
         self, resources: Resources, size: tuple[int, int], options: Mapping[str, int], floor: Floor | None
     ) -> None:
         blocks = -(-size[0] // _PIXELS), -(-size[1] // _PIXELS)
+        self._gl = resources.gl
         self._texture = resources.clamped_texture(blocks, 4, dtype="f2")
         self._framebuffer = resources.framebuffer([self._texture], resources.depth_renderbuffer(blocks))
         self._blocks = Background(resources, size, options, floor, _PIXELS)
@@ -128,6 +129,7 @@ class CoarseBackground:
         ctx.enable_only(moderngl.DEPTH_TEST)
         self._framebuffer.clear(depth=LEVELS["OPEN"])
         self._blocks.draw(ctx, self._framebuffer)
+        self._gl.flush()
         self._texture.use(Unit.COARSE_BACKGROUND)
         self._kinds_framebuffer.use()
         ctx.enable_only(moderngl.NOTHING)

@@ -17,7 +17,7 @@ import pytest
 from programs import ended
 
 from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
-from ripple_sim.solver.gl import create_context, current_context, is_software, load_shader, shared_context
+from ripple_sim.solver.gl import GLContext, create_context, current_context, is_software, load_shader, shared_context
 
 
 def test_solvers_that_share_shaders_keep_their_own_coefficients(gl_backend: str) -> None:
@@ -160,6 +160,56 @@ def test_software_drivers_are_told_by_their_name(renderer: str) -> None:
 def test_a_device_that_does_not_exist_is_named_in_the_error(opengl: None, device: int) -> None:
     with pytest.raises(GLError, match=rf"EGL device {device} \(.+\); devices are counted from 0"):
         create_context(device)
+
+
+def test_the_device_that_the_user_has_chosen_for_mujoco_is_ours_too(opengl: None, monkeypatch) -> None:
+    made = []
+    create = moderngl.create_context
+    monkeypatch.setattr("moderngl.create_context", lambda **settings: made.append(settings) or create(**settings))
+    monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "0")
+    create_context(None).release()
+    assert [settings["device_index"] for settings in made] == [0]
+    monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "99")
+    with pytest.raises(GLError, match=r"EGL device 99, which MUJOCO_EGL_DEVICE_ID names \(.+\); devices are counted"):
+        GLContext()
+    create_context(0).release()  # what the program asks for comes first
+
+
+@pytest.mark.parametrize("value", ["", "gpu", "1.5"])
+def test_a_device_for_mujoco_that_is_no_number_is_refused(opengl: None, monkeypatch, value: str) -> None:
+    monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", value)
+    with pytest.raises(GLError, match=f"MUJOCO_EGL_DEVICE_ID must be the number of an EGL device.*got '{value}'"):
+        create_context(None)
+
+
+def test_a_device_below_zero_is_refused_before_anything_is_read_there(opengl: None, monkeypatch) -> None:
+    with pytest.raises(GLError, match="there is no EGL device -1; devices are counted from 0"):
+        create_context(-1)
+    monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "-1")
+    with pytest.raises(GLError, match="there is no EGL device -1, which MUJOCO_EGL_DEVICE_ID names"):
+        create_context(None)
+
+
+def drawing_threads(**environment: str) -> int:
+    """How many threads llvmpipe has in a process with our context; other drivers are skipped."""
+    script = """
+        from pathlib import Path
+        from ripple_sim.solver.gl import shared_context
+        print(shared_context().renderer)
+        print(sum(comm.read_text().startswith("llvmpipe-") for comm in Path("/proc/self/task").glob("*/comm")))
+    """
+    usual = {name: value for name, value in os.environ.items() if name != "LP_NUM_THREADS"}
+    done = ended("-c", textwrap.dedent(script), env=usual | environment, timeout=300, check=True)
+    renderer, count = done.stdout.splitlines()
+    if "llvmpipe" not in renderer:
+        pytest.skip("needs the driver llvmpipe")
+    return int(count)
+
+
+def test_llvmpipe_draws_without_threads_unless_the_user_says_how_many(opengl: None) -> None:
+    """A thread of llvmpipe's may unlock a fence that is freed: glibc then ends the program."""
+    assert drawing_threads() == 0
+    assert drawing_threads(LP_NUM_THREADS="3") == 3
 
 
 NO_DEVICES = "requested device index 0, but found 0 devices"
