@@ -146,6 +146,7 @@ class RippleRenderer:
             lighting=lighting,
             backdrop=in_studio(self.model, lighting),
         )
+        self._renderer.watch()
 
     def enable_depth_rendering(self) -> None:
         """Have `render` return depths from now on."""
@@ -162,6 +163,23 @@ class RippleRenderer:
     def disable_segmentation_rendering(self) -> None:
         """Have `render` return no segmentation any more."""
         self._shows = "colours" if self._shows == "segmentation" else self._shows
+
+    def upload_texture(self, texture: int) -> None:
+        """Draw a texture of the model, by its id, as it is now, as `mujoco.mjr_uploadTexture` does.
+
+        There is no need to call this: what a program writes into the model's textures, height fields and meshes is seen
+        when the next frame is drawn. Of more than a megabyte of textures, a change of single pixels may come some
+        frames later.
+        """
+        self._upload("texture", texture, self.model.ntex)
+
+    def upload_hfield(self, hfield: int) -> None:
+        """Draw a height field of the model, by its id, as it is now; see `upload_texture`."""
+        self._upload("hfield", hfield, self.model.nhfield)
+
+    def upload_mesh(self, mesh: int) -> None:
+        """Draw a mesh of the model, by its id, as it is now; see `upload_texture`."""
+        self._upload("mesh", mesh, self.model.nmesh)
 
     def update_scene(
         self, data: mujoco.MjData, camera: AnyCamera = -1, scene_option: mujoco.MjvOption | None = None
@@ -272,6 +290,13 @@ class RippleRenderer:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+    def _upload(self, kind: str, index: int, count: int) -> None:
+        if self._renderer is None:
+            raise GLError(f"the renderer is closed: upload_{kind} cannot be called after close; make another one")
+        if not 0 <= index < count:
+            raise RenderError(f"{kind} is {index!r}; the model has {count} of them, with ids from 0")
+        self._renderer.upload(kind, index)
 
     def _now(self) -> tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint]:
         """What is to be drawn: bodies and waves as they were taken in, seen with the scene's camera as it is."""

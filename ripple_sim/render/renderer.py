@@ -150,7 +150,8 @@ class Renderer:
         if scene is None:
             scene, kinds = self._own_scene, int(mujoco.mjtCatBit.mjCAT_ALL)
             mujoco.mjv_updateScene(self._model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), kinds, scene)
-        if shown.read(scene, segmented):
+        self._assets.refresh()
+        if shown.read(scene, segmented, self._assets):
             self._scene.show(shown.visuals, shown.targets, shown.hidden)
             if self._floor is not None:
                 self._floor.shown = shown.floor is not None
@@ -171,6 +172,15 @@ class Renderer:
     def close(self) -> None:
         """Release everything on the GPU; the renderer cannot be used afterwards."""
         self._resources.release()
+
+    def watch(self) -> None:
+        """See what a program writes into the model's textures, height fields and meshes from now on."""
+        self._assets.watch()
+
+    def upload(self, kind: str, index: int) -> None:
+        """Take a "texture", "hfield" or "mesh" of the model, by its id, as it is now."""
+        with self._gl:
+            self._assets.upload(kind, index)
 
     def set_heatmap(self, geom: int, values: NDArray[np.float32], limit: float) -> None:
         """Set the field that a target with `heatmap_colors` shows from now on.

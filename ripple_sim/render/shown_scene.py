@@ -5,7 +5,7 @@ An entry is compared with what it showed in the frame before, so that a frame in
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from ripple_sim.coupling.model import find_flex_colliders
 from ripple_sim.coupling.soft import is_soft
 
 from .visuals.geoms import shaped
+from .visuals.objects import Assets
 from .visuals.scene_entries import EntryPoses, content_of, identity_of, is_of_model, own_visual, visuals_in
 from .visuals.shapes import NamedShape
 from .visuals.visual import Visual, geom_visual
@@ -66,27 +67,28 @@ class ShownScene:
         self.hidden: list[int] = []
         self.left_out: set[str] = set()
 
-    def read(self, scene: mujoco.MjvScene, segmented: bool, assets: Any = None) -> bool:
+    def read(self, scene: mujoco.MjvScene, segmented: bool, assets: Assets) -> bool:
         """Take in what a scene has; whether that is something else than before, but for poses.
 
-        Of what is `segmented` there is only what has a number for it. The number of `assets` changes with the model's
-        textures and meshes.
+        Of what is `segmented` there is only what has a number for it.
         """
         entries = [each for each in scene.geoms[: scene.ngeom] if each.segid >= 0 or not segmented]
         content: list[tuple[Any, ...]] = [content_of(each) for each in entries]
-        content.append((assets, *(getattr(self._model, name).tobytes() for name in _MATERIALS)))
+        content.append((assets.version, *(getattr(self._model, name).tobytes() for name in _MATERIALS)))
         if content == self._content:
             self._place()
             return False
         self._content = content
-        self._sort(scene, entries)
+        self._sort(scene, entries, assets.reshaped)
         return True
 
     def poses(self, data: Any) -> Any:
         """Where geoms and sites are, by names of MuJoCo's data: as the scene has them."""
         return self._own_entries.of(data)
 
-    def _sort(self, scene: mujoco.MjvScene, entries: list[mujoco.MjvGeom]) -> None:
+    def _sort(
+        self, scene: mujoco.MjvScene, entries: list[mujoco.MjvGeom], reshaped: Collection[tuple[str, int]]
+    ) -> None:
         self.targets, self.floor, self.left_out, self._placed = {}, None, set(), []
         visuals: list[Visual] = []
         own: dict[tuple[int, int], mujoco.MjvGeom] = {}
@@ -102,7 +104,7 @@ class ShownScene:
             elif first and self._floor is not None and identity == self._floor.identity:
                 self._take_floor(entry)
             elif identity not in self._colliders:
-                found = visuals_in(self._model, scene, entry, ghost=not first)
+                found = visuals_in(self._model, scene, entry, not first, reshaped)
                 visuals += found
                 if len(found) == 1 and found[0].pose is not None and found[0].corners is None:
                     self._placed.append((found[0], entry))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, TypeAlias
+from typing import Any
 
 import moderngl
 import mujoco
@@ -46,19 +46,41 @@ _SHARPEST = 1e-6  # bevel of sharp edges, in half sizes: normals need some
 # depths are off by as much of a pixel's width, and more only where a surface is seen at a slant.
 _FLATNESS, _MEASURED_FLATNESS = 0.25, 1 / 64
 
-# vertices (core, shell, normal, texture coordinates) and indices of a shape with so many segments to a right angle
-Levels: TypeAlias = Callable[[int], tuple[moderngl.Buffer, moderngl.Buffer]]
 
+class Levels:
+    """Buffers of a shape at several levels of detail, each uploaded at its first use.
 
-def levels_of(resources: Resources, make: Callable[[int], Shape]) -> Levels:
-    """Buffers of a shape at several levels of detail, each uploaded at its first use."""
+    Parameters
+    ----------
+    make : callable
+        Makes the shape with so many segments to a right angle.
+    """
 
-    @functools.cache
-    def level(segments: int) -> tuple[moderngl.Buffer, moderngl.Buffer]:
-        vertices, indices = _packed(make(segments))
-        return resources.buffer(vertices), resources.buffer(indices)
+    def __init__(self, resources: Resources, make: Callable[[int], Shape]) -> None:
+        self._resources, self._make = resources, make
+        self._levels: dict[int, tuple[moderngl.Buffer, moderngl.Buffer, int]] = {}
 
-    return level
+    def __call__(self, segments: int) -> tuple[moderngl.Buffer, moderngl.Buffer]:
+        """Vertices (core, shell, normal, texture coordinates) and indices."""
+        if segments not in self._levels:
+            vertices, indices = _packed(self._make(segments))
+            buffers = self._resources.buffer(vertices), self._resources.buffer(indices)
+            self._levels[segments] = *buffers, len(indices) // 4
+        return self._levels[segments][:2]
+
+    def count(self, segments: int) -> int:
+        """How many indices there are."""
+        return self._levels[segments][2]
+
+    def renew(self, make: Callable[[int], Shape] | None = None) -> None:
+        """Make the shape anew, in the same buffers, by another function if one is given."""
+        self._make = make or self._make
+        for segments, (vertices, indices, _) in self._levels.items():
+            contents = _packed(self._make(segments))
+            for buffer, content in zip((vertices, indices), contents, strict=True):
+                buffer.orphan(len(content))
+                buffer.write(content)
+            self._levels[segments] = vertices, indices, len(contents[1]) // 4
 
 
 def _packed(shape: Shape) -> tuple[bytes, bytes]:
@@ -127,12 +149,8 @@ class Instances:
         self._unit, self._image = mapping.unit, None if mapping.texture < 0 else self._assets.texture(mapping.texture)
         if self._buffer.size < self._records.nbytes:
             self._buffer.orphan(2 * self._records.nbytes)
-        corners = self._visual.corners
-        self._corners = -1 if corners is None else len(corners)
-        if corners is not None and (found := shape_of(model, self._visual)) is not None:
-            for buffer, content in zip(self._level(0), _packed(found[1](0)), strict=True):
-                buffer.orphan(len(content))
-                buffer.write(content)
+        if self._visual.corners is not None and (found := shape_of(model, self._visual)) is not None:
+            self._level.renew(found[1])
         self.shadow_biases = np.zeros(len(members))
 
     def update(self, data: Any, pose: Pose, height: int, occluders: Occluders, sharp: bool = False) -> None:
@@ -211,7 +229,7 @@ class Instances:
             self._arrays[seen, segments, members] = self._assets.resources.vertex_array(
                 self._programs[seen], content, indices, skip_errors=True
             )
-        self._arrays[seen, segments, members].render(vertices=self._corners, instances=count)
+        self._arrays[seen, segments, members].render(vertices=self._level.count(segments), instances=count)
 
 
 def _segments(radius: NDArray[np.float64], flatness: float, levels: tuple[int, ...]) -> NDArray[np.int64]:
@@ -263,6 +281,6 @@ def instances_of(
         if key in made:
             made[key].hold(members)
         else:
-            level = assets.levels.setdefault(name, levels_of(resources, make))
+            level = assets.levels.setdefault(name, Levels(resources, make))
             made[key] = Instances(assets, level, casters | {None: program(mapping.kind, mapping.own)}, members)
     return [made[key] for key in groups]

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.contract import MAX_OCCLUDERS, OBJECT, OBJECT_COLUMNS, Binding, Unit
-from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture
+from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture, write_srgb
 from ripple_sim.render.tone_mapping import srgb_to_linear
 
+from .scene_entries import outgrown_assets
 from .surroundings import horizon_of
+from .uploads import WrittenAssets
 from .visual import Look, texture_pixels
 
 _ROW = OBJECT.dtype
@@ -137,7 +139,11 @@ class Assets:
     objects : ObjectTable
         Every visual and target has a row in it.
     levels : dict
-        Buffers of shapes, by their names.
+        `Levels` of shapes, by their names.
+    version : int
+        Counts what was uploaded anew.
+    reshaped : set of (str, int)
+        Kind, "hfield" or "mesh", and id of what has another shape than the model was compiled with.
     """
 
     def __init__(self, model: Any, resources: Resources) -> None:
@@ -146,6 +152,33 @@ class Assets:
         self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
         self._mean_colors: dict[int, NDArray[np.float64]] = {}
         self.levels: dict[str, Any] = {}
+        self.version = 0
+        self.reshaped: set[tuple[str, int]] = set()
+        self._written: WrittenAssets | None = None
+
+    def watch(self) -> None:
+        """Upload what a program writes into the model from now on, at each `refresh`."""
+        self._written = WrittenAssets(self.model)
+        self.reshaped |= outgrown_assets(self.model)
+
+    def refresh(self) -> None:
+        """Upload whatever a program has written into the model since the last time, where this is watched."""
+        if self._written is not None:
+            for kind, index in sorted(self._written.look()):
+                self.upload(kind, index)
+
+    def upload(self, kind: str, index: int) -> None:
+        """Take a "texture", "hfield" or "mesh" of the model as it is now, where it was uploaded before."""
+        self.version += 1
+        if kind == "texture":
+            self._mean_colors.pop(index, None)
+            if index in self._uploaded:
+                write_srgb(self.resources, self._uploaded[index], texture_pixels(self.model, index))
+            return
+        self.reshaped.add((kind, index))
+        for name in (f"{kind} {index}", f"hull {index}" if kind == "mesh" else ""):
+            if name in self.levels:
+                self.levels[name].renew()
 
     def texture(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
         """Return the texture of an id; it reads as linear light."""

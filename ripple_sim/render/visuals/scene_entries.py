@@ -6,7 +6,7 @@ geom or a site is that geom or site; others of the same id are shown beside it, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -25,6 +25,8 @@ _SOFT = (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN)
 _DECOR = int(mujoco.mjtCatBit.mjCAT_DECOR)
 # How far a scene's rounded pose of an infinite plane may be off the plane, over the distance from the origin.
 _IN_PLANE = 1e-5
+# How far apart two boxes may be that are one, over their size.
+_SAME_BOX = 1e-3
 
 
 def content_of(entry: mujoco.MjvGeom) -> tuple[Any, ...]:
@@ -60,13 +62,19 @@ def is_of_model(model: Any, entry: mujoco.MjvGeom) -> bool:
     return 0 <= entry.objid < count
 
 
-def visuals_in(model: Any, scene: mujoco.MjvScene, entry: mujoco.MjvGeom, ghost: bool = False) -> list[Visual]:
+def visuals_in(
+    model: Any,
+    scene: mujoco.MjvScene,
+    entry: mujoco.MjvGeom,
+    ghost: bool = False,
+    reshaped: Collection[tuple[str, int]] = (),
+) -> list[Visual]:
     """What an entry of a scene shows: one visual, but of a flex its faces, edges and vertices.
 
-    A `ghost` of a geom or a site is none of the model's, but something beside them.
+    A `ghost` of a geom or a site is none of the model's, but something beside them. For `reshaped` see `own_visual`.
     """
     if not ghost and is_of_model(model, entry):
-        return [own_visual(model, entry)]
+        return [own_visual(model, entry, reshaped)]
     size, asset = np.array(entry.size, dtype=np.float64), _asset_of(model, entry)
     visual = Visual(
         False,
@@ -93,15 +101,19 @@ def visuals_in(model: Any, scene: mujoco.MjvScene, entry: mujoco.MjvGeom, ghost:
     ]
 
 
-def own_visual(model: Any, entry: mujoco.MjvGeom) -> Visual:
-    """The geom or site of the model that an entry shows; its pose is that of the model's data, see `ScenePoses`."""
+def own_visual(model: Any, entry: mujoco.MjvGeom, reshaped: Collection[tuple[str, int]] = ()) -> Visual:
+    """The geom or site of the model that an entry shows; its pose is that of the model's data, see `ScenePoses`.
+
+    What is `reshaped`, by "mesh" or "hfield" and its id, has outgrown the box that the model was compiled with.
+    """
     site = entry.objtype == SITE_OBJECT
     visual = (site_visual if site else geom_visual)(model, int(entry.objid))
     kind, size, asset, half_size, box = int(entry.type), np.array(entry.size), _asset_of(model, entry), None, None
     # the scene's sizes are those of the model, rounded
     if kind != visual.kind or not np.array_equal(visual.half_sizes.astype(np.float32), size):
         half_size = size.astype(np.float64)
-    if not site and (kind, asset) != (visual.kind, visual.asset):
+    has_outgrown = ("mesh" if kind in _MESHES else "hfield", asset) in reshaped
+    if not site and ((kind, asset) != (visual.kind, visual.asset) or has_outgrown):
         box = asset_box(model, kind, asset)
     return replace(
         visual, kind=kind, asset=asset, hull=_is_hull(entry), half_size=half_size, box=box, **_paint_of(entry)
@@ -119,6 +131,18 @@ def asset_box(model: Any, kind: int, asset: int) -> tuple[NDArray[np.float64], N
         points = np.concatenate([points, points[:1] * [1, 1, 0] - [0, 0, model.hfield_size[asset, 3]]])
     least, most = points.min(axis=0), points.max(axis=0)
     return (least + most) / 2, (most - least) / 2
+
+
+def outgrown_assets(model: Any) -> set[tuple[str, int]]:
+    """Meshes and height fields, "mesh" or "hfield" and id, with geoms whose boxes in the model are others' by now."""
+    found = set()
+    kinds = (*_MESHES, _GEOM.mjGEOM_HFIELD)
+    for geom in np.flatnonzero(np.isin(model.geom_type, [int(kind) for kind in kinds])).tolist():
+        kind, asset = int(model.geom_type[geom]), int(model.geom_dataid[geom])
+        box = asset_box(model, kind, asset)
+        if box is not None and np.abs(np.concatenate(box) - model.geom_aabb[geom]).max() > _SAME_BOX * box[1].max():
+            found.add(("mesh" if kind in _MESHES else "hfield", asset))
+    return found
 
 
 def _asset_of(model: Any, entry: mujoco.MjvGeom) -> int:
