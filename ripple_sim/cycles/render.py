@@ -38,6 +38,7 @@ from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.errors import warn_caller
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import Progress, open_video
 from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
@@ -137,6 +138,11 @@ _DIFFUSE_SHARE = 0.13 * np.pi / 4
 def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
     model, pose = source.model, source.pose(data)
+    if not pose.has_square_pixels(source.size[0] / source.size[1]):
+        warn_caller(
+            "Cycles shows the camera with square pixels, which it has not; ripple-sim render without --renderer cycles "
+            "shows it as it is"
+        )
     lighting = lighting_of(model, data, pose, source.lighting)
     studio = lighting.studio
     floor = find_floor(model, source.ripples.geom_ids.values())

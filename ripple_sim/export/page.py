@@ -298,7 +298,8 @@ class PageWriter(Writer):
         floor = find_floor(model, targets)
         found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
         parts = [*(target.part for target in self._targets.values()), *(_solid_part(solid) for solid in found)]
-        pose = source.pose(data)
+        aspect = source.size[0] / source.size[1]
+        pose = source.pose(data).in_perspective(aspect, "the page")
         floor_meta = None if floor is None else floor_of(model, floor)
         textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])
         meta = {
@@ -311,7 +312,7 @@ class PageWriter(Writer):
             "light": light_of(source, data),
             "fovy": pose.fovy,
             "distance": pose.distance,
-            "aspect": source.size[0] / source.size[1],
+            "aspect": aspect,
             "heat": color_table()[::8].tolist(),  # of the heights, from the lowest to the highest, sRGB
         }
         folder = importlib.resources.files(__package__).joinpath("html")

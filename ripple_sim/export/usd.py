@@ -170,8 +170,6 @@ class UsdWriter:
         stage.SetDefaultPrim(world.GetPrim())
         self._materials = Materials(stage, world.GetPath().AppendChild("Looks"), source.model, self._images)
         self._camera = UsdGeom.Camera.Define(stage, world.GetPath().AppendChild("camera"))
-        self._camera.CreateVerticalApertureAttr(_TENTHS * _SENSOR)
-        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * source.size[0] / source.size[1])
         self._camera.CreateShutterOpenAttr(0.0)
         self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
         self._lamps = Lamps(stage, world.GetPath().AppendChild("lights"), source)
@@ -235,11 +233,21 @@ class UsdWriter:
     def _begin(self, data: mujoco.MjData) -> None:
         """Define what stays as it is at the first frame."""
         pose = self._source.pose(data)
-        focal, aperture = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2), self._source.camera.aperture
+        width, height = self._source.size
+        half_width, half_height = pose.half_sizes(width / height)
+        # of an orthographic camera the aperture is what it sees, and it has no lens
+        focal = 1.0 if pose.orthographic else _SENSOR / 2 / half_height
+        lens = 0.0 if pose.orthographic else self._source.camera.aperture
+        near, far = pose.clip or (_NEAR * pose.distance, _FAR * pose.distance)
         placing(self._camera)
+        self._camera.CreateProjectionAttr("orthographic" if pose.orthographic else "perspective")
+        self._camera.CreateHorizontalApertureAttr(_TENTHS * 2 * focal * half_width)
+        self._camera.CreateVerticalApertureAttr(_TENTHS * 2 * focal * half_height)
+        self._camera.CreateHorizontalApertureOffsetAttr(_TENTHS * focal * pose.centre[0])
+        self._camera.CreateVerticalApertureOffsetAttr(_TENTHS * focal * pose.centre[1])
         self._camera.CreateFocalLengthAttr(_TENTHS * focal)
-        self._camera.CreateFStopAttr(focal / aperture if aperture else 0.0)  # 0: all is sharp
-        self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
+        self._camera.CreateFStopAttr(focal / lens if lens else 0.0)  # 0: all is sharp
+        self._camera.CreateClippingRangeAttr(Gf.Vec2f(near, far))
         self._camera.CreateFocusDistanceAttr()
         self._lamps.begin(data)
         for body, prim in enumerate(self._bodies):

@@ -23,6 +23,7 @@ from ripple_sim.solver.errors import RippleError, shown, warn_caller
 
 # Clip planes of a camera that says nothing of them, in its distances.
 _NEAR, _FAR = 0.02, 200.0
+_ROUND_OFF = 1e-4  # of MuJoCo's frustums, which have single precision, relative
 _SLACK = 0.99  # of the distance of the first thing, where the near plane may be
 # Least distance of the focus, in extents of the model: of a camera among what it shows; and of one that a body carries,
 # which looks at what is about it.
@@ -116,9 +117,29 @@ class Pose:
         half_width = aspect * self.half_height if self.half_width is None else self.half_width
         return np.array([half_width, self.half_height])
 
-    def is_plain(self) -> bool:
+    def is_plain(self, aspect: float) -> bool:
         """Whether it is in perspective, looks along the middle of its frame, and has square pixels."""
-        return not self.orthographic and self.half_width is None and not any(self.centre)
+        centred = np.allclose(self.centre, 0.0, atol=_ROUND_OFF * self.half_height)
+        return not self.orthographic and centred and self.has_square_pixels(aspect)
+
+    def has_square_pixels(self, aspect: float) -> bool:
+        """Whether pixels of a frame of an aspect, width over height, are as wide as high."""
+        return bool(np.isclose(self.half_sizes(aspect)[0], aspect * self.half_height, rtol=_ROUND_OFF))
+
+    def in_perspective(self, aspect: float, shown_by: str) -> Pose:
+        """For what can show no other: itself in plain perspective, where what is in focus has the same height.
+
+        It warns once that `shown_by` shows it otherwise than it is.
+        """
+        if self.is_plain(aspect):
+            return self
+        warn_caller(
+            f"{shown_by} shows the camera in perspective, centred and with square pixels, which it is not; "
+            "RippleRenderer and ripple-sim render show it as it is"
+        )
+        half_height = self.half_height / self.distance if self.orthographic else self.half_height
+        fovy = float(np.degrees(2 * np.arctan(half_height)))
+        return dataclasses.replace(self, fovy=fovy, orthographic=False, centre=(0.0, 0.0), half_width=None)
 
     def pose(self) -> Pose:
         """Itself: a pose is a viewpoint."""

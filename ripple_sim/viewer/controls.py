@@ -68,7 +68,11 @@ def ray(renderer: pv.Renderer, x: int, y: int) -> tuple[NDArray[np.float64], NDA
     renderer.DisplayToWorld()
     point = np.array(renderer.GetWorldPoint())
     eye = np.array(renderer.camera.position)
-    along = point[:3] / point[3] - eye
+    point = point[:3] / point[3]
+    if renderer.camera.parallel_projection:
+        along = np.array(renderer.camera.direction)
+        return point - ((point - eye) @ along) * along, along
+    along = point - eye
     return eye, along / np.linalg.norm(along)
 
 

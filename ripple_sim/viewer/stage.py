@@ -217,6 +217,9 @@ class Stage:
             plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
         simulation = session.simulation
         pose = viewpoint(simulation.model, simulation.data, simulation.scene.camera, 0.0).pose()
+        width, height = plotter.window_size
+        if not (pose.orthographic and pose.has_square_pixels(width / height)):
+            pose = pose.in_perspective(width / height, "the viewer")
         self.skins = {
             entry.geom: SkinActor(
                 plotter,
@@ -241,7 +244,11 @@ class Stage:
         self._bar.SetVisibility(self._heatmap)
         camera = plotter.camera
         camera.position, camera.focal_point, camera.up = pose.position, pose.focus, (0.0, 0.0, 1.0)
-        camera.view_angle = pose.fovy
+        if pose.orthographic:
+            camera.parallel_projection = True
+            camera.parallel_scale = pose.half_height
+        else:
+            camera.view_angle = pose.fovy
 
     def update(self) -> None:
         """Bring the actors up to date with the session."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import mujoco
 import pytest
-from mujoco_models import forwarded
+from mujoco_models import forwarded, posed
 
-from ripple_sim import Exporter, RippleError, Ripples
+from ripple_sim import Exporter, Material, RippleError, Ripples, RippleWarning
 
 pytest.importorskip("pxr")
 
@@ -82,3 +82,15 @@ def test_a_file_without_frames_is_refused(ripples: Ripples, tmp_path: Path) -> N
     with pytest.raises(RippleError, match="at least one"), Exporter(ripples.model, ripples, tmp_path / "run.usdc"):
         pass
     assert not list(tmp_path.iterdir())
+
+
+def test_a_page_says_once_that_it_shows_an_orthographic_camera_in_perspective(tmp_path: Path) -> None:
+    xml = """<mujoco><worldbody><geom name="ball" size=".3"/><camera name="flat" pos="0 -2 0" xyaxes="1 0 0 0 0 1"
+        projection="orthographic" fovy="1"/></worldbody></mujoco>"""
+    model, data = posed(xml)
+    ripples = Ripples(model, {"ball": Material(speed=1.0, density=1.0)}, resolution=8, backend="cpu")
+    page = Exporter(model, ripples, tmp_path / "run.html", camera="flat")
+    with page as exporter, pytest.warns(RippleWarning, match="the page shows the camera in perspective") as told:
+        exporter.write(data)
+        exporter.write(data)
+    assert len(told) == 1

@@ -75,6 +75,51 @@ def test_cameras_are_given_as_to_mujocos_renderer_and_without_one_it_is_the_free
         RippleRenderer(model, ripples, looks={"egg": "glass"})
 
 
+def test_the_camera_of_the_scene_is_that_of_the_picture_however_it_was_given(egg):
+    model, data, _, renderer = egg
+    fixed = Camera.from_mjcf(model, data, "side")
+    tracking = mujoco.MjvCamera()
+    tracking.type = mujoco.mjtCamera.mjCAMERA_TRACKING
+    tracking.trackbodyid, tracking.distance = 0, 3.0
+    seen = {}
+    ours = Camera(lookat=(0.1, 0.2, 0.3), distance=2.0, azimuth=20.0, elevation=-30.0, fovy=33.0)
+    given = {"name": "side", "id": 0, "numpy": np.int64(0), "fixed": fixed, "ours": ours, "tracking": tracking}
+    for kind, camera in given.items():
+        renderer.update_scene(data, camera)
+        pair = renderer.scene.camera
+        eye = np.mean([each.pos for each in pair], axis=0)
+        seen[kind] = [*eye, *pair[0].forward, *pair[0].up, pair[0].frustum_top, pair[0].frustum_near]
+    for kind in ("id", "numpy", "fixed"):
+        np.testing.assert_allclose(seen[kind], seen["name"], atol=1e-6)
+    assert seen["ours"][:3] == pytest.approx(ours.pose().position, abs=1e-6)
+    assert seen["ours"][9] / seen["ours"][10] == pytest.approx(np.tan(np.radians(33.0 / 2)), rel=1e-5)
+    assert seen["tracking"][:3] == pytest.approx(tracking.lookat - 3.0 * np.array(seen["tracking"][3:6]), abs=1e-5)
+
+
+def test_cameras_that_are_not_there_are_refused_in_mujocos_words(egg):
+    _, data, _, renderer = egg
+    for camera, words in (
+        ("top", 'The camera "top" does not exist'),
+        (1, r"The camera id 1 is out of range \[-1, 1\)"),
+        (np.int64(-2), r"The camera id -2 is out of range \[-1, 1\)"),
+    ):
+        with pytest.raises(ValueError, match=words) as error:
+            renderer.update_scene(data, camera)
+        assert isinstance(error.value, RippleError)
+
+
+def test_after_kinematics_alone_a_camera_is_where_it_belongs_with_a_warning(egg):
+    model, data, _, renderer = egg
+    new = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, new)
+    with pytest.warns(RippleWarning, match="no poses of cameras") as told:
+        frame = renderer.render(new, "side")
+    assert len(told) == 1
+    assert told[0].filename == __file__
+    assert np.array_equal(frame, renderer.render(data, "side"))
+    assert not new.cam_xmat.any()
+
+
 @pytest.mark.filterwarnings("error")
 def test_data_without_poses_is_drawn_as_forwarded(egg):
     """As it comes from `MjData(model)`; it stays as it is."""

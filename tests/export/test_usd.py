@@ -14,6 +14,7 @@ from mujoco_models import forwarded
 from ripple_sim import Exporter, ExportOptions, Material, RippleError, Ripples, export_scene
 from ripple_sim.cycles import python_with_bpy
 from ripple_sim.export import MovingMesh
+from ripple_sim.render import find_viewpoint, view_matrix
 from ripple_sim.scene import CameraEntry, Scene
 
 pxr = pytest.importorskip("pxr")
@@ -95,6 +96,26 @@ def test_camera_has_the_angle_of_view_the_lens_and_the_shutter(run: Any) -> None
     assert UsdGeom.Camera(stage.GetPrimAtPath("/World/camera")).GetShutterCloseAttr().Get() == 0.5
     forward = -np.array(camera.transform).T[:3, 2]
     assert np.abs(forward - np.array([0, 1, -0.2]) / math.hypot(1, 0.2)).max() < 1e-9
+
+
+CAMERAS = """<mujoco><worldbody><geom name="ball" size=".3"/>
+  <camera name="orthographic" pos="0 -2 .3" xyaxes="1 0 0 0 .2 1" projection="orthographic" fovy="1.5"/>
+  <camera name="off centre" pos="0 -2 .3" xyaxes="1 0 0 0 .2 1" resolution="320 240" sensorsize="8e-3 6e-3"
+    focal="5e-3 7e-3" principal="1e-3 .5e-3"/></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("name", ["orthographic", "off centre"])
+def test_cameras_of_all_projections_see_what_ours_see(name: str, tmp_path: Path) -> None:
+    model = mujoco.MjModel.from_xml_string(CAMERAS)
+    data = forwarded(model)
+    ripples = Ripples(model, {"ball": Material(speed=1.0, density=1.0)}, resolution=8, backend="cpu")
+    with Exporter(model, ripples, tmp_path / "run.usda", camera=name, size=(320, 240)) as exporter:
+        exporter.write(data)
+    stage = Usd.Stage.Open(str(tmp_path / "run.usda"))
+    frustum = UsdGeom.Camera(stage.GetPrimAtPath("/World/camera")).GetCamera(0).frustum
+    pose = find_viewpoint(model, data, name).pose()
+    theirs = np.array(frustum.ComputeProjectionMatrix()).T @ np.array(frustum.ComputeViewMatrix()).T
+    np.testing.assert_allclose(theirs, pose.projection(320 / 240) @ view_matrix(pose), atol=1e-4)
 
 
 def test_lamps_light_the_middle_as_strongly_as_ours(run: Any) -> None:

@@ -1,5 +1,7 @@
 """Cameras agree with MuJoCo's, points land where they shall in the frame; bounding balls and boxes; the sRGB curve."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -126,22 +128,27 @@ def test_the_srgb_curve_has_known_values_and_an_inverse() -> None:
 SIZE = (200, 120)
 
 
-def pose(seed: int, lens: tuple[float, float] = (0.0, 0.0)) -> Pose:
+def pose(seed: int, lens: tuple[float, float] = (0.0, 0.0), **others: object) -> Pose:
     rotation, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     rotation[:, 0] *= np.sign(np.linalg.det(rotation))
-    return Pose(np.array([0.3, -0.2, 0.5]), rotation, 2.0, 50.0, lens, 2.0)
+    return dataclasses.replace(Pose(np.array([0.3, -0.2, 0.5]), rotation, 2.0, 50.0, lens, 2.0), **others)
 
 
 def pixels(points: np.ndarray, camera: Pose) -> np.ndarray:
     """Where points show [pixels], [k, 2], and how far away along the camera's axis they lie."""
-    matrix = render.perspective(camera.fovy, SIZE[0] / SIZE[1], 0.01, 100.0, camera.shear) @ render.view_matrix(camera)
+    matrix = camera.projection(SIZE[0] / SIZE[1], (0.01, 100.0)) @ render.view_matrix(camera)
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
     return (0.5 + 0.5 * clip[:, :2] / clip[:, 3:]) * SIZE
 
 
+PARALLEL = {"orthographic": True, "fovy": 3.0}
+OFF_CENTRE = {"centre": (0.4, -0.2), "half_width": 0.6}
+
+
 @pytest.mark.parametrize("lens", [(0.0, 0.0), (0.2, -0.1)])
-def test_box_holds_the_ball(lens: tuple[float, float]) -> None:
-    camera, random = pose(1, lens), np.random.default_rng(2)
+@pytest.mark.parametrize("others", [{}, OFF_CENTRE, PARALLEL, PARALLEL | OFF_CENTRE])
+def test_box_holds_the_ball(lens: tuple[float, float], others: dict[str, object]) -> None:
+    camera, random = pose(1, lens, **others), np.random.default_rng(2)
     local = np.stack([random.uniform(-2, 2, 40), random.uniform(-2, 2, 40), random.uniform(-6, -1, 40)], axis=1)
     radii = random.uniform(0.05, 0.6, 40)
     centres = camera.eye + local @ camera.rotation.T
@@ -151,6 +158,45 @@ def test_box_holds_the_ball(lens: tuple[float, float]) -> None:
     for centre, radius, box in zip(centres, radii, boxes, strict=True):
         shown = np.clip(pixels(centre + radius * directions, camera), 0, SIZE)
         assert (shown >= box[:2]).all() and (shown <= box[2:]).all()
+
+
+@pytest.mark.parametrize("others", [{}, OFF_CENTRE, PARALLEL, PARALLEL | OFF_CENTRE])
+def test_points_in_focus_stay_in_the_frame_wherever_on_the_lens_the_eye_is_and_rays_end_at_points(others) -> None:
+    middle, aside = pose(1, **others), pose(1, (0.2, -0.1), **others)
+    points = np.random.default_rng(6).normal(size=(20, 3))
+    depth = (points - middle.position) @ middle.rotation[:, 2] + 2.0
+    in_focus = points - depth[:, None] * middle.rotation[:, 2]
+    np.testing.assert_allclose(pixels(in_focus, aside), pixels(in_focus, middle), atol=1e-9)
+    for camera in (middle, aside):
+        ways = camera.ways(points)
+        shown, away = camera.pixels(points, SIZE)
+        ahead = away > 0
+        half_way = camera.pixels(points - 0.5 * ways, SIZE)
+        np.testing.assert_allclose(half_way[0][ahead], shown[ahead], atol=1e-6)
+        np.testing.assert_allclose(half_way[1], away / 2, atol=1e-12)
+
+
+@pytest.mark.parametrize("others", [{}, PARALLEL])
+def test_the_near_plane_moves_on_to_the_first_ball_ahead_and_no_farther(others) -> None:
+    camera = pose(1, clip=(0.001, 100.0), **others)
+    forward = -camera.rotation[:, 2]
+    balls = np.array([[*(camera.position + away * forward), 0.5] for away in (-3.0, 4.0, 6.0)])
+    near, far = camera.planes_about(balls)
+    assert (near, far) == (pytest.approx(3.5, rel=0.02), 100.0)
+    assert near < 3.5
+    about = np.array([[*camera.position, 1.0]])
+    assert camera.planes_about(np.concatenate([balls, about])) == camera.planes_about(balls[:0]) == (0.001, 100.0)
+    assert dataclasses.replace(camera, clip=None).planes_about(balls) == (0.02 * 2.0, 200.0 * 2.0)
+
+
+def test_where_only_perspective_can_be_shown_it_has_the_same_height_in_focus_with_one_warning() -> None:
+    plain, parallel = pose(1), pose(1, **PARALLEL)
+    assert plain.in_perspective(1.5, "the page") is plain
+    with pytest.warns(RippleWarning, match="the page shows the camera in perspective") as told:
+        shown = parallel.in_perspective(1.5, "the page")
+    assert len(told) == 1
+    assert shown.is_plain(1.5)
+    assert shown.pixel_height(parallel.distance, 100) == pytest.approx(parallel.pixel_height(5.0, 100))
 
 
 def test_the_whole_frame_for_a_ball_about_the_eye_or_an_infinite_one_and_nothing_for_one_behind() -> None:

@@ -1,6 +1,7 @@
 """Screenshots and videos are numbered and whole, or leave nothing; the orbiting camera stays level."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image
 
 from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.viewer import Recorder, level
+from ripple_sim.viewer.controls import ray
 
 
 def frame(level: int, height: int = 32, width: int = 48) -> np.ndarray:
@@ -151,3 +153,17 @@ def test_a_camera_straight_above_without_any_heading_looks_along_y() -> None:
     level(made)
     assert elevation(made) == pytest.approx(88.0)
     assert made.position[1] < FOCUS[1]
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_rays_through_a_pixel_start_at_the_eye_or_beside_it_where_they_are_parallel(parallel: bool) -> None:
+    eye, direction, point = np.array([0.0, -3.0, 1.0]), np.array([0.0, 1.0, 0.0]), np.array([0.5, 2.0, 1.5])
+    renderer = SimpleNamespace(
+        SetDisplayPoint=lambda *place: None,
+        DisplayToWorld=lambda: None,
+        GetWorldPoint=lambda: [*(2 * point), 2.0],
+        camera=SimpleNamespace(position=eye, direction=direction, parallel_projection=parallel),
+    )
+    start, along = ray(renderer, 10, 20)
+    np.testing.assert_allclose(start, [0.5, -3.0, 1.5] if parallel else eye)
+    np.testing.assert_allclose(along, direction if parallel else (point - eye) / np.linalg.norm(point - eye))
