@@ -20,6 +20,7 @@ from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
 from .contacts import ContactReader, Contacts, first_rows
+from .easing import Easing
 from .hertz import Hits
 from .model import CoupledModel
 from .patches import Footprints, corners, load_points
@@ -197,13 +198,22 @@ class TargetLoad:
         Of contacts with it [s].
     hits : Hits, optional
         What gives hits the pulse of Hertz's law.
+    easing : Easing, optional
+        What share of forces is taken up; by default all.
     """
 
     def __init__(
-        self, waves: WaveSolver, target: int, radii: NDArray[np.float64], convex: NDArray[np.bool_],
-        time_constant: float = DEFAULT_TIME_CONSTANT, hits: Hits | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        waves: WaveSolver,
+        target: int,
+        radii: NDArray[np.float64],
+        convex: NDArray[np.bool_],
+        time_constant: float = DEFAULT_TIME_CONSTANT,
+        hits: Hits | None = None,
+        easing: Easing | None = None,
+    ) -> None:
         self._hits = hits
+        self._easing = easing
         self._target, self._radii, self._convex = target, np.minimum(radii, radii[target]), convex
         self._is_open = not waves.atlas.mesh.closed
         self._filter = RestFilter(len(radii), waves.atlas.areas.size, time_constant)
@@ -214,6 +224,10 @@ class TargetLoad:
         self._waves, self._atlas = waves, waves.atlas
         self._footprints = Footprints(waves.atlas, waves.operator.movable.reshape(-1))
         self._filter.forget_places()
+
+    def take_up_all(self) -> None:
+        """Ease no forces any more."""
+        self._easing = None
 
     def touched(
         self,
@@ -252,7 +266,10 @@ class TargetLoad:
         )
         under = self._footprints.under(geoms[patches], points, radii, self._filter.active)
         # what touches from inside pushes outwards
-        pushes = parts * np.where(inner, -timestep / elapsed, timestep / elapsed)[patches]
+        signs = np.where(inner, -timestep / elapsed, timestep / elapsed)
+        if self._easing is not None:
+            signs *= self._easing.shares(geoms, at, forces * (timestep / elapsed), elapsed)
+        pushes = parts * signs[patches]
         texels, shares = (np.concatenate(each) for each in zip(*under, strict=True))
         counts = [len(each) for each, _ in under]
         first = np.searchsorted(patches, np.arange(len(geoms) + 1))
@@ -274,6 +291,8 @@ class TargetLoad:
 
     def given(self, elapsed: float, present: TexelForces = NO_FORCES) -> Load:
         """Load over a time [s] in which these forces act, or in which no geom touches, with the pulses of hits."""
+        if self._easing is not None and present is NO_FORCES:
+            self._easing.pause(elapsed)
         load = self._filter(present, elapsed)
         return load if self._hits is None else self._hits.over(load, elapsed)
 
@@ -288,6 +307,8 @@ class ContactLoads:
         Geom id of every target to its waves. Looked at again by `waves_changed` and `clear`.
     hits : mapping, optional
         Geom id of targets whose hits have the pulse of Hertz's law.
+    easings : mapping, optional
+        Geom id of targets that take up a share of forces alone.
 
     Attributes
     ----------
@@ -296,9 +317,14 @@ class ContactLoads:
     """
 
     def __init__(
-        self, coupled: CoupledModel, waves: Mapping[int, WaveSolver], hits: Mapping[int, Hits] | None = None
+        self,
+        coupled: CoupledModel,
+        waves: Mapping[int, WaveSolver],
+        hits: Mapping[int, Hits] | None = None,
+        easings: Mapping[int, Easing] | None = None,
     ) -> None:
         self._coupled, self._waves, self._hits = coupled, waves, hits or {}
+        self._easings = dict(easings or {})
         self._contacts = ContactReader(coupled, {geom: each.atlas for geom, each in waves.items()})
         self.clear()
 
@@ -316,9 +342,12 @@ class ContactLoads:
                 constant = 1 / float(np.sqrt(max(-constant, _TINY)))
             # a flex has a contact at each of its vertices: nothing touches between them
             convex = coupled.convex & (surface is None)
-            self._targets[geom] = TargetLoad(waves, geom, coupled.footprint_radii, convex, constant, hits)
+            easing = self._easings.get(geom)
+            self._targets[geom] = TargetLoad(waves, geom, coupled.footprint_radii, convex, constant, hits, easing)
             if hits is not None:
                 hits.clear()
+            if easing is not None:
+                easing.clear()
         self.skip()
 
     def skip(self) -> None:
@@ -329,6 +358,11 @@ class ContactLoads:
     def waves_changed(self, geom: int) -> None:
         """Go on with the new waves of a target."""
         self._targets[geom].set_waves(self._waves[geom])
+
+    def take_up_all(self, geom: int) -> None:
+        """Ease no forces on a target any more."""
+        self._easings.pop(geom, None)
+        self._targets[geom].take_up_all()
 
     def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, Load]:
         """Load on each target over a time [s], from the contact forces that MuJoCo held over its latest time step.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -15,6 +15,7 @@ from ripple_sim.solver import Material
 from ripple_sim.solver.errors import checked, warn_caller, whole
 from ripple_sim.solver.operator.plate_rim import Rim
 
+from .easing import Easing, bodies_of, easing_warning
 from .energy import Energy, body_energy
 from .geoms import ByGeom, GeomKey, for_each, named_collision_geoms, own_data, own_model, target_name
 from .hertz import Hits, hertz_moduli
@@ -60,7 +61,7 @@ class Ripples(Targets):
         so does a mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
         `make_collidable`. Impulses are exact with every integrator but RK4. Of a material without a density,
         this and the speed, damping and stiffness that it does not give are chosen by the model, see `suited_material`;
-        they stand in `ripples[geom].material`.
+        they stand in `ripples[geom].material`, and forces of bodies too heavy for it are eased, see `Easing`.
     resolution : int, None or mapping
         Texels along an edge of the atlas's charts, for all targets or by geom. None: 32 to 256, by what touches the
         target and by the time step, see `suited_resolution`.
@@ -121,7 +122,10 @@ class Ripples(Targets):
         conserve_volume: bool | ByGeom[bool | None] | None = None,
     ) -> None:
         options = {"backend": backend, "operator": operator}
-        super().__init__(own_model(model), materials, resolution, layout, rim, conserve_volume, options)
+        # what pushes back, and pulses of hits, need all of a force
+        pulses = pulse.values() if isinstance(pulse, Mapping) else [pulse]
+        can_ease = not two_way and all(each == "contact" for each in pulses)
+        super().__init__(own_model(model), materials, resolution, layout, rim, conserve_volume, options, can_ease)
         adopt_warnings()
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
@@ -152,7 +156,10 @@ class Ripples(Targets):
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
                 'impulses are off by some per cent; use integrator="implicitfast", or a short time step'
             )
-        self._loads = ContactLoads(coupled, self._waves, {geom: Hits(coupled, geom, e) for geom, e in moduli.items()})
+        hits = {geom: Hits(coupled, geom, e) for geom, e in moduli.items()}
+        bodies = bodies_of(coupled)
+        self._eased = {geom: Easing(law, bodies, self._waves[geom].rest) for geom, law in self._easings.items()}
+        self._loads = ContactLoads(coupled, self._waves, hits, self._eased)
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._two_way = TwoWay(coupled, self._waves) if two_way else None
@@ -282,6 +289,8 @@ class Ripples(Targets):
         if self._two_way is not None:
             shared = self._two_way.solve(data, solved, passed.elapsed, pending=unsolved is not None)
         loads = self._loads.loads(solved, passed.elapsed)
+        for geom, easing in self._eased.items():
+            self._warn_once(f"eased {geom}", easing_warning(target_name(self.model, geom), easing))
         for target, filtered in self._high_pass.items():
             loads[target] = filtered(loads[target])
         for geom, waves in self._waves.items():
@@ -289,6 +298,11 @@ class Ripples(Targets):
         if self._two_way is not None:
             self._two_way.settle()
         self._check_amplitude()
+
+    def _take_up_all(self, geom: int) -> None:
+        super()._take_up_all(geom)
+        if self._eased.pop(geom, None) is not None:
+            self._loads.take_up_all(geom)
 
     def _change(self, name: GeomKey, **changes: Any) -> None:
         super()._change(name, **changes)

@@ -82,7 +82,7 @@ class StepClock:
 
     def __getstate__(self) -> dict[str, object]:
         # MuJoCo's data loses the mark when it is pickled; that is no reset
-        return {"_time": self._time, "_timestep": self._timestep}
+        return {"_time": self._time, "_timestep": self._timestep, "_diverged": self._diverged}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.restart()

@@ -27,6 +27,7 @@ from ripple_sim.solver.operator.presets import (
 )
 from ripple_sim.solver.texels.thickness import half_thickness_at
 
+from .easing import EasingLaw
 from .geoms import find_target
 from .model import CoupledModel
 from .soft import SoftSurface, is_soft
@@ -41,6 +42,13 @@ _DENSITY = 1000.0
 # By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is warned of. The
 # estimates are half of what a hard, short hit does, and many times what the slow push of a limb does.
 _HIT, _REST = 0.085, 0.05
+
+# The same where forces are eased: the lightest body leaves a ring that is seen, and none dents the target deeper.
+# It sinks in by the second share at rest.
+_SHOWN, _SUNK, _EASED = 0.17, 0.1, 0.12
+
+# The least density over that for the heaviest body: what is lighter still is a speck.
+_SPECK = 1e-6
 
 # How long most of a contact's impulse takes, over the time constant of its `solref`.
 _PULSE = 0.4
@@ -78,7 +86,16 @@ class Extent(NamedTuple):
         return cls(size, area, max(volume, 1e-3 * size * area), float(radii[middle_one]))
 
 
-def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> Material:
+class SuitedMaterial(NamedTuple):
+    """A material without unset coefficients, and how the target bears what is too heavy for it; None: as it is."""
+
+    material: Material
+    easing: EasingLaw | None = None
+
+
+def suited_material(
+    coupled: CoupledModel, geom: int, extent: Extent, material: Material, *, can_ease: bool = False
+) -> SuitedMaterial:
     """The material with what it leaves to the model chosen; what is given stays, all of it where the density is.
 
     - speed: waves cross the target in a quarter of a second, or as fast as a body is that has fallen from a height of
@@ -92,6 +109,9 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
       as it begins. Where nothing can touch it, it is the mass of the target's body over the area of the target; of a
       geom without a mass, 1000 kg/m^3 times its volume over its area.
 
+    Where `can_ease`, the density is for the lightest body that can touch the target and is not joined to it, whose ring
+    is then seen, and forces are taken up as far as they dent the target by a fifth of its radius, see `Easing`.
+
     Parameters
     ----------
     coupled : CoupledModel
@@ -100,14 +120,33 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     extent : Extent
         Of its surface.
     material : Material
+    can_ease : bool
     """
     if not material.unset:
-        return material
+        return SuitedMaterial(material)
     speed, stiffness = _speed_and_stiffness(coupled.model, extent, material)
     density = _density_under(coupled, geom, extent, speed, stiffness)
     if density == 0:
         density = _density(float(coupled.model.body_mass[coupled.model.geom_bodyid[geom]]), extent)
-    return _filled_in(material, speed, stiffness, density)
+    if not can_ease or _reduced_masses(coupled, geom).max() == 0:
+        return SuitedMaterial(_filled_in(material, speed, stiffness, density))
+    lightest = lightest_hit(coupled, geom, extent)
+    footprint = heaviest(coupled, geom)[1]
+    if lightest is not None:
+        footprint = lightest.footprint
+        shown = _density_for(
+            coupled, geom, extent, lightest, speed, stiffness, dent=_SHOWN * extent.radius, sink=_SUNK * extent.radius
+        )
+        density = min(density, max(shown, _SPECK * density))
+    easing = EasingLaw.of(
+        _EASED,
+        extent.radius,
+        radius=max(footprint, FOOTPRINT * extent.size),
+        density=density,
+        speed=speed,
+        stiffness=_stiffness_of_the_whole(extent, speed, stiffness),
+    )
+    return SuitedMaterial(_filled_in(material, speed, stiffness, density), easing)
 
 
 def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
@@ -153,15 +192,84 @@ def _density_under(
     """
     model = coupled.model
     mass, footprint = heaviest(coupled, geom)
-    weight = _resting(coupled, geom) * float(np.linalg.norm(model.opt.gravity))
-    impulse = BOUNCE * mass * _fall(model, max(extent.size, _height(coupled, geom)))
+    fall = _fall(model, max(extent.size, _height(coupled, geom)))
+    hit = Hit(mass, _resting(coupled, geom), footprint, fall)
+    dent = min(_HIT * extent.radius, limit)
+    return _density_for(coupled, geom, extent, hit, speed, stiffness, dent=dent, sink=min(_REST * extent.radius, limit))
+
+
+class Hit(NamedTuple):
+    """What meets a target.
+
+    Attributes
+    ----------
+    mass : float
+        Reduced mass of the two bodies [kg].
+    weight : float
+        Mass that may lie on the target [kg].
+    footprint : float
+        Radius [m].
+    speed : float
+        [m/s].
+    """
+
+    mass: float
+    weight: float
+    footprint: float
+    speed: float
+
+
+def _density_for(
+    coupled: CoupledModel,
+    geom: int,
+    extent: Extent,
+    hit: Hit,
+    speed: float,
+    stiffness: float,
+    *,
+    dent: float,
+    sink: float | None = None,
+) -> float:
+    """The least with which a target is dented by a hit, and sinks under the body at rest, no deeper than this [m]."""
+    sink = _REST * extent.radius if sink is None else sink
+    model = coupled.model
+    weight = hit.weight * float(np.linalg.norm(model.opt.gravity))
+    impulse = BOUNCE * hit.mass * hit.speed
     duration = max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep)
-    # the whole target gives way no further than its longest wave
-    stiffness = max(stiffness, (_LONGEST * speed / extent.size) ** 2)
-    of = {"radius": max(footprint, FOOTPRINT * extent.size), "speed": speed, "stiffness": stiffness}
+    stiffness = _stiffness_of_the_whole(extent, speed, stiffness)
+    of = {"radius": max(hit.footprint, FOOTPRINT * extent.size), "speed": speed, "stiffness": stiffness}
     return max(
-        density_under(weight, min(_REST * extent.radius, limit), **of),
-        density_after(impulse, min(_HIT * extent.radius, limit), duration=duration, **of),
+        density_under(weight, sink, **of),
+        density_after(impulse, dent, duration=duration, **of),
+    )
+
+
+def _stiffness_of_the_whole(extent: Extent, speed: float, stiffness: float) -> float:
+    """Stiffness of a material on a target, which gives way no further than its longest wave [1/s^2]."""
+    return max(stiffness, (_LONGEST * speed / extent.size) ** 2)
+
+
+def lightest_hit(coupled: CoupledModel, geom: int, extent: Extent) -> Hit | None:
+    """Hit of the lightest body that can touch a target, of those that it is not joined to; None if there are none.
+
+    It falls from the target's size, or from where it is above the target as the model begins, up to twice the size:
+    higher, bodies wait to be dropped. What is fixed to the world counts where the target moves.
+    """
+    model = coupled.model
+    reduced = _reduced_masses(coupled, geom)
+    roots = model.body_rootid[model.geom_bodyid]
+    masses = model.body_subtreemass[roots]
+    others = np.flatnonzero((reduced > 0) & (roots != roots[geom]))
+    if not len(others):
+        return None
+    lightest = int(others[np.argmin(reduced[others])])
+    moves = bool(_moves(model)[lightest])
+    height = min(max(extent.size, _height(coupled, geom)), 2 * extent.size)
+    return Hit(
+        mass=float(reduced[lightest]),
+        weight=float(masses[lightest] if moves else masses[geom]),
+        footprint=float(coupled.footprint_radii[[geom, lightest]].min()),
+        speed=_fall(model, height),
     )
 
 
@@ -292,14 +400,27 @@ _HEAVY = 100.0
 _SOFT = 64  # resolution of flexes and skins
 
 
+class SuitedTargets(NamedTuple):
+    """What suits targets, by their names: materials without unset coefficients, resolutions, and laws of easing."""
+
+    materials: dict[str, Material]
+    resolutions: dict[str, int]
+    easings: dict[str, EasingLaw]
+
+
 def suited_targets(
-    model: mujoco.MjModel, materials: Mapping[str, Material], resolutions: Mapping[str, int | None]
-) -> tuple[dict[str, Material], dict[str, int]]:
-    """Materials without unset coefficients, and resolutions, by the names of the targets.
+    model: mujoco.MjModel,
+    materials: Mapping[str, Material],
+    resolutions: Mapping[str, int | None],
+    *,
+    can_ease: bool = False,
+) -> SuitedTargets:
+    """What suits targets where it is not given.
 
     Raises `MeshError` if a target's mesh cannot ripple.
     """
     suited, texels = dict(materials), {name: n for name, n in resolutions.items() if n is not None}
+    easings: dict[str, EasingLaw] = {}
     geoms = {name: find_target(model, name) for name in materials}
     for name, target in list(geoms.items()):
         if is_soft(model, target):
@@ -313,21 +434,29 @@ def suited_targets(
             texels.setdefault(name, _SOFT)
     left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:
-        return suited, texels
+        return SuitedTargets(suited, texels, easings)
     coupled = CoupledModel(model, geoms.values())
     for name in left:
         extent = Extent.of(target_mesh(model, geoms[name]))
-        suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
-        if "density" in materials[name].unset:  # it may be made so heavy that hits of a light body will not be seen
-            reduced = _reduced_masses(coupled, geoms[name])
-            heavy = max(_resting(coupled, geoms[name]), float(reduced.max()))
-            light = float(reduced[reduced > 0].min(initial=np.inf))
-            if heavy > _HEAVY * light:
-                warn_caller(
-                    f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as {light:.2g} "
-                    f"kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is suited "
-                    "to them"
-                )
+        found_material = suited_material(coupled, geoms[name], extent, materials[name], can_ease=can_ease)
+        suited[name] = found_material.material
+        if found_material.easing is not None:
+            easings[name] = found_material.easing
+        elif "density" in materials[name].unset:
+            _warn_of_unseen(coupled, name, geoms[name], extent)
         if name not in texels:
             texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
-    return suited, texels
+    return SuitedTargets(suited, texels, easings)
+
+
+def _warn_of_unseen(coupled: CoupledModel, name: str, geom: int, extent: Extent) -> None:
+    """Warn of a target that is made so heavy that hits of a light body will not be seen."""
+    reduced = _reduced_masses(coupled, geom)
+    heavy = max(_resting(coupled, geom), float(reduced.max()))
+    light = float(reduced[reduced > 0].min(initial=np.inf))
+    if heavy > _HEAVY * light:
+        warn_caller(
+            f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as {light:.2g} "
+            f"kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is suited "
+            "to them"
+        )

@@ -103,6 +103,8 @@ class Targets:
         Of the waves, likewise.
     options : mapping
         Further keyword arguments of `WaveSolver`.
+    can_ease : bool
+        Whether a target whose density is chosen may take up less than all of a heavy body's forces, see `Easing`.
     """
 
     def __init__(
@@ -114,6 +116,7 @@ class Targets:
         rim: Rim | ByGeom[Rim],
         conserve_volume: bool | ByGeom[bool | None] | None,
         options: Mapping[str, Any],
+        can_ease: bool = False,
     ) -> None:
         if not isinstance(materials, Mapping):
             raise SceneError(f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material")
@@ -125,7 +128,8 @@ class Targets:
         given = for_each(model, named, "resolution", resolution)
         layouts, rims = for_each(model, named, "layout", layout), for_each(model, named, "rim", rim)
         conserves = for_each(model, named, "conserve_volume", conserve_volume)
-        named, texels = suited_targets(model, named, given)
+        suited = suited_targets(model, named, given, can_ease=can_ease)
+        named, texels = suited.materials, suited.resolutions
         self.model = model
         self._targets = {}
         for name, material in named.items():
@@ -133,6 +137,7 @@ class Targets:
             atlas = target_atlas(model, geom, texels[name], layouts[name])
             self._targets[name] = Target(geom, material, own, WaveSolver(atlas, material, **own))
             self[name].listeners.find_points = functools.partial(site_on, model, geom)
+        self._easings = {find_target(model, name): law for name, law in suited.easings.items()}
         # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here
         self._waves = {target.geom: target.waves for target in self._targets.values()}
 
@@ -166,6 +171,8 @@ class Targets:
             if given not in names:
                 raise SolverError(f"a material has no coefficient {given!r}; valid are {', '.join(names)}")
         self._change(name, material=dataclasses.replace(self._target(name).material, **coefficients))
+        if "density" in coefficients:
+            self._take_up_all(self._target(name).geom)
 
     def poke(self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0) -> Footprint:
         """Give a geom's surface an impulse at once, as `[[poke]]` in a scene file does.
@@ -264,6 +271,10 @@ class Targets:
             return np.array(point, dtype=np.float64)
         places = check_points(point) - self.model.geom_pos[geom]
         return (places @ rotation_in_body(self.model, geom)).reshape(np.shape(point))
+
+    def _take_up_all(self, geom: int) -> None:
+        """Ease no forces on a target any more: the user gives its density."""
+        self._easings.pop(geom, None)
 
     def _target(self, name: GeomKey) -> Target:
         target = self._targets.get(name) if isinstance(name, str) else None

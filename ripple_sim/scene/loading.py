@@ -269,10 +269,14 @@ def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[
         preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
         if preset is not None and preset.name == "suited":  # what it leaves out is found from the model
             given = given_fields(preset, without="name")
-            if not {"size", "hit"} <= set(given):
-                given = typical_hit(model, entry.geom) | given
-            material = msgspec.structs.replace(entry.material, preset=PresetEntry(name="suited", **given))
-            entry = msgspec.structs.replace(entry, material=material)
+            can_ease = not content.two_way and entry.pulse == "contact"
+            if not given and can_ease and entry.material.density is None:
+                chosen = None  # all of it, as without a preset: rings that are seen
+            else:
+                if not {"size", "hit"} <= set(given):
+                    given = typical_hit(model, entry.geom) | given
+                chosen = PresetEntry(name="suited", **given)
+            entry = msgspec.structs.replace(entry, material=msgspec.structs.replace(entry.material, preset=chosen))
         targets.append(entry)
     look = content.two_way, tuple(content.overlay), content.lighting
     sensors = tuple(content.sensor)

@@ -153,8 +153,8 @@ def open_scene(
         load = functools.partial(drop_scene, target, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap)
     scene = load()
     size, first = surface_size(scene), scene.targets[0]
-    materials, _ = suited_targets(scene.model, {first.geom: first.material.material()}, {first.geom: 1})
-    _, impulse = poke_strength(materials[first.geom], size)
+    suited = suited_targets(scene.model, {first.geom: first.material.material()}, {first.geom: 1})
+    _, impulse = poke_strength(suited.materials[first.geom], size)
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
     mass = impulse / (1.5 * _THROW * size / FLIGHT)
 

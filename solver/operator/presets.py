@@ -160,9 +160,14 @@ def density_under(force: float, depth: float, *, radius: float, speed: float, st
         return 0.0
     if not stiffness > 0:
         return math.inf
+    return depth_under(force, radius=radius, density=1.0, speed=speed, stiffness=stiffness) / depth
+
+
+def depth_under(force: float, *, radius: float, density: float, speed: float, stiffness: float) -> float:
+    """How deep a resting load sinks, at most [m]; with a stiffness greater than 0. Arguments are as above."""
     ratio = 2 * speed**2 / ((SPREAD * radius) ** 2 * stiffness)
     share = math.log1p(ratio) / ratio if ratio > 0 else 1.0  # of what the stiffness alone would let it sink
-    return share * force / (2 * math.pi * (SPREAD * radius) ** 2 * stiffness * depth)
+    return share * force / (2 * math.pi * (SPREAD * radius) ** 2 * stiffness * density)
 
 
 def density_after(

@@ -38,14 +38,18 @@ def test_the_preset_suited_takes_its_size_and_a_typical_hit_from_the_model(tmp_p
         scene.write_text(f'model = "{model}"\n[[ripple]]\ngeom = "target"\nmaterial = {{preset = {preset}}}')
         return load_scene(scene).targets[0].material.material()
 
+    # all of it is left to the model
+    assert chosen("rain.xml", '"suited"').unset == Material().unset
     # the body of median mass, 1.6 m - 0.5 m - 0.08 m above the target, or a fall of its size
     expected = Material.suited(1.0, (0.5, (2 * 9.81 * 1.02) ** 0.5), radius=0.04)
     for name in ("density", "stiffness", "speed", "damping", "viscosity"):
-        assert getattr(chosen("rain.xml", '"suited"'), name) == pytest.approx(getattr(expected, name), rel=0.03)
+        assert getattr(chosen("rain.xml", '{name = "suited", amplitude = 0.05}'), name) == pytest.approx(
+            getattr(expected, name), rel=0.03
+        )
     lower = chosen("rain.xml", '{name = "suited", amplitude = 0.02}')
     assert lower.density == pytest.approx(2.5 * expected.density, rel=0.03)
     with pytest.raises(SceneError, match=r"needs a size .* and a hit .*: nothing that moves can touch it"):
-        chosen("nothing.xml", '"suited"')
+        chosen("nothing.xml", '{name = "suited", amplitude = 0.02}')
     given = chosen("nothing.xml", '{name = "suited", size = 1.0, hit = 3.0}')
     assert given.density == Material.suited(1.0, 3.0).density
 
@@ -160,16 +164,59 @@ def test_what_is_given_stays_and_a_density_says_that_all_is_given() -> None:
 
 
 def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so() -> None:
-    """As torsos of robots are, whose limbs may touch them: they bear the whole robot."""
+    """As torsos of robots are where surfaces push back: they bear the whole robot."""
     link = BOX.format(mass=3e4).replace('"target"', '"target" mass="1"').replace("<geom", "<body><freejoint/><geom", 1)
     model = mujoco.MjModel.from_xml_string(link.replace('0.25"/>', '0.25"/></body>', 1))
     with pytest.warns(
         RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit=\(1, m/s"
     ) as told:
-        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
+        Ripples(model, {"target": Material()}, resolution=8, backend="cpu", two_way=True)
     assert told[0].filename == __file__
     with warnings.catch_warnings(action="error"):
         Ripples(model, {"target": Material.suited(1.0, (1.0, 2.0))}, resolution=8, backend="cpu")
+
+
+# a robot of 200 kg that stands, or falls on its trunk, and a ball of 50 g
+ROBOT = """<mujoco><option timestep="0.002"/><worldbody><geom type="plane" size="9 9 1" pos="0 0 -0.4"/>
+    <body><freejoint/><geom name="target" type="capsule" size="0.15 0.25" zaxis="1 0 0" mass="199"/>{legs}</body>
+    <body pos="{x} 0 0.35"><freejoint/><geom name="ball" size="0.04" mass="0.05"/></body></worldbody></mujoco>"""
+LEGS = '<geom type="box" size="0.2 0.2 0.1" pos="0 0 -0.3" mass="1"/>'
+
+
+def test_a_chosen_material_shows_a_light_ball_on_a_heavy_robot_and_bears_the_robot() -> None:
+    """Their impulses differ by a factor of thousands."""
+    peaks, given, said = [], [], []
+    for legs, x in ((LEGS, 0.1), ("", 5.0)):
+        model = mujoco.MjModel.from_xml_string(ROBOT.format(legs=legs, x=x))
+        run = Run(model, "target", material=Material(), resolution=24, conserve_volume=True)
+        waves, impulse, peak = run.ripples["target"], 0.0, 0.0
+        with warnings.catch_warnings(record=True, action="always") as caught:
+            while run.data.time < 0.5:
+                impulse += sum(hit.impulse for hit in run.step())
+                peak = max(peak, float(np.abs(waves.height).max()))
+        peaks.append(peak)
+        given.append(impulse)
+        said.append([str(each.message) for each in caught])
+    size, radius = 0.8, 0.15
+    assert given[0] < 0.3 < 300 < given[1], "impulses are told as they are"
+    assert 0.004 * size < peaks[0] < 2 * peaks[1] and peaks[1] < 0.25 * radius
+    assert said[0] == []
+    [message] = said[1]
+    assert "geom 'target' shows hits of the lightest body" in message and "give the material a density" in message
+
+
+def test_a_density_ends_the_easing() -> None:
+    model = mujoco.MjModel.from_xml_string(ROBOT.format(legs="", x=5.0))
+    heights = []
+    for changed in (False, True):
+        run = Run(model, "target", material=Material(), resolution=16, conserve_volume=True)
+        run.ripples.allow_any_height("target")
+        if changed:
+            run.ripples.change_material("target", density=float(run.ripples["target"].material.density))
+        with warnings.catch_warnings(action="ignore", category=RippleWarning):
+            run.until(0.4)
+        heights.append(float(np.abs(run.ripples["target"].height).max()))
+    assert heights[1] > 100 * heights[0]
 
 
 def test_a_heavier_body_is_met_by_a_heavier_surface() -> None:

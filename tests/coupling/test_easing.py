@@ -1,0 +1,57 @@
+"""Easing takes up all of what is light, and no more of what is heavy than what reaches the law's most."""
+
+import numpy as np
+import pytest
+
+from ripple_sim.coupling.easing import Easing, EasingLaw
+from ripple_sim.solver import sphere_atlas
+from ripple_sim.solver.operator.presets import depth_under
+
+DT = 0.001
+LAW = EasingLaw(most=10.0, rate=50.0, thickness=1.0)
+BODIES = np.array([0, 1, 1, 2])
+ATLAS = sphere_atlas(resolution=8)
+
+
+def taken_up(forces: list[float], collider: int = 1, easing: Easing | None = None) -> np.ndarray:
+    """What is taken up of forces that one collider holds, step by step [N]."""
+    easing = easing or Easing(LAW, BODIES, ATLAS)
+    at = np.array([0])
+    return np.array([force * easing.shares(np.array([collider]), at, np.array([force]), DT)[0] for force in forces])
+
+
+def test_light_hits_and_weights_are_taken_up_whole() -> None:
+    hit = [100.0] * 2 + [0.0] * 50  # 0.2 N s, at a rate of 50 a second as much as 10 N, less what fades
+    np.testing.assert_array_equal(taken_up(hit), hit)
+    weight = [9.0] * 500
+    np.testing.assert_array_equal(taken_up(weight), weight)
+
+
+def test_a_heavy_hit_gives_as_much_as_the_hardest_that_is_taken_up_whole() -> None:
+    impulses = [DT * taken_up([force] * 5).sum() for force in (1e3, 1e4, 1e6)]
+    # the most over the rate, and what fades in five steps
+    assert impulses == pytest.approx([LAW.most / LAW.rate] * 3, rel=0.3)
+    assert np.ptp(impulses) < 0.2 * impulses[0]
+    assert taken_up([1e6] * 500)[-1] == pytest.approx(LAW.most)
+
+
+def test_each_body_has_its_own_and_a_pause_gives_it_back() -> None:
+    easing = Easing(LAW, BODIES, ATLAS)
+    colliders, texels = np.array([0, 1, 2, 3]), np.zeros(4, np.int64)
+    shares = easing.shares(colliders, texels, np.array([1.0, 1e5, 1e5, 1.0]), DT)
+    assert shares[0] == shares[3] == 1.0 and shares[1] == shares[2] < 0.01, "colliders 1 and 2 are one body"
+    assert taken_up([100.0], easing=easing)[0] < 50.0
+    easing.pause(1.0)
+    assert taken_up([100.0], easing=easing)[0] == 100.0
+    assert easing.least_share < 0.01
+
+
+def test_pulling_counts_as_pushing() -> None:
+    np.testing.assert_allclose(taken_up([-1e5] * 9), -taken_up([1e5] * 9))
+
+
+def test_the_law_dents_by_its_share_of_the_thickness() -> None:
+    of = {"radius": 0.05, "density": 30.0, "speed": 2.0, "stiffness": 900.0}
+    law = EasingLaw.of(0.2, 0.3, **of)
+    assert depth_under(law.most, **of) == pytest.approx(0.06)
+    assert law.rate == 30.0
