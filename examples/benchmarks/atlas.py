@@ -67,10 +67,10 @@ def main() -> None:
     mesh, n = load_mesh(options.mesh), options.resolution
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_CACHE_HOME"] = folder  # what an earlier run left behind must not count
-        atlas = build_atlas(mesh, 8, cache=False)
-        whole = seconds(3, lambda: build_atlas(mesh, n, cache=False))
-        build_atlas(mesh, n)
-        cached = seconds(3, lambda: build_atlas(mesh, n))
+        atlas = build_atlas(mesh, 8, cache=False, layout="cube")
+        whole = seconds(3, lambda: build_atlas(mesh, n, cache=False, layout="cube"))
+        build_atlas(mesh, n, layout="cube")
+        cached = seconds(3, lambda: build_atlas(mesh, n, layout="cube"))
     directions = np.random.default_rng(0).permutation(texel_directions(n).reshape(-1, 3))[: options.rays]
     a_ray = seconds(3, lambda: cast_rays_exhaustively(atlas.sphere, mesh.F, directions)) / options.rays
     exhaustive = 6 * n * n * a_ray

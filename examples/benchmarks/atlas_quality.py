@@ -30,8 +30,8 @@ def line(path: Path, resolution: int, method: str) -> str:
     start = time.perf_counter()
     mesh = load_mesh(path)
     loaded = time.perf_counter() - start
-    atlas = build_atlas(mesh, resolution, method)
-    cached = build_atlas(mesh, resolution, method)
+    atlas = build_atlas(mesh, resolution, method, layout="cube")
+    cached = build_atlas(mesh, resolution, method, layout="cube")
     quality, seconds = atlas.quality(), atlas.timings
     step = WaveSolver(atlas, backend="cpu").stable_timestep / even_grid_timestep(mesh.area, atlas.areas.size)
     return ROW.format(

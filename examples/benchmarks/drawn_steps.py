@@ -86,7 +86,7 @@ def main() -> None:
         + " | ".join(f"N = {n}" for n in RESOLUTIONS)
     )
     for polygons in map(int, options.polygons.split(",")):
-        body = build_atlas(knobbly_body(polygons), RESOLUTIONS[0])
+        body = build_atlas(knobbly_body(polygons), RESOLUTIONS[0], layout="cube")
         model = posed(body.mesh)
         atlases = [atlas_from_sphere_map(body.mesh, body.sphere, n) for n in RESOLUTIONS]
         for backend in options.backends.split(","):

@@ -18,7 +18,7 @@ def make(folder: Path) -> Part:
     mesh = load_mesh(LIMBED_FILE)
     pictures, rows = [], [["sphere map", "folds", "widest 0.1 % of the area", "starved area", "covered"]]
     for method, words in (("conformal", "as in the paper"), ("progressive", "ours")):
-        atlas = build_atlas(mesh, RESOLUTION, method=method)
+        atlas = build_atlas(mesh, RESOLUTION, method=method, layout="cube")
         file = folder / f"figure_2_{method}.png"
         plot_atlas(atlas, file, title=f"{method}, {words}", subtitle=f"6 x {RESOLUTION} x {RESOLUTION} texels", up="z")
         figures = atlas.quality()

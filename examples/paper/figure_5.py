@@ -23,7 +23,7 @@ def make(folder: Path) -> Part:
         write_obj(path, *duck(CELL))
         mesh = load_mesh(path)
         start = time.perf_counter()
-        build_atlas(mesh, 128, cache=False)
+        build_atlas(mesh, 128, cache=False, layout="cube")
         seconds = time.perf_counter() - start
         scene = drop_scene(path, bodies=10, seed=3, up="z", look="jelly")
         file = strip(scene, [1.0, 2.0, 3.0], folder / "figure_5.png", (534, 400))

@@ -29,7 +29,7 @@ def steps_per_second(
     table = {}
     for count in polygons:
         start = time.perf_counter()
-        atlas = build_atlas(knobbly_body(count), resolutions[0], cache=False)
+        atlas = build_atlas(knobbly_body(count), resolutions[0], cache=False, layout="cube")
         row = {"sphere map [s]": time.perf_counter() - start}
         for n in resolutions:
             start = time.perf_counter()

@@ -33,7 +33,7 @@ class AtlasCommand:
     resolution: Count = 128
     """Texels along the edge of a cube's chart, N: about 6 N^2 in all, in every layout."""
     layout: LayoutName = "auto"
-    """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube where it fits."""
+    """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube for round bodies."""
     method: Annotated[str, arg(metavar="{progressive,conformal}")] = "progressive"
     """Sphere map of the cube: progressive (fold-free, even area) or conformal (preserves angles; starves limbs)."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
@@ -151,8 +151,8 @@ def atlas_report(
     """Figures of an atlas, as JSON can hold them.
 
     They are of the mesh in the file at a path (`size` of the bounding box [m], `area` [m^2], `volume` [m^3], `notes` on
-    what was done to it), of its charts (C, n, n), the `method` of the cube's sphere map, `quality` (see
-    `Atlas.quality`), quantiles of the `thickness` [m] of a layer, and wall time of each stage [s].
+    what was done to it and why it got its layout), of its charts (C, n, n), the `method` of the cube's sphere map,
+    `quality` (see `Atlas.quality`), quantiles of the `thickness` [m] of a layer, and wall time of each stage [s].
     """
     mesh = atlas.mesh
     known: dict[str, Any] = {}
@@ -166,7 +166,7 @@ def atlas_report(
         "size": np.ptp(mesh.V, axis=0).tolist(),
         "area": mesh.area,
         "volume": mesh.volume,
-        "notes": list(mesh.notes),
+        "notes": [*mesh.notes, *atlas.notes],
         "resolution": atlas.resolution,
         "layout": atlas.layout,
         "method": method if atlas.layout == "cube" else None,
@@ -216,7 +216,7 @@ class ModesCommand:
     resolution: Count = 64
     """Texels along the edge of a cube's chart, N: about 6 N^2 in all, in every layout."""
     layout: LayoutName = "auto"
-    """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube where it fits."""
+    """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube for round bodies."""
     rim: RimName = "free"
     """Rim of an open mesh: free, fixed as that of a drum, or supported or clamped as that of a plate."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None

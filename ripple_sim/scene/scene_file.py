@@ -114,7 +114,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     resolution: int | None = None
     """Texels along the edge of a chart; by default chosen by the model, see `suited_resolution`."""
     layout: str = "auto"
-    """How the surface gets its charts, see `build_atlas`."""
+    """How the surface gets its charts: "cube", "patches" or "auto", see `build_atlas`."""
     rim: str | dict[str, str] = "free"
     """Rims of an open surface: waves come back upright from a free one, inverted from one that is held. By region, a
     table such as `rim = {clamped = "x < -0.24"}`: conditions as in `ripple.height`, of which the first that holds

@@ -18,13 +18,14 @@ from ..texels.atlas import ADVICE, FORMAT, Atlas, read_atlas_file
 from ..texels.chart_map import ChartMap, LinearChartMap
 from ..texels.texel_mesh import TexelMesh
 from ..texels.topology import glue
+from .choice import LONGEST_TEXEL, texel_length
 from .cube.atlas import CubeChartMap, SphereAtlas, atlas_from_sphere_map
 from .cube.convention import check_memory, check_resolution
 from .patches.atlas import PatchChartMap, patch_atlas
 from .patches.pieces import Pieces
 from .sphere_map import certify, conformal_sphere_map, progressive_sphere_map
 
-# "auto" takes the first of the others that fits a mesh.
+# "auto" chooses between the others; see `choice`.
 LAYOUTS = ("auto", "cube", "patches")
 
 Arrays = dict[str, NDArray]
@@ -62,6 +63,7 @@ def load_atlas(path: str | Path) -> Atlas:
         chart_map=chart_map,
         triangles=arrays["triangles"],
         barycentrics=arrays["barycentrics"],
+        notes=tuple(arrays["notes"].tolist()) if "notes" in arrays else (),
     )
 
 
@@ -96,9 +98,10 @@ def build_atlas(
         Keep the result in the user's cache folder and take it from there the next time; see `cache_limit`.
     layout : str
         "cube": six charts of N x N texels, for a closed mesh of genus 0 in one part. "patches": many small charts, for
-        any mesh. "auto": cube where it fits.
+        any mesh. "auto": the cube for round meshes, patches for all that have long limbs, handles, rims or several
+        parts. The choice depends on the mesh alone, and `Atlas.notes` says why limbs get patches.
     sphere : float64 [vertex_count, 3], optional
-        Sphere map of the cube layout, where it is known already; `method` is not asked then.
+        Sphere map of the cube layout, where it is known already; `method` is not asked then, and "auto" takes the cube.
 
     Raises
     ------
@@ -115,65 +118,126 @@ def build_atlas(
         if name not in valid:
             raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
     check_memory(resolution)
-    cube = layout != "patches"
-    if cube:
+    builder = _Builder(mesh, resolution, method, cache, sphere)
+    if layout == "patches":
+        return builder.patches()
+    try:
+        check_genus_zero(mesh)
+    except MeshError:
+        if layout == "cube":
+            raise
+        return builder.patches()
+    return builder.cube() if layout == "cube" or sphere is not None else builder.chosen()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Builder:
+    """Builds the atlas of a mesh in a layout, or takes it from the cache; see `build_atlas`."""
+
+    mesh: Mesh
+    resolution: int
+    method: str
+    cache: bool
+    sphere: NDArray[np.float64] | None
+
+    def patches(self) -> Atlas:
+        """Atlas of the patch layout."""
+        start = time.perf_counter()
+        # charts have a resolution of their own, and a file for each of the atlas's
+        path = self._path(f"patches {self.resolution}")
+        stored = self._stored(path, start, "patches")
+        if stored is not None:
+            return stored
+        return self._kept(path, patch_atlas(self.mesh, self.resolution))
+
+    def cube(self) -> Atlas:
+        """Atlas of the cube layout, by way of a sphere map that is known already, or by the method."""
+        start = time.perf_counter()
+        path = self._path(self.method) if self.sphere is None else self._path("given", self.sphere)
+        stored = self._stored(path, start, "cube")
+        if stored is not None:
+            return self._at_resolution(stored, path, start)
+        return self._kept(path, self._six_charts(self._sphere_map(self.sphere), start))
+
+    def chosen(self) -> Atlas:
+        """Atlas in the layout that suits a closed mesh of genus 0, as its sphere map tells."""
+        start = time.perf_counter()
+        # files of their own, which say that the choice is made
+        round_path, limbed_path = self._path(f"auto {self.method}"), self._path(f"auto {self.method} {self.resolution}")
+        stored = self._stored(round_path, start, "cube")
+        if stored is not None:
+            return self._at_resolution(stored, round_path, start)
+        stored = self._stored(limbed_path, start, "patches", "cube")
+        if stored is not None:
+            return stored
+        sphere = self._sphere_map(None)
+        length = texel_length(self.mesh, sphere)
+        if length > LONGEST_TEXEL:
+            return self._kept(limbed_path, self._limbed(sphere, length, start))
+        return self._kept(round_path, self._six_charts(sphere, start))
+
+    def _at_resolution(self, stored: Atlas, path: Path | None, start: float) -> Atlas:
+        """A stored atlas of the cube layout; of another resolution its sphere map, as rays are quick."""
+        if stored.resolution == self.resolution:
+            return stored
+        return self._kept(path, self._six_charts(self._sphere_map(stored.sphere), start))
+
+    def _limbed(self, sphere: NDArray[np.float64], length: float, start: float) -> Atlas:
+        """Patches, or the cube where there are none, with a note: its texels are `length` times as long as wide."""
+        mapped = time.perf_counter()
         try:
-            check_genus_zero(mesh)
-        except MeshError:
-            if layout == "cube":
-                raise
-            cube = False
-    start = time.perf_counter()
-    path = None
-    if cache:  # a file for each mesh and sphere map: that does not depend on the resolution, and rays are quick
-        kind = "given" if cube and sphere is not None else method if cube else f"patches {resolution}"
-        made_of = (mesh.V, mesh.F) if sphere is None or not cube else (mesh.V, mesh.F, sphere)
-        path = cache_path(f"{FORMAT} {kind}", made_of)
-    stored = None if path is None else _read_cache(path, mesh, cube)
-    # charts of the patch layout have a resolution of their own, and a file for each of the atlas's
-    if stored is not None and (not cube or stored.resolution == resolution):
-        stored.timings["cache"] = time.perf_counter() - start
-        return stored
-    if cube:
-        atlas = _cube(mesh, resolution, method, sphere if stored is None else stored.sphere)
-    else:
-        atlas = patch_atlas(mesh, resolution)
-    if path is not None:
-        # a folder that cannot be written costs the next call its time, nothing else
-        with contextlib.suppress(AtlasError, OSError):
-            if path.is_symlink():  # whatever it leads to is not ours
-                path.unlink()
-            atlas.save(path, overwrite=True)
-            make_room(path)
-    return atlas
+            atlas = patch_atlas(self.mesh, self.resolution)
+            note = f"layout patches: texels of the cube would be up to {length:.0f} times as long as wide, on limbs"
+        except AtlasError as error:
+            atlas = self._six_charts(sphere, mapped)
+            note = f"layout cube, with texels up to {length:.0f} times as long as wide, since patches fail: {error}"
+        timings = {"sphere_map": mapped - start, **atlas.timings}
+        return dataclasses.replace(atlas, timings=timings, notes=(note,))
 
-
-def _cube(mesh: Mesh, resolution: int, method: str, known: NDArray[np.float64] | None) -> Atlas:
-    """Atlas of the cube layout, by way of a sphere map that is known already, or by a method."""
-    start = time.perf_counter()
-    if known is None:
-        sphere = SPHERE_MAPS[method](mesh.V, mesh.F)
-    else:
+    def _sphere_map(self, known: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        """A sphere map that is known already, checked, or one by the method."""
+        if known is None:
+            return SPHERE_MAPS[self.method](self.mesh.V, self.mesh.F)
         sphere = np.ascontiguousarray(known, dtype=np.float64)
-        if sphere.shape != mesh.V.shape or not np.isfinite(sphere).all() or not certify(mesh.F, sphere).valid:
+        if sphere.shape != self.mesh.V.shape or not np.isfinite(sphere).all() or not certify(self.mesh.F, sphere).valid:
             raise SphereMapError(
                 f"sphere has the shape {sphere.shape} and is no fold-free sphere map of the mesh, which has "
-                f"{len(mesh.V)} vertices; leave it out to have one computed"
+                f"{len(self.mesh.V)} vertices; leave it out to have one computed"
             )
-    mapped = time.perf_counter()
-    atlas = atlas_from_sphere_map(mesh, sphere, resolution)
-    atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
-    return atlas
+        return sphere
 
+    def _six_charts(self, sphere: NDArray[np.float64], start: float) -> Atlas:
+        """Atlas of the cube layout with a sphere map that was begun at a time `start`."""
+        mapped = time.perf_counter()
+        atlas = atlas_from_sphere_map(self.mesh, sphere, self.resolution)
+        atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
+        return atlas
 
-def _read_cache(path: Path, mesh: Mesh, cube: bool) -> Atlas | None:
-    """The atlas of this very mesh in this layout, or None where the file is missing, does not verify, or is another."""
-    try:
-        stored = load_atlas(path)
-    except AtlasError:
-        return None
-    same = np.array_equal(stored.mesh.V, mesh.V) and np.array_equal(stored.mesh.F, mesh.F)
-    if not same or (stored.layout == "cube") != cube:
-        return None
-    mark_used(path)
-    return dataclasses.replace(stored, mesh=mesh, timings={})
+    def _path(self, kind: str, *arrays: NDArray) -> Path | None:
+        """Where the cache keeps an atlas of this mesh; None without a cache."""
+        return cache_path(f"{FORMAT} {kind}", (self.mesh.V, self.mesh.F, *arrays)) if self.cache else None
+
+    def _stored(self, path: Path | None, start: float, *layouts: str) -> Atlas | None:
+        """The atlas of this very mesh in one of some layouts; None if there is no file, or a damaged or another one."""
+        if path is None:
+            return None
+        try:
+            stored = load_atlas(path)
+        except AtlasError:
+            return None
+        same = np.array_equal(stored.mesh.V, self.mesh.V) and np.array_equal(stored.mesh.F, self.mesh.F)
+        if not same or stored.layout not in layouts:
+            return None
+        mark_used(path)
+        return dataclasses.replace(stored, mesh=self.mesh, timings={"cache": time.perf_counter() - start})
+
+    def _kept(self, path: Path | None, atlas: Atlas) -> Atlas:
+        """Put an atlas into the cache."""
+        if path is not None:
+            # a folder that cannot be written costs the next call its time, nothing else
+            with contextlib.suppress(AtlasError, OSError):
+                if path.is_symlink():  # whatever it leads to is not ours
+                    path.unlink()
+                atlas.save(path, overwrite=True)
+                make_room(path)
+        return atlas

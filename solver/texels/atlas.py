@@ -143,6 +143,8 @@ class Atlas:
         Where in that triangle.
     timings : dict
         Seconds per stage of the construction.
+    notes : tuple of str
+        Why "auto" took this layout, where that is not plain.
     """
 
     mesh: Mesh
@@ -151,6 +153,7 @@ class Atlas:
     triangles: NDArray[np.int64]
     barycentrics: NDArray[np.float64]
     timings: dict[str, float] = dataclasses.field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def layout(self) -> str:
@@ -284,7 +287,14 @@ class Atlas:
             "barycentrics": self.barycentrics,
             **self.chart_map.arrays(),
         }
-        optional = {"uv": mesh.uv, "corner_uv": mesh.corner_uv, "beyond": texels.beyond, "detours": texels.detours}
+        notes = np.array(self.notes) if self.notes else None
+        optional = {
+            "uv": mesh.uv,
+            "corner_uv": mesh.corner_uv,
+            "beyond": texels.beyond,
+            "detours": texels.detours,
+            "notes": notes,
+        }
         write_atlas_file(Path(path), arrays | {name: each for name, each in optional.items() if each is not None})
 
     def __getstate__(self) -> dict[str, Any]:

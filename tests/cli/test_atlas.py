@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from genus_zero import thin_limb
 from PIL import Image
 
 from ripple_sim.cli import main as cli
@@ -61,6 +62,14 @@ def test_json_tells_size_area_quality_seconds_and_what_was_mended(told, ball_fil
     assert {"flipped", "solid_angle", "q001", "q50", "q999", "starved", "coverage"} <= report["quality"].keys()
     assert {"load", "sphere_map", "rays"} == report["seconds"].keys()
     assert {"load", "cache"} == told(ball_file)["seconds"].keys()
+
+
+def test_a_body_with_a_limb_gets_patches_and_the_report_says_why(told, tmp_path):
+    V, F = thin_limb(3, 0.1)
+    trimesh.Trimesh(V, F, process=False).export(tmp_path / "limb.off")
+    report = told(tmp_path / "limb.off")
+    assert (report["layout"], report["method"]) == ("patches", None)
+    assert re.search(r"the cube would be up to \d+ times as long as wide", *report["notes"])
 
 
 def test_the_plain_report_says_the_same(capsys, ball_file):

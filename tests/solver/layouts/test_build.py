@@ -105,7 +105,7 @@ def revolved(height: np.ndarray, radius: np.ndarray, around: int) -> tuple[np.nd
 def sound_atlas(V: np.ndarray, F: np.ndarray, starved: float = 0.0) -> Atlas:
     """Build the atlas of a mesh and assert that nothing is wrong with it."""
     mesh = Mesh.from_arrays(V, F)
-    atlas = build_atlas(mesh, 12, cache=False)
+    atlas = build_atlas(mesh, 12, cache=False, layout="cube")
     quality = atlas.quality()
     assert quality["flipped"] == 0
     assert quality["solid_angle"] == pytest.approx(4 * np.pi, abs=1e-9)

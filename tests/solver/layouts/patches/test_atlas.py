@@ -101,7 +101,7 @@ def test_parts_share_the_texels_by_area() -> None:
     assert (small.all(axis=(1, 2)) | ~small.any(axis=(1, 2))).all()
 
 
-def test_auto_takes_the_cube_where_it_fits() -> None:
+def test_auto_takes_patches_where_the_cube_does_not_fit() -> None:
     assert build_atlas(sphere(2), 8, cache=False).layout == "cube"
     assert build_atlas(torus(6), 8, cache=False).layout == "patches"
 
