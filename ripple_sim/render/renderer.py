@@ -232,8 +232,12 @@ class Renderer:
             Top row first; a new array for every frame. uint8 in sRGB, alpha straight; or, of linear light, float16,
             with ITU-R BT.709's primaries, multiplied by alpha.
         """
-        self.submit(data, height_maps, camera, exposure, scene)
-        return self.fetch()
+        try:
+            self.submit(data, height_maps, camera, exposure, scene)
+            return self.fetch()
+        except BaseException:
+            self._readback.forget()  # else the next call would return this frame
+            raise
 
     def submit(
         self,
@@ -268,7 +272,7 @@ class Renderer:
             over it.
         """
         drawn, pose = self._scene, camera.pose()
-        with self._gl as ctx:
+        with self._gl as ctx, self._resources.drawing():
             poses = self._show(data, scene)
             shading = self._shading
             drawn.update(ctx, poses, height_maps, pose)
@@ -325,7 +329,7 @@ class Renderer:
         edges; if `segmented`, only what MuJoCo would segment.
         """
         drawn, pose, size = self._scene, camera.pose(), size or self._size
-        with self._gl as ctx:
+        with self._gl as ctx, self._resources.drawing():
             if self._buffers is None or self._buffers.size != size:
                 self._buffers = SurfaceBuffers(self._resources, size)
             poses = self._show(data, scene, segmented)

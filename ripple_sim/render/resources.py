@@ -6,8 +6,9 @@ targets.
 
 from __future__ import annotations
 
+import contextlib
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import moderngl
@@ -80,6 +81,28 @@ class Resources:
         """Release everything, at once or when the context is next entered; a second time does nothing."""
         self._finalizer()
         self.gl.free()
+
+    @contextlib.contextmanager
+    def drawing(self) -> Iterator[None]:
+        """A frame: if it is interrupted, by Ctrl-C for instance, the next one begins like the first."""
+        try:
+            yield
+        except BaseException:
+            self._reset_framebuffers()
+            raise
+
+    def _reset_framebuffers(self) -> None:
+        """Undo what passes set for a while: masks, scissors, viewports, and the reflection's winding."""
+        all_channels = (True,) * 4
+        with self.gl as ctx:
+            ctx.front_face = "ccw"
+            for created in self._created:
+                if isinstance(created, moderngl.Framebuffer):
+                    count = len(created.color_attachments)
+                    created.color_mask = all_channels if count == 1 else [all_channels] * count
+                    created.depth_mask = True
+                    created.scissor = None
+                    created.viewport = (0, 0, *created.size)
 
     def _own(self, created: Any) -> Any:
         self._created.append(created)

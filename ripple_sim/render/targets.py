@@ -209,6 +209,13 @@ class Readback:
             _unpremultiply(frame)
         return frame
 
+    def forget(self) -> None:
+        """Drop all frames that are on their way."""
+        while self._pending:
+            buffer, fence = self._pending.popleft()
+            self._gl.wait_for(fence)
+            self._free.append(buffer)
+
 
 @kernel
 def _unpremultiply(frame: NDArray[np.uint8]) -> None:

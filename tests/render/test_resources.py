@@ -12,7 +12,7 @@ from shader_functions import evaluated
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Camera, Pose, Renderer, fitted, srgb_cube, srgb_texture, srgb_to_linear
-from ripple_sim.render.targets import FramePass
+from ripple_sim.render.targets import FramePass, GBuffer, Readback
 
 
 def test_renderers_leave_nothing_behind(gl):
@@ -67,6 +67,43 @@ def test_a_renderer_that_is_collected_while_another_draws_changes_no_pixel(gl):
         for moment in (1, 2):
             for end_another in (list.clear, close):
                 np.testing.assert_array_equal(frame_while(end_another, moment), expected)
+
+
+SHINY = """<mujoco><asset><material name="shiny" reflectance=".4" rgba=".8 .8 .8 1"/></asset><worldbody>
+<geom type="plane" size="0 0 .1" material="shiny"/><geom type="sphere" size=".3" pos="0 0 .8" rgba=".8 .2 .2 1"/>
+<geom type="sphere" size=".2" pos=".6 0 .8" rgba=".2 .2 .9 .5"/></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "moments"),
+    [(FramePass, "run", (2, 5, 8)), (GBuffer, "clear", (2,)), (Readback, "fetch", (1,))],
+)
+def test_after_an_interrupted_frame_the_next_is_right_also_in_other_renderers(gl, monkeypatch, owner, name, moments):
+    """As after Ctrl-C in a notebook: masks, scissors or the reflection's winding are set for a while."""
+    model = mujoco.MjModel.from_xml_string(SHINY)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = Camera((0.0, 0.0, 0.5), 4.0, 90.0, -10.0, 40.0)
+    elsewhere = Camera((0.0, 0.0, 0.5), 3.0, 60.0, -10.0, 40.0)
+    function = getattr(owner, name)
+    with Renderer(gl, model, {}, size=(32, 24)) as renderer, Renderer(gl, model, {}, size=(16, 12)) as other:
+        expected, of_other = (each.render(data, {}, camera) for each in (renderer, other))
+        assert np.ptp(expected)
+        for moment in moments:
+            calls = 0
+
+            def interrupt(*arguments, moment=moment):
+                nonlocal calls
+                calls += 1
+                if calls == moment:
+                    raise KeyboardInterrupt
+                return function(*arguments)
+
+            with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+                patch.setattr(owner, name, interrupt)
+                renderer.render(data, {}, elsewhere)
+            np.testing.assert_array_equal(renderer.render(data, {}, camera), expected, err_msg=f"{name}, call {moment}")
+            np.testing.assert_array_equal(other.render(data, {}, camera), of_other)
 
 
 POSE = Camera((0.3, -1.2, 0.7), 5.0, 130.0, -35.0, 50.0).pose()
