@@ -449,11 +449,11 @@ def _focus_distance(model: mujoco.MjModel, data: mujoco.MjData, camera: int) -> 
     """
     position = data.cam_xpos[camera]
     target, carrier = int(model.cam_targetbodyid[camera]), int(model.cam_bodyid[camera])
-    extent, root = float(model.stat.extent), int(model.body_rootid[carrier])
+    extent = float(model.stat.extent)
     if model.cam_mode[camera] in _AIMED and target >= 0:
         return max(float(np.linalg.norm(position - data.xipos[target])), _LEAST_FOCUS * extent)
-    if root and model.body_dofnum[root]:
-        away = float(np.linalg.norm(position - data.subtree_com[root]))
+    if model.body_weldid[carrier]:  # which is 0 where it is fixed to the world
+        away = float(np.linalg.norm(position - data.subtree_com[model.body_rootid[carrier]]))
         return max(away, _LEAST_FOCUS_RIDING * extent)
     return max(float(np.linalg.norm(position - model.stat.center)), _LEAST_FOCUS * extent)
 

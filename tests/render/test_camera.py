@@ -316,3 +316,15 @@ def test_a_camera_that_rides_along_stays_about_what_carries_it():
         mujoco.mj_forward(model, data)
         distances.append(render.find_viewpoint(model, data, 1).distance)
     assert distances[0] == pytest.approx(distances[1]) == pytest.approx(np.hypot(2.0, 0.2), rel=0.2)
+
+
+def test_a_camera_on_a_moving_link_is_about_its_robot_and_one_that_turns_to_a_body_about_that():
+    model = mujoco.MjModel.from_xml_string("""<mujoco><statistic center="9 9 9" extent="1"/><worldbody>
+        <body name="base" pos="3 0 0"><geom size=".2"/><body pos="0 0 1"><joint/><geom size=".2"/>
+        <camera name="wrist" pos="0 0 1"/></body></body>
+        <camera name="aimed" mode="targetbody" target="base"/><camera name="still"/></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    away = {name: render.find_viewpoint(model, data, name).distance for name in ("wrist", "aimed", "still")}
+    middle = 9 * np.sqrt(3)
+    assert away == {"wrist": pytest.approx(1.5), "aimed": pytest.approx(3.0), "still": pytest.approx(middle)}

@@ -184,8 +184,11 @@ class Instances:
 
     def _by_level(self, segments: NDArray[np.int64]) -> list[tuple[int, moderngl.Buffer, int]]:
         """Draw calls of the members by their segments [k]: segments, a buffer of the members, and their count."""
+        levels = np.unique(segments).tolist()
+        if len(levels) == 1:
+            return [(levels[0], self._buffer, len(self._records))]
         draws = []
-        for level in np.unique(segments).tolist():
+        for level in levels:
             records = self._records[segments == level]
             if level not in self._level_buffers:
                 self._level_buffers[level] = self._assets.resources.buffer(reserve=records.nbytes, dynamic=True)
