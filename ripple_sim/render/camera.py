@@ -28,7 +28,7 @@ _SLACK = 0.99  # of the distance of the first thing, where the near plane may be
 # Least distance of the focus, in extents of the model: of a camera among what it shows; and of one that a body carries,
 # which looks at what is about it.
 _LEAST_FOCUS, _LEAST_FOCUS_RIDING = 0.05, 0.5
-_AIMED = (mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY, mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM)
+_AT_BODY, _AT_MASS = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY), int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM)
 
 
 @dataclass(frozen=True)
@@ -450,8 +450,9 @@ def _focus_distance(model: mujoco.MjModel, data: mujoco.MjData, camera: int) -> 
     position = data.cam_xpos[camera]
     target, carrier = int(model.cam_targetbodyid[camera]), int(model.cam_bodyid[camera])
     extent = float(model.stat.extent)
-    if model.cam_mode[camera] in _AIMED and target >= 0:
-        return max(float(np.linalg.norm(position - data.xipos[target])), _LEAST_FOCUS * extent)
+    if model.cam_mode[camera] in (_AT_BODY, _AT_MASS) and target >= 0:
+        aim = data.xpos[target] if model.cam_mode[camera] == _AT_BODY else data.subtree_com[target]
+        return max(float(np.linalg.norm(position - aim)), _LEAST_FOCUS * extent)
     if model.body_weldid[carrier]:  # which is 0 where it is fixed to the world
         away = float(np.linalg.norm(position - data.subtree_com[model.body_rootid[carrier]]))
         return max(away, _LEAST_FOCUS_RIDING * extent)
