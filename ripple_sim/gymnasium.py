@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.geoms import ByGeom, own_data, own_model
+from ripple_sim.coupling.geoms import ByGeom
+from ripple_sim.coupling.own_model import own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RippleError, SceneError
 from ripple_sim.solver import Material

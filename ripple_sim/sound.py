@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.coupling.soft import target_pose
-from ripple_sim.encode.images import riff_chunk
 from ripple_sim.encode.replace import MARK
+from ripple_sim.encode.webp import riff_chunk
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.backends.kernels import Probes

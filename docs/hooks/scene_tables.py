@@ -18,7 +18,7 @@ from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
 from ripple_sim.scene.bodies import BODY_SHAPES
 from ripple_sim.scene.material_entry import LAWS, MapEntry, MaterialChange, MaterialEntry, PresetEntry
-from ripple_sim.scene.scene import NAMES as OVERLAYS
+from ripple_sim.scene.overlays import NAMES as OVERLAYS
 from ripple_sim.solver import Material
 from ripple_sim.solver.layouts.build import LAYOUTS
 from ripple_sim.solver.operator.plate_rim import RIMS

@@ -27,7 +27,13 @@ SUBTITLE = (
     "an arrow means: imports (those that others imply are left out); blue: solver/, which knows nothing of MuJoCo"
 )
 # everybody may import these: no arrow is drawn to them
-COMMON = ("ripple_sim.solver.errors", "ripple_sim.solver.kernel", "ripple_sim.solver.files", "ripple_sim.errors")
+COMMON = (
+    "ripple_sim.solver.errors",
+    "ripple_sim.solver.kernel",
+    "ripple_sim.solver.files",
+    "ripple_sim.solver.memory",
+    "ripple_sim.errors",
+)
 ENTRY = "ripple_sim.__main__"
 
 WIDTH, HEIGHT, GAP, RISE = 2.5, 0.92, 0.3, 0.42  # of a box, between boxes, between layers [inches]

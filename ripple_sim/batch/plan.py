@@ -22,8 +22,8 @@ import numpy as np
 import trimesh
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.scene import read_toml, shipped_scenes
 from ripple_sim.scene.scene_file import check_keys, converted
+from ripple_sim.scene.source import read_toml, shipped_scenes
 from ripple_sim.solver.errors import shown
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.settings import check_options

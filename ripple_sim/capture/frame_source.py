@@ -28,7 +28,7 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.solver import SphereAtlas, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.kernel import Floats32, kernel
-from ripple_sim.solver.texels.topology import ChartPage
+from ripple_sim.solver.texels.chart_page import ChartPage
 
 from .snapshot import ShownWaves, Snapshot, exposures_of
 

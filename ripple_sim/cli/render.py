@@ -249,7 +249,7 @@ class RenderCommand(_VideoCommand):
 
     def check_input(self) -> None:
         """Make sure that there is such a scene."""
-        from ripple_sim.scene.scene import scene_path
+        from ripple_sim.scene.source import scene_path
 
         scene_path(self.scene)
 

@@ -4,6 +4,7 @@ from .colliders import (
     inset as inset,
     make_collidable as make_collidable,
 )
+from .collision_geoms import named_collision_geoms as named_collision_geoms
 from .contacts import (
     ContactReader as ContactReader,
     Contacts as Contacts,
@@ -15,15 +16,10 @@ from .geoms import (
     TARGET_TYPES as TARGET_TYPES,
     ByGeom as ByGeom,
     by_name as by_name,
-    check_targets as check_targets,
     find_any as find_any,
     find_geom as find_geom,
     find_target as find_target,
     geom_name as geom_name,
-    named_collision_geoms as named_collision_geoms,
-    own_data as own_data,
-    own_model as own_model,
-    posed as posed,
     target_name as target_name,
 )
 from .load import ContactLoads as ContactLoads, StepContacts as StepContacts, TargetLoad as TargetLoad
@@ -33,6 +29,7 @@ from .model import (
     find_flex_colliders as find_flex_colliders,
     flex_thickness as flex_thickness,
 )
+from .own_model import check_targets as check_targets, own_data as own_data, own_model as own_model, posed as posed
 from .patches import (
     MAX_CORNERS as MAX_CORNERS,
     Footprints as Footprints,
@@ -50,7 +47,6 @@ from .soft import (
     is_soft as is_soft,
     target_pose as target_pose,
 )
-from .step_checks import PAIR as PAIR, TunnellingCheck as TunnellingCheck, too_fast as too_fast
 from .stepping import (
     Passed as Passed,
     SolvedForces as SolvedForces,
@@ -67,4 +63,5 @@ from .target_mesh import (
     target_atlas as target_atlas,
 )
 from .target_warnings import GAP_TOLERANCE as GAP_TOLERANCE, hull_gap as hull_gap
+from .tunnelling import PAIR as PAIR, TunnellingCheck as TunnellingCheck, too_fast as too_fast
 from .two_way import support_point as support_point

@@ -18,8 +18,9 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
 from .model import CoupledModel, FlexContacts
-from .step_checks import SolverBalance, WrapCheck
+from .solver_balance import SolverBalance
 from .target_mesh import target_mesh
+from .wrap_check import WrapCheck
 
 
 class Contacts(NamedTuple):

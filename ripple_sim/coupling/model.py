@@ -17,7 +17,8 @@ from ripple_sim.solver import Mesh
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.kernel import Bools, Floats, Ints
 
-from .geoms import ENDLESS, find_collision_geoms, geom_name, rotation_in_body
+from .collision_geoms import ENDLESS, find_collision_geoms
+from .geoms import geom_name, rotation_in_body
 from .soft import SoftSurface, is_soft, soft_names
 
 # The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.

@@ -15,14 +15,15 @@ from ripple_sim.solver import Material
 from ripple_sim.solver.errors import checked, warn_caller, whole
 from ripple_sim.solver.operator.plate_rim import Rim
 
+from .collision_geoms import named_collision_geoms
 from .easing import Easing, bodies_of, easing_warning
 from .energy import Energy, body_energy
-from .geoms import ByGeom, GeomKey, for_each, named_collision_geoms, own_data, own_model, target_name
+from .geoms import ByGeom, GeomKey, for_each, target_name
 from .hertz import Hits, hertz_moduli
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
+from .own_model import own_data, own_model
 from .soft import HighPass
-from .step_checks import TunnellingCheck
 from .stepping import (
     IN_TURN_WARNING,
     NO_RESET,
@@ -38,6 +39,7 @@ from .stepping import (
 )
 from .target_warnings import AmplitudeCheck, collision_warnings
 from .targets import Targets
+from .tunnelling import TunnellingCheck
 from .two_way import TwoWay, require_suited_options
 
 __all__ = ["Impulse", "Ripples"]

@@ -23,9 +23,10 @@ from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
+from .collision_geoms import ENDLESS
 from .contacts import collider_ids, pair_rows, places_facing, points_outside
 from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
-from .geoms import ENDLESS, TARGET_TYPES
+from .geoms import TARGET_TYPES
 from .model import CoupledModel
 from .patches import MAX_CORNERS, SAME_PLACE
 from .sleep import SLEEP, at_rest, sleeping_dofs, wake

@@ -7,7 +7,7 @@ from .clip import (
     Stream as Stream,
     join_clips as join_clips,
 )
-from .images import PassFiles as PassFiles, check_passes as check_passes, join_gif as join_gif, join_webp as join_webp
+from .gif import join_gif as join_gif
 from .output import (
     ENDINGS as ENDINGS,
     FORMATS as FORMATS,
@@ -20,10 +20,12 @@ from .output import (
     video_format as video_format,
 )
 from .part import STATES as STATES, Part as Part
+from .passes import PassFiles as PassFiles, check_passes as check_passes
 from .replace import (
     MARK as MARK,
     made_here as made_here,
     move as move,
     png_mark as png_mark,
 )
+from .webp import join_webp as join_webp
 from .writer import FrameWriter as FrameWriter, open_writer as open_writer

@@ -20,8 +20,10 @@ from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.files import NO_NAME, final_path
 
 from .clip import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips
-from .images import check_exr, join_gif, join_webp, write_exr
+from .exr import check_exr, write_exr
+from .gif import join_gif
 from .replace import MARK, is_plain, made_here, png_mark
+from .webp import join_webp
 
 FRAMES_IN_CLIP = 48  # as many may be lost when a render is killed; each clip begins with a key frame
 

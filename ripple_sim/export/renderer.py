@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import surface_of
 from ripple_sim.capture.snapshot import ShownWaves, drawn_heights
-from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, own_model, posed
+from ripple_sim.coupling.geoms import ByGeom, by_name
+from ripple_sim.coupling.own_model import check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RenderError, SceneError
 from ripple_sim.render import AnyHeightMap, Camera, FixedCamera, Renderer

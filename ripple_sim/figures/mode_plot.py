@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ripple_sim.render.visuals.corners import corner_normals
 from ripple_sim.solver import Atlas, Modes, texel_atlas
 from ripple_sim.solver.mesh.queries import RayScene
-from ripple_sim.solver.texels.topology import sampling_matrix
+from ripple_sim.solver.texels.halo import sampling_matrix
 
 from .atlas_plot import STRETCH_COLORS, TEXT, AtlasPainter, View, check_plot_path, dressed, save_plot, show
 

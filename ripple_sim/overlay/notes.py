@@ -23,9 +23,9 @@ from ripple_sim.coupling.energy import Energy
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 from ripple_sim.render.tone_mapping import linear_to_srgb
-from ripple_sim.scene.scene import Request
+from ripple_sim.scene.overlays import Request
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.texels.topology import with_filled_halo
+from ripple_sim.solver.texels.halo import with_filled_halo
 from ripple_sim.solver.waves.sensor import UNITS, Sensor
 
 from .marks import ContactMarks, Mark

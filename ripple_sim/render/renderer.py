@@ -20,8 +20,8 @@ from ripple_sim.render.visuals.lights import SceneLight, in_studio
 from ripple_sim.render.visuals.objects import Assets
 from ripple_sim.render.visuals.surroundings import RenderFlags
 from ripple_sim.solver.errors import RippleError, warn_caller
-from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.memory import require_memory
 
 from .camera import Pose, Viewpoint, boxes_of, enclosing, within
 from .drawn_scene import DrawnScene

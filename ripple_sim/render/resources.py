@@ -18,7 +18,7 @@ from PIL import Image
 
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.texels.topology import ChartPage
+from ripple_sim.solver.texels.chart_page import ChartPage
 from ripple_sim.solver.waves.height_map import DeviceHeightMap
 
 from .camera import Pose, view_matrix
@@ -93,16 +93,17 @@ class Resources:
 
     def _reset_framebuffers(self) -> None:
         """Undo what passes set for a while: masks, scissors, viewports, and the reflection's winding."""
-        all_channels = (True,) * 4
+        all_channels = (True, True, True, True)
         with self.gl as ctx:
             ctx.front_face = "ccw"
             for created in self._created:
                 if isinstance(created, moderngl.Framebuffer):
-                    count = len(created.color_attachments)
-                    created.color_mask = all_channels if count == 1 else [all_channels] * count
-                    created.depth_mask = True
-                    created.scissor = None
-                    created.viewport = (0, 0, *created.size)
+                    framebuffer: Any = created  # moderngl's own hints say less than it takes
+                    count = len(framebuffer.color_attachments)
+                    framebuffer.color_mask = all_channels if count == 1 else [all_channels] * count
+                    framebuffer.depth_mask = True
+                    framebuffer.scissor = None
+                    framebuffer.viewport = (0, 0, *framebuffer.size)
 
     def _own(self, created: Any) -> Any:
         self._created.append(created)

@@ -35,19 +35,13 @@ from .material_entry import (
     MaterialEntry as MaterialEntry,
     PresetEntry as PresetEntry,
 )
+from .overlays import HEATMAPS as HEATMAPS, NAMES as NAMES, Request as Request, parse_request as parse_request
 from .paint import load_image as load_image, mesh_image as mesh_image, paint_target as paint_target
 from .scene import (
-    HEATMAPS as HEATMAPS,
     MAX_DURATION as MAX_DURATION,
     MAX_SLOW_MOTION as MAX_SLOW_MOTION,
-    NAMES as NAMES,
-    Request as Request,
     Scene as Scene,
     check_duration as check_duration,
-    parse_request as parse_request,
-    read_toml as read_toml,
-    scene_path as scene_path,
-    shipped_scenes as shipped_scenes,
     through_camera as through_camera,
     with_exposure as with_exposure,
 )
@@ -62,6 +56,7 @@ from .scene_file import (
     parse_scene as parse_scene,
     uniform_material as uniform_material,
 )
+from .source import read_toml as read_toml, scene_path as scene_path, shipped_scenes as shipped_scenes
 from .target_maps import (
     HeightEntry as HeightEntry,
     InsideEntry as InsideEntry,

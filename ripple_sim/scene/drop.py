@@ -24,8 +24,9 @@ from .events import Events
 from .loading import Edit, load_scene, refusal_of
 from .material_entry import COEFFICIENTS, MaterialEntry
 from .paint import paint_target
-from .scene import Scene, scene_path, shipped_scenes
+from .scene import Scene
 from .scene_file import CameraEntry, RippleEntry
+from .source import scene_path, shipped_scenes
 
 UP_AXES = ("y", "z")
 

@@ -21,20 +21,24 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.geoms import find_target, named_collision_geoms, own_model, target_name
+from ripple_sim.coupling.collision_geoms import named_collision_geoms
+from ripple_sim.coupling.geoms import find_target, target_name
+from ripple_sim.coupling.own_model import own_model
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.coupling.suited import typical_hit
 from ripple_sim.coupling.targets import site_on
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, warn_caller
-from ripple_sim.solver.files import open_image
+from ripple_sim.solver.images import open_image
 from ripple_sim.solver.layouts.build import LAYOUTS
 
 from .bodies import RandomEntry, randomize
 from .events import DropEntry, Events, Script, ThrowEntry
 from .material_entry import PresetEntry, given_fields
-from .scene import Scene, check_duration, parse_request, read_toml, scene_path
+from .overlays import parse_request
+from .scene import Scene, check_duration
 from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
+from .source import read_toml, scene_path
 from .target_maps import check_rim
 
 

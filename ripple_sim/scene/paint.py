@@ -19,7 +19,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.render.tone_mapping import linear_to_srgb
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.errors import warn_caller
-from ripple_sim.solver.files import read_image
+from ripple_sim.solver.images import read_image
 
 _SCENES = (".glb", ".gltf")
 

@@ -24,13 +24,14 @@ from ripple_sim.capture.snapshot import Snapshot, snapshots
 from ripple_sim.coupling.geoms import geom_name
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.encode import FrameWriter, open_writer
-from ripple_sim.encode.images import PassFiles
 from ripple_sim.encode.part import Settings
+from ripple_sim.encode.passes import PassFiles
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay.notes import TITLES, Notebook, Notes, color_table, compared_operators, grid_spacing
 from ripple_sim.overlay.panels import Layout, Painter, PlacedMark, Projection, draw_marks, place_marks
 from ripple_sim.render import Surface
-from ripple_sim.scene.scene import Scene, parse_request, with_exposure
+from ripple_sim.scene.overlays import parse_request
+from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance, user_line, work_for
 from ripple_sim.solver.gl import GLContext, shared_context

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.geoms import own_data, own_model
+from ripple_sim.coupling.own_model import own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.coupling.soft import first_flex, first_skin, is_soft, target_pose
 from ripple_sim.errors import DisplayError, SceneError

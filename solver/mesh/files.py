@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import PATH, MeshError, checked
-from ..files import require_memory
+from ..memory import require_memory
 from .clean import counted, place
 from .mesh import Mesh, many_parts
 from .ply import Soup, read_ply, too_small, triangulate

@@ -30,6 +30,7 @@ from .chart_map import (
     texture_coordinates as texture_coordinates,
     uncut as uncut,
 )
+from .chart_page import ChartPage as ChartPage
 from .detours import link_detours as link_detours
 from .distance import (
     clean as clean,
@@ -39,6 +40,7 @@ from .distance import (
     march as march,
     seeded as seeded,
 )
+from .halo import fill_halo as fill_halo, sampling_matrix as sampling_matrix, with_filled_halo as with_filled_halo
 from .maps import texture_map as texture_map, vertex_map as vertex_map
 from .moving import (
     MovedPlaces as MovedPlaces,
@@ -59,6 +61,7 @@ from .stencil import (
     stiffness_matrix as stiffness_matrix,
 )
 from .stiffness import LEAST_RATIO as LEAST_RATIO, TexelCells as TexelCells
+from .stretch import QUANTILES as QUANTILES, stretch_summary as stretch_summary
 from .texel_mesh import (
     TexelGrid as TexelGrid,
     TexelMesh as TexelMesh,
@@ -74,13 +77,4 @@ from .thickness import (
     medial_radius as medial_radius,
     thickness_map as thickness_map,
 )
-from .topology import (
-    QUANTILES as QUANTILES,
-    ChartPage as ChartPage,
-    TexelTopology as TexelTopology,
-    fill_halo as fill_halo,
-    glue as glue,
-    sampling_matrix as sampling_matrix,
-    stretch_summary as stretch_summary,
-    with_filled_halo as with_filled_halo,
-)
+from .topology import TexelTopology as TexelTopology, glue as glue

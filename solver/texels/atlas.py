@@ -23,8 +23,8 @@ from ..files import atomic_write, final_path
 from ..mesh.mesh import Mesh
 from ..mesh.queries import ClosestPoints
 from .chart_map import ChartMap, LinearChartMap, TextureCoordinates, texture_coordinates
+from .halo import sampling_matrix
 from .texel_mesh import TexelMesh, texel_quality
-from .topology import sampling_matrix
 
 
 def write_arrays(file: BinaryIO, arrays: dict[str, NDArray]) -> None:

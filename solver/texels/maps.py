@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError
-from ..files import read_image
+from ..images import read_image
 from .atlas import Atlas
 
 _CHANNELS = {"red": 0, "green": 1, "blue": 2, "alpha": 3}

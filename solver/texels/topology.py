@@ -4,22 +4,18 @@ A chart is a square of n x n texels. Its sides are numbered counter-clockwise, s
 runs from corner s to corner s + 1, so that corner 0 lies south-west. Two charts that share a side run along it in
 opposite directions, as on any oriented surface. Each chart has a halo, copies of the texels beyond its border, so that
 fields can be read, and interpolated, across sides; corners of other than four charts are cells of their own.
-
-A page holds all charts, each with its halo, in one rectangle: one texture then holds any number of them.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from ..errors import AtlasError
-from ..kernel import Bools, Floats, Floats32, Ints
+from ..kernel import Bools, Ints
 
 # A corner where so many charts meet is a triangle or a quad of the nine-point stencil.
 TRIANGLE, QUAD = 3, 4
@@ -199,103 +195,3 @@ def _along_sides(along: Ints, width: int) -> Ints:
     """Flat places along each side of a square of so many rows and columns, [4, n]."""
     last = width - 1
     return np.stack([along, along * width + last, last * width + last - along, (last - along) * width])
-
-
-def fill_halo(topology: TexelTopology, field: NDArray) -> None:
-    """Fill in the halo of a field [C, n + 2, n + 2, ...] from its texels.
-
-    Where no texel lies, in corners of other than four charts, comes the mean of the three next to it: bilinear
-    interpolation is then continuous where three charts meet. Beyond a rim the last texels are repeated.
-    """
-    _, ghosts, sources = topology.addresses
-    flat = field.reshape(topology.halo.size, *field.shape[3:])
-    flat[ghosts] = flat[sources]
-    last = field.shape[1] - 1
-    for r, r_in in ((0, 1), (last, last - 1)):
-        for c, c_in in ((0, 1), (last, last - 1)):
-            missing = topology.halo[:, r, c] < 0
-            mean = (field[:, r_in, c_in] + field[:, r_in, c] + field[:, r, c_in]) / field.dtype.type(3)
-            field[missing, r, c] = mean[missing]
-
-
-def with_filled_halo(topology: TexelTopology, field: Floats32) -> Floats32:
-    """A field [C, n, n, ...] surrounded by its halo; see `fill_halo`."""
-    around = topology.with_halo(field)
-    fill_halo(topology, around)
-    return around
-
-
-def sampling_matrix(topology: TexelTopology, chart: Ints, row: Floats, column: Floats) -> csr_array:
-    """Matrix that takes a flattened field [C n^2] to its values at chart points, each [k]; see `Atlas.locate`.
-
-    In a corner where other than four charts meet the weight of the texel that is missing is shared out.
-    """
-    r, c = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
-    s, t = row - r, column - c
-    i, j = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, :, None]
-    texel = topology.halo[chart, r + 1 + i, c + 1 + j]
-    share = np.where(texel < 0, 0, [(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t])
-    share /= share.sum(axis=0)
-    places = np.tile(np.arange(len(chart)), 4), np.maximum(texel, 0).ravel()
-    return csr_array((share.ravel(), places), shape=(len(chart), topology.texel_count))
-
-
-QUANTILES = {"q001": 0.001, "q01": 0.01, "q50": 0.5, "q99": 0.99, "q999": 0.999}
-STARVED = 4.0
-
-
-def stretch_summary(stretch: Floats, areas: Floats) -> dict[str, float]:
-    """Quantiles of the stretch over the real areas, both [m], and the starved share; see `Atlas.quality`."""
-    order = np.argsort(stretch, kind="stable")
-    share = np.cumsum(areas[order]) / areas.sum()
-    at = np.minimum(np.searchsorted(share, list(QUANTILES.values())), len(order) - 1)
-    starved = float(areas[stretch > STARVED].sum() / areas.sum())
-    return {**dict(zip(QUANTILES, stretch[order][at].tolist(), strict=True)), "starved": starved}
-
-
-@dataclasses.dataclass(frozen=True)
-class ChartPage:
-    """Rows of charts with a halo of one texel.
-
-    Attributes
-    ----------
-    charts : int
-        How many, C.
-    resolution : int
-        Texels along a chart's side, n.
-    """
-
-    charts: int
-    resolution: int
-
-    @property
-    def block(self) -> int:
-        """Texels along a side of a chart with its halo."""
-        return self.resolution + 2
-
-    @property
-    def columns(self) -> int:
-        """Charts side by side."""
-        return math.ceil(math.sqrt(self.charts))
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of the page [texels]."""
-        rows = -(-self.charts // self.columns)
-        return self.columns * self.block, rows * self.block
-
-    def corner(self, chart: int) -> tuple[int, int]:
-        """Column and row of the page's texel in which a chart's halo begins."""
-        row, column = divmod(chart, self.columns)
-        return column * self.block, row * self.block
-
-    def locate(self, places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Chart, row and column of places [k, 2] on the page, each [k]; 0.0 is the centre of the first texel."""
-        block = np.floor(places / self.block).astype(np.int64)
-        column, row = (places - block * self.block - 1.5).T
-        return block[:, 1] * self.columns + block[:, 0], row, column
-
-    def places(self, chart: NDArray[np.int64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Places on the page [k, 2], in texels from its corner, of places [k, 2] in charts [k], 0 to 1."""
-        row, column = np.divmod(chart, self.columns)
-        return np.stack([column, row], axis=1) * self.block + 1.0 + self.resolution * uv

@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 from ..backends.gl_fields import DeviceField, bind_buffers
 from ..cache import kept_with
 from ..errors import SolverError
-from ..files import require_memory
 from ..gl import GLContext
 from ..kernel import Floats32, kernel
+from ..memory import require_memory
 from ..texels.atlas import Atlas
+from ..texels.chart_page import ChartPage
+from ..texels.halo import fill_halo
 from ..texels.texel_mesh import TexelMesh
 from ..texels.thickness import LEAST, medial_radius
-from ..texels.topology import ChartPage, TexelTopology, fill_halo
+from ..texels.topology import TexelTopology
 
 # Of the medial radius: heights up to the first share are drawn as they are, and none beyond the second.
 FREE, MOST = 0.25, 0.6

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..backends.backend import make_backend
 from ..backends.gl_fields import DeviceField
 from ..errors import SolverError, checked, instance
-from ..files import require_memory
+from ..memory import require_memory
 from ..operator.assembly import build_operator
 from ..operator.material import Material, warn_of_wavelengths
 from ..operator.plate_rim import Rim

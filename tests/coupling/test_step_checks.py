@@ -10,7 +10,7 @@ from hits import contact_forces
 from mujoco_models import BALL, mesh_asset, model_of
 
 from ripple_sim import Material, Ripples, RippleWarning, make_collidable
-from ripple_sim.coupling import PAIR, CoupledModel, TunnellingCheck, step_checks, too_fast
+from ripple_sim.coupling import PAIR, CoupledModel, TunnellingCheck, too_fast, tunnelling
 from ripple_sim.scenes.shapes import peanut
 
 MASS, DT = 1e-5, 0.001
@@ -234,8 +234,8 @@ def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: s
 
 def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
     flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
-    assert sum(int(flag) for flag in flags) == step_checks.SPECULATIVE
-    monkeypatch.setattr(step_checks, "SPECULATIVE", 1 << 20)
+    assert sum(int(flag) for flag in flags) == tunnelling.SPECULATIVE
+    monkeypatch.setattr(tunnelling, "SPECULATIVE", 1 << 20)
     model, data, check = watched(f"<worldbody>{PLATE}{SHOT.format(0.2)}</worldbody>")
     data.qvel[2] = -60
     mujoco.mj_forward(model, data)

@@ -16,8 +16,10 @@ from PIL import Image
 
 from ripple_sim.scene import check_files, load_image, mesh_image
 from ripple_sim.solver import AtlasError, HeightMap, Mesh, RippleError, SolverError, WaveSolver, load_mesh, sphere_atlas
-from ripple_sim.solver.files import atomic_write, read_image, require_memory, rooms
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.solver.images import read_image
 from ripple_sim.solver.layouts import build_atlas
+from ripple_sim.solver.memory import require_memory, rooms
 from ripple_sim.solver.texels import texture_map
 
 
@@ -112,7 +114,7 @@ def test_the_limits_of_cgroups_and_of_those_above_count(version: str, tmp_path: 
 
 def test_where_nothing_is_known_nothing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert list(rooms(tmp_path)) == []
-    monkeypatch.setattr("ripple_sim.solver.files.rooms", lambda: iter(()))
+    monkeypatch.setattr("ripple_sim.solver.memory.rooms", lambda: iter(()))
     require_memory(SolverError, 1e15, "this", "do that")
 
 
@@ -228,10 +230,10 @@ def test_a_jpeg_beyond_the_limit_is_read_at_a_smaller_scale(tmp_path: Path, monk
 
 
 def test_an_image_that_does_not_fit_into_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from ripple_sim.solver import files
+    from ripple_sim.solver import memory
 
     (tmp_path / "large.png").write_bytes(png(10_000, 10_000))
-    monkeypatch.setattr(files, "rooms", lambda: iter([(5e8, "a small machine")]))
+    monkeypatch.setattr(memory, "rooms", lambda: iter([(5e8, "a small machine")]))
     with pytest.raises(SolverError, match=r"large\.png' of 10000x10000 pixels takes 1\.20 GB .* leaves 0\.50"):
         read_image(SolverError, tmp_path / "large.png", "image", lambda mode: "RGB")
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ripple_sim.render.contract import Binding
 from ripple_sim.render.resources import Resources
 from ripple_sim.solver.kernel import Floats, Floats32, Ints32, kernel
-from ripple_sim.solver.texels.topology import ChartPage
+from ripple_sim.solver.texels.chart_page import ChartPage
 
 from .tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from .vertices import SurfaceVertices

@@ -21,7 +21,7 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.mesh.topology import undirected
 from ripple_sim.solver.texels.chart_map import ChartMap
-from ripple_sim.solver.texels.topology import ChartPage
+from ripple_sim.solver.texels.chart_page import ChartPage
 
 from .tessellation import COORDINATES, NORMAL, POSITION
 

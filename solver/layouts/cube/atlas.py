@@ -23,8 +23,8 @@ from ...mesh.vectors import cross, dot
 from ...texels.atlas import Atlas, check_points, triangles_of
 from ...texels.chart_map import Parts, barycentrics_at, uncut
 from ...texels.detours import link_detours
+from ...texels.stretch import stretch_summary
 from ...texels.texel_mesh import TexelMesh
-from ...texels.topology import stretch_summary
 from ..sphere_map import certify, stretch
 from .convention import (
     CHART_U,

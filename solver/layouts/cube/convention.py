@@ -20,8 +20,8 @@ import numbers
 import numpy as np
 
 from ...errors import AtlasError
-from ...files import require_memory
 from ...kernel import Floats, Ints, log
+from ...memory import require_memory
 from ...mesh.mesh import Mesh
 from ...mesh.vectors import cross, dot
 from ...texels.chart_map import Parts, texel_areas

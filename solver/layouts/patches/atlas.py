@@ -14,8 +14,9 @@ from ...mesh.mesh import Mesh
 from ...texels.atlas import Atlas
 from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, texel_areas, uncut
 from ...texels.detours import link_detours
+from ...texels.stretch import stretch_summary
 from ...texels.texel_mesh import TexelMesh
-from ...texels.topology import TexelTopology, glue, stretch_summary
+from ...texels.topology import TexelTopology, glue
 from ..energy import COLUMN, FIXED
 from .disks import signed_areas
 from .layout import PatchMap, patch_map

@@ -1,0 +1,129 @@
+"""Models and data as users give them: taken out of other libraries' wrappers, and checked to belong together."""
+
+from __future__ import annotations
+
+import copy
+import operator
+from collections.abc import Mapping
+from typing import Any
+from weakref import WeakKeyDictionary, WeakSet
+
+import mujoco
+import numpy as np
+
+from ripple_sim.errors import SceneError
+
+from .geoms import target_name
+
+# Numbers that two models of one signature share.
+_SIZES = ("nq", "nv", "nu", "nbody", "ngeom")
+
+
+# Beginnings of the names of the arrays that say what is where and of what shape, and of those that say how it moves and
+# collides; and endings of those that only say how it looks.
+_SHAPES = (
+    "body_parentid", "geom_type", "geom_size", "geom_bodyid", "geom_dataid", "geom_pos", "geom_quat", "mesh_vert",
+    "mesh_face", "flex_vert", "flex_elem", "skin_vert", "skin_face",
+)  # fmt: skip
+
+
+_DYNAMICS = ("body_", "jnt_", "dof_", "geom_", "mesh_", "flex_", "skin_")
+
+
+_LOOKS = ("_rgba", "_matid", "_group", "_user")
+
+
+# Models that were found to be copies of one another stay so, whatever is changed in them later.
+_copies: WeakKeyDictionary[mujoco.MjModel, WeakSet[mujoco.MjModel]] = WeakKeyDictionary()
+
+
+# Of physics [s]: no contact is met in longer ones.
+_LONGEST_STEP = 1.0
+
+
+def own_model(model: Any) -> mujoco.MjModel:
+    """MuJoCo's model itself, also of dm_control's wrapper.
+
+    Raises `SceneError` if it is something else, or has a time step, a place, a size, a mass or a gravity out of range.
+    """
+    found = getattr(model, "ptr", model)
+    if not isinstance(found, mujoco.MjModel):
+        raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's")
+    if not 0 < found.opt.timestep <= _LONGEST_STEP:
+        raise SceneError(
+            f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 and up to "
+            f"{_LONGEST_STEP:g}, such as 0.002 (<option timestep=...>)"
+        )
+    for name in ("opt.gravity", "opt.wind", "body_pos", "body_quat", "body_mass", "geom_pos", "geom_size", "qpos0"):
+        values = operator.attrgetter(name)(found)
+        wrong = values[~(np.abs(values) <= mujoco.mjMAXVAL)]  # NaN, too
+        if len(wrong):
+            raise SceneError(f"the model's {name} holds {wrong[0]:g}; valid are numbers up to {mujoco.mjMAXVAL:g}")
+    return found
+
+
+def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco.MjData:
+    """MuJoCo's data itself, also of dm_control's wrapper.
+
+    Its model is `model`, whatever was changed there since, or a copy in which bodies move and collide alike. Where it
+    is only `drawn`, they need not: shapes and places have to do. Raises `SceneError` if it is something else, or
+    belongs to another model.
+    """
+    found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
+    if not isinstance(found, mujoco.MjData):
+        raise SceneError(f"data is {type(data).__name__}; valid is a mujoco.MjData, or dm_control's")
+    other = found.model
+    if other is model or other in _copies.get(model, ()):
+        return found
+    kinds = _SHAPES if drawn else _DYNAMICS
+    if found.signature and model.signature:
+        differing = "signature" if found.signature != model.signature else _differing(model, other, kinds)
+    else:  # MuJoCo drops signatures in pickling, and gives the data a model of its own: then sizes have to do
+        differing = "sizes" if _sizes(other) != _sizes(model) else None
+    if differing:
+        raise SceneError(
+            f"data belongs to another model ({_sizes(other)}) than that of the ripples ({_sizes(model)}), of another "
+            f"{differing}: give step the data of the latter, mujoco.MjData(model), or make new Ripples for the former"
+        )
+    if not drawn:
+        _copies.setdefault(model, WeakSet()).add(other)
+    return found
+
+
+def check_targets(model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping[str, int]) -> None:
+    """Make sure that targets, by name their geom ids in the `other` model, are those of a model that is to be drawn.
+
+    Raises `SceneError` if any geom has another shape or place, or a target another name.
+    """
+    if model is other:
+        return
+    differing = _differing(model, other, _SHAPES)
+    if differing is None and any(target_name(model, geom) != name for name, geom in targets.items()):
+        differing = "names of geoms"
+    if differing:
+        raise SceneError(
+            f"the ripples belong to another model ({_sizes(other)}) than the one to be drawn ({_sizes(model)}), of "
+            f"another {differing}: draw ripples.model, or make new Ripples for the latter"
+        )
+
+
+def posed(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
+    """The data, or where no poses were ever computed a copy with those of its `qpos`, as `mj_forward` computes them."""
+    if data.xquat[0].any():  # that of the world
+        return data
+    data = copy.copy(data)
+    for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex):
+        compute(model, data)
+    return data
+
+
+def _differing(model: mujoco.MjModel, other: mujoco.MjModel, kinds: tuple[str, ...]) -> str | None:
+    """Name of the first array in which two models differ, of those whose names begin so."""
+    names = (name for name in dir(model) if name.startswith(kinds) and not name.endswith(_LOOKS))
+    return next((name for name in names if not np.array_equal(getattr(model, name), getattr(other, name))), None)
+
+
+def _sizes(model: mujoco.MjModel) -> str:
+    """What tells models apart: name, and how much they have of everything."""
+    name = model.names.split(b"\0", 1)[0].decode()
+    return ", ".join([repr(name), *(f"{size} {getattr(model, size)}" for size in _SIZES)])
