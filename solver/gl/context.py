@@ -145,7 +145,8 @@ def create_context(device: int | None) -> moderngl.Context:
     Without a `device` it is on the one that the environment variable MUJOCO_EGL_DEVICE_ID names, as MuJoCo's own
     renderer is, and where that is not set either on the first that yields a context.
     """
-    _check_system()
+    if not sys.platform.startswith("linux"):
+        raise GLError(f"no OpenGL over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'")
     with current_kept():
         return _create_current(device)
 
@@ -162,11 +163,6 @@ def _device_of_environment() -> int | None:
             f"{_MUJOCO_DEVICE} must be the number of an EGL device, counted from 0, got {text!r}; "
             "unset it to take the first that works"
         ) from None
-
-
-def _check_system() -> None:
-    if not sys.platform.startswith("linux"):
-        raise GLError(f"no OpenGL over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'")
 
 
 def _create_current(device: int | None) -> moderngl.Context:
@@ -255,9 +251,9 @@ class GLContext:
         # uniforms that they began with
         self._idle: dict[int, Any] = {}
         self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
-        _check_system()
         with current_kept():
-            self._ctx = _create_current(device)
+            self._ctx = create_context(device)
+            self._ctx.__enter__()
             self._find_driver()
 
     def _find_driver(self) -> None:
