@@ -188,7 +188,8 @@ OBJECT = Struct(
     "Object",
     base="vec4",  # roughness, metallic, sheen, coat
     volume="vec4",  # translucency, transparency, emission, opacity
-    place="vec4",  # geom, size [m], shadow bias [m], 1 where its colours are those of a heatmap
+    # geom, size [m], shadow bias [m]; 1: colours are those of a heatmap, -1: a sheet's back is lit as its front
+    place="vec4",
     # layer; 1 with a height map, 0 without; bits of the occluders near a geom; a chart's side with its halo [texels]
     height_map="vec4",
     rotation="mat3",  # of the height map's gradients, into the world

@@ -53,9 +53,9 @@ class SurfaceMesh:
     ----------
     numbers : list of int
         Its one number in the table of objects.
-    transparent, occludes, casts : bool
-        Whether the scene behind shows through; whether it hides the sky from what is below, and casts shadows, as every
-        target does.
+    transparent, blocks, occludes, casts : bool
+        Whether the scene behind shows through, and whether no light passes; whether it hides the sky from what is
+        below, and casts shadows, as every target does.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class SurfaceMesh:
         self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
         visual = geom_visual(assets.model, geom)
         look, _, mapping = appearance(assets.model, visual, surface)
-        self.transparent, self.occludes, self.casts = look.transparency > 0.0, True, True
+        self.occludes, self.casts, self.is_plane = True, True, False
         heatmap = surface.heatmap_colors is not None
         number = assets.objects.add(
             look, geom, identity=visual.identity, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block
@@ -103,10 +103,10 @@ class SurfaceMesh:
         moved = (displacement.moved, "4f", "in_moved")
         # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
         whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse))
-        solid = int(not self._open)
+        lens = int(not self._open and look.transparency > 0.0)
         self._casters = {
             seen: resources.vertex_array(
-                resources.program("passes/casters", MOVED=1, MAP=seen, SOLID=solid), [moved], triangles
+                resources.program("passes/casters", MOVED=1, MAP=seen, SOLID=lens), [moved], triangles
             )
             for seen, triangles in zip(CasterMap, (whole, coarse, self._indices), strict=True)
         }
@@ -116,9 +116,12 @@ class SurfaceMesh:
     def paint(self, visual: Visual) -> None:
         """Be painted as what it stands for."""
         look, rgb, mapping = appearance(self._assets.model, visual, self._surface)
-        self._objects.paint(self.numbers[0], look)
+        opacity = visual.opacity or 1.0  # what MuJoCo shows nothing of is drawn all the same
+        self._objects.paint(self.numbers[0], look, opacity)
+        self.transparent = look.transparency > 0.0 or opacity < 1.0
+        self.blocks = not self.transparent
         self._color = (*rgb, float(self.numbers[0]))
-        passing = look.transparency * rgb  # linear colour of the light that passes
+        passing = 1.0 - opacity + opacity * look.transparency * rgb  # linear colour of the light that passes
         self._casters[CasterMap.ALBEDO].program["color"] = tuple(rgb - passing)
         self._casters[CasterMap.TRANSMISSION].program["transmission"] = tuple(passing)
         if mapping.key != self._mapping.key:
@@ -302,9 +305,9 @@ class DrawnScene:
         self.opaque = [each for each in drawn if not each.transparent]
         self.transparent = [each for each in drawn if each.transparent]
         self._casters = {
-            CasterMap.DEPTH: [each for each in self.opaque if each.casts],
+            CasterMap.DEPTH: [each for each in drawn if each.casts and each.blocks],
             CasterMap.ALBEDO: [each for each in drawn if each.occludes],
-            CasterMap.TRANSMISSION: [each for each in self.transparent if each.casts],
+            CasterMap.TRANSMISSION: [each for each in drawn if each.casts and not each.blocks],
         }
 
     def target(self, geom: int) -> SurfaceMesh:
@@ -333,12 +336,14 @@ class DrawnScene:
         others = [ball_of(self._model, data, visual) for visual in (*self._others, *self._planes)]
         return np.concatenate([self._occluders.balls(data), *others, *(target.bounds() for target in self.targets)])
 
-    def casters(self, data: Any) -> NDArray[np.float64]:
-        """Balls that contain everything that may cast a shadow.
+    def casters(self, data: Any, largest: float = 0.0) -> NDArray[np.float64]:
+        """Balls that contain everything that may cast a shadow, but for planes larger than that radius [m].
 
         They do not change their size as a target turns, so that shadow maps stay as they are.
         """
         others = [ball_of(self._model, data, visual) for visual in self._others if visual.casts]
+        planes = [ball_of(self._model, data, visual) for visual in self._planes]
+        others += [ball for ball in planes if ball[0, 3] <= largest]
         return np.concatenate([self._occluders.balls(data), *others, *(target.ball() for target in self.targets)])
 
     def draw(self) -> None:
@@ -359,6 +364,8 @@ class DrawnScene:
         layers = [(each.bounds(data), each) for each in self.transparent]
 
         def distance(layer: tuple[NDArray[np.float64], SurfaceMesh | Instances]) -> float:
+            if layer[1].is_plane:  # behind all else, as in MuJoCo
+                return float("inf")
             offset = layer[0][:, :3].mean(axis=0) - pose.eye
             return float(-offset @ pose.rotation[:, 2] if pose.orthographic else np.linalg.norm(offset))
 

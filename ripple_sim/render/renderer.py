@@ -107,7 +107,7 @@ class Renderer:
             plane = find_floor(model, targets)
             self._floor = None if plane is None else Floor(assets, plane)
             self._scene = DrawnScene(assets, targets, size)
-            self._shown = ShownScene(model, targets, plane)
+            self._shown = ShownScene(model, targets, plane, cut_out=alpha)
             self._own_scene = mujoco.MjvScene(model, _MOST_GEOMS)
             self._told: set[str] = set()
             self._frame = FrameUniforms(resources)
@@ -140,18 +140,19 @@ class Renderer:
             mirror = Mirror(resources, self._format, floor, options)
         return _Passes(occlusion, shading, transmission, layers, mirror)
 
-    def _show(self, data: Any, scene: mujoco.MjvScene | None, segmented: bool = False) -> Any:
+    def _show(self, data: Any, scene: mujoco.MjvScene | None, pose: Pose, segmented: bool = False) -> Any:
         """Draw what a scene of MuJoCo's has, by default all that it shows of the data, with surfaces for the targets.
 
         Surfaces of targets that MuJoCo shows by default are drawn only if the scene has the target. What is `segmented`
-        has a `segid`. What is not drawn is told once. Return where geoms and sites are, as the scene has them.
+        has a `segid`. Planes are seen from the `pose`. What is not drawn is told once. Return where geoms and sites
+        are, as the scene has them.
         """
         shown, edited = self._shown, scene is not None
         if scene is None:
             scene, kinds = self._own_scene, int(mujoco.mjtCatBit.mjCAT_ALL)
             mujoco.mjv_updateScene(self._model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), kinds, scene)
         self._assets.refresh()
-        if shown.read(scene, segmented, self._assets):
+        if shown.read(scene, pose.position, segmented, self._assets, doubled=edited):
             self._scene.show(shown.visuals, shown.targets, shown.hidden)
             if self._floor is not None:
                 self._floor.shown = shown.floor is not None
@@ -273,7 +274,7 @@ class Renderer:
         """
         drawn, pose = self._scene, camera.pose()
         with self._gl as ctx, self._resources.drawing():
-            poses = self._show(data, scene)
+            poses = self._show(data, scene, pose)
             shading = self._shading
             drawn.update(ctx, poses, height_maps, pose)
             shading.clear(ctx)
@@ -332,7 +333,7 @@ class Renderer:
         with self._gl as ctx, self._resources.drawing():
             if self._buffers is None or self._buffers.size != size:
                 self._buffers = SurfaceBuffers(self._resources, size)
-            poses = self._show(data, scene, segmented)
+            poses = self._show(data, scene, pose, segmented)
             drawn.update(ctx, poses, height_maps, pose, sharp=scene is not None)
             self._update(data, poses, pose, 0, RenderFlags())
             drawn.height_maps.bind()
@@ -347,7 +348,7 @@ class Renderer:
         """Bring the frame's uniforms up to date; `poses` are those of geoms and sites."""
         frame, floor = self._frame, self._floor
         frame.set_camera(pose, self._format.aspect, self._scene.balls(poses))
-        casters = within(self._scene.casters(poses), pose.focus, _SHADOW_REACH * pose.distance)
+        casters = within(self._scene.casters(poses, pose.distance), pose.focus, _SHADOW_REACH * pose.distance)
         centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
         if floor is not None:
             floor.place(frame, poses, centre, radius)

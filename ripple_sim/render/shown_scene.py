@@ -11,6 +11,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import target_name
 from ripple_sim.coupling.model import find_flex_colliders
@@ -18,10 +19,12 @@ from ripple_sim.coupling.soft import is_soft
 
 from .visuals.geoms import shaped
 from .visuals.objects import Assets
-from .visuals.scene_entries import EntryPoses, content_of, identity_of, is_of_model, own_visual, visuals_in
+from .visuals.scene_entries import EntryPoses, content_of, identity_of, is_behind, is_of_model, own_visual, visuals_in
 from .visuals.shapes import NamedShape
 from .visuals.visual import Visual, geom_visual
 
+_OPAQUE = 0.995  # opacity from which MuJoCo draws something as opaque
+_FROM_BEHIND = 0.3  # opacity of planes that are seen from behind, over that from the front
 # Of the model's materials, what entries of a scene do not repeat.
 _MATERIALS = ("mat_texid", "mat_texrepeat", "mat_texuniform", "mat_roughness", "mat_metallic")
 
@@ -35,7 +38,9 @@ class ShownScene:
     targets : iterable of int
         Geom ids of the rippling surfaces, which are drawn in the place of their geoms.
     floor : int, optional
-        Geom id of the plane that is drawn as the floor.
+        Geom id of the plane that is drawn as the floor, where it is seen from above and opaque.
+    cut_out : bool
+        Whether it is drawn as the floor from above in any case, and not at all from below: only its shadows are left.
 
     Attributes
     ----------
@@ -51,8 +56,9 @@ class ShownScene:
         What is not drawn as the scene has it, in words.
     """
 
-    def __init__(self, model: Any, targets: Iterable[int], floor: int | None) -> None:
+    def __init__(self, model: Any, targets: Iterable[int], floor: int | None, cut_out: bool = False) -> None:
         self._model = model
+        self._cut_out = cut_out
         self._targets = {geom_visual(model, target).identity: target for target in targets}
         self._own = {target: geom_visual(model, target) for target in self._targets.values()}
         self._floor = None if floor is None else geom_visual(model, floor)
@@ -67,18 +73,27 @@ class ShownScene:
         self.hidden: list[int] = []
         self.left_out: set[str] = set()
 
-    def read(self, scene: mujoco.MjvScene, segmented: bool, assets: Assets) -> bool:
-        """Take in what a scene has; whether that is something else than before, but for poses.
+    def read(
+        self,
+        scene: mujoco.MjvScene,
+        eye: NDArray[np.float64],
+        segmented: bool,
+        assets: Assets,
+        doubled: bool = False,
+    ) -> bool:
+        """Take in what a scene has, seen from an eye [m]; whether that is something else than before, but for poses.
 
-        Of what is `segmented` there is only what has a number for it.
+        Of what is `segmented` there is only what has a number for it. With `doubled` what is transparent is as opaque
+        as in MuJoCo, which draws it twice.
         """
         entries = [each for each in scene.geoms[: scene.ngeom] if each.segid >= 0 or not segmented]
-        content: list[tuple[Any, ...]] = [content_of(each) for each in entries]
+        content: list[tuple[Any, ...]] = [(*content_of(each), is_behind(each, eye)) for each in entries]
         content.append((assets.version, *(getattr(self._model, name).tobytes() for name in _MATERIALS)))
         if content == self._content:
             self._place()
             return False
         self._content = content
+        self._eye, self._doubled = eye, doubled
         self._sort(scene, entries, assets.reshaped)
         return True
 
@@ -101,10 +116,14 @@ class ShownScene:
                 own[identity] = entry
             if first and identity in self._targets and self._ripples(entry):
                 self._take_target(self._targets[identity], entry)
-            elif first and self._floor is not None and identity == self._floor.identity:
-                self._take_floor(entry)
+            elif first and self._is_floor(entry):
+                self.floor = own_visual(self._model, entry)
+            elif self._cut_out and self._floor is not None and identity == self._floor.identity:
+                continue
             elif identity not in self._colliders:
-                found = visuals_in(self._model, scene, entry, not first, reshaped)
+                found = [
+                    self._as_seen(each, entry) for each in visuals_in(self._model, scene, entry, not first, reshaped)
+                ]
                 visuals += found
                 if len(found) == 1 and found[0].pose is not None and found[0].corners is None:
                     self._placed.append((found[0], entry))
@@ -135,16 +154,24 @@ class ShownScene:
     def _take_target(self, target: int, entry: mujoco.MjvGeom) -> None:
         paint: dict[str, Any] = {"rgba": np.array(entry.rgba, dtype=np.float64), "material": int(entry.matid)}
         if is_soft(self._model, target):
-            self.targets[target] = replace(geom_visual(self._model, target), **paint)
+            visual = replace(geom_visual(self._model, target), **paint)
         else:
-            self.targets[target] = own_visual(self._model, entry)
-        if entry.rgba[3] < self._own[target].opacity:
-            self.left_out.add("transparency of rippling surfaces and of the floor")
+            visual = own_visual(self._model, entry)
+        self.targets[target] = self._as_seen(visual, entry)
 
-    def _take_floor(self, entry: mujoco.MjvGeom) -> None:
-        self.floor = own_visual(self._model, entry)
-        if self._floor is not None and entry.rgba[3] < self._floor.opacity:
-            self.left_out.add("transparency of rippling surfaces and of the floor")
+    def _is_floor(self, entry: mujoco.MjvGeom) -> bool:
+        """Whether an entry is the floor, and drawn as such."""
+        if self._floor is None or identity_of(entry) != self._floor.identity:
+            return False
+        return not is_behind(entry, self._eye) and (self._cut_out or entry.rgba[3] >= _OPAQUE)
+
+    def _as_seen(self, visual: Visual, entry: mujoco.MjvGeom) -> Visual:
+        """A visual with the opacity with which MuJoCo shows it: less of planes from behind."""
+        behind = is_behind(entry, self._eye)
+        opacity = float(visual.rgba[3]) * (_FROM_BEHIND if behind else 1.0)
+        if self._doubled and opacity < _OPAQUE:
+            opacity = 1.0 - (1.0 - opacity) ** 2
+        return replace(visual, behind=behind, shown_opacity=opacity)
 
 
 def _name_of(kind: int) -> str:

@@ -168,7 +168,6 @@ def mujocos(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", unrippled.WORLDS)
-@pytest.mark.filterwarnings("ignore:not drawn. transparency of rippling")
 def test_without_ripples_depth_and_segmentation_are_mujocos(mujocos, name):
     model, data = unrippled.state_of(name)
     ripples = Ripples(model, {"target": Material()}, resolution=16, backend="cpu")
@@ -197,18 +196,45 @@ def test_lights_and_surroundings_are_mujocos(mujocos, name):
     theirs, there = mujocos[f"colours {name}"].astype(float), mujocos[f"shown {name}"]
     same = (shown == there).all(axis=2)
     around = same & (shown[..., 0] == -1)
-    assert around.sum() > 2000
-    np.testing.assert_allclose(colours[around].mean(axis=0), theirs[around].mean(axis=0), atol=3.0)
+    assert same.mean() > 0.99
+    if around.any():
+        np.testing.assert_allclose(colours[around].mean(axis=0), theirs[around].mean(axis=0), atol=3.0)
     if name in ("headlight", "lamp", "no skybox"):
         assert not colours[around].any()
     if name in ("haze", "fog"):
         at_horizon = slice(24, 36)
         rows = np.abs(colours[at_horizon].mean(axis=1) - theirs[at_horizon].mean(axis=1))
         assert rows.max() < 30.0
-    for geom in range(3):  # light adds up in linear light here, so that what faces it aslant is brighter
+    for geom in set(there[same][:, 0].tolist()) - {
+        -1
+    }:  # light adds up in linear light here, so that what faces it aslant is brighter
         ours, other = (each[same & (shown[..., 0] == geom)].mean(axis=0) for each in (colours, theirs))
         np.testing.assert_allclose(ours, other, atol=60.0)
         assert (ours[other < 1.0] < 8.0).all()  # no light of a colour that the lamps lack
+
+
+def test_a_transparent_target_shows_what_is_behind_it_whenever_its_opacity_is_set(egg):
+    """Twice blended, as in MuJoCo: where 40 % pass, 16 % of what is behind are seen."""
+    model, data = posed(
+        MODEL.replace(
+            "</worldbody>",
+            """<geom type="box" size="2 .1 2" pos="0 1 0" rgba="0 0 1 1"/>
+        <light pos="0 -3 3" dir="0 1 -1"/></worldbody>""",
+        )
+    )
+    ripples = Ripples(model, {"egg": Material()}, resolution=16, backend="cpu")
+    seen = []
+    with RippleRenderer(model, ripples, 72, 96, looks={"egg": "model"}) as renderer:
+        for opacity in (1.0, 0.6, 0.2, 1.0):
+            model.geom_rgba[0, 3] = opacity
+            seen.append(renderer.render(data, "side")[30:42, 42:54].mean(axis=(0, 1)))
+        renderer.enable_segmentation_rendering()
+        assert (renderer.render()[36, 48] == [0, mujoco.mjtObj.mjOBJ_GEOM]).all()
+    solid, slightly, mostly, again = seen
+    np.testing.assert_array_equal(solid, again)
+    wall = (mostly - (1 - 0.8**2) * solid) / 0.8**2
+    np.testing.assert_allclose(slightly, (1 - 0.4**2) * solid + 0.4**2 * wall, atol=4.0)
+    assert wall[2] > 1.4 * wall[0] and mostly[2] > slightly[2] > solid[2]
 
 
 def test_ripples_show_in_depth_and_segmentation(egg):

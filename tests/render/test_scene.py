@@ -15,7 +15,7 @@ XML = """<mujoco><worldbody>
 <geom name="far" type="box" size=".2 .2 .2" pos="0 5 0" rgba="1 0 0 .5"/>
 <geom name="near" type="sphere" size=".2" pos="0 -1 0" rgba="0 1 0 .5"/>
 <geom name="solid" type="capsule" size=".1 .3" pos="2 0 0"/>
-<geom name="wall" type="plane" size="1 1 .1" pos="0 0 -3"/>
+<geom name="wall" type="plane" size="0 0 .1" pos="0 0 -3"/>
 <site type="sphere" size=".1" pos="0 2 0" rgba="0 0 1 .5"/>
 </worldbody></mujoco>"""
 HEIGHT_MAP = np.zeros((6, 10, 10, 4), np.float32)

@@ -31,6 +31,9 @@ WORLDS = {
     "height field": """<geom type="hfield" hfield="hills"/><geom size=".1" pos="0 0 .3"/>""",
     "planes": """<geom type="plane" size="0 0 1" pos="0 0 -.2"/><geom type="plane" size=".3 .2 1" pos=".3 0 .3"
         euler="0 30 0"/>""",
+    "planes from behind": """<geom type="plane" size="2 2 1" pos="0 0 2"/><geom type="plane" size=".5 .6 1"
+        euler="180 0 0"/><geom type="plane" size=".3 .4 1" pos="-.4 .4 .3" euler="70 0 40" rgba="1 0 0 .4"/>
+        <geom size=".2" pos="0 0 -.3"/>""",
     "sites and tendons": """<site name="a" type="box" size=".1 .1 .1" pos="-.3 0 0"/>
         <site name="hidden" size=".3" group="4"/>
         <body pos=".3 0 .2"><freejoint/><geom size=".05"/><site name="b" type="capsule" size=".03 .1"/></body>""",
@@ -65,6 +68,36 @@ _STARS = """<texture type="skybox" builtin="gradient" rgb1=".5 .6 .7" rgb2=".1 .
     mark="random" markrgb="1 1 1"/>"""
 _LAMP = '<light pos="0 0 6" dir="0 0 -1"/>'
 _FOGGY = '<rgba fog=".6 .3 .2 1" haze=".2 .9 .3 1"/><map fogstart="1" fogend="8"/>'
+# What stands in place of the usual scene, and where the camera is.
+_FROM_BELOW = 'pos="0 -3 -1.5" xyaxes="1 0 0 0 -.5 1"'
+_PLANES = {
+    "floor from below": (
+        '<geom type="plane" size="0 0 1" rgba=".4 .6 .4 1"/><geom size=".4" pos="0 0 .5"/>',
+        _FROM_BELOW,
+    ),
+    "plane from below": (
+        '<geom type="plane" size="1 1 1" rgba=".4 .6 .4 1"/><geom size=".4" pos="0 0 .5"/>',
+        _FROM_BELOW,
+    ),
+    "transparent floor": (
+        '<geom type="plane" size="0 0 1" rgba=".4 .6 .4 .4"/><geom size=".5" pos="0 0 -.7" rgba=".9 .8 .1 1"/>',
+        'pos="0 -4 2" xyaxes="1 0 0 0 .6 1"',
+    ),
+    "transparent ball": (
+        """<geom type="plane" size="0 0 1" rgba=".4 .4 .4 1"/><geom size=".6" pos="0 0 .7" rgba=".8 .3 .2 .4"/>
+        <geom type="box" size=".9 .1 .9" pos="0 1.5 .9" rgba=".2 .2 .9 1"/>""",
+        'pos="0 -4 1.2" xyaxes="1 0 0 0 .2 1"',
+    ),
+    "table over a floor": (
+        """<geom type="plane" size="0 0 1" rgba=".5 .5 .5 1"/>
+        <geom type="plane" size=".8 .6 1" pos="0 0 .7" rgba=".9 .1 .1 1"/><geom size=".2" pos="0 0 .9"/>""",
+        'pos="0 -4 2" xyaxes="1 0 0 0 .5 1"',
+    ),
+    "table": (
+        '<geom type="plane" size=".8 .6 1" pos="0 0 .7" rgba=".9 .1 .1 1"/><geom size=".2" pos="0 0 .9"/>',
+        'pos="0 -4 2" xyaxes="1 0 0 0 .5 1"',
+    ),
+}
 LIT: dict[str, tuple[str, str, str, dict[str, int]]] = {
     "headlight": ("", "", "", {}),
     "red headlight": ('<headlight diffuse="1 0 0" ambient=".1 0 0" specular="0 0 0"/>', "", "", {}),
@@ -78,12 +111,16 @@ LIT: dict[str, tuple[str, str, str, dict[str, int]]] = {
     "fog": (_FOGGY, _STARS, _LAMP, {"FOG": 1}),
     "no shadow": ("", "", _LAMP, {"SHADOW": 0}),
     "no reflection": ("", "", _LAMP, {"REFLECTION": 0}),
+    **{name: ("", "", _LAMP, {}) for name in _PLANES},
 }
 
 
 def lit_state(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """A ball and a box over a floor that mirrors, in one of those lights."""
+    """A ball and a box over a floor that mirrors, in one of those lights, or some planes."""
     visual, asset, lamp, _ = LIT[name]
+    if name in _PLANES:
+        body, camera = _PLANES[name]
+        return posed(f"<mujoco><worldbody>{lamp}{body}<camera name='side' {camera}/></worldbody></mujoco>")
     return posed(f"""<mujoco><visual>{visual}</visual><asset>{asset}
         <material name="floor" rgba=".4 .5 .4 1" reflectance=".3"/></asset><worldbody>{lamp}
         <geom type="plane" size="0 0 1" material="floor"/><geom size=".4" pos="-.3 0 .5" rgba=".8 .5 .3 1"/>

@@ -93,10 +93,13 @@ vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, fl
     float translucency = object.volume.x, transparency = object.volume.y, emission = object.volume.z;
     float size = object.place.y, bumps = object.place.z;  // those that the shading normal accounts for
     vec3 normal = surface.rippled, flat_normal = surface.normal, view = normalize(start - position);
+    bool from_behind = object.place.w < 0.0 && surface.inner;  // of a sheet that is lit on its front
+    normal = from_behind ? -normal : normal;
+    flat_normal = from_behind ? -flat_normal : flat_normal;
     // interpolated normals of bumpy silhouettes may look away from the camera
-    normal = normalize(normal + max(0.1 - dot(normal, view), 0.0) * view);
+    normal = normalize(normal + (from_behind ? 0.0 : max(0.1 - dot(normal, view), 0.0)) * view);
     vec3 reflected = reflect(-view, normal);
-    float n_v = clamp(dot(normal, view), 0.1, 1.0);
+    float n_v = clamp(from_behind ? -dot(normal, view) : dot(normal, view), 0.1, 1.0);
 
     float open = surface.visibility * occluder_visibility(position, flat_normal, int(object.height_map.z));
     float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);

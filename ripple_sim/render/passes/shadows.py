@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import orthographic, perspective, view_along
+from ripple_sim.render.camera import enclosing, orthographic, perspective, view_along
 from ripple_sim.render.contract import CasterMap, MappingKind, Unit
 from ripple_sim.render.resources import FrameUniforms, Resources
 from ripple_sim.render.visuals.lights import Light
@@ -179,6 +179,8 @@ class TransmissionMaps:
         self._maps.use(Unit.TRANSMISSION)
 
 
+_GROUND = 4.0  # least half size of the floor, in radii of all else
+_LEAST_UP = 0.1  # of the floor's normal: walls are none
 _ENDLESS = 1e9  # half size of an infinite plane [m]
 _SOFT = 0.1  # margin about shadows for their penumbras, in half widths of the map
 _LOWEST_SINE = 0.02  # elevation of a light at which shadows have no end
@@ -187,12 +189,33 @@ _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # o
 
 
 def find_floor(model: Any, targets: Collection[int]) -> int | None:
-    """The visible plane that faces up most and is no target, of several the highest, or None."""
+    """The visible plane under all, or None: infinite or large, and no target. A table's top is none.
+
+    Opaque ones come before others, infinite ones before large ones, then those that face up most, of several the
+    highest.
+    """
     rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
-    visible = [geom for geom in visible_geoms(model) if geom not in targets]
-    planes = [geom for geom in visible if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE]
-    return max(planes, key=lambda geom: (round(rest.geom_xmat[geom, 8], 3), rest.geom_xpos[geom, 2]), default=None)
+    visible = np.array(visible_geoms(model), dtype=np.int64)
+    is_plane = model.geom_type[visible] == mujoco.mjtGeom.mjGEOM_PLANE
+    others = visible[~is_plane]
+    size = model.stat.extent / 2 if model.nflex or model.nskin else 0.0
+    if len(others):
+        size = enclosing(np.column_stack([rest.geom_xpos[others], model.geom_rbound[others]]))[1]
+    half = model.geom_size[:, :2]
+    ground = [
+        geom
+        for geom in visible[is_plane].tolist()
+        if geom not in targets
+        and rest.geom_xmat[geom, 8] > _LEAST_UP
+        and (half[geom] >= np.where(half[geom] > 0, _GROUND * size, 0.0)).all()
+    ]
+
+    def order(geom: int) -> tuple[bool, bool, float, float]:
+        opaque, endless = geom_visual(model, geom).opacity == 1.0, not half[geom].any()
+        return opaque, endless, round(rest.geom_xmat[geom, 8], 3), rest.geom_xpos[geom, 2]
+
+    return max(ground, key=order, default=None)
 
 
 class Floor:

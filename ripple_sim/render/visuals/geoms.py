@@ -106,6 +106,10 @@ class Instances:
         In the table of objects.
     transparent : bool
         Whether the scene behind shows through.
+    blocks : bool
+        Whether no light passes.
+    is_plane : bool
+        Which has two sides.
     occludes : bool
         Whether it hides the sky from what is below: opaque geoms do.
     casts : bool
@@ -133,7 +137,9 @@ class Instances:
         model, self._visual = self._assets.model, members[0][0]
         self.numbers = [number for _, number in members]
         self.transparent = self._visual.opacity < 1.0
-        self.occludes = not (self.transparent or self._visual.site or self._visual.pose)
+        self.blocks = self._visual.passes == 0.0
+        self.is_plane = self._visual.kind == _GEOM.mjGEOM_PLANE
+        self.occludes = self.blocks and not (self._visual.site or self._visual.pose)
         self.casts = self._visual.casts
         self._indices = np.array([visual.index for visual, _ in members], dtype=np.int64)
         self._hosts = np.array([host_of(model, visual) for visual, _ in members])
@@ -213,7 +219,7 @@ class Instances:
     def cast(self, seen: CasterMap, **uniforms: Any) -> None:
         """Draw into a map of a light or, coarsely, of the floor; see `DrawnScene.cast`."""
         if seen == CasterMap.TRANSMISSION:
-            uniforms["transmission"] = (1.0 - self._visual.opacity,) * 3
+            uniforms["transmission"] = (self._visual.passes,) * 3
         for name, value in uniforms.items():
             self._programs[seen][name] = value
         segments = _LEVELS[0] if seen == CasterMap.ALBEDO else self._segments
@@ -232,7 +238,12 @@ class Instances:
             self._arrays[seen, segments, members] = self._assets.resources.vertex_array(
                 self._programs[seen], content, indices, skip_errors=True
             )
-        self._arrays[seen, segments, members].render(vertices=self._level.count(segments), instances=count)
+        with self._assets.resources.gl as ctx:
+            if self.is_plane:
+                ctx.disable(moderngl.CULL_FACE)
+            self._arrays[seen, segments, members].render(vertices=self._level.count(segments), instances=count)
+            if self.is_plane:
+                ctx.enable(moderngl.CULL_FACE)
 
 
 def _segments(radius: NDArray[np.float64], flatness: float, levels: tuple[int, ...]) -> NDArray[np.int64]:
@@ -268,7 +279,9 @@ def instances_of(
     for index, (visual, shape) in enumerate(visuals):
         mapping = mapping_of(model, visual)
         look, host = look_of(model, visual), host_of(model, visual)
-        number = assets.objects.add(look, host, opacity=visual.opacity, identity=visual.identity)
+        number = assets.objects.add(
+            look, host, opacity=visual.opacity, identity=visual.identity, lit_in_front=visual.behind
+        )
         kind = visual.site, visual.pose is not None, visual.casts
         key = *kind, shape[0], mapping.kind, mapping.texture, index if visual.opacity < 1.0 else None
         groups.setdefault(key, (shape, mapping, []))[2].append((visual, number))

@@ -122,8 +122,6 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
         if model.light_active[index] and model.light_type[index] != _KIND.mjLIGHT_IMAGE:
             ambient += model.light_ambient[index]
             lights.append(_light(model, data, index))
-    if not (head.active or model.light_active.any()):
-        ambient += _UNLIT
     lights = [light for light in lights if light.radiance.any()]
     # lights that cast shadows come before the others, the brightest first
     lights.sort(key=lambda light: (not light.shadow, -light.radiance.sum()))
@@ -310,6 +308,8 @@ class SceneLight:
             lights = [dataclasses.replace(light, shadow=False) for light in lights]
         lighting = dataclasses.replace(lighting, lights=lights, backdrop=self._backdrop)
         if not self._backdrop:
+            if not (self._model.vis.headlight.active or self._model.light_active.any()):
+                lighting = dataclasses.replace(lighting, ambient=np.full(3, srgb_to_linear(_UNLIT)))
             sky = self._sky is not None
             set_surroundings(frame, self._model, pose, flags, skybox=sky, endless=endless)
         set_lighting(frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky.mean)

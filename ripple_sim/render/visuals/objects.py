@@ -46,19 +46,20 @@ class ObjectTable:
         opacity: float = 1.0,
         size: float = 1.0,
         heatmap: bool = False,
+        lit_in_front: bool = False,
         height_map: int | None = None,
         chart: int = 0,
     ) -> int:
         """Append a row and return its number.
 
-        `identity` is the id and the type, of `mujoco.mjtObj`, of what is drawn;
-        `size` [m] is how thick a transparent object is where its relative thickness is 1; `heatmap` says that colours
-        are shown as they are, but for shadows; `height_map` is the layer of the object's height map, and `chart` the
-        side of a chart with its halo in it [texels].
+        `identity` is the id and the type, of `mujoco.mjtObj`, of what is drawn; `size` [m] is how thick a transparent
+        object is where its relative thickness is 1; `heatmap` says that colours are shown as they are, but for shadows;
+        `lit_in_front` that a sheet's back is as bright as its front; `height_map` is the layer of the object's height
+        map, and `chart` the side of a chart with its halo in it [texels].
         """
         row = np.zeros((), dtype=_ROW)
         row["volume"][3] = opacity
-        row["place"] = geom, size, 0.0, heatmap
+        row["place"] = geom, size, 0.0, -1.0 if lit_in_front else heatmap
         row["height_map"] = 0 if height_map is None else (height_map, 1, 0, chart)
         self._rows.append(row)
         self.identities.append(identity)
@@ -66,9 +67,11 @@ class ObjectTable:
         self.paint(number, look)
         return number
 
-    def paint(self, number: int, look: Look) -> None:
-        """Give a row another look."""
+    def paint(self, number: int, look: Look, opacity: float | None = None) -> None:
+        """Give a row another look, and another opacity."""
         row = self._rows[number]
+        if opacity is not None:
+            row["volume"][3] = opacity
         row["base"] = look.roughness, look.metallic, look.sheen, look.coat
         row["volume"][:3] = look.translucency, look.transparency, look.emission
 

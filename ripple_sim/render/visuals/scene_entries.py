@@ -56,6 +56,11 @@ def identity_of(entry: mujoco.MjvGeom) -> tuple[int, int]:
     return int(entry.objid), int(entry.objtype)
 
 
+def is_behind(entry: mujoco.MjvGeom, eye: NDArray[np.float64]) -> bool:
+    """Whether an entry is a plane that an eye [m] sees from behind."""
+    return entry.type == _GEOM.mjGEOM_PLANE and bool((eye - entry.pos) @ entry.mat[:, 2] < 0.0)
+
+
 def is_of_model(model: Any, entry: mujoco.MjvGeom) -> bool:
     """Whether an entry may be a geom or a site of the model."""
     count = {GEOM_OBJECT: model.ngeom, SITE_OBJECT: model.nsite}.get(int(entry.objtype), 0)

@@ -135,6 +135,10 @@ class Visual:
         Half sizes along its axes that a scene gives in place of `size` [m].
     box : (float64 [3], float64 [3]), optional
         Centre and half sizes of the box about it in its own frame [m], of what has an asset and is no geom.
+    behind : bool
+        Whether it is a plane that is seen from behind.
+    shown_opacity : float, optional
+        With which it is seen, if that is not its own.
     """
 
     site: bool
@@ -150,6 +154,8 @@ class Visual:
     pose: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
     corners: NDArray[np.float32] | None = None
     part: str = ""
+    behind: bool = False
+    shown_opacity: float | None = None
     finish: Finish | None = None
     texture: SceneTexture | None = None
     decor: bool = False
@@ -178,8 +184,13 @@ class Visual:
 
     @property
     def opacity(self) -> float:
-        """0 to 1."""
-        return float(self.rgba[3])
+        """With which it is seen, 0 to 1."""
+        return float(self.rgba[3]) if self.shown_opacity is None else self.shown_opacity
+
+    @property
+    def passes(self) -> float:
+        """Share of the light that passes, 0 to 1."""
+        return 1.0 - float(self.rgba[3])
 
     @property
     def half_sizes(self) -> NDArray[np.float64]:
@@ -267,7 +278,7 @@ def box_of(model: Any, visual: Visual) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
-    """Bounding ball [1, 4] of a visual in the world; that of a plane is infinite."""
+    """Bounding ball [1, 4] of a visual in the world; that of an infinite plane is infinite."""
     if visual.corners is not None:
         points = visual.corners[:, :3]
         middle = points.mean(axis=0)
@@ -288,7 +299,8 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
         return np.array([[*data.site_xpos[visual.index], radius]])
     position = data.geom_xpos[visual.index]
     if visual.kind == _GEOM.mjGEOM_PLANE:
-        return np.array([[*position, np.inf]])
+        half = visual.half_sizes[:2]
+        return np.array([[*position, np.linalg.norm(half) if half.all() else np.inf]])
     middle, half = box_of(model, visual)
     centre = position + data.geom_xmat[visual.index].reshape(3, 3) @ middle
     return np.array([[*centre, np.linalg.norm(half)]])

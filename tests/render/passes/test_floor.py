@@ -21,9 +21,40 @@ CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 
 def test_the_floor_is_the_highest_of_the_planes_that_face_up_most() -> None:
     places = 'pos="0 0 -1"', "", 'pos="0 0 9" euler="90 0 0"', 'pos="0 0 9" euler="180 0 0"'
     low, high, wall, ceiling = (f'<geom type="plane" size="0 0 1" {place}/>' for place in places)
-    for planes, floor in ((low + wall + high + ceiling, 2), (high + low, 0), (ceiling + wall, 1), ("", None)):
+    for planes, floor in ((low + wall + high + ceiling, 2), (high + low, 0), (ceiling + wall, None), ("", None)):
         model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{planes}</worldbody></mujoco>")
         assert find_floor(model, []) == floor
+
+
+def test_a_small_plane_is_no_floor() -> None:
+    """Nor a wall; an infinite plane is one before a large one, and an opaque one before water over it."""
+    ground, large = '<geom type="plane" size="0 0 1"/>', '<geom type="plane" size="9 9 1" pos="0 0 .1"/>'
+    table, ball = '<geom type="plane" size=".8 .6 1" pos="0 0 .5"/>', '<geom size=".3" pos="0 0 .8"/>'
+    water = '<geom type="plane" size="0 0 1" pos="0 0 .2" rgba="0 0 1 .4"/>'
+    wall = '<geom type="plane" size="0 0 1" zaxis="1 0 0"/>'
+    for body, floor in (
+        (table + ball, None),
+        (table + ball + wall, None),
+        (table + ground + ball, 1),
+        (table + large + ball, 1),
+        (ground + large + ball, 0),
+        (water + ground + ball, 1),
+        (water + ball, 0),
+    ):
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+        assert find_floor(model, []) == floor
+
+
+def test_a_table_casts_a_shadow_on_the_floor_and_gives_the_sky_no_colour(gl):
+    table = '<geom type="plane" size=".5 .5 1" pos="0 0 1" rgba="{} 1"/>'
+    red, blue = (
+        frame_of(gl, FLOOR + table.format(rgb) + SUN.format(0.7, "true"), camera=FRONT).astype(int)
+        for rgb in ("1 0 0", "0 0 1")
+    )
+    bare = frame_of(gl, FLOOR + SUN.format(0.7, "true"), camera=FRONT).astype(int)
+    np.testing.assert_array_equal(red[:4], blue[:4])
+    darker = (bare - red).min(axis=2) > 20
+    assert darker.sum() > 200
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):
