@@ -27,6 +27,9 @@ from .renderer import RippleRenderer
 # Gymnasium's modes in which frames with ripples are drawn.
 DRAWN_MODES = ("rgb_array", "depth_array", "rgbd_tuple")
 
+# Entries of a scene, as of `mujoco.Renderer`.
+_MAX_GEOM = 10_000
+
 
 def depth_buffer(model: mujoco.MjModel, depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """What Gymnasium returns for depths [m]: MuJoCo's depth buffer, 0 at the near plane and 1 at the far one."""
@@ -137,7 +140,7 @@ class RenderedInPlace:
         self._ripples = ripples
         self._looks = looks
         self._lighting = lighting
-        self._renderers: dict[tuple[int, int], RippleRenderer] = {}
+        self._renderers: dict[tuple[int, int, int], RippleRenderer] = {}
         self._viewers = weakref.WeakKeyDictionary[MujocoRenderer, dict[str, RippleViewer]]()
         self._taken_in = weakref.WeakSet[mujoco.Renderer]()
         self.frames = 0
@@ -179,7 +182,7 @@ class RenderedInPlace:
         viewers = self._viewers.setdefault(drawn_by, {})
         is_new = mode not in viewers
         if is_new:
-            renderer = self.renderer(drawn_by.width, drawn_by.height)
+            renderer = self.renderer(drawn_by.width, drawn_by.height, drawn_by.max_geom)
             viewers[mode] = RippleViewer(renderer, drawn_by.data, drawn_by._vopt)
         drawn_by.viewer = viewers[mode]
         if is_new:
