@@ -335,6 +335,8 @@ class GLContext:
     def _take(self) -> None:
         """Make the context current, and free what nobody needs any more."""
         self._owner = threading.current_thread().name
+        if self._current.is_current():  # left so by Ctrl-C: other threads could not enter
+            release_current()
         self._restore = leave_current()
         # finalizers of others leave the context under our feet, in any line: MuJoCo's call eglReleaseThread
         self._collects = gc.isenabled()
@@ -351,9 +353,11 @@ class GLContext:
             raise
 
     def _leave(self) -> None:
-        self._restore()
-        if self._collects:
-            gc.enable()
+        try:
+            self._restore()
+        finally:
+            if self._collects:
+                gc.enable()
 
     def discard(self, objects: list[Any]) -> None:
         """Have objects of moderngl's freed when the context is next entered from outside.

@@ -67,6 +67,14 @@ def test_where_the_program_destroys_its_context_meanwhile_none_is_current_afterw
         assert current_context() is None
 
 
+def test_our_context_is_left_even_where_an_interrupted_entry_left_it_current(opengl: None) -> None:
+    gl = shared_context()
+    gl._current.make_current()
+    with gl:
+        pass
+    assert current_context() is None
+
+
 def test_somebody_who_takes_the_context_away_while_it_draws_is_reported(opengl: None) -> None:
     """As MuJoCo does, whose renderers release all that their thread has, whenever they are collected."""
     with pytest.raises(GLError, match=r"was left while it drew.*Close other renderers"), shared_context():
