@@ -129,13 +129,17 @@ class Ripples(Targets):
         can_ease = not two_way and all(each == "contact" for each in pulses)
         super().__init__(own_model(model), materials, resolution, layout, rim, conserve_volume, options, can_ease)
         adopt_warnings()
-        coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
-        rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
-        for geom, waves in rigid.items():
-            for message in collision_warnings(coupled, geom, waves.atlas):
-                warn_caller(message)
-        moduli = hertz_moduli(self.model, self, pulse, modulus)
-        if two_way and moduli:
+        self._contacts = named_collision_geoms(self.model, self, contacts or {})
+        self._moduli = hertz_moduli(self.model, self, pulse, modulus)
+        self._fine = for_each(self.model, self, "high_pass", high_pass)
+        self._has_two_way = two_way
+        coupled = self._couple(None)
+        self._check_tunnelling = TunnellingCheck(coupled, [geom for geom in self._waves if geom not in coupled.soft])
+        for geom, waves in self._waves.items():
+            if geom not in coupled.soft:
+                for message in collision_warnings(coupled, geom, waves.atlas):
+                    warn_caller(message)
+        if two_way and self._moduli:
             raise SceneError(
                 "with two_way the surface itself says how long a hit takes; take two_way=False, or pulse='contact'"
             )
@@ -144,13 +148,6 @@ class Ripples(Targets):
                 "flexes and skins cannot push back: their waves have the masses that their nodes and bones have "
                 "already; take two_way=False, or geoms as targets alone"
             )
-        self._soft = coupled.soft
-        fine = for_each(self.model, self, "high_pass", high_pass)
-        self._high_pass = {
-            target: HighPass(self._waves[target], surface)
-            for target, surface in coupled.soft.items()
-            if surface.flex >= 0 and fine[target_name(self.model, target)]
-        }
         if two_way:
             require_suited_options(self.model)
         if self._waves and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
@@ -158,13 +155,6 @@ class Ripples(Targets):
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
                 'impulses are off by some per cent; use integrator="implicitfast", or a short time step'
             )
-        hits = {geom: Hits(coupled, geom, e) for geom, e in moduli.items()}
-        bodies = bodies_of(coupled)
-        self._eased = {geom: Easing(law, bodies, self._waves[geom].rest) for geom, law in self._easings.items()}
-        self._loads = ContactLoads(coupled, self._waves, hits, self._eased)
-        self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
-        self._check_amplitude = AmplitudeCheck(coupled, rigid)
-        self._two_way = TwoWay(coupled, self._waves) if two_way else None
         self._scratch = mujoco.MjData(self.model)
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
@@ -282,6 +272,7 @@ class Ripples(Targets):
         self._warn_once("disabled", disabled_warning(self.model))
         if broken or not passed.elapsed:
             return
+        self.follow_shapes()
         solved, unsolved = self._solved.of(data)
         self._warn_once("unsolved", unsolved)
         self._check_tunnelling(solved)
@@ -305,6 +296,52 @@ class Ripples(Targets):
         super()._take_up_all(geom)
         if self._eased.pop(geom, None) is not None:
             self._loads.take_up_all(geom)
+
+    def follow_shapes(self) -> None:
+        """Lay new atlases on the targets whose surfaces a program has changed in the model; their waves begin flat.
+
+        That is their geom's size, the data of a height field or the vertices of a mesh. Each step does so by itself.
+
+        Raises
+        ------
+        SceneError
+            If a region of such a target is held still, its material is given texel by texel, or sensors listen to it.
+        MeshError
+            If the new surface does not suit the layout.
+        """
+        if changed := self._follow_shapes():
+            self._couple(self._check_amplitude)
+            names = ", ".join(map(repr, changed))
+            self._warn_once(
+                f"shapes {names}",
+                f"the surface of {names} was changed in the model: it gets a new atlas, and its waves begin flat; set "
+                "surfaces before Ripples is made where that takes too long",
+            )
+
+    def _couple(self, before: AmplitudeCheck | None) -> CoupledModel:
+        """Have the model's contacts drive the waves as they are now, from nothing.
+
+        What was warned of `before` is not warned of again.
+        """
+        coupled = CoupledModel(self.model, self._waves, self._contacts)
+        rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
+        self._soft = coupled.soft
+        self._high_pass = {
+            target: HighPass(self._waves[target], surface)
+            for target, surface in coupled.soft.items()
+            if surface.flex >= 0 and self._fine[target_name(self.model, target)]
+        }
+        hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in self._moduli.items()}
+        bodies = bodies_of(coupled)
+        self._eased = {geom: Easing(law, bodies, self._waves[geom].rest) for geom, law in self._easings.items()}
+        self._loads = ContactLoads(coupled, self._waves, hits, self._eased)
+        self._check_amplitude = AmplitudeCheck(coupled, rigid)
+        for geom in rigid:
+            if before is not None and not before.watches(geom):
+                self._check_amplitude.ignore(geom)
+        can_push = self._has_two_way and not (self._moduli or coupled.soft)
+        self._two_way = TwoWay(coupled, self._waves) if can_push else None
+        return coupled
 
     def _change(self, name: GeomKey, **changes: Any) -> None:
         super()._change(name, **changes)

@@ -258,6 +258,10 @@ class AmplitudeCheck:
         """Give no warning of a geom."""
         self._watched.pop(geom, None)
 
+    def watches(self, geom: int) -> bool:
+        """Whether a geom may still be warned of."""
+        return geom in self._watched
+
     def waves_changed(self, geom: int, waves: WaveSolver) -> None:
         """Go on with the new waves of a geom."""
         if geom in self._watched:

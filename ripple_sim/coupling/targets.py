@@ -23,6 +23,7 @@ from .geoms import ByGeom, GeomKey, by_name, find_any, find_target, for_each, ro
 from .soft import is_soft, target_pose
 from .suited import suited_targets
 from .target_mesh import target_atlas
+from .watched import WatchedShape
 
 # How far off the surface a poke may be without a word, over the object's size.
 _FAR = 0.1
@@ -42,6 +43,10 @@ class Target:
     waves : WaveSolver
     held : float64 [C, n, n], optional
         Shares of the texels that are held still.
+    layout : str
+        Of its atlas, as for `build_atlas`.
+    shape : WatchedShape, optional
+        Its surface in the model, as the atlas has it.
     """
 
     geom: int
@@ -49,6 +54,30 @@ class Target:
     options: Mapping[str, Any]
     waves: WaveSolver
     held: NDArray[np.float64] | None = None
+    layout: str = "auto"
+    shape: WatchedShape | None = None
+
+    def on_its_surface(self, model: mujoco.MjModel) -> Target:
+        """The same, flat, on a new atlas of the surface that the model has now.
+
+        Raises `SceneError` if something belongs to single texels of the old atlas.
+        """
+        name, old = target_name(model, self.geom), self.waves
+        bound = [
+            ("a region of it is held still", self.held is not None),
+            ("its material is given texel by texel", _is_mapped(self.material)),
+            ("sensors listen to it", bool(old.listeners.all)),
+        ]
+        for what, so in bound:
+            if so:
+                raise SceneError(
+                    f"the surface of {name!r} was changed in the model, and {what}, which belongs to the old one: make "
+                    "new Ripples for the model as it is now"
+                )
+        atlas = target_atlas(model, self.geom, old.rest.resolution, self.layout)
+        new = WaveSolver(atlas, self.material, **self.options)
+        new.listeners.find_points = old.listeners.find_points
+        return dataclasses.replace(self, waves=new, shape=WatchedShape(model, self.geom))
 
     def rebuilt(self, **changes: Any) -> Target:
         """The same with a new solver in the state of the old one, after a change of its material, options or `held`."""
@@ -63,6 +92,12 @@ class Target:
         new.listeners.use(old.listeners.all)
         new.listeners.find_points = old.listeners.find_points
         return dataclasses.replace(changed, waves=new)
+
+
+def _is_mapped(material: Material) -> bool:
+    """Whether a coefficient has a number for each texel."""
+    values = [getattr(material, field.name) for field in dataclasses.fields(material)]
+    return any(isinstance(value, np.ndarray) and value.ndim for value in values)
 
 
 def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
@@ -135,7 +170,8 @@ class Targets:
         for name, material in named.items():
             geom, own = find_target(model, name), {**options, "rim": rims[name], "conserve_volume": conserves[name]}
             atlas = target_atlas(model, geom, texels[name], layouts[name])
-            self._targets[name] = Target(geom, material, own, WaveSolver(atlas, material, **own))
+            waves, shape = WaveSolver(atlas, material, **own), WatchedShape(model, geom)
+            self._targets[name] = Target(geom, material, own, waves, layout=layouts[name], shape=shape)
             self[name].listeners.find_points = functools.partial(site_on, model, geom)
         self._easings = {find_target(model, name): law for name, law in suited.easings.items()}
         # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here
@@ -285,6 +321,18 @@ class Targets:
                 f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._targets))}"
             )
         return target
+
+    def _follow_shapes(self) -> list[str]:
+        """Lay new atlases on the targets whose surfaces were changed in the model; return the names of these."""
+        changed = [
+            name
+            for name, target in self._targets.items()
+            if target.shape is not None and target.shape.changed(self.model)
+        ]
+        for name in changed:
+            target = self._targets[name].on_its_surface(self.model)
+            self._targets[name], self._waves[target.geom] = target, target.waves
+        return changed
 
     def _change(self, name: GeomKey, **changes: Any) -> None:
         """Change a target's material, options or what is held, see `Target`; if that fails, nothing has changed."""

@@ -6,36 +6,36 @@ another whole.
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
+
+from .soft import is_soft
 
 _WHOLE = 1 << 20  # bytes that are compared whole at each look: some 0.05 ms
 _STRETCH = 1 << 18  # bytes of a larger array that are compared at each look, one stretch after another
 _SAMPLES = 4096  # of a larger array that are compared at each look
 
 
-class WatchedArray:
-    """Tells whether an array was written to.
+def _bytes_of(array: NDArray) -> NDArray[np.uint8]:
+    return array.reshape(-1).view(np.uint8)
 
-    Parameters
-    ----------
-    array : array
-        Contiguous, in whose memory others write.
-    """
+
+class WatchedArray:
+    """Tells whether an array was written to; it must be contiguous."""
 
     def __init__(self, array: NDArray) -> None:
-        self._bytes = array.reshape(-1).view(np.uint8)
-        self._step = max(len(self._bytes) // _SAMPLES, 1)
         self._next = 0
-        self.take()
+        self.take(array)
 
-    def take(self) -> None:
+    def take(self, array: NDArray) -> None:
         """Remember what is there now."""
-        self._taken = self._bytes.copy()
+        self._taken = _bytes_of(array).copy()
+        self._step = max(len(self._taken) // _SAMPLES, 1)
 
-    def changed(self) -> bool:
+    def changed(self, array: NDArray) -> bool:
         """Whether something else is there than was taken: of a large array whatever this look comes across."""
-        now, taken = self._bytes, self._taken
+        now, taken = _bytes_of(array), self._taken
         if len(now) <= _WHOLE:
             return not np.array_equal(now, taken)
         stretch = slice(self._next, self._next + _STRETCH)
@@ -44,7 +44,41 @@ class WatchedArray:
             np.array_equal(now[stretch], taken[stretch]) and np.array_equal(now[:: self._step], taken[:: self._step])
         )
 
-    def differs(self, start: int, count: int) -> bool:
+    def differs(self, array: NDArray, start: int, count: int) -> bool:
         """Whether something else is there than was taken from a byte on, over so many bytes."""
         part = slice(start, start + count)
-        return not np.array_equal(self._bytes[part], self._taken[part])
+        return not np.array_equal(_bytes_of(array)[part], self._taken[part])
+
+
+class WatchedShape:
+    """Tells whether a program has given a geom another surface: another size, height field or mesh.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    geom : int
+        Geom id; what is soft has no shape of its own, and never changes.
+    """
+
+    def __init__(self, model: mujoco.MjModel, geom: int) -> None:
+        self._geom = geom
+        self._watched = [WatchedArray(array) for array in self._arrays(model)]
+
+    def changed(self, model: mujoco.MjModel) -> bool:
+        """Whether the surface is another one than at the beginning."""
+        return any(watched.changed(array) for watched, array in zip(self._watched, self._arrays(model), strict=True))
+
+    def _arrays(self, model: mujoco.MjModel) -> list[NDArray]:
+        geom = self._geom
+        if is_soft(model, geom):
+            return []
+        asset = int(model.geom_dataid[geom])
+        match int(model.geom_type[geom]):
+            case mujoco.mjtGeom.mjGEOM_HFIELD:
+                first, count = int(model.hfield_adr[asset]), int(model.hfield_nrow[asset] * model.hfield_ncol[asset])
+                return [model.hfield_data[first : first + count], model.hfield_size[asset]]
+            case mujoco.mjtGeom.mjGEOM_MESH | mujoco.mjtGeom.mjGEOM_SDF:
+                first, count = int(model.mesh_vertadr[asset]), int(model.mesh_vertnum[asset])
+                return [model.mesh_vert[first : first + count]]
+            case _:
+                return [model.geom_size[geom]]

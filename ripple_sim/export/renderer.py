@@ -124,13 +124,8 @@ class RippleRenderer:
     ) -> None:
         self.model, self._ripples = own_model(model), ripples
         check_targets(self.model, ripples.model, ripples.geom_ids)
-        self._height_maps = {name: drawn_heights(ripples, name, limit) for name in ripples}
-        self._shown = ShownWaves(ripples, height)
         named = by_name(self.model, looks or {}, "looks")
-        surfaces = {
-            geom: dataclasses.replace(surface_of(ripples[name], named.get(name, "rubber")), grey=name not in named)
-            for name, geom in ripples.geom_ids.items()
-        }
+        self._shown = ShownWaves(ripples, height)
         self.height, self.width, self._looks, self._limit = int(height), int(width), named, limit
         self._lighting = lighting
         self.scene = mujoco.MjvScene(self.model, max_geom)
@@ -139,15 +134,9 @@ class RippleRenderer:
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
         self._camera_taken: list[object] = []
-        self._renderer: Renderer | None = Renderer(
-            gl or shared_context(),
-            self.model,
-            surfaces,
-            size=(self.width, self.height),
-            lighting=lighting,
-            backdrop=in_studio(self.model, lighting),
-        )
-        self._renderer.watch()
+        self._gl = gl or shared_context()
+        ripples.follow_shapes()
+        self._renderer: Renderer | None = self._make_renderer()
 
     def enable_depth_rendering(self) -> None:
         """Have `render` return depths from now on."""
@@ -204,6 +193,7 @@ class RippleRenderer:
             ValueError, too.
         """
         now = own_data(self.model, data, drawn=True)
+        self._follow_shapes()
         state = mujoco.MjData(self.model) if self._drawn is None else self._drawn[0]
         mujoco.mj_copyData(state, self.model, with_camera_poses(self.model, posed(self.model, now)))
         try:
@@ -291,6 +281,34 @@ class RippleRenderer:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+    def _make_renderer(self) -> Renderer:
+        """A renderer for the targets' surfaces as they are now."""
+        ripples, looks = self._ripples, self._looks
+        self._atlases = {name: ripples[name].rest for name in ripples}
+        self._height_maps = {name: drawn_heights(ripples, name, self._limit) for name in ripples}
+        surfaces = {
+            geom: dataclasses.replace(surface_of(ripples[name], looks.get(name, "rubber")), grey=name not in looks)
+            for name, geom in ripples.geom_ids.items()
+        }
+        renderer = Renderer(
+            self._gl,
+            self.model,
+            surfaces,
+            size=(self.width, self.height),
+            lighting=self._lighting,
+            backdrop=in_studio(self.model, self._lighting),
+        )
+        renderer.watch()
+        return renderer
+
+    def _follow_shapes(self) -> None:
+        """Draw targets whose surfaces a program has changed in the model on their new atlases."""
+        self._ripples.follow_shapes()
+        changed = any(self._ripples[name].rest is not atlas for name, atlas in self._atlases.items())
+        if changed and self._renderer is not None:
+            self._renderer.close()
+            self._renderer = self._make_renderer()
 
     def _upload(self, kind: str, index: int, count: int) -> None:
         if self._renderer is None:

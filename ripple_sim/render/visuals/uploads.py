@@ -61,16 +61,16 @@ class WrittenAssets:
         self._model = model
         arrays = {name: getattr(model, name) for name in _ARRAYS}
         self._watched = {name: WatchedArray(array) for name, array in arrays.items() if array.size}
-        self._entry_bytes = {name: array.nbytes // max(len(array), 1) for name, array in arrays.items()}
 
     def look(self) -> set[tuple[str, int]]:
         """Kind ("texture", "hfield" or "mesh") and id of each."""
         written = set()
         for name, watched in self._watched.items():
-            if watched.changed():
-                size = self._entry_bytes[name]
+            array = getattr(self._model, name)
+            if watched.changed(array):
+                size = array.nbytes // len(array)
                 for part in _ARRAYS[name](self._model):
-                    if watched.differs(part.begin * size, part.entries * size):
+                    if watched.differs(array, part.begin * size, part.entries * size):
                         written.add((part.kind, part.asset))
-                watched.take()
+                watched.take(array)
         return written
