@@ -27,6 +27,7 @@ SMALL: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "step_hook.py": ({}, {"duration": 1 / 60}, "1 frames in"),
     "compare_operators.py": ({"SIZE": 60, "RESOLUTION": 16}, {}, "out/compare_operators.png"),
     "gymnasium_tapped_place.py": ({"DROPS": 48}, {}, "100% of 16 taps"),
+    "sphere_on_film.py": ({"STEP": 4e-5, "RESOLUTIONS": (16,)}, {}, "greatest depth 0."),
     "benchmarks/finite_guard.py": ({"TIMES": 3}, {}, "| 256 |"),
     "benchmarks/loops.py": ({}, {}, "1.0000"),
     "benchmarks/export.py": ({"RESOLUTION": 16, "TRIANGLES": 1000, "WARM_UP": 1}, {"frames": 3}, "frames a second"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from eigenvalues import cases, errors_against, mean_error, of_polyhedron
 from plates import PLATES, atlas_of, frequencies
+from pulsating_sphere import level
 from surfaces import sphere
 from waveforms import rows
 
@@ -14,11 +15,17 @@ from ripple_sim.solver import build_atlas, load_mesh
 ROOT = Path(__file__).parents[2]
 DOCS, LIMBED = ROOT / "docs", ROOT / "scenes" / "meshes" / "limbed.obj"
 RUNS = {path.stem: path.read_text("utf-8") for path in sorted((DOCS / "runs").glob("*.txt"))}
+PAGES = {
+    "plates": "validation.md",
+    "waveforms": "validation.md",
+    "sphere_on_film": "validation.md",
+    "pulsating_sphere": "signals.md",
+}
 
 
 @pytest.mark.parametrize("run", RUNS)
 def test_the_printed_table_is_the_stored_run(run: str) -> None:
-    page = "validation.md" if run in ("plates", "waveforms") else "accuracy.md"
+    page = PAGES.get(run, "accuracy.md")
     assert f"```\n{RUNS[run]}```" in (DOCS / page).read_text("utf-8")
 
 
@@ -45,6 +52,12 @@ def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
 
 def test_waveforms_are_those_of_finite_elements() -> None:
     assert min(float(row[3]) for row in rows("sphere", sphere(4), 16, 6.0)) > 0.9995
+
+
+def test_levels_of_a_pulsating_sphere_are_of_todays_sound() -> None:
+    sizes, *rows = (line.split() for line in RUNS["pulsating_sphere"].splitlines())
+    stored = float(rows[1][4:][sizes[2:].index("1.0")])
+    assert level(1.0, 10) == pytest.approx(stored, abs=0.06)
 
 
 @pytest.mark.parametrize(
