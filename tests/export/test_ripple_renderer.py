@@ -213,6 +213,23 @@ def test_lights_and_surroundings_are_mujocos(mujocos, name):
         assert (ours[other < 1.0] < 8.0).all()  # no light of a colour that the lamps lack
 
 
+def test_the_studio_lights_on_demand_and_flags_that_it_lacks_are_told(egg):
+    model, data, ripples, _ = egg
+    seen = {}
+    for lighting in ("model", "studio", "auto"):
+        with RippleRenderer(model, ripples, 72, 96, lighting=lighting) as renderer:
+            seen[lighting] = renderer.render(data, "side")
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = 0
+            with warnings.catch_warnings(record=True, action="always") as messages:
+                renderer.render()
+            assert len(messages) == (0 if lighting == "model" else 1)
+    np.testing.assert_array_equal(seen["studio"], seen["auto"])  # the model has no <light>
+    assert not seen["model"][0, 0].any()
+    assert seen["studio"][0, 0].min() > 50
+    with pytest.raises(RippleError, match="lighting is 'disco'; valid are 'auto', 'model', 'studio'"):
+        RippleRenderer(model, ripples, 72, 96, lighting="disco")
+
+
 def test_a_transparent_target_shows_what_is_behind_it_whenever_its_opacity_is_set(egg):
     """Twice blended, as in MuJoCo: where 40 % pass, 16 % of what is behind are seen."""
     model, data = posed(
