@@ -352,8 +352,8 @@ class Renderer:
         centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
         if floor is not None:
             floor.place(frame, poses, centre, radius)
-            endless = floor.endless and floor.shown
-            lights = self._light.set(frame, data, pose, floor.albedo, floor.normal, flags=flags, endless=endless)
+            ground = floor.origin if floor.endless and floor.shown else None
+            lights = self._light.set(frame, data, pose, floor.albedo, floor.normal, flags=flags, ground=ground)
         else:
             lights = self._light.set(frame, data, pose, flags=flags)
         casting = self._shadows.fit(frame, lights, centre, radius)

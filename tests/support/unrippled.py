@@ -111,6 +111,7 @@ LIT: dict[str, tuple[str, str, str, dict[str, int]]] = {
     "fog": (_FOGGY, _STARS, _LAMP, {"FOG": 1}),
     "no shadow": ("", "", _LAMP, {"SHADOW": 0}),
     "no reflection": ("", "", _LAMP, {"REFLECTION": 0}),
+    "lamp under the floor": ("", "", '<light pos="0 0 -3" dir="0 0 1"/>', {}),
     **{name: ("", "", _LAMP, {}) for name in _PLANES},
 }
 

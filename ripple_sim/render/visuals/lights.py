@@ -65,6 +65,11 @@ class Light:
     gloss: float = 1.0
     shadow: bool = False
 
+    def is_below(self, point: NDArray[np.float64], normal: NDArray[np.float64]) -> bool:
+        """Whether it shines from behind a plane, given by a point and its normal."""
+        towards = self.direction if self.position is None else self.position - point
+        return bool(towards @ normal < 0.0)
+
     def at(self, point: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
         """Irradiance over pi of a small patch, shape [3]."""
         towards, strength = self.direction, 1.0
@@ -296,11 +301,12 @@ class SceneLight:
         floor_normal: NDArray | None = None,
         *,
         flags: RenderFlags = _AS_USUAL,
-        endless: bool = False,
+        ground: NDArray | None = None,
     ) -> list[Light]:
         """Set the frame's light and background; return the lights.
 
-        The floor's colour and normal are [3] each; whether it is `endless`, and the `flags`, see `set_surroundings`.
+        The floor's colour and normal are [3] each, likewise a point of it, the `ground`, where it is an infinite plane
+        that is seen from above: nothing that is seen has the light of lamps below it, unless they cast no shadows.
         """
         lighting = lighting_of(self._model, data, pose, self._lighting)
         lights = lighting.lights
@@ -308,10 +314,13 @@ class SceneLight:
             lights = [dataclasses.replace(light, shadow=False) for light in lights]
         lighting = dataclasses.replace(lighting, lights=lights, backdrop=self._backdrop)
         if not self._backdrop:
+            if ground is not None and floor_normal is not None:
+                above = [light for light in lights if not (light.shadow and light.is_below(ground, floor_normal))]
+                lighting = dataclasses.replace(lighting, lights=above)
             if not (self._model.vis.headlight.active or self._model.light_active.any()):
                 lighting = dataclasses.replace(lighting, ambient=np.full(3, srgb_to_linear(_UNLIT)))
             sky = self._sky is not None
-            set_surroundings(frame, self._model, pose, flags, skybox=sky, endless=endless)
+            set_surroundings(frame, self._model, pose, flags, skybox=sky, endless=ground is not None)
         set_lighting(frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky.mean)
         if floor_normal is not None:
             frame.set_vector("floor_light", lighting.on(pose.focus, floor_normal))
