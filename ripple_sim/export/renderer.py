@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
 
@@ -47,6 +46,10 @@ _CAMERA = (
     "frustum_top",
     "frustum_width",
 )
+
+# Of the scene's lights, what is drawn.
+_LIGHT_ARRAYS = ("pos", "dir", "attenuation", "ambient", "diffuse", "specular")
+_LIGHT = ("type", "cutoff", "exponent", "castshadow", "bulbradius")
 
 
 class RippleRenderer:
@@ -134,6 +137,7 @@ class RippleRenderer:
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
         self._camera_taken: list[object] = []
+        self._lights_taken: list[object] = []
         self._gl = gl or shared_context()
         ripples.follow_shapes()
         self._renderer: Renderer | None = self._make_renderer()
@@ -206,7 +210,7 @@ class RippleRenderer:
         pose = seen.pose()
         in_scene = pose_of_scene(self.scene.camera, pose.distance)
         seen = dataclasses.replace(in_scene, lens=pose.lens, focal_distance=pose.focal_distance)
-        self._camera_taken = _content(self.scene.camera)
+        self._camera_taken, self._lights_taken = _camera_content(self.scene), _light_content(self.scene)
         heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
         self._shown.look(state, heights, seen.pose())
         height_maps = {
@@ -252,7 +256,9 @@ class RippleRenderer:
         if self._drawn is None:
             frame = self._empty_frame()
         elif self._shows == "colours":
-            frame = self._renderer.render(*self._now(), scene=self.scene)
+            lights = self.scene.lights[: self.scene.nlight]
+            edited = _light_content(self.scene) != self._lights_taken
+            frame = self._renderer.render(*self._now(), scene=self.scene, lights=lights if edited else None)
         else:
             segmented = self._shows == "segmentation"
             image = self._renderer.surfaces(*self._now(), scene=self.scene, segmented=segmented)
@@ -322,7 +328,7 @@ class RippleRenderer:
         if self._drawn is None:
             raise RenderError("there is nothing to render; call update_scene(data) before, or render(data)")
         state, height_maps, seen = self._drawn
-        if _content(self.scene.camera) != self._camera_taken:
+        if _camera_content(self.scene) != self._camera_taken:
             try:
                 seen = pose_of_scene(self.scene.camera, seen.pose().distance)
             except SceneError as error:
@@ -399,10 +405,19 @@ class RippleRenderer:
             return framed(page, self.width / self.height)
 
 
-def _content(cameras: Sequence[mujoco.MjvGLCamera]) -> list[object]:
+def _camera_content(scene: mujoco.MjvScene) -> list[object]:
     """What the cameras of a scene say, to be compared."""
     content: list[object] = []
-    for camera in cameras:
+    for camera in scene.camera:
         content += [camera.pos.tobytes(), camera.forward.tobytes(), camera.up.tobytes()]
         content += [getattr(camera, name) for name in _CAMERA]
+    return content
+
+
+def _light_content(scene: mujoco.MjvScene) -> list[object]:
+    """What the lights of a scene say, to be compared."""
+    content: list[object] = [scene.nlight]
+    for light in scene.lights[: scene.nlight]:
+        content += [getattr(light, name).tobytes() for name in _LIGHT_ARRAYS]
+        content += [getattr(light, name) for name in _LIGHT]
     return content

@@ -5,7 +5,7 @@ The passes of one frame in their order: shadow maps, floor map, reflection, G-bu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import moderngl
@@ -103,7 +103,7 @@ class Renderer:
         with gl:
             self._assets = assets = Assets(model, resources)
             self._backdrop = backdrop or in_studio(model, lighting)
-            self._light = light = SceneLight(assets, lighting, backdrop)
+            self._light = SceneLight(assets, lighting, backdrop)
             plane = find_floor(model, targets)
             self._floor = None if plane is None else Floor(assets, plane)
             self._scene = DrawnScene(assets, targets, size)
@@ -111,8 +111,8 @@ class Renderer:
             self._own_scene = mujoco.MjvScene(model, _MOST_GEOMS)
             self._told: set[str] = set()
             self._frame = FrameUniforms(resources)
-            self._shadows = ShadowMaps(resources, light.options["SHADOWS"], size[1])
-            self._made_passes: dict[tuple[bool, ...], _Passes] = {}
+            self._shadow_maps: dict[int, ShadowMaps] = {}
+            self._made_passes: dict[tuple[int, ...], _Passes] = {}
             self._choose_passes()
             self._buffers: SurfaceBuffers | None = None
         self._readback = Readback(resources, frame_format)
@@ -120,9 +120,14 @@ class Renderer:
     def _choose_passes(self) -> None:
         """Take the passes for what is drawn; those that were made before are kept."""
         floor = self._floor
-        kind = bool(self._scene.transparent), floor is not None and floor.tiled, floor is not None and floor.reflects
+        transparent, options = bool(self._scene.transparent), self._light.options
+        floor_kind = floor is not None and floor.tiled, floor is not None and floor.reflects
+        kind = transparent, *floor_kind, *options.values()
+        if options["SHADOWS"] not in self._shadow_maps:
+            self._shadow_maps[options["SHADOWS"]] = ShadowMaps(self._resources, options["SHADOWS"], self._size[1])
+        self._shadows = self._shadow_maps[options["SHADOWS"]]
         if kind not in self._made_passes:
-            self._made_passes[kind] = self._make_passes(transparent=kind[0])
+            self._made_passes[kind] = self._make_passes(transparent)
         self._occlusion, self._shading, self._transmission, self._layers, self._mirror = self._made_passes[kind]
 
     def _make_passes(self, transparent: bool) -> _Passes:
@@ -158,11 +163,15 @@ class Renderer:
                 self._floor.shown = shown.floor is not None
                 if shown.floor is not None:
                     self._floor.paint(shown.floor)
-            self._choose_passes()
-            if new := shown.left_out - self._told:
-                self._told |= new
-                warn_caller(f"not drawn: {', '.join(sorted(new))}; all else of the scene is")
+            self._warn_of(shown.left_out)
+        self._choose_passes()
         return shown.poses(data) if edited else data
+
+    def _warn_of(self, left_out: set[str]) -> None:
+        """Say what is not drawn as the scene has it, once each."""
+        if new := left_out - self._told:
+            self._told |= new
+            warn_caller(f"not drawn: {', '.join(sorted(new))}; all else of the scene is")
 
     def __enter__(self) -> Renderer:
         return self
@@ -210,6 +219,7 @@ class Renderer:
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
+        lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> NDArray:
         """Draw one frame and return its pixels.
 
@@ -226,6 +236,8 @@ class Renderer:
             Number of this exposure among those whose mean is a frame: each has another noise in its shadows.
         scene : mujoco.MjvScene, optional
             What is drawn beside the targets, and which of them; by default what MuJoCo shows of the data.
+        lights : sequence of mujoco.MjvLight, optional
+            Those of the scene, where they are to replace the model's.
 
         Returns
         -------
@@ -234,7 +246,7 @@ class Renderer:
             with ITU-R BT.709's primaries, multiplied by alpha.
         """
         try:
-            self.submit(data, height_maps, camera, exposure, scene)
+            self.submit(data, height_maps, camera, exposure, scene, lights)
             return self.fetch()
         except BaseException:
             self._readback.forget()  # else the next call would return this frame
@@ -247,10 +259,11 @@ class Renderer:
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
+        lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> None:
         """Draw one frame as `render` does without waiting for it; `fetch` returns frames in the order of submission."""
         with self._gl:
-            self._readback.submit(self.draw(data, height_maps, camera, exposure, scene))
+            self._readback.submit(self.draw(data, height_maps, camera, exposure, scene, lights))
 
     def fetch(self) -> NDArray:
         """Wait for the earliest submitted frame, and return it as `render` does."""
@@ -263,6 +276,7 @@ class Renderer:
         camera: Viewpoint,
         exposure: int = 0,
         scene: mujoco.MjvScene | None = None,
+        lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> moderngl.Framebuffer:
         """Draw one frame and leave it on the GPU.
 
@@ -274,13 +288,14 @@ class Renderer:
         """
         drawn, pose = self._scene, camera.pose()
         with self._gl as ctx, self._resources.drawing():
+            self._light.make_room(lights)
             poses = self._show(data, scene, pose)
             shading = self._shading
             drawn.update(ctx, poses, height_maps, pose)
             shading.clear(ctx)
             self._gl.flush()
             flags = RenderFlags.of(scene)
-            self._update(data, poses, pose, exposure, flags)
+            self._update(data, poses, pose, exposure, flags, lights)
             # what shading looks up; a software driver stops for each texture that it is still drawing to
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             ctx.depth_func = "<="
@@ -344,7 +359,15 @@ class Renderer:
 
             return self._buffers.draw(ctx, draw, self._assets.objects, -1 if self._floor is None else self._floor.geom)
 
-    def _update(self, data: Any, poses: Any, pose: Pose, exposure: int, flags: RenderFlags) -> None:
+    def _update(
+        self,
+        data: Any,
+        poses: Any,
+        pose: Pose,
+        exposure: int,
+        flags: RenderFlags,
+        lights: Sequence[mujoco.MjvLight] | None = None,
+    ) -> None:
         """Bring the frame's uniforms up to date; `poses` are those of geoms and sites."""
         frame, floor = self._frame, self._floor
         frame.set_camera(pose, self._format.aspect, self._scene.balls(poses))
@@ -353,13 +376,15 @@ class Renderer:
         if floor is not None:
             floor.place(frame, poses, centre, radius)
             ground = floor.origin if floor.endless and floor.shown else None
-            lights = self._light.set(frame, data, pose, floor.albedo, floor.normal, flags=flags, ground=ground)
+            shining = self._light.set(frame, data, pose, floor.albedo, floor.normal, lights, flags=flags, ground=ground)
         else:
-            lights = self._light.set(frame, data, pose, flags=flags)
-        casting = self._shadows.fit(frame, lights, centre, radius)
+            shining = self._light.set(frame, data, pose, lights=lights, flags=flags)
+        if lights is not None and self._light.studio:
+            self._warn_of({"lights of the scene, which the studio replaces"})
+        casting = self._shadows.fit(frame, shining, centre, radius)
         if floor is not None and len(casters):
             floor.shade(frame, casting, casters)
-        frame.set_vector("counts", [0, len(lights), exposure], len(casting))
+        frame.set_vector("counts", [0, len(shining), exposure], len(casting))
         frame.bind()
 
     def _bind(self) -> None:

@@ -67,6 +67,23 @@ def test_colours_are_those_of_the_scene(flat):
         assert change[rgb] - change.min() > 20, entry
 
 
+def test_a_light_that_is_added_lights_and_casts_shadows_and_one_that_is_taken_away_does_not(flat):
+    renderer, data = flat
+    renderer.update_scene(data, "c")
+    before = renderer.render().astype(int)
+    edited_scenes.lamp(renderer.scene)
+    lit = renderer.render().astype(int)
+    renderer.scene.geoms[edited_scenes.LINK].pos = [-1, -1, 2]  # in the beam
+    shaded = renderer.render().astype(int)
+    renderer.scene.nlight = 0
+    dark = renderer.render().astype(int)
+    floor = (slice(60, 80), slice(40, 56))
+    red, _, blue = (lit - before)[floor].mean(axis=(0, 1))
+    assert red > 20 and red - blue > 30
+    assert (shaded - lit)[..., 0].min() < -20
+    assert dark.mean() < 0.8 * before.mean()
+
+
 def test_waves_ride_on_their_geom_to_where_the_scene_has_it():
     model, data = edited_scenes.state()
     ripples = Ripples(model, {"target": Material(speed=0.5)}, resolution=16)

@@ -63,7 +63,22 @@ def added(scene: mujoco.MjvScene) -> None:
     scene.ngeom += 2
 
 
-EDITS = {edit.__name__: edit for edit in (ghost, moved, target_moved, other_shapes, taken_away, added)}
+def camera_moved(scene: mujoco.MjvScene) -> None:
+    for camera in scene.camera:
+        camera.pos = np.add(camera.pos, (0.7, 1, 0.2))
+        camera.frustum_top *= 0.8
+
+
+def lamp(scene: mujoco.MjvScene) -> None:
+    """A red spot from above the empty middle of the floor."""
+    light = scene.lights[scene.nlight]
+    light.type, light.pos, light.dir = mujoco.mjtLightType.mjLIGHT_SPOT, [-1, -1, 4], [0, 0, -1]
+    light.diffuse, light.attenuation, light.cutoff, light.exponent = [1, 0, 0], [1, 0, 0], 30, 1
+    light.ambient, light.specular, light.castshadow, light.headlight = [0, 0, 0], [0.3, 0.3, 0.3], 1, 0
+    scene.nlight += 1
+
+
+EDITS = {edit.__name__: edit for edit in (ghost, moved, target_moved, other_shapes, taken_away, added, camera_moved)}
 
 
 def drawn(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> dict[str, np.ndarray]:

@@ -7,6 +7,7 @@ and a backdrop; it stands in where the MJCF has no lights.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -106,9 +107,13 @@ def in_studio(model: Any, lighting: str) -> bool:
     return lighting == "studio" or (lighting == "auto" and not model.nlight)
 
 
-def lighting_of(model: Any, data: Any, pose: Pose, lighting: str) -> Lighting:
-    """All light of a frame, as the renderer has it; see `SceneLight`."""
-    return studio_lighting(pose) if in_studio(model, lighting) else model_lighting(model, data, pose)
+def lighting_of(
+    model: Any, data: Any, pose: Pose, lighting: str, lights: Sequence[mujoco.MjvLight] | None = None
+) -> Lighting:
+    """All light of a frame, as the renderer has it; see `SceneLight`. A scene's `lights` replace those of the model."""
+    if in_studio(model, lighting):
+        return studio_lighting(pose)
+    return model_lighting(model, data, pose) if lights is None else scene_lighting(lights)
 
 
 def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
@@ -127,6 +132,21 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
         if model.light_active[index] and model.light_type[index] != _KIND.mjLIGHT_IMAGE:
             ambient += model.light_ambient[index]
             lights.append(_light(model, data, index))
+    return _in_linear_light(lights, ambient)
+
+
+def scene_lighting(lights: Sequence[mujoco.MjvLight]) -> Lighting:
+    """Lights as a scene of MuJoCo's has them, the headlight too; see `model_lighting`."""
+    ambient, lamps = np.zeros(3), []
+    for light in lights:
+        if light.type != _KIND.mjLIGHT_IMAGE:
+            ambient += light.ambient
+            lamps.append(_scene_light(light))
+    return _in_linear_light(lamps, ambient if len(lights) else np.full(3, _UNLIT))
+
+
+def _in_linear_light(lights: list[Light], ambient: NDArray[np.float64]) -> Lighting:
+    """Lights and ambient light that add up in linear light, of those that add up in sRGB."""
     lights = [light for light in lights if light.radiance.any()]
     # lights that cast shadows come before the others, the brightest first
     lights.sort(key=lambda light: (not light.shadow, -light.radiance.sum()))
@@ -157,6 +177,23 @@ def _light(model: Any, data: Any, index: int) -> Light:
         falloff=np.array(model.light_attenuation[index], dtype=np.float64),
         gloss=_gloss(model.light_specular[index]),
         shadow=bool(model.light_castshadow[index]),
+    )
+
+
+def _scene_light(light: mujoco.MjvLight) -> Light:
+    """A light of a scene, with its radiance in sRGB."""
+    directional, spot = light.type == _KIND.mjLIGHT_DIRECTIONAL, light.type == _KIND.mjLIGHT_SPOT
+    direction = np.array(light.dir, dtype=np.float64)
+    return Light(
+        direction=-direction / max(float(np.linalg.norm(direction)), 1e-9),
+        radiance=np.array(light.diffuse, dtype=np.float64),
+        position=None if directional else np.array(light.pos, dtype=np.float64),
+        size=_SUN_TANGENT if directional else float(light.bulbradius),
+        cutoff=np.radians(min(float(light.cutoff), 180.0)) if spot else np.pi,
+        exponent=_GAMMA * float(light.exponent) if spot else 0.0,
+        falloff=np.array(light.attenuation if spot else [1.0, 0.0, 0.0], dtype=np.float64),
+        gloss=_gloss(light.specular),
+        shadow=bool(light.castshadow),
     )
 
 
@@ -266,6 +303,8 @@ class SceneLight:
 
     Attributes
     ----------
+    studio : bool
+        Whether the studio replaces all lights.
     options : dict
         Defines for the shaders, see `DeferredShading`: BACKDROP, SKYBOX, HORIZON, NEAR_LIGHTS, LIGHTS and SHADOWS.
 
@@ -282,15 +321,33 @@ class SceneLight:
         self._lighting, studio = lighting, in_studio(model, lighting)
         self._sky = None if studio else assets.skybox()
         self._backdrop = backdrop or studio
-        casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
+        self.studio = studio
         self.options = {
             "BACKDROP": int(self._backdrop),
             "SKYBOX": int(self._sky is not None),
             "HORIZON": int(self._sky is not None and self._sky.horizon is not None),
-            "NEAR_LIGHTS": int(not studio and (model.light_type != _KIND.mjLIGHT_DIRECTIONAL).any()),
-            "LIGHTS": 1 if studio else int(np.clip(model.nlight + 1, 1, MAX_LIGHTS)),  # with the headlight
-            "SHADOWS": 1 if studio else int(np.clip(casting.sum(), 1, MAX_SHADOWS)),
+            "NEAR_LIGHTS": 0,
+            "LIGHTS": 1,
+            "SHADOWS": 1,
         }
+        self.make_room(None)
+
+    def make_room(self, lights: Sequence[mujoco.MjvLight] | None) -> None:
+        """Have the options allow the lights of a scene, or else those of the model as they are now."""
+        if self.studio:
+            return
+        if lights is None:
+            kinds, casting = self._model.light_type, self._model.light_castshadow
+        else:
+            kinds, casting = np.array([(each.type, each.castshadow) for each in lights]).reshape(-1, 2).T
+        cast = np.count_nonzero(casting.astype(bool) & (kinds != _KIND.mjLIGHT_IMAGE))
+        needed = {
+            "NEAR_LIGHTS": int((kinds != _KIND.mjLIGHT_DIRECTIONAL).any()),
+            "LIGHTS": min(len(kinds) + 1, MAX_LIGHTS),  # with the headlight
+            "SHADOWS": min(int(cast), MAX_SHADOWS),
+        }
+        for name, least in needed.items():
+            self.options[name] = max(self.options[name], least)
 
     def set(
         self,
@@ -299,6 +356,7 @@ class SceneLight:
         pose: Pose,
         floor_albedo: NDArray | None = None,
         floor_normal: NDArray | None = None,
+        lights: Sequence[mujoco.MjvLight] | None = None,
         *,
         flags: RenderFlags = _AS_USUAL,
         ground: NDArray | None = None,
@@ -307,17 +365,19 @@ class SceneLight:
 
         The floor's colour and normal are [3] each, likewise a point of it, the `ground`, where it is an infinite plane
         that is seen from above: nothing that is seen has the light of lamps below it, unless they cast no shadows.
+
+        `lights` are those of a scene that replace the model's.
         """
-        lighting = lighting_of(self._model, data, pose, self._lighting)
-        lights = lighting.lights
+        lighting = lighting_of(self._model, data, pose, self._lighting, lights)
+        shining = lighting.lights
         if not flags.shadow:
-            lights = [dataclasses.replace(light, shadow=False) for light in lights]
-        lighting = dataclasses.replace(lighting, lights=lights, backdrop=self._backdrop)
+            shining = [dataclasses.replace(light, shadow=False) for light in shining]
+        lighting = dataclasses.replace(lighting, lights=shining, backdrop=self._backdrop)
         if not self._backdrop:
             if ground is not None and floor_normal is not None:
-                above = [light for light in lights if not (light.shadow and light.is_below(ground, floor_normal))]
+                above = [light for light in shining if not (light.shadow and light.is_below(ground, floor_normal))]
                 lighting = dataclasses.replace(lighting, lights=above)
-            if not (self._model.vis.headlight.active or self._model.light_active.any()):
+            if lights is None and not (self._model.vis.headlight.active or self._model.light_active.any()):
                 lighting = dataclasses.replace(lighting, ambient=np.full(3, srgb_to_linear(_UNLIT)))
             sky = self._sky is not None
             set_surroundings(frame, self._model, pose, flags, skybox=sky, endless=ground is not None)
