@@ -119,13 +119,15 @@ def build_atlas(
             raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
     check_memory(resolution)
     builder = _Builder(mesh, resolution, method, cache, sphere)
-    if layout == "patches":
-        return builder.patches()
-    try:
-        check_genus_zero(mesh)
-    except MeshError:
-        if layout == "cube":
-            raise
+    cube_fits = layout != "patches"
+    if cube_fits:
+        try:
+            check_genus_zero(mesh)
+        except MeshError:
+            if layout == "cube":
+                raise
+            cube_fits = False
+    if not cube_fits:
         return builder.patches()
     return builder.cube() if layout == "cube" or sphere is not None else builder.chosen()
 

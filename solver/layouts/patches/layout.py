@@ -13,6 +13,7 @@ import dataclasses
 
 import numpy as np
 
+from ...errors import AtlasError
 from ...kernel import Floats, Ints, kernel
 from ...mesh.topology import labels
 from ..energy import FIXED, FREE, Density, Reference, star_energy
@@ -255,7 +256,10 @@ def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
             count, before = max(1, round(count * float(np.sqrt(wanted[i] / charts)))), count
             if abs(charts / wanted[i] - 1) < _MISJUDGED or count == before:
                 break
-            latest = quads_of(parts[i], count, large)
+            try:
+                latest = quads_of(parts[i], count, large)
+            except AtlasError:  # what there was before is good
+                break
             quads[i] = min(quads[i], latest, key=lambda each: abs(np.log(len(each.glued) / wanted[i])))
     whole = _joined(quads)
     surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)

@@ -13,6 +13,7 @@ round a corner, which are joined too.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from typing import NamedTuple
 
@@ -343,18 +344,34 @@ _REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
 _SMALLEST = 0.85  # of the radius of cells elsewhere
 _FARTHEST = 100**2  # length of a surface over its width, times the number of its cells: at 88**2 charts take a minute
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
+_OTHER_COUNTS = (2, 3, 5)  # times as many cells, where round-off folds a triangle: other cuts fold none
 
 
 def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
-    """The quads of a count of cells; large ones where they are wanted and possible, else about as many."""
+    """The quads of a count of cells; large ones where they are wanted and possible, else about as many.
+
+    Raises `AtlasError` if round-off folds a triangle whatever the cells.
+    """
     quads = large_quads_of(part, count) if large else None
+    if quads is not None:
+        return quads
     few = max(1, round(count * _LARGE / _CORNERS)) if large else count
-    return cut_into_quads(_cells_of(part, few)) if quads is None else quads
+    try:
+        return cut_into_quads(_cells_of(part, few))
+    except AtlasError:
+        for times in _OTHER_COUNTS:
+            with contextlib.suppress(AtlasError):
+                return cut_into_quads(_cells_of(part, times * few))
+        raise
 
 
 def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:
-    """About as many quads as cells, some more of these; None where the surface has none."""
-    return cut_into_large_quads(_cells_of(part, max(count, min(round(_LARGE * count), int(_FARTHEST / _length(part))))))
+    """About as many quads as cells, some more of these; None where the surface has none, or round-off folds one."""
+    cells = _cells_of(part, max(count, min(round(_LARGE * count), int(_FARTHEST / _length(part)))))
+    try:
+        return cut_into_large_quads(cells)
+    except AtlasError:
+        return None
 
 
 def _length(part: TriangleSurface) -> float:

@@ -12,6 +12,8 @@ from surfaces import disk, grid, joined, moved, sphere, square, torus
 
 from ripple_sim.solver import Atlas, AtlasError, Material, Mesh, TexelMesh, WaveSolver, build_atlas, glue, load_mesh
 from ripple_sim.solver.layouts.patches import atlas_from_patch_map, centres, layout, patch_map, quads
+from ripple_sim.solver.layouts.patches.quads import Quads
+from ripple_sim.solver.layouts.patches.surface import TriangleSurface
 from ripple_sim.solver.texels import folded_texels
 
 
@@ -183,6 +185,43 @@ def test_many_parts_none_of_which_has_a_share_to_speak_of(monkeypatch: pytest.Mo
     V = np.concatenate([solid.vertices + np.array([2 * i, 0, 0]) for i in range(4)])
     F = np.concatenate([solid.faces + len(solid.vertices) * i for i in range(4)])
     assert_atlas_carries_waves(build_atlas(Mesh.from_arrays(V, F), resolution=16, cache=False))
+
+
+def spout() -> Mesh:
+    """An open tube, half as wide at its end."""
+    around, along = 8, 4
+    row, column = np.divmod(np.arange(around * (along + 1)), around)
+    radius, angle = 0.04 * (1 - row / (2 * along)), 2 * np.pi / around * column
+    V = np.stack([0.1 * row, radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    a = np.arange(around * along)
+    b = a - a % around + (a + 1) % around
+    return Mesh.from_arrays(
+        V, np.concatenate([np.stack([a, b, b + around], 1), np.stack([a, b + around, a + around], 1)])
+    )
+
+
+def test_a_small_tube_beside_a_sheet_gets_charts_without_a_fold() -> None:
+    mesh = joined(moved(square(12), (-6, -6, 0), 12), moved(spout(), (0, 0, 0.5)))
+    atlas = build_atlas(mesh, 48, cache=False)
+    assert atlas.quality()["flipped"] == 0
+    assert set(mesh.components[atlas.triangles].ravel()) == {0, 1}
+
+
+def test_a_failed_second_cut_of_a_part_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    cuts = []
+
+    def cut_once(part: TriangleSurface, count: int, large: bool) -> Quads:
+        # the second part first gets too few charts for its area, then none
+        cuts.append(count)
+        if len(cuts) > 1:
+            raise AtlasError("4 triangles of the surface are too thin to be laid out flat")
+        return quads.quads_of(part, 1, False)
+
+    monkeypatch.setattr(layout, "quads_of", cut_once)
+    mesh = joined(sphere(2), moved(sphere(2), (3, 0, 0)))
+    patches = patch_map(mesh.V, mesh.F, 48)
+    assert len(cuts) > 1
+    assert len(patches.seamless.glued) > 0
 
 
 def test_texels_astride_of_a_knife_edge_are_put_in_order() -> None:
