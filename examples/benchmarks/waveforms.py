@@ -4,19 +4,28 @@
 
 A bump so many texels wide, the deviation of a Gaussian, is let go at a vertex, and its wave followed until it has
 passed the farthest one; five receivers lie at equal shares of the area. The elements are linear with lumped masses,
-with two vertices or more in a texel's width. Columns: the layout, how far the receiver is from the source along the
-surface, in widths of the bump, the correlation of the two waveforms over the whole time, and their difference over the
-elements' in the L2 norm.
+with two vertices or more in a texel's width; texels are in the cube layout where a mesh fits it. Columns: the layout,
+how far the receiver is from the source along the surface, in widths of the bump, the correlation of the two waveforms
+over the whole time, and their difference over the elements' in the L2 norm.
 """
 
 import argparse
 from pathlib import Path
 
 import numpy as np
-from arrival import WIDTH, elements_waves, geodesic_distance, ideal_width, spread_sources, vertex_coordinates, waves_of
+from arrival import (
+    WIDTH,
+    elements_waves,
+    geodesic_distance,
+    ideal_width,
+    paper_atlas,
+    spread_sources,
+    vertex_coordinates,
+    waves_of,
+)
 
 from ripple_sim.bench import table
-from ripple_sim.solver import Mesh, build_atlas, load_mesh
+from ripple_sim.solver import Mesh, load_mesh
 
 MESHES = [Path(__file__).parents[2] / "scenes" / "meshes" / f"{name}.obj" for name in ("limbed", "pretzel")]
 RECEIVERS = 5
@@ -24,7 +33,7 @@ RECEIVERS = 5
 
 def rows(name: str, mesh: Mesh, resolution: int, texels: float) -> list[list[str]]:
     """One row for each receiver, as `main` prints them."""
-    atlas = build_atlas(mesh, resolution)
+    atlas = paper_atlas(mesh, resolution)
     width = texels / WIDTH * ideal_width(atlas)
     source, *receivers = spread_sources(mesh, RECEIVERS + 1)
     distance = geodesic_distance(mesh, source)
