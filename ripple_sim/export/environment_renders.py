@@ -145,14 +145,14 @@ class RenderedInPlace:
         self._taken_in = weakref.WeakSet[mujoco.Renderer]()
         self.frames = 0
 
-    def renderer(self, width: int, height: int) -> RippleRenderer:
-        """The renderer of frames of a size [pixels]."""
-        size = width, height
-        if size not in self._renderers:
-            self._renderers[size] = RippleRenderer(
-                self._model, self._ripples, height, width, looks=self._looks, lighting=self._lighting
+    def renderer(self, width: int, height: int, max_geom: int = _MAX_GEOM) -> RippleRenderer:
+        """The renderer of frames of a size [pixels], whose scene has room for so many geoms."""
+        kind = width, height, max_geom
+        if kind not in self._renderers:
+            self._renderers[kind] = RippleRenderer(
+                self._model, self._ripples, height, width, max_geom, looks=self._looks, lighting=self._lighting
             )
-        return self._renderers[size]
+        return self._renderers[kind]
 
     @contextlib.contextmanager
     def replacing(self) -> Iterator[None]:
