@@ -12,13 +12,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..operator.curvatures import STEPS, Curvatures
 from ..operator.volume import volume_rate
-from ..operator.wave_operator import StepCoefficients, WaveOperator, number_or_field, step_coefficients
+from ..operator.wave_operator import Bending, StepCoefficients, WaveOperator, number_or_field, step_coefficients
 from ..texels.stencil import Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
 from .field_backend import FieldBackend
-from .kernels import NO_BALANCE, NO_FEATURES, NO_WEIGHTS, Amplitude, Balance, Coefficient, Kick, Links, Weights
+from .kernels import (
+    NO_BALANCE,
+    NO_FEATURES,
+    NO_WEIGHTS,
+    Amplitude,
+    Balance,
+    Coefficient,
+    Kick,
+    Links,
+    Squares,
+    Weights,
+)
 
 # Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of them. On charts of
 # 12 columns, loops that begin anew for each take four times as long.
@@ -102,6 +114,15 @@ class RowLayout:
         irregular = Links(self.places[texels], addresses[texels], links.begins, addresses[links.others], weights)
         return Weights(rows, self.columns, irregular)
 
+    def squares(self, bending: Curvatures) -> Squares:
+        """Weights of curvatures laid out like coefficients, and room for their forces."""
+        by_neighbour = bending.weights.astype(np.float32).swapaxes(0, 1)
+        weights = np.stack([[self.coefficients(weight) for weight in kinds] for kinds in by_neighbour])
+        steps = np.array([row * self._pitch + column for row, column in STEPS])
+        rows = weights.shape[-1] // self.columns
+        scratch = np.zeros((4, kernels.BLOCK), np.float32)
+        return Squares(weights, steps, rows, self.n, self.columns, self._pitch, self.zeros().reshape(-1), scratch)
+
     def texels(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texels of a field, without halo: a view [C, n, n]."""
         if self._alone:
@@ -171,8 +192,10 @@ class CPUBackend(FieldBackend):
         # each field begins elsewhere in its page
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
         self._stencil, self._features = NO_WEIGHTS, NO_FEATURES
-        if operator.bending is not None:
+        if isinstance(operator.bending, Bending):
             self._features = self._features._replace(moment=fields.zeros().reshape(-1))
+        elif operator.bending is not None:
+            self._features = self._features._replace(squares=fields.squares(operator.bending))
         if operator.yield_height is not None:
             self._dent = fields.zeros()
             limit = np.full_like(self._dent, np.inf)
@@ -230,7 +253,7 @@ class CPUBackend(FieldBackend):
         features = self._features
         if operator.viscosity_stencil is not None:
             features = features._replace(viscosity=fields.weights(operator.viscosity_stencil, features.viscosity.rows))
-        if operator.bending is not None:
+        if isinstance(operator.bending, Bending):
             rigidity = fields.coefficients(operator.bending.rigidity.astype(np.float32))
             laplace = fields.weights(operator.bending.laplace, features.laplace.rows)
             features = features._replace(laplace=laplace, rigidity=rigidity)
@@ -274,7 +297,7 @@ class CPUBackend(FieldBackend):
             laid_out = map(self._fields.coefficients, np.broadcast_arrays(*each) if varied else each)
             self._coefficients = StepCoefficients(*laid_out)
             features = self._features
-            self._plain = not (varied or len(features.moment) or len(features.dent))
+            self._plain = not (varied or len(features.moment) or len(features.squares.force) or len(features.dent))
             # a field where forces are added up, or the number 0
             drags = len(features.viscosity.rows) > 0 or not self._plain
             if drags != bool(np.ndim(self._extra)):

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..gl import GLContext, shared_context
 from ..kernel import Ints
+from ..operator.curvatures import KINDS, Curvatures
 from ..operator.volume import volume_rate
-from ..operator.wave_operator import WaveOperator, step_coefficients
+from ..operator.wave_operator import Bending, WaveOperator, step_coefficients
 from ..texels import cells
 from ..texels.moving import MovedStencil, interpolate
 from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links
@@ -136,6 +137,27 @@ class StencilBuffer:
             self.irregular = stencil.irregular
 
 
+class Squares:
+    """Bending by the squares of three curvatures; see `Curvatures`."""
+
+    def __init__(self, fields: FieldLayout, bending: Curvatures, *, add: bool) -> None:
+        self._fields = fields
+        self._weights, self._transposed = (
+            fields.upload(*each.reshape(-1, *bending.topology.shape)) for each in (bending.weights, bending.transposed)
+        )
+        self._curvatures, self._halo = fields.upload(*np.zeros(KINDS, np.float32)), fields.halo_pairs(KINDS)
+        self._take = fields.texel_shader("curvatures")
+        self._bend = fields.texel_shader("bend", **({"ADD": 1} if add else {}))
+
+    def gather(self, height: moderngl.Buffer, result: moderngl.Buffer) -> None:
+        """Write the forces at a height, whose halo is filled, or add them."""
+        bind_buffers(height, self._curvatures, self._weights)
+        self._fields.run_texels(self._take)
+        self._fields.fill_halo(self._curvatures, self._halo)
+        bind_buffers(self._curvatures, result, self._transposed)
+        self._fields.run_texels(self._bend)
+
+
 class ExtraForces:
     """The forces that need stencils of their own, gathered in a field before a substep's kick.
 
@@ -146,16 +168,19 @@ class ExtraForces:
         self._fields = fields
         self._viscosity: StencilBuffer | None = None
         self._laplace: StencilBuffer | None = None
+        self._squares: Squares | None = None
         if operator.viscosity_stencil is not None:
             self._viscosity = StencilBuffer(fields, operator.viscosity_stencil)
             self._apply_viscosity = fields.texel_shader("apply")
-        if operator.bending is not None:
+        if isinstance(operator.bending, Curvatures):
+            self._squares = Squares(fields, operator.bending, add=self._viscosity is not None)
+        if isinstance(operator.bending, Bending):
             self._laplace = StencilBuffer(fields, operator.bending.laplace)
             self._rigidity, self._moment = fields.upload(operator.bending.rigidity), fields.zeros()
             self._apply_rigidity = fields.texel_shader("apply", FACTOR=1)
             added = {"ADD": 1} if self._viscosity else {}
             self._subtract_laplace = fields.texel_shader("apply", SUBTRACT=1, **added)
-        self.field = fields.zeros() if self._viscosity or self._laplace else None
+        self.field = fields.zeros() if self._viscosity or self._laplace or self._squares else None
         self._irregular = fields.shader("irregular", KICK=0)
         self._link(operator)
 
@@ -163,7 +188,7 @@ class ExtraForces:
         """Take over the stencils of the same surface with its texels elsewhere."""
         if self._viscosity and operator.viscosity_stencil is not None:
             self._viscosity.write(operator.viscosity_stencil, operator.mass)
-        if self._laplace and operator.bending is not None:
+        if self._laplace and isinstance(operator.bending, Bending):
             self._laplace.write(operator.bending.laplace, operator.mass)
             self._fields.write(self._rigidity, operator.bending.rigidity.astype(np.float32))
         self._link(operator)
@@ -179,13 +204,15 @@ class ExtraForces:
             self._apply(self._apply_rigidity, self._laplace, self._moment_links, height, self._moment, self._rigidity)
             self._fields.fill_halo(self._moment)
             self._apply(self._subtract_laplace, self._laplace, self._bending_links, self._moment, self.field)
+        if self._squares:
+            self._squares.gather(height, self.field)
 
     def _link(self, operator: WaveOperator) -> None:
         """Upload the links at irregular vertices."""
         ones = np.ones_like(operator.mass)
         if self._viscosity:
             self._viscosity_links = self._fields.upload_links(self._viscosity.irregular, ones)
-        if self._laplace and operator.bending is not None:
+        if self._laplace and isinstance(operator.bending, Bending):
             self._moment_links, self._bending_links = (
                 self._fields.upload_links(self._laplace.irregular, factors)
                 for factors in (operator.bending.rigidity, -ones)

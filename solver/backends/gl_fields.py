@@ -108,7 +108,8 @@ class FieldLayout:
         self.gl, self._places, self._n = gl, topology.halo.shape, topology.shape[1]
         self.texels, *halo = topology.addresses
         # places in the halo, and the texels that they show
-        self._halo, self._halo_count = to_buffer(gl, np.stack(halo, axis=1), np.int32), len(halo[0])
+        self._pairs = np.stack(halo, axis=1)
+        self._halo = self.halo_pairs(1)
         self._fill_halo = self.shader("halo")
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
@@ -130,10 +131,17 @@ class FieldLayout:
             shader.run(-(-count // _LISTED))
             self.gl.barrier()
 
-    def fill_halo(self, field: moderngl.Buffer) -> None:
-        """Fill the halo of a field."""
-        bind_buffers(field, self._halo)
-        self.run_list(self._fill_halo, self._halo_count)
+    def halo_pairs(self, number: int) -> tuple[int, moderngl.Buffer]:
+        """Places in the halos of a number of fields, one after the other, and the texels that they show: how many."""
+        starts = int(np.prod(self._places)) * np.arange(number)
+        pairs = (starts[:, None, None] + self._pairs).reshape(-1, 2)
+        return len(pairs), to_buffer(self.gl, pairs, np.int32)
+
+    def fill_halo(self, field: moderngl.Buffer, halo: tuple[int, moderngl.Buffer] | None = None) -> None:
+        """Fill the halo of a field, or of several with the `halo_pairs` of so many."""
+        count, pairs = self._halo if halo is None else halo
+        bind_buffers(field, pairs)
+        self.run_list(self._fill_halo, count)
 
     @functools.cached_property
     def texel_addresses(self) -> moderngl.Buffer:

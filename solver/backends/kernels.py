@@ -23,6 +23,9 @@ from ..kernel import Floats, Floats32, Ints, kernel
 
 Coefficient: TypeAlias = Floats32 | np.float32
 
+# Texels whose curvatures are taken at once: with their weights they stay in the fastest memory.
+BLOCK = 512
+
 # Of the operator's `response`: a number, or one for each of its parts.
 Amplitude: TypeAlias = float | Floats
 
@@ -156,18 +159,38 @@ class Balance(NamedTuple):
     parts: Ints
 
 
+class Squares(NamedTuple):
+    """Bending by the squares of three curvatures; see `Curvatures`.
+
+    Weights of the eight neighbours in each curvature, [8, 3, size] as coefficients; steps from an address to those of
+    the neighbours, [8]; rows of texels in all, and in a chart; their columns, and addresses from one row to the next; a
+    field for the forces, none without curvatures; room for a block of texels.
+    """
+
+    weights: Floats32
+    steps: Ints
+    rows: int
+    chart_rows: int
+    columns: int
+    pitch: int
+    force: Floats32
+    scratch: Floats32
+
+
 class Features(NamedTuple):
     """What few materials have, each empty where this one lacks it.
 
-    Stencil of the viscosity; stencil of the Laplacian, rigidity, and a field for the moments of bending; yield height,
-    a field that is infinite in the halo, and the field of what stays; what keeps the volume. Lengths tell which are
-    empty, not types: with one of them for every set of features, dozens would be compiled.
+    Stencil of the viscosity; stencil of the Laplacian, rigidity, and a field for the moments of bending; the squares of
+    a plate with rims; yield height, a field that is infinite in the halo, and the field of what stays; what keeps the
+    volume. Lengths tell which are empty, not types: with one of them for every set of features, dozens would be
+    compiled.
     """
 
     viscosity: Weights
     laplace: Weights
     rigidity: Floats32
     moment: Floats32
+    squares: Squares
     limit: Floats32
     dent: Floats32
     balance: Balance
@@ -178,7 +201,75 @@ NO_WEIGHTS = Weights(np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_
 NO_BALANCE = Balance(
     _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_INTS, _NO_INTS
 )
-NO_FEATURES = Features(NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, NO_BALANCE)
+NO_SQUARES = Squares(np.zeros((0, 0, 0), np.float32), _NO_INTS, 0, 1, 0, 0, _NO_FLOATS, np.zeros((4, 0), np.float32))
+NO_FEATURES = Features(NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, NO_SQUARES, _NO_FLOATS, _NO_FLOATS, NO_BALANCE)
+
+
+@kernel(no_cpython_wrapper=True)
+def bend(squares: Squares, h: Floats32, halo: Ints, add: bool, out: Floats32) -> None:
+    """Force of the curvatures at each texel, written into `out` or added to it.
+
+    Every curvature pulls at the texels from which it was taken, also at those that are the halo of another chart: what
+    gathers there is handed to the texel that it shows.
+    """
+    columns, force = squares.columns, squares.force
+    force[:] = np.float32(0)
+    for i in range(squares.rows):
+        at = _first_of_row(squares, i)
+        for begin in range(0, columns, BLOCK):
+            count = min(BLOCK, columns - begin)
+            _pull_neighbours(squares, i * columns + begin, at + begin, count, h, force)
+    for i in range(halo.shape[1]):
+        force[halo[1, i]] += force[halo[0, i]]
+    for i in range(squares.rows):
+        at = _first_of_row(squares, i)
+        pull, result = force[at : at + columns], out[at : at + columns]
+        for c in range(columns):
+            result[c] = result[c] + pull[c] if add else pull[c]
+
+
+@kernel(no_cpython_wrapper=True)
+def _first_of_row(squares: Squares, i: int) -> int:
+    """Address of the first texel of row i, of all charts."""
+    chart, row = i // squares.chart_rows, i % squares.chart_rows
+    return (chart * (squares.chart_rows + 2) + row + 1) * squares.pitch + 1
+
+
+@kernel(no_cpython_wrapper=True)
+def _pull_neighbours(squares: Squares, first: int, at: int, count: int, h: Floats32, force: Floats32) -> None:
+    """Forces of the curvatures of texels side by side: their coefficients begin at `first`, they themselves at `at`."""
+    own, uu, vv, uv = squares.scratch[0], squares.scratch[1], squares.scratch[2], squares.scratch[3]
+    row = h[at : at + count]
+    for c in range(count):
+        own[c] = uu[c] = vv[c] = uv[c] = np.float32(0)
+    for k in range(len(squares.steps)):
+        start = at + squares.steps[k]
+        beside, weights = h[start : start + count], squares.weights[k]
+        to_uu, to_vv, to_uv = (
+            weights[0, first : first + count],
+            weights[1, first : first + count],
+            weights[2, first : first + count],
+        )
+        for c in range(count):
+            difference = beside[c] - row[c]
+            uu[c] += to_uu[c] * difference
+            vv[c] += to_vv[c] * difference
+            uv[c] += to_uv[c] * difference
+    for k in range(len(squares.steps)):
+        start = at + squares.steps[k]
+        pulled, weights = force[start : start + count], squares.weights[k]
+        to_uu, to_vv, to_uv = (
+            weights[0, first : first + count],
+            weights[1, first : first + count],
+            weights[2, first : first + count],
+        )
+        for c in range(count):
+            pull = to_uu[c] * uu[c] + to_vv[c] * vv[c] + to_uv[c] * uv[c]
+            pulled[c] -= pull
+            own[c] += pull
+    here = force[at : at + count]
+    for c in range(count):
+        here[c] += own[c]
 
 
 class Probes(NamedTuple):
@@ -332,6 +423,8 @@ def _act(h: Floats32, v: Floats32, halo: Ints, features: Features, extra: Floats
         apply(features.laplace, h, features.rigidity, False, features.moment)
         fill(features.moment, halo)
         apply(features.laplace, features.moment, np.float32(-1), drags, extra)
+    if len(features.squares.force):
+        bend(features.squares, h, halo, drags, extra)
     balance = features.balance
     for part in range(len(balance.loaded)):  # of which there are none where the density does not vary
         total = 0.0

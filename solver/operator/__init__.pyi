@@ -12,6 +12,7 @@ from .coefficients import (
     check_numbers as check_numbers,
     require_positive as require_positive,
 )
+from .curvatures import STEPS as STEPS, Curvatures as Curvatures
 from .deep_water import FluidOperator as FluidOperator, HalfLaplacian as HalfLaplacian, factorised as factorised
 from .material import (
     SHORTEST_TEXELS as SHORTEST_TEXELS,

@@ -20,9 +20,11 @@ from ..texels.moving import MovedPlaces, MovedStencil
 from ..texels.stencil import LINK_ENDS, NO_LINKS, IrregularLinks, Stencil, crossing_links, link_lengths
 from ..texels.texel_mesh import TexelMesh, smoothed, softening
 from .coefficients import LIMITS
+from .curvatures import Curvatures
 from .deep_water import FluidOperator, over_fluid
 from .material import Material
-from .plate_rim import FREE, RIMS, Rim, plate_matrix, rim_conditions, rim_places, tension_springs
+from .plate_bending import plate_bending
+from .plate_rim import FREE, RIMS, Rim, rim_conditions, rim_places, tension_springs
 from .wave_operator import Bending, WaveOperator
 
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
@@ -46,7 +48,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
 
     rim : str or callable
         "free", "supported", "clamped" or "fixed", see `WaveSolver`. To surfaces that do not bend the last three are the
-        same. Rims of a plate that are free, supported or clamped are those of `plate_matrix`, where it is of kind
+        same. Rims of a plate that are free, supported or clamped are those of `plate_bending`, where it is of kind
         "fem"; elsewhere, and where it is "fixed", heights are 0 at rims that are not free, and so is L h.
 
     Raises
@@ -72,14 +74,14 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: Rim = "free
     grip = source_grip(field["speed"] ** 2, field["stiffness"], field["bending"])
     tension, rigidity = density * field["speed"] ** 2, density * field["bending"]
     stencil, laplace = assemble(tension), assemble(np.ones_like(area)) if bends else None
-    bending, links = None if laplace is None else Bending(laplace, rigidity / area), NO_LINKS
+    bending: Bending | Curvatures | None = None if laplace is None else Bending(laplace, rigidity / area)
+    links = NO_LINKS
     if kind == "fem" and not texels.topology.fixed_rim and (conditions > (0 if bends else FREE)).any():
         places = rim_places(texels, conditions)
         springs, held = tension_springs(places, texels, tension.ravel()), places.texels[places.conditions != FREE]
         field["fixed"].reshape(-1)[held] |= texels.bare_rim.reshape(-1)[held]
-        if bending is not None:
-            links, beside, inner = plate_matrix(texels, places, soft, rigidity, material.poisson, bending.laplace)
-            bending = bending._replace(rigidity=bending.rigidity * inner)
+        if laplace is not None:
+            bending, links, beside = plate_bending(texels, places, soft, rigidity, material.poisson, laplace)
             springs += beside
             stencil.irregular = IrregularLinks.joined(stencil.irregular, links)
         field["stiffness"] += (springs / (density * area).ravel()).reshape(area.shape)
@@ -178,7 +180,7 @@ class MovingOperator:
                 share = field["viscosity"] / squared
                 self._viscosity_share = float(share.flat[0]) if (share == share.flat[0]).all() else None
             self._viscosity = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
-        if operator.bending is not None and not len(operator.rim_links.texels):
+        if isinstance(operator.bending, Bending):
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
         around = np.ascontiguousarray(np.moveaxis(texels.halo_positions, -1, 0))
         self._level = atlas.areas / self._cells.moved(around, self._tension)[1]
@@ -191,7 +193,7 @@ class MovingOperator:
         if self._viscosity is not None:
             like = None if self._viscosity_share is None else (tension, self._viscosity_share)
             viscosity = MovedStencil(self._cells, self._viscosity, places, like)
-        if self._laplace is not None and bending is not None:
+        if self._laplace is not None and isinstance(bending, Bending):
             laplace = MovedStencil(self._cells, self._laplace, places)
             # sigma b / A, with sigma = M / A
             bending = Bending(laplace, bending.rigidity * (self._areas / self.areas(laplace)) ** 2)

@@ -35,6 +35,7 @@ SHORTEST, LONGEST = 2 * np.pi / 8, 2 * np.pi / 1.3
 _SHORT_STIFF, _SHORT_FAST, _SHORT_MASS, _SHORT_LONGEST = 4.263, 0.8781, 0.517, 2 * np.pi / 5
 
 _MOST = 8.0  # power with which tension may follow the area
+_LEAST_POISSON = -0.9  # at -1 a sheet would resist only what changes its shape, and its rigidity be infinite
 
 
 class Default(float):
@@ -77,7 +78,7 @@ class Material:
     yield_height : [m]
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
     poisson : nu
-        Poisson's ratio, which counts at the rims of a surface that bends: one number from 0 to 0.5.
+        Poisson's ratio, which counts at the rims of a surface that bends: one number from -0.9 to 0.5.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
     deep : [1/m]
@@ -114,8 +115,10 @@ class Material:
         check_mask("fixed", self.fixed)
         if not (is_finite(self.tightening) and -_MOST <= self.tightening <= _MOST):
             raise SolverError(f"material tightening is {shown(self.tightening)}; valid is from {-_MOST:g} to {_MOST:g}")
-        if not (is_finite(self.poisson) and 0 <= self.poisson <= 0.5):
-            raise SolverError(f"material poisson is {shown(self.poisson)}; valid is a number from 0 to 0.5")
+        if not (is_finite(self.poisson) and _LEAST_POISSON <= self.poisson <= 0.5):
+            raise SolverError(
+                f"material poisson is {shown(self.poisson)}; valid is a number from {_LEAST_POISSON} to 0.5"
+            )
         if np.ndim(self.deep):
             raise SolverError(f"material deep has shape {np.shape(self.deep)}; valid is one number")
         check_wavelengths(self.wavelengths)
@@ -261,7 +264,7 @@ class Material:
         thickness : d [m]
         density : rho [kg/m^3]
         poisson : nu
-            From 0 up to 0.5.
+            From -0.9 to 0.5.
         damping : [1/s]
         """
         require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))

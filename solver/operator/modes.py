@@ -107,8 +107,7 @@ def elastic_matrix(operator: WaveOperator) -> csr_array:
     """K + L B L + M k as a matrix [T, T] [kg/s^2], whose product with a height is minus `elastic_force`."""
     matrix = stiffness_matrix(operator.stencil) + diags_array((operator.mass * operator.stiffness).ravel())
     if operator.bending is not None:
-        laplace = stiffness_matrix(operator.bending.laplace)
-        matrix = matrix + laplace @ diags_array(operator.bending.rigidity.ravel()) @ laplace
+        matrix = matrix + operator.bending.stiffness
     return csr_array(matrix)
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SolverError
@@ -20,15 +20,13 @@ from ..kernel import Bools, Floats, Floats32, Ints, Ints32
 from ..mesh.topology import labels
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
 from ..texels.topology import TexelTopology
+from .curvatures import Curvatures
 
 
-def _graph(stencil: Stencil, rigidity: Floats | None) -> csr_array:
-    """Texels that are joined, [C n^2, C n^2]; not symmetric."""
-    graph = abs(stiffness_matrix(stencil))
-    if rigidity is not None:
-        graph = csr_array(graph.multiply((rigidity.reshape(-1, 1) > 0).astype(np.float64)))
-    graph.eliminate_zeros()
-    return graph
+def _joins_neighbours(stencil: Stencil) -> bool:
+    """Whether the sides of all quads are links, so that every part of the mesh is one."""
+    topology = stencil.topology
+    return all(stencil.weights[:, link][link_exists(topology, link)].all() for link in range(2))
 
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
@@ -52,6 +50,36 @@ class Bending(NamedTuple):
     laplace: Stencil
     rigidity: Floats
 
+    def force(self, height: Floats) -> Floats:
+        """-L B L h [N], float64 [C, n, n]."""
+        return -self.laplace(self.rigidity * self.laplace(height))
+
+    @property
+    def stiffness(self) -> csr_array:
+        """L B L [N/m], [T, T]."""
+        laplace = stiffness_matrix(self.laplace)
+        return csr_array(laplace @ diags_array(self.rigidity.ravel()) @ laplace)
+
+    def fastest(self, mass: Floats) -> float:
+        """Bound of the largest eigenvalue over a lumped mass [C, n, n]."""
+        rate = self.laplace.fastest(mass)
+        return rate * float((self.rigidity * mass).max()) * rate
+
+    def ties(self, free: Bools) -> Bools:
+        """Texels that bend together with one that is not free, [C, n, n]."""
+        return self.laplace(free.astype(np.float64)) != 0
+
+    @property
+    def joins_all(self) -> bool:
+        """Whether all texels of a part of the mesh bend together."""
+        return bool((self.rigidity > 0).all()) and _joins_neighbours(self.laplace)
+
+    @property
+    def graph(self) -> csr_array:
+        """Texels that are joined, [T, T]; not symmetric."""
+        stiff = (self.rigidity.reshape(-1, 1) > 0).astype(np.float64)
+        return csr_array(abs(stiffness_matrix(self.laplace)).multiply(stiff))
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class WaveOperator:
@@ -67,8 +95,8 @@ class WaveOperator:
         zeta [1/s] and k [1/s^2]; beside the rims of a plate k may be below 0.
     viscosity_stencil : Stencil or None
         Link weights of D [kg/s]; None without viscosity.
-    bending : Bending or None
-        L and B; None without bending.
+    bending : Bending, Curvatures or None
+        L and B, or the curvatures of a plate with rims, whose R^T R then stands for L B L; None without bending.
     yield_height : float64 [C, n, n] or None
         [m]; None where everything is elastic.
     fixed : bool [C, n, n] or None
@@ -88,7 +116,7 @@ class WaveOperator:
     damping: Floats
     stiffness: Floats
     viscosity_stencil: Stencil | None = None
-    bending: Bending | None = None
+    bending: Bending | Curvatures | None = None
     yield_height: Floats | None = None
     fixed: Bools | None = None
     rim_links: IrregularLinks = NO_LINKS
@@ -118,10 +146,9 @@ class WaveOperator:
     @functools.cached_property
     def anchored(self) -> Bools:
         """Free texels that a link ties to what is clamped, [C, n, n]."""
-        free = self.free.astype(np.float64)
-        tied = self.stencil(free) != 0
+        tied = self.stencil(self.free.astype(np.float64)) != 0
         if self.bending is not None:
-            tied |= self.bending.laplace(free) != 0
+            tied |= self.bending.ties(self.free)
         return tied & self.free
 
     @functools.cached_property
@@ -148,15 +175,14 @@ class WaveOperator:
         were. Those that are not movable are rigid, and belong to any part.
         """
         topology, of_chart = self.topology, self._part_of_chart
-        # what joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours
-        ties: list[tuple[Stencil, Floats | None]] = [(self.stencil, None), *([self.bending] if self.bending else [])]
-        for stencil, rigidity in ties:
-            sides = (stencil.weights[:, link][link_exists(topology, link)] for link in range(2))
-            # where the sides of all quads are links, every part of the mesh is one
-            if (rigidity is None or (rigidity > 0).all()) and all(side.all() for side in sides):
-                charts = np.broadcast_to(of_chart[:, None, None], topology.shape)
-                return np.ascontiguousarray(charts, np.int32) if of_chart.any() else None
-        part = connected_components(sum(_graph(*tie) for tie in ties), directed=False)[1].astype(np.int64)
+        if _joins_neighbours(self.stencil) or (self.bending is not None and self.bending.joins_all):
+            charts = np.broadcast_to(of_chart[:, None, None], topology.shape)
+            return np.ascontiguousarray(charts, np.int32) if of_chart.any() else None
+        graph = abs(stiffness_matrix(self.stencil))
+        if self.bending is not None:
+            graph = csr_array(graph + self.bending.graph)
+        graph.eliminate_zeros()
+        part = connected_components(graph, directed=False)[1].astype(np.int64)
         is_held = np.bincount(part, ((self.stiffness > 0) | self.anchored).reshape(-1)) > 0
         # those that are held bear the number of their part of the mesh, after all others
         of_texel = np.repeat(of_chart, topology.texel_count // len(of_chart))
@@ -194,7 +220,9 @@ class WaveOperator:
         chart, side = np.nonzero(glued[..., 0] >= 0)
         return labels(np.stack([chart, glued[chart, side, 0]], axis=1), len(glued))
 
-    def moved(self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | None) -> WaveOperator:
+    def moved(
+        self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | Curvatures | None
+    ) -> WaveOperator:
         """The same surface with its texels elsewhere: masses, and what holds or parts it, stay."""
         moved = dataclasses.replace(
             self, stencil=stencil, viscosity_stencil=viscosity_stencil, bending=bending, bounded=True
@@ -216,8 +244,7 @@ class WaveOperator:
         """-(K + L B L) h [N], float64 [C, n, n]: what neighbours exert on each other, by tension and bending."""
         force = self.stencil(height)
         if self.bending is not None:
-            laplace, rigidity = self.bending
-            force -= laplace(rigidity * laplace(height))
+            force += self.bending.force(height)
         return force
 
     @functools.cached_property
@@ -229,8 +256,7 @@ class WaveOperator:
         """
         bound = self.stencil.fastest(self.mass)
         if self.bending is not None:
-            bending = self.bending.laplace.fastest(self.mass)
-            bound += bending * float((self.bending.rigidity * self.mass).max()) * bending
+            bound += self.bending.fastest(self.mass)
         if self.stiffness.min() < 0:  # as plates have them beside rims, with links that outweigh them
             wave = self._rate(self.elastic_force, bound + max(self.stiffness.max(), 0.0))
         else:
@@ -260,7 +286,9 @@ class WaveOperator:
 
     def _rate(self, force: Callable[[Floats], Floats], bound: float) -> float:
         """Largest eigenvalue of -M^-1 force, or its bound."""
-        return bound if self.bounded else largest_eigenvalue(force, self.mass, self.free, bound)
+        if self.bounded:
+            return bound
+        return largest_eigenvalue(force, self.mass, self.free, bound, loose=isinstance(self.bending, Curvatures))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

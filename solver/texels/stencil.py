@@ -164,7 +164,9 @@ _LANCZOS_FROM = 6
 _RESIDUAL, _LOOK, _MOST = 2e-3, 5, 1000
 
 
-def largest_eigenvalue(force: Callable[[Floats], Floats], mass: Floats, free: Bools, bound: float) -> float:
+def largest_eigenvalue(
+    force: Callable[[Floats], Floats], mass: Floats, free: Bools, bound: float, *, loose: bool = False
+) -> float:
     """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
 
     Plain Lanczos, without a basis that is kept orthogonal: lost orthogonality repeats eigenvalues and makes no new ones
@@ -179,10 +181,12 @@ def largest_eigenvalue(force: Callable[[Floats], Floats], mass: Floats, free: Bo
         The other texels do not move.
     bound : float
         One that is always safe, such as Gershgorin's, caps the estimate, and stands where none is found.
+    loose : bool
+        Whether the bound is far too high even on small charts, as that of a sum of squares.
     """
     if not free.any():
         return 0.0
-    if bound == 0 or mass.shape[1] < _LANCZOS_FROM:
+    if bound == 0 or (mass.shape[1] < _LANCZOS_FROM and not loose):
         return bound
     weight, start = free / np.sqrt(mass), np.random.default_rng(0).standard_normal(mass.size)
     before, vector = np.zeros_like(start), start / np.sqrt((start * start).sum())

@@ -21,12 +21,11 @@ class DenseWaves:
         self.dent = np.zeros_like(self.h)
         self.forces, self.acceleration = np.zeros_like(self.h), 0.0
         size = len(self.h)
-        laplace, rigidity = operator.bending or (None, np.zeros(size))
-        self._tension, self._viscosity, self._laplace = (
+        self._tension, self._viscosity = (
             np.zeros((size, size)) if stencil is None else -stiffness_matrix(stencil).toarray()
-            for stencil in (operator.stencil, operator.viscosity_stencil, laplace)
+            for stencil in (operator.stencil, operator.viscosity_stencil)
         )
-        self._rigidity = rigidity.ravel()
+        self._bending = np.zeros((size, size)) if operator.bending is None else operator.bending.stiffness.toarray()
 
     def advance(self, substeps: int, dt: float) -> None:
         operator = self._operator
@@ -36,8 +35,7 @@ class DenseWaves:
         self.h += dt / 2 * self.v
         self._flow()
         for step in range(substeps):
-            moments = self._rigidity * (self._laplace @ self.h)
-            force = self._tension @ self.h + self._viscosity @ self.v - self._laplace @ moments
+            force = self._tension @ self.h + self._viscosity @ self.v - self._bending @ self.h
             self.v = (
                 (1 - half) / (1 + half) * self.v
                 + gain * (force + self.forces)

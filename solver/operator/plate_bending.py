@@ -1,0 +1,385 @@
+"""The bending of a plate with rims, as a sum of squares: its energy is never negative, whatever its shape and rims.
+
+A plate's energy is D / 2 times the integral of (1 - nu) |H|^2 + nu (tr H)^2, with the rigidity D, Poisson's ratio nu
+and the second derivatives H of its height in the surface. Where neither the height nor its slope is held at a rim, that
+alone makes the rim's natural conditions: no moment, no shear force. In terms of three curvatures it is a sum of squares
+
+    D / 2 (1 + nu) / 2 (H_uu + H_vv)^2 + D / 2 (1 - nu) / 2 ((H_uu - H_vv)^2 + (2 H_uv)^2)
+
+for any -1 < nu < 1. Each texel has its own three: those of a quadratic fitted to the heights around it. Inside, a fit
+takes the texels that share a cell with it, and leaves heights that are linear in space without any energy. Beside rims
+that are free or supported, and round softened texels, it takes two rings and the supports, and a stiffness against what
+it misses keeps the rest from moving freely. Beside a clamp the Laplacian of the membrane's elements takes its place,
+which knows that the slope is 0 there.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array, eye_array, triu, vstack
+
+from ..errors import warn_caller
+from ..kernel import Bools, Floats, Ints
+from ..texels.stencil import IrregularLinks, Stencil, stiffness_matrix
+from ..texels.texel_mesh import TexelMesh
+from ..texels.topology import TRIANGLE
+from .curvatures import KINDS, STEPS, Curvatures, neighbours, regular_texels
+from .plate_rim import CLAMPED, FREE, RimPlaces
+
+# Weights of a fit inside: of a texel beside another one, and of one across a corner. Less for the latter brings H_uu
+# close to the difference of three texels in a row, which sees the pattern + - + - of a chessboard.
+_BESIDE, _ACROSS = np.exp(-1.0), np.exp(-2.0)
+
+# Weight with which second derivatives are 0; all of a fit's texels have about 0.5. It decides what degenerate fits
+# leave open.
+_RIDGE_INSIDE, _RIDGE_OUTSIDE = 0.003, 0.01
+
+# The same of slopes: texels in one line tell none across it.
+_RIDGE_SLOPE = 1e-7
+
+_MISFIT = 8.0  # stiffness against what a fit misses, and against leaving a clamp, in D / A
+_HEAVY = 30.0  # weight of a support in a fit; a texel's is 1 at most
+_REACH = 1.5  # spacings up to which supports count
+_TINY = 1e-9
+_BLOCK = 2**14  # fits that are solved at once
+
+# Texels whose bending is faster than that of nearly all others, by this factor of Gershgorin's bound, are softened: no
+# more than this share of the surface.
+_FASTER, _BULK = 1.2, 0.95
+
+# A texel whose curvatures lose more than this by ridges or for the sake of the time step, and the share of the surface
+# that such texels may have before the solver warns.
+_LOSS, _UNTRUSTED = 0.25, 0.05
+
+
+class Fits(NamedTuple):
+    """Quadratics fitted to the heights round o texels, each at up to w places.
+
+    Attributes
+    ----------
+    texels : int64 [o]
+        In the middle of each.
+    columns : int64 [o, w]
+        Texel of each place; -1 for supports, whose height is 0, and where there is none.
+    weights : float64 [o, w]
+        With which places count; 0 where there is none.
+    ways : float64 [o, w, 2]
+        To the places in the tangent plane, as long as they are in space, in units of `spacings`.
+    spacings : float64 [o]
+        Root of the mean area of the texels [m].
+    """
+
+    texels: Ints
+    columns: Ints
+    weights: Floats
+    ways: Floats
+    spacings: Floats
+
+
+class Rows(NamedTuple):
+    """Rows whose squares add up to energy.
+
+    Attributes
+    ----------
+    matrix : csr [r, T]
+    owners : int64 [r]
+        Texel to whose bending a row belongs; -1 for what may not be softened.
+    """
+
+    matrix: csr_array
+    owners: Ints
+
+    @classmethod
+    def together(cls, *parts: Rows) -> Rows:
+        """The rows of several, one below the other."""
+        matrix = csr_array(vstack([part.matrix for part in parts]))
+        return cls(matrix, np.concatenate([part.owners for part in parts]))
+
+    def scaled(self, factors: Floats) -> csr_array:
+        """The matrix with each texel's rows multiplied by its factor, [T]."""
+        return diags_array(np.where(self.owners < 0, 1.0, factors[self.owners])) @ self.matrix
+
+
+def plate_bending(
+    texels: TexelMesh, places: RimPlaces, softening: Floats, rigidity: Floats, poisson: float, laplace: Stencil
+) -> tuple[Curvatures, IrregularLinks, Floats]:
+    """Bending of a plate with rims.
+
+    Parameters
+    ----------
+    texels : TexelMesh
+    places : RimPlaces
+    softening : float64 [C, n, n]
+        That of `laplace`.
+    rigidity : float64 [C, n, n]
+        D [N m].
+    poisson : float
+    laplace : Stencil
+        The membrane's Laplacian, of free rims.
+
+    Returns
+    -------
+    curvatures : Curvatures
+    links : IrregularLinks
+        Bending beside rims, and round irregular vertices.
+    springs : float64 [T]
+        Of the same, from each texel to where it is at rest [N/m].
+
+    Warns
+    -----
+    RippleWarning
+        If the bending of more than a small part of the surface is softer than it should be.
+    """
+    topology, count = texels.topology, texels.topology.texel_count
+    areas, rigidities = texels.areas.reshape(-1), rigidity.reshape(-1)
+    stiff = rigidities * areas
+    laplacian = -stiffness_matrix(laplace)
+    near = shared_cells(texels)
+    held = np.bincount(places.texels[places.conditions == CLAMPED], minlength=count) > 0
+    outer = _outer_texels(places, softening.reshape(-1) < 1, near)
+    regular = regular_texels(topology).reshape(-1) & ~outer & ~held
+    irregular = ~(regular | outer | held)
+
+    weights, kept = _regular_weights(texels, regular, stiff, poisson)
+    inside = Rows(Curvatures(topology, weights, rigidity).matrix, np.tile(np.arange(count), KINDS))
+    ring_fits = _ring_fits(texels, np.flatnonzero(irregular), near)
+    rim_fits = _rim_fits(texels, np.flatnonzero(outer), near, places)
+    rings, kept[irregular] = _bending_rows(ring_fits, stiff, poisson, _RIDGE_INSIDE)
+    rims, kept[outer] = _bending_rows(rim_fits, stiff, poisson, _RIDGE_OUTSIDE)
+    missed = _misfit_rows(rim_fits, rigidities)
+    clamps = _clamp_rows(texels, places, rigidities, laplacian)
+    beside = Rows.together(rings, rims, missed, clamps)
+
+    factors = _evened(Rows.together(inside, beside), laplacian, stiff, areas)
+    _warn_of_softened(kept * factors, areas)
+    roots = np.sqrt(factors)
+    matrix = beside.scaled(roots)
+    curvatures = Curvatures(topology, weights * roots.reshape(topology.shape), rigidity)
+    return curvatures, *_links_and_springs(csr_array(matrix.T @ matrix))
+
+
+def shared_cells(texels: TexelMesh) -> csr_array:
+    """How many cells two texels share, [T, T]; those of a texel itself count."""
+    topology, count = texels.topology, texels.topology.texel_count
+    halo = np.where(topology.rim, -1, topology.halo)
+    quads = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1)
+    corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
+    triangles = quads[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]  # a place of theirs shows nothing
+    kinds = [quads[(quads >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
+    sizes = sorted({len(each) for each in topology.polygons})
+    kinds += [np.array([each for each in topology.polygons if len(each) == size]) for size in sizes]
+    shared = csr_array((count, count))
+    for corners in filter(len, kinds):
+        # those across a glued side come once from each chart
+        cells = corners[np.unique(np.sort(corners, axis=1), axis=0, return_index=True)[1]]
+        cell = np.repeat(np.arange(len(cells)), cells.shape[1])
+        has = csr_array((np.ones(cells.size), (cell, cells.ravel())), shape=(len(cells), count))
+        shared = shared + has.T @ has
+    return csr_array(shared + eye_array(count))
+
+
+def _outer_texels(places: RimPlaces, soft: Bools, near: csr_array) -> Bools:
+    """Texels beside rims that are not clamped, and those that are softened or beside such ones, [T]."""
+    clamped = places.conditions == CLAMPED
+    outer = np.zeros(len(soft), bool)
+    outer[places.texels[~clamped]] = True
+    outer[places.texels[clamped]] = False
+    return outer | ((near @ soft.astype(np.float64)) > 0)
+
+
+def _regular_weights(texels: TexelMesh, regular: Bools, stiff: Floats, poisson: float) -> tuple[Floats, Floats]:
+    """Weights of `Curvatures`, and what ridges keep of them, [T]: 1 but at the regular texels."""
+    n, count = texels.resolution, texels.topology.texel_count
+    around = neighbours(texels.topology).reshape(len(STEPS), count)
+    middles = texels.positions.reshape(-1, 3)
+    ends = np.stack([texels.halo_positions[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c] for r, c in STEPS])
+    ends = ends.reshape(len(STEPS), count, 3)
+    importance = np.array([_BESIDE if r == 0 or c == 0 else _ACROSS for r, c in STEPS] + [1.0])
+    weights, kept = np.zeros((KINDS, len(STEPS), count)), np.ones(count)
+    at = np.flatnonzero(regular)
+    for begin in range(0, len(at), _BLOCK):
+        block = at[begin : begin + _BLOCK]
+        columns = np.column_stack([around[:, block].T, block])
+        areas = texels.areas.reshape(-1)[columns]
+        spacings = np.sqrt(areas.mean(axis=1))
+        ways = np.concatenate([np.moveaxis(ends[:, block], 0, 1), middles[block][:, None]], axis=1)
+        ways = (ways - middles[block][:, None]) / spacings[:, None, None]
+        flat = _in_tangent_plane(texels.normals.reshape(-1, 3)[block][:, None], ways)
+        fits = Fits(block, columns, np.sqrt(areas) / spacings[:, None] * importance, flat, spacings)
+        curved, kept[block] = _curvature_weights(fits, stiff, poisson, _RIDGE_INSIDE)
+        weights[:, :, block] = np.moveaxis(curved[:, :, :-1], 0, -1)
+    return weights.reshape(KINDS, len(STEPS), *texels.shape), kept
+
+
+def _ring_fits(texels: TexelMesh, at: Ints, near: csr_array) -> Fits:
+    """Fits to the texels that share a cell with those at [o]."""
+    ring = near[at].tocoo()
+    itself = ring.col == at[ring.row]
+    importance = np.where(itself, 1.0, np.where(ring.data >= 2, _BESIDE, _ACROSS))
+    spacings = _mean_spacings(near[at], texels)
+    weights = np.sqrt(texels.areas.reshape(-1)[ring.col]) / spacings[ring.row] * importance
+    ends = texels.positions.reshape(-1, 3)[ring.col]
+    return _fits(texels, at, spacings, (ring.row, ring.col, ends, weights))
+
+
+def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -> Fits:
+    """Fits to two rings of texels round those at [o], and to supports: heavy places of height 0.
+
+    Texels count by their areas, so that needles do not stiffen.
+    """
+    count, areas = texels.topology.texel_count, texels.areas.reshape(-1)
+    points = texels.positions.reshape(-1, 3)
+    rings = near[at] @ near
+    spacings = _mean_spacings(rings, texels)
+    owner, column = rings.nonzero()
+    distance = np.linalg.norm(points[column] - points[at[owner]], axis=1) / spacings[owner]
+    weights = np.sqrt(areas[column]) / spacings[owner] * np.exp(-(distance**2) / 2)
+    texels_around = owner, column, points[column], weights
+
+    held = np.flatnonzero(places.conditions != FREE)
+    beside = csr_array((np.ones(len(held)), (places.texels[held], held)), shape=(count, len(places.points)))
+    owner, place = (rings @ beside).nonzero()
+    distance = np.linalg.norm(places.points[place] - points[at[owner]], axis=1) / spacings[owner]
+    weights = np.where(distance <= _REACH, _HEAVY, 0.0)
+    supports = owner, np.full(len(owner), -1), places.points[place], weights
+    return _fits(texels, at, spacings, texels_around, supports)
+
+
+def _mean_spacings(rings: csr_array, texels: TexelMesh) -> Floats:
+    """Root of the mean area of the texels in each row of rings."""
+    members = (rings > 0).astype(np.float64)
+    return np.sqrt((members @ texels.areas.reshape(-1)) / np.maximum(members.sum(axis=1), 1))
+
+
+def _fits(texels: TexelMesh, at: Ints, spacings: Floats, *groups: tuple[Ints, Ints, Floats, Floats]) -> Fits:
+    """Fits round texels at [o], to groups of places: the fit of each, its texel, where it is [m], and its weight."""
+    owner, column, ends, weight = (np.concatenate(each) for each in zip(*groups, strict=True))
+    order = np.argsort(owner, kind="stable")
+    owner, column, ends, weight = owner[order], column[order], ends[order], weight[order]
+    ways = (ends - texels.positions.reshape(-1, 3)[at[owner]]) / spacings[owner, None]
+    flat = _in_tangent_plane(texels.normals.reshape(-1, 3)[at[owner]], ways)
+    # as many places for each fit as the largest has
+    slot = np.arange(len(owner)) - np.searchsorted(owner, np.arange(len(at)))[owner]
+    shape = len(at), int(slot.max(initial=0)) + 1
+    fits = Fits(at, np.full(shape, -1), np.zeros(shape), np.zeros((*shape, 2)), spacings)
+    fits.columns[owner, slot] = column
+    fits.weights[owner, slot] = weight
+    fits.ways[owner, slot] = flat
+    return fits
+
+
+def _in_tangent_plane(normals: Floats, ways: Floats) -> Floats:
+    """Ways [..., 3] turned into the plane across normals [..., 3] without a change of length, [..., 2]."""
+    across = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=-1)])
+    first = across / np.linalg.norm(across, axis=-1, keepdims=True)
+    second = np.cross(normals, first)
+    flat = np.stack([(ways * first).sum(axis=-1), (ways * second).sum(axis=-1)], axis=-1)
+    shortened = np.maximum(np.linalg.norm(flat, axis=-1), _TINY)
+    return flat * (np.linalg.norm(ways, axis=-1) / shortened)[..., None]
+
+
+def _solved(fits: Fits, ridge: float) -> tuple[Floats, Floats]:
+    """Weighted quadratics at their places [o, w, 6], and from weighted heights to coefficients [o, 6, w]."""
+    u, v = fits.ways[..., 0], fits.ways[..., 1]
+    terms = np.stack([np.ones_like(u), u, v, u * u / 2, u * v, v * v / 2], axis=-1)
+    weighed = fits.weights[..., None] * terms
+    ridges = np.diag(np.array([0.0, _RIDGE_SLOPE, _RIDGE_SLOPE, ridge, ridge, ridge]) ** 2)
+    transposed = np.swapaxes(weighed, 1, 2)
+    inverse = np.linalg.solve(transposed @ weighed + ridges, transposed)
+    return weighed, inverse.astype(np.float64, copy=False)
+
+
+def _curvature_weights(fits: Fits, stiff: Floats, poisson: float, ridge: float) -> tuple[Floats, Floats]:
+    """Weights of places in the three curvatures [o, 3, w], and the least share that ridges leave of one, [o].
+
+    `stiff` [T] is D A, by texels [N m^3].
+    """
+    weighed, inverse = _solved(fits, ridge)
+    second = inverse[:, 3:]
+    kept: Floats = np.einsum("okw,owk->ok", second, weighed[:, :, 3:]).min(axis=1)
+    uu, uv, vv = np.moveaxis(second * fits.weights[:, None], 1, 0)
+    mean, difference = np.sqrt((1 + poisson) / 2), np.sqrt((1 - poisson) / 2)
+    scale: Floats = np.sqrt(stiff[fits.texels]) / fits.spacings**2
+    curved: Floats = np.stack([mean * (uu + vv), difference * (uu - vv), 2 * difference * uv], axis=1)
+    return curved * scale[:, None, None], kept
+
+
+def _bending_rows(fits: Fits, stiff: Floats, poisson: float, ridge: float) -> tuple[Rows, Floats]:
+    """The curvatures of fits as rows, and the least share that ridges leave of one, [o]."""
+    curved, kept = _curvature_weights(fits, stiff, poisson, ridge)
+    return Rows(_row_matrix(curved, fits.columns, len(stiff)), np.repeat(fits.texels, KINDS)), kept
+
+
+def _misfit_rows(fits: Fits, rigidity: Floats) -> Rows:
+    """What fits miss of the heights, against which there is a stiffness: else some patterns had no energy."""
+    weighed, inverse = _solved(fits, _RIDGE_OUTSIDE)
+    missed = np.eye(fits.weights.shape[1]) - weighed @ inverse
+    total = np.linalg.norm(np.where(fits.columns >= 0, fits.weights, 0.0), axis=1)
+    stiffness = np.sqrt(_MISFIT * rigidity[fits.texels]) / (total * fits.spacings)
+    weights = missed * fits.weights[:, None] * stiffness[:, None, None]
+    matrix = _row_matrix(weights, fits.columns, len(rigidity))
+    return Rows(matrix, np.full(matrix.shape[0], -1))
+
+
+def _row_matrix(weights: Floats, columns: Ints, count: int) -> csr_array:
+    """Weights [o, k, w] of places as a matrix [o k, count], without the supports."""
+    fit, row, place = np.nonzero((weights != 0) & (columns >= 0)[:, None])
+    number = fit * weights.shape[1] + row
+    shape = weights.shape[0] * weights.shape[1], count
+    return csr_array((weights[fit, row, place], (number, columns[fit, place])), shape=shape)
+
+
+def _clamp_rows(texels: TexelMesh, places: RimPlaces, rigidity: Floats, laplacian: csr_array) -> Rows:
+    """Beside a clamp: the Laplacian, and springs to the height that it makes, d^2 / 2 times the second derivative."""
+    areas = texels.areas.reshape(-1)
+    clamped = places.conditions == CLAMPED
+    held = places.texels[clamped]
+    away = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
+    share = np.minimum(away**2 / (2 * areas[held]), 0.5)
+    heights = eye_array(len(areas), format="csr")[held]
+    leaving = diags_array(np.sqrt(_MISFIT * rigidity / areas)[held]) @ (heights - diags_array(share) @ laplacian[held])
+    once = np.unique(held)  # a texel in a corner lies beside two places
+    bent = diags_array(np.sqrt(rigidity / areas)[once]) @ laplacian[once]
+    return Rows(csr_array(vstack([leaving, bent])), np.concatenate([held, once]))
+
+
+def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> Floats:
+    """Factors up to 1 of each texel's bending, [T]: a few tiny texels must not set the time step for all.
+
+    They may be as fast as the fastest texel of L B L, or as nearly all of the surface is.
+    """
+    ones = np.ones(len(areas))
+    size = abs(laplacian)
+    closed = (size @ (stiff / areas**2 * (size @ ones)) / areas).max()
+    pull = abs(rows.matrix)
+    rate = pull.T @ (pull @ ones) / areas
+    order = np.argsort(rate)
+    covered = np.cumsum(areas[order])
+    bulk = rate[order[np.searchsorted(covered, _BULK * covered[-1])]]
+    bound = _FASTER * max(closed, bulk)
+    entry = pull.tocoo()
+    owner = rows.owners[entry.row]
+    factors = np.ones(len(areas))
+    np.minimum.at(factors, owner[owner >= 0], (bound / np.maximum(rate, bound))[entry.col[owner >= 0]])
+    return factors
+
+
+def _warn_of_softened(kept: Floats, areas: Floats) -> None:
+    """Warn where more than a small part of the surface keeps less of its bending than it should."""
+    share = areas[kept < 1 - _LOSS].sum() / areas.sum()
+    if share > _UNTRUSTED:
+        warn_caller(
+            f"the plate is softer than its material on {100 * share:.0f} % of its surface, where texels are too narrow "
+            f"to tell its curvature; frequencies may be too low: take a mesh of evener triangles, or a finer resolution"
+        )
+
+
+def _links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
+    """A symmetric stiffness matrix as links between texels, and springs from each to where it is at rest."""
+    above = triu(matrix, 1).tocoo()
+    springs, diagonal = matrix @ np.ones(matrix.shape[0]), matrix.diagonal()
+    springs[np.abs(springs) <= _TINY * diagonal] = 0.0  # sums that are round-off are no springs
+    links = IrregularLinks.of(np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data)
+    return links, springs
