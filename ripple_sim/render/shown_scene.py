@@ -21,7 +21,7 @@ from .visuals.geoms import shaped
 from .visuals.objects import Assets
 from .visuals.scene_entries import EntryPoses, content_of, identity_of, is_behind, is_of_model, own_visual, visuals_in
 from .visuals.shapes import NamedShape
-from .visuals.visual import Visual, geom_visual
+from .visuals.visual import WALLS, Visual, geom_visual
 
 _OPAQUE = 0.995  # opacity from which MuJoCo draws something as opaque
 _FROM_BEHIND = 0.3  # opacity of planes that are seen from behind, over that from the front
@@ -116,6 +116,9 @@ class ShownScene:
                 own[identity] = entry
             if first and identity in self._targets and self._ripples(entry):
                 self._take_target(self._targets[identity], entry)
+                if self._doubled and entry.type == mujoco.mjtGeom.mjGEOM_HFIELD:
+                    walls = own_visual(self._model, entry, reshaped)
+                    visuals.append(self._as_seen(replace(walls, part=WALLS), entry))
             elif first and self._is_floor(entry):
                 self.floor = own_visual(self._model, entry)
             elif self._cut_out and self._floor is not None and identity == self._floor.identity:

@@ -107,3 +107,15 @@ def test_a_changed_surface_is_drawn_where_it_is_now_with_its_waves():
     assert seen.sum() > 100
     assert np.median((flat - high)[seen]) > 0.2
     assert 0.02 < np.median((high - risen)[seen]) < 0.15
+
+
+@pytest.mark.filterwarnings("ignore:no wave", "ignore:the surface of")
+def test_a_rippling_height_field_has_its_walls_as_one_that_does_not():
+    model, data, ripples = made("terrain")
+    model.hfield_data[:] = 0.8
+    depths = []
+    for each in (Ripples(model, {}), ripples):
+        with RippleRenderer(model, each, 48, 64) as renderer:
+            renderer.enable_depth_rendering()
+            depths.append(renderer.render(data, "c"))
+    assert (abs(depths[0] - depths[1]) > 0.02).mean() < 0.003

@@ -19,7 +19,7 @@ from ripple_sim.coupling.target_mesh import height_field_triangles, mesh_arrays
 from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V
 
 from .corners import normalized, split_corners
-from .visual import Visual
+from .visual import WALLS, Visual
 
 
 @dataclass(frozen=True)
@@ -140,8 +140,8 @@ def mesh_asset(model: Any, mesh: int, hull: bool = False) -> Shape:
     return creased(V, F, uv)
 
 
-def height_field(model: Any, hfield: int) -> Shape:
-    """Height field of a MuJoCo model with its walls, in its geom's frame."""
+def height_field(model: Any, hfield: int, walls_only: bool = False) -> Shape:
+    """Height field of a MuJoCo model with its walls, or these alone, in its geom's frame."""
     ground, F = height_field_triangles(model, hfield)
     index = np.arange(len(ground)).reshape(model.hfield_nrow[hfield], model.hfield_ncol[hfield])
     # round the rim, counter-clockwise from above
@@ -150,7 +150,8 @@ def height_field(model: Any, hfield: int) -> Shape:
     after, foot_after = np.roll(rim, -1), np.roll(foot, -1)
     walls = np.stack([rim, foot, foot_after], axis=1), np.stack([rim, foot_after, after], axis=1)
     feet = ground[rim] * [1, 1, 0] - [0, 0, model.hfield_size[hfield, 3]]
-    return creased(np.concatenate([ground, feet]), np.concatenate([F, *walls]))
+    V, F = np.concatenate([ground, feet]), np.concatenate(walls if walls_only else [F, *walls])
+    return creased(V, F)
 
 
 def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
@@ -194,6 +195,8 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
         faces = np.arange(len(own)).reshape(-1, 3)
         name = f"{kind} {visual.part} {visual.identity[0]}"
         return name, lambda _: Shape(np.zeros_like(points), points, normals, faces, uv)
+    if kind == _GEOM.mjGEOM_HFIELD and asset >= 0 and visual.part == WALLS:
+        return f"{WALLS} {asset}", lambda _: height_field(model, asset, walls_only=True)
     if kind == _GEOM.mjGEOM_HFIELD and asset >= 0:
         return f"hfield {asset}", lambda _: height_field(model, asset)
     return _SHAPES.get(kind)

@@ -18,6 +18,8 @@ from ripple_sim.solver.errors import RippleError
 
 # The look that takes colour, texture and gloss from the geom's MuJoCo material.
 MODEL_LOOK = "model"
+# The part of a height field that does not ripple.
+WALLS = "walls"
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ class Visual:
     corners : float32 [3 m, 8], optional
         Points, normals and texture coordinates of the corners of a flex's or a skin's triangles.
     part : str
-        Which part of a flex they are, see `flex_parts`.
+        Which part of a flex they are, see `flex_parts`; or `WALLS`, of a height field without its ground.
     finish : Finish, optional
         As a scene has it; by default the material's.
     texture : SceneTexture, optional
