@@ -180,7 +180,7 @@ FRAME = Struct(
     # without a backdrop, colours in sRGB
     fog="vec4",  # its colour; w: 1 with fog
     haze="vec4",  # the colour of the haze over the floor's horizon; w: 1 with haze
-    haze_ring="vec4",  # x: its width, y: how high it is densest (see background.glsl), z: how far the skybox is [m]
+    haze_cone="vec4",  # x: its width, y: how high it is densest (see background.glsl), z: how far the skybox is [m]
     shown_far="vec4",  # x, y: where fog begins and is complete [m]; z: 1 where the skybox is shown
     counts="vec4",  # y: lights, z: number of the exposure, w: lights that cast shadows
 )

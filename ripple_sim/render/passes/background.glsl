@@ -65,11 +65,11 @@ bool may_be_shaded(vec2 place, vec2 near)
 // nearer by the ring's width, a share of that distance. It is densest at some height, and clear at its foot and its top.
 vec3 hazed(vec3 shown)
 {
-    float slope = way_local.z / max(length(way_local.xy), 1e-9), height = eye_local.z / haze_ring.z;
-    float below = slope / max(height + haze_ring.x * slope, 1e-9);  // the eye, in heights of it, where the ray meets the ring
-    float up = 1.0 - below, dense = haze_ring.y;
+    float slope = way_local.z / max(length(way_local.xy), 1e-9), height = eye_local.z / haze_cone.z;
+    float below = slope / max(height + haze_cone.x * slope, 1e-9);  // the eye, in heights of it, where the ray meets the ring
+    float up = 1.0 - below, dense = haze_cone.y;
     float share = min(up / dense, below / (1.0 - dense));
-    return mix(shown, fogged(haze.rgb, haze_ring.z), haze.w * (eye_local.z > 0.0 ? clamp(share, 0.0, 1.0) : 0.0));
+    return mix(shown, fogged(haze.rgb, haze_cone.z), haze.w * (eye_local.z > 0.0 ? clamp(share, 0.0, 1.0) : 0.0));
 }
 #endif
 
@@ -161,7 +161,7 @@ void main()
     shown += reflectance * textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb;
 #endif
     vec3 far = encoded(sky_at(direction, 0.0));
-    far = mix(far, fogged(far, haze_ring.z), shown_far.z);  // black has none
+    far = mix(far, fogged(far, haze_cone.z), shown_far.z);  // black has none
     shown = hazed(mix(fogged(shown, at), far, fade));
 #endif
 #if BLOCK > 1

@@ -70,11 +70,14 @@ def _balls(centres: NDArray[np.float64], radius: float) -> NDArray[np.float32]:
     turn = 2 * np.pi * np.arange(_SIDES + 1) / _SIDES
     rise = np.pi * (np.arange(_STACKS + 1) / _STACKS - 0.5)
     flat = np.cos(rise)[:, None, None] * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
-    directions = flat + np.sin(rise)[:, None, None] * [0.0, 0.0, 1.0]  # [ring, side, 3]
+    directions = flat + np.sin(rise)[:, None, None] * [0.0, 0.0, 1.0]  # [level, side, 3]
     rings = centres[:, None, None] + radius * directions
     normals = np.broadcast_to(directions, rings.shape)
     return np.concatenate(
-        [_strips(rings[:, ring], rings[:, ring + 1], normals[:, ring], normals[:, ring + 1]) for ring in range(_STACKS)]
+        [
+            _strips(rings[:, level], rings[:, level + 1], normals[:, level], normals[:, level + 1])
+            for level in range(_STACKS)
+        ]
     )
 
 

@@ -101,7 +101,7 @@ def set_surroundings(
     frame.set_vector("fog", model.vis.rgba.fog[:3], float(flags.fog))
     frame.set_vector("haze", model.vis.rgba.haze[:3], float(shown and flags.haze and endless))
     width = float(model.vis.map.haze)
-    frame.set_vector("haze_ring", [width, _densest(width), _SKYBOX * far])
+    frame.set_vector("haze_cone", [width, _densest(width), _SKYBOX * far])
     begins, ends = model.stat.extent * np.array([model.vis.map.fogstart, model.vis.map.fogend])
     frame.set_vector("shown_far", [begins, ends, float(shown)])
 
