@@ -399,6 +399,10 @@ _HEAVY = 100.0
 
 _SOFT = 64  # resolution of flexes and skins
 
+# A mesh of so many triangles that is no sphere in shape (whose Euler characteristic is 2) gets this resolution at most:
+# laying charts on it takes three to ten times as long at 96.
+_MANY_TRIANGLES, _INTRICATE, _SPHERE = 10_000, 48, 2
+
 
 class SuitedTargets(NamedTuple):
     """What suits targets, by their names: materials without unset coefficients, resolutions, and laws of easing."""
@@ -437,7 +441,8 @@ def suited_targets(
         return SuitedTargets(suited, texels, easings)
     coupled = CoupledModel(model, geoms.values())
     for name in left:
-        extent = Extent.of(target_mesh(model, geoms[name]))
+        mesh = target_mesh(model, geoms[name])
+        extent = Extent.of(mesh)
         found_material = suited_material(coupled, geoms[name], extent, materials[name], can_ease=can_ease)
         suited[name] = found_material.material
         if found_material.easing is not None:
@@ -445,8 +450,15 @@ def suited_targets(
         elif "density" in materials[name].unset:
             _warn_of_unseen(coupled, name, geoms[name], extent)
         if name not in texels:
-            texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
+            n = suited_resolution(coupled, geoms[name], extent, suited[name])
+            texels[name] = min(n, _INTRICATE) if _is_intricate(mesh) else n
     return SuitedTargets(suited, texels, easings)
+
+
+def _is_intricate(mesh: Mesh) -> bool:
+    """Whether charts take long on a mesh: a robot's cover of many triangles, with holes, handles or loose parts."""
+    is_plain = mesh.closed and mesh.component_count == 1 and len(mesh.V) - len(mesh.F) / 2 == _SPHERE
+    return len(mesh.F) > _MANY_TRIANGLES and not is_plain
 
 
 def _warn_of_unseen(coupled: CoupledModel, name: str, geom: int, extent: Extent) -> None:

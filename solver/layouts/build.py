@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 from ..cache import cache_path, make_room, mark_used
 from ..errors import PATH, AtlasError, MeshError, SphereMapError, checked, instance
+from ..kernel import log
+from ..mesh.clean import counted
 from ..mesh.mesh import Mesh, check_genus_zero
 from ..texels.atlas import ADVICE, FORMAT, Atlas, read_atlas_file
 from ..texels.chart_map import ChartMap, LinearChartMap
@@ -27,6 +30,9 @@ from .sphere_map import certify, conformal_sphere_map, progressive_sphere_map
 
 # "auto" chooses between the others; see `choice`.
 LAYOUTS = ("auto", "cube", "patches")
+
+# How long charts are laid in silence, and between two lines that tell of it [s].
+_TOLD_EVERY = 15.0
 
 Arrays = dict[str, NDArray]
 
@@ -150,7 +156,7 @@ class _Builder:
         stored = self._stored(path, start, "patches")
         if stored is not None:
             return stored
-        return self._kept(path, patch_atlas(self.mesh, self.resolution))
+        return self._kept(path, _patches(self.mesh, self.resolution))
 
     def cube(self) -> Atlas:
         """Atlas of the cube layout, by way of a sphere map that is known already, or by the method."""
@@ -188,7 +194,7 @@ class _Builder:
         """Patches, or the cube where there are none, with a note: its texels are `length` times as long as wide."""
         mapped = time.perf_counter()
         try:
-            atlas = patch_atlas(self.mesh, self.resolution)
+            atlas = _patches(self.mesh, self.resolution)
             note = f"layout patches: texels of the cube would be up to {length:.0f} times as long as wide, on limbs"
         except AtlasError as error:
             atlas = self._six_charts(sphere, mapped)
@@ -243,3 +249,35 @@ class _Builder:
                 atlas.save(path, overwrite=True)
                 make_room(path)
         return atlas
+
+
+def _patches(mesh: Mesh, resolution: int) -> Atlas:
+    """Atlas of the patch layout; where that takes long, lines tell of it."""
+    with _told_if_long(mesh):
+        return patch_atlas(mesh, resolution)
+
+
+@contextlib.contextmanager
+def _told_if_long(mesh: Mesh) -> Iterator[None]:
+    """Tell from time to time that charts are still being laid on a mesh."""
+    done = threading.Event()
+
+    def tell() -> None:
+        waited = 0.0
+        while not done.wait(_TOLD_EVERY):
+            waited += _TOLD_EVERY
+            log.warning(
+                "laying charts on a mesh of %s in %s: %.0f s so far; later runs load what is made, and a lower "
+                "resolution takes less",
+                counted(len(mesh.F), "triangle"),
+                counted(mesh.component_count, "part"),
+                waited,
+            )
+
+    telling = threading.Thread(target=tell, daemon=True)
+    telling.start()
+    try:
+        yield
+    finally:
+        done.set()
+        telling.join()

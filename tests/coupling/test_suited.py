@@ -12,12 +12,15 @@ import msgspec
 import mujoco
 import numpy as np
 import pytest
+from genus_zero import icosphere
 from hits import Run
 from mujoco_models import limbed_asset
 
 from ripple_sim import Material, Ripples, Simulation, load_scene
+from ripple_sim.coupling.suited import _is_intricate
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import MaterialEntry
+from ripple_sim.solver import Mesh
 from ripple_sim.solver.texels import half_thickness
 
 BOX = """<mujoco><option timestep="0.002"/><worldbody><geom name="target" type="box" size="0.5 0.5 0.25"/>
@@ -257,6 +260,15 @@ def test_a_small_body_gets_texels_that_resolve_its_footprint() -> None:
     waves = chosen(Material(speed=0.5, density=1.0), ball=0.03)["egg"]
     assert waves.atlas.resolution > 96
     assert waves.atlas.areas.mean() ** 0.5 < 0.5 * 0.03 / 3.5
+
+
+def test_only_meshes_that_are_no_spheres_in_shape_are_intricate() -> None:
+    V, F = icosphere(5)
+    assert not _is_intricate(Mesh.from_arrays(V, F))
+    assert _is_intricate(Mesh.from_arrays(V, F[1:])), "a hole"
+    assert _is_intricate(Mesh.from_arrays(np.concatenate([V, V + 3.0]), np.concatenate([F, F + len(V)]))), "two parts"
+    V, F = icosphere(3)
+    assert not _is_intricate(Mesh.from_arrays(V, F[1:])), "few triangles"
 
 
 def test_a_resolution_that_is_given_is_the_one_that_is_taken() -> None:

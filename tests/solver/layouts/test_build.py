@@ -1,5 +1,7 @@
 """Atlases are built, saved, loaded and cached; every texel lies on the surface, of hard shapes too."""
 
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -143,3 +145,14 @@ def test_a_hard_shape_gives_the_same_bits_again() -> None:
     first, second = (sound_atlas(V, F) for _ in range(2))
     for name in ("sphere", "positions", "normals", "triangles", "barycentrics"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+def test_charts_that_take_long_are_told_of(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    build = sys.modules[build_atlas.__module__]
+    monkeypatch.setattr(build, "_TOLD_EVERY", 0.01)
+    monkeypatch.setattr(build, "patch_atlas", lambda mesh, resolution: time.sleep(0.2))
+    build._patches(Mesh.from_arrays(*icosphere(2)), 8)
+    assert "laying charts on a mesh of 320 triangles in 1 part: 0 s so far" in caplog.messages[0]
+    told = len(caplog.messages)
+    time.sleep(0.1)
+    assert len(caplog.messages) == told
