@@ -13,10 +13,11 @@ from ripple_sim.coupling.energy import Energy
 from ripple_sim.coupling.geoms import find_target, target_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping import divergence, physics_errors
+from ripple_sim.coupling.target import Target
 from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.scene_file import apply_maps, uniform_material
+from ripple_sim.scene.scene_file import RippleEntry, apply_maps, uniform_material
 from ripple_sim.scene.target_maps import rim_of
 from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
 from ripple_sim.solver.kernel import work_clock
@@ -98,25 +99,15 @@ class Simulation:
         self.data = mujoco.MjData(self.model)
         self.ripples = Ripples(
             self.model,
-            {entry.geom: uniform_material(entry) for entry in scene.targets},
-            resolution={entry.geom: resolution or entry.resolution for entry in scene.targets},
-            layout={entry.geom: layout or entry.layout for entry in scene.targets},
-            rim={entry.geom: rim or rim_of(self.model, entry.geom, entry.rim) for entry in scene.targets},
-            conserve_volume={entry.geom: entry.conserve_volume for entry in scene.targets},
+            {entry.geom: self._target(entry, resolution, layout, rim) for entry in scene.targets},
             backend=backend,
             operator=operator,
             two_way=scene.two_way,
-            contacts=scene.contacts,
-            high_pass={entry.geom: entry.high_pass for entry in scene.targets},
-            pulse={entry.geom: entry.pulse for entry in scene.targets},
-            modulus={entry.geom: entry.modulus for entry in scene.targets},
         )
         self.limited = {}
         for entry in scene.targets:
             apply_maps(self.ripples, entry)
             self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
-            if not (entry.limit and entry.warn):
-                self.ripples.allow_any_height(entry.geom)
         shaped = {entry.geom: entry.height for entry in scene.targets if entry.height is not None}
         self._heights = {geom: height.heights(self.ripples, geom) for geom, height in shaped.items()}
         self._materials = {name: self.ripples[name].material for name in self.ripples}
@@ -128,6 +119,21 @@ class Simulation:
             at = sensor.site if sensor.site is not None else self.ripples.to_geom(sensor.geom, points)
             waves = self.ripples[sensor.geom]
             self.sensors[sensor.name] = waves.sensor(at, sensor.kind, sensor.rate, thickness=sensor.thickness)
+
+    def _target(self, entry: RippleEntry, resolution: int | None, layout: str | None, rim: str | None) -> Target:
+        """What an entry of the scene says of a target, with the overrides of the simulation."""
+        return Target(
+            uniform_material(entry),
+            resolution=resolution or entry.resolution,
+            layout=layout or entry.layout,
+            rim=rim or rim_of(self.model, entry.geom, entry.rim),
+            high_pass=entry.high_pass,
+            pulse=entry.pulse,
+            modulus=entry.modulus,
+            contacts=entry.contacts,
+            limit=entry.limit and entry.warn,
+            conserve_volume=entry.conserve_volume,
+        )
 
     @classmethod
     def of(

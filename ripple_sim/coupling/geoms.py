@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TypeVar
 
 import mujoco
@@ -115,23 +115,6 @@ def find_any(model: mujoco.MjModel, key: GeomKey) -> int:
     if soft >= 0 and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, str(key)) < 0:
         return soft
     return find_geom(model, key)
-
-
-def for_each(model: mujoco.MjModel, names: Iterable[str], what: str, value: Value | ByGeom[Value]) -> dict[str, Value]:
-    """What an argument says for each target, by name: one value for all, or a mapping.
-
-    Raises `SceneError` for a target that a mapping leaves out.
-    """
-    if not isinstance(value, Mapping):
-        return dict.fromkeys(names, value)
-    given = by_name(model, value, what)
-    for name in names:
-        if name not in given:
-            raise SceneError(
-                f"{what} has no entry for geom {name!r}; it has {', '.join(map(repr, given)) or 'none'}: "
-                f"give every rippling geom one, or one {what} for all"
-            )
-    return {name: given[name] for name in names}
 
 
 def to_body(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> NDArray[np.float64]:

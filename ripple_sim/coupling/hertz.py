@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import mujoco
@@ -26,8 +26,9 @@ from ripple_sim.solver.kernel import Floats, Ints
 
 from .contacts import Contacts, collider_ids, normal_rows
 from .energy import impedance
-from .geoms import ByGeom, find_any, for_each
+from .geoms import find_any
 from .model import CoupledModel
+from .target import Target
 
 PULSES = ("contact", "hertz")
 
@@ -48,25 +49,27 @@ _PARTS = 32
 _WHOLE = 1 - 1e-9
 
 
-def hertz_moduli(
-    model: mujoco.MjModel, names: Iterable[str], pulse: str | ByGeom[str], modulus: float | ByGeom[float | None] | None
-) -> dict[int, float]:
-    """E* [Pa] of the targets whose hits have Hertz's pulse, by geom id; raises `SceneError` for what is not valid."""
-    pulses, found = for_each(model, names, "pulse", pulse), {}
-    for name, each in pulses.items():
-        if each not in PULSES:
-            raise SceneError(f"pulse is {shown(each)} for geom {name!r}; valid are {', '.join(map(repr, PULSES))}")
-    wanted = [name for name, each in pulses.items() if each == "hertz"]
-    given = for_each(model, wanted, "modulus", modulus)
-    for name in wanted:
-        if not POSITIVE.holds(given[name]):
+def hertz_moduli(model: mujoco.MjModel, targets: Mapping[str, Target]) -> dict[int, float]:
+    """E* [Pa] of the targets whose hits have Hertz's pulse, by geom id.
+
+    Raises `SceneError` for a pulse that is unknown, or a modulus that is missing or not positive.
+    """
+    moduli = {}
+    for name, target in targets.items():
+        if target.pulse not in PULSES:
             raise SceneError(
-                f"modulus is {shown(given[name])} Pa for geom {name!r}, whose pulse is 'hertz'; valid is "
+                f"pulse is {shown(target.pulse)} for geom {name!r}; valid are {', '.join(map(repr, PULSES))}"
+            )
+        if target.pulse != "hertz":
+            continue
+        if not POSITIVE.holds(target.modulus):
+            raise SceneError(
+                f"modulus is {shown(target.modulus)} Pa for geom {name!r}, whose pulse is 'hertz'; valid is "
                 f"{POSITIVE.words}: E* of the two materials, 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2, about 1e11 "
                 "for steel on steel, 1e9 for wood, 1e6 for a rubber ball on anything hard"
             )
-        found[find_any(model, name)] = float(given[name] or 0.0)
-    return found
+        moduli[find_any(model, name)] = float(target.modulus or 0.0)
+    return moduli
 
 
 def given_share(age: float) -> float:

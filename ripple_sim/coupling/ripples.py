@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+import dataclasses
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Material
+from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.errors import checked, warn_caller, whole
 from ripple_sim.solver.operator.plate_rim import Rim
+from ripple_sim.solver.texels.atlas import check_points
+from ripple_sim.solver.waves.footprint import Footprint, footprint
 
 from .collision_geoms import named_collision_geoms
 from .easing import Easing, bodies_of, easing_warning
 from .energy import Energy, body_energy
-from .geoms import ByGeom, GeomKey, for_each, target_name
+from .geoms import ByGeom, GeomKey, find_any, rotation_in_body, target_name
 from .hertz import Hits, hertz_moduli
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .own_model import own_data, own_model
-from .soft import HighPass
+from .rippling import RipplingSurface, rippling_surfaces
+from .soft import HighPass, is_soft
 from .stepping import (
     IN_TURN_WARNING,
     NO_RESET,
@@ -37,15 +41,18 @@ from .stepping import (
     missed_warning,
     physics_errors,
 )
+from .target import Target, contacts_of, named_targets
 from .target_warnings import AmplitudeCheck, collision_warnings
-from .targets import Targets
 from .tunnelling import TunnellingCheck
 from .two_way import TwoWay, require_suited_options
 
 __all__ = ["Impulse", "Ripples"]
 
+# How far off the surface a poke may be without a warning, over the object's size.
+_FAR = 0.1
 
-class Ripples(Targets):
+
+class Ripples:
     """Ripples on geoms of a MuJoCo model, driven by its contact forces.
 
     Call `step(data)` after each `mujoco.mj_step(model, data)`, or `mj_step(data)` instead of both. From now on MuJoCo's
@@ -56,46 +63,45 @@ class Ripples(Targets):
     model : mujoco.MjModel
         Or dm_control's wrapper of one; likewise the data of each step.
     materials : mapping
-        Geom to its `Material`: by its name, for unnamed geoms by "body/index" (index among the geoms of its body), or
-        by its id. Geoms of type mesh, sdf, hfield, sphere, ellipsoid, capsule, cylinder and box can ripple, and
-        flexes and skins, by their names.
-        Note that MuJoCo collides a mesh geom as its convex hull. A geom of type="sdf" collides as the true surface, and
-        so does a mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
-        `make_collidable`. Impulses are exact with every integrator but RK4. Of a material without a density,
-        this and the speed, damping and stiffness that it does not give are chosen by the model, see `suited_material`;
-        they stand in `ripples[geom].material`, and forces of bodies too heavy for it are eased, see `Easing`.
-    resolution : int, None or mapping
-        Texels along an edge of the atlas's charts, for all targets or by geom. None: 32 to 256, by what touches the
-        target and by the time step, see `suited_resolution`.
-    layout : str or mapping
-        How surfaces get their charts: "auto", "cube" or "patches", for all targets or by geom; see `build_atlas`.
-    rim : str, callable or mapping
+        Geom to its `Material`, or to a `Target`, which also says how the waves of this geom are solved. A geom is given
+        by its name, an unnamed one by "body/index" (index among the geoms of its body), or by its id. Geoms of type
+        mesh, sdf, hfield, sphere, ellipsoid, capsule, cylinder and box can ripple, and flexes and skins, by their
+        names.
+        MuJoCo collides a mesh geom as its convex hull. A geom of type="sdf" collides as the true surface, and so does a
+        mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
+        `make_collidable`. Impulses are exact with every integrator but RK4. Of a material without a density, this and
+        the speed, damping and stiffness that it does not give are chosen by the model, see `suited_material`; they
+        stand in `ripples[geom].material`, and forces of bodies too heavy for it are eased, see `Easing`.
+    resolution : int, optional
+        Texels along an edge of the atlas's charts. None: 32 to 256, by what touches the target and by the time step,
+        see `suited_resolution`. This argument and the following ones hold for all targets whose `Target` leaves them
+        open. Mappings of values by geom still work, and are deprecated.
+    layout : str
+        How surfaces get their charts: "auto", "cube" or "patches"; see `build_atlas`.
+    rim : str or callable
         "free", "supported", "clamped" or "fixed" rims of open surfaces, or a function of their points in the geom's
-        frame, likewise; see `WaveSolver`.
+        frame; see `WaveSolver`.
     two_way : bool
         Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
         Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects
         `data.qvel` and `data.qpos`; `xfrc_applied` and the other applied forces in `data` are yours alone. The
         integrator RK4 is refused. See "Two-way coupling" in how-it-works.md.
     contacts : mapping, optional
-        Geom to the geoms that collide for it, where a visible geom ripples and others, on its body or on bodies welded
-        to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
-        that collide and do not ripple. A contact loads the surface where this is nearest and faces it; of several
-        targets that share a geom, the nearest.
-    high_pass : bool or mapping
-        Whether a flex keeps to itself the coarse motion that contacts give it, for all targets or by name: its waves
+        Geom to the geoms that collide for it. Deprecated: use `Target(contacts=...)`.
+    high_pass : bool
+        Whether a flex keeps to itself the coarse motion that contacts give it: its waves
         then get what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in the flex
         and in its waves, which take theirs from nothing.
-    pulse : str or mapping
-        How long a hit takes, for all targets or by geom: "contact", as MuJoCo's soft contact holds it, some
+    pulse : str
+        How long a hit takes: "contact", as MuJoCo's soft contact holds it, some
         milliseconds, or "hertz", as two elastic bodies touch, with the same impulse; see `Hits`.
-    modulus : float or mapping, optional
+    modulus : float, optional
         For "hertz": E* of the two materials, 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2 [Pa].
     backend : str
         As for `WaveSolver`; so are the next two.
     operator : str
-    conserve_volume : bool or mapping, optional
-        For all targets or by geom: whether the mean of every push is taken out. By default on closed surfaces, and on
+    conserve_volume : bool, optional
+        Whether the mean of every push is taken out. By default on closed surfaces, and on
         open ones that no rim, clamp or stiffness holds.
 
     Raises
@@ -109,7 +115,7 @@ class Ripples(Targets):
     def __init__(
         self,
         model: mujoco.MjModel,
-        materials: ByGeom[Material],
+        materials: ByGeom[Material | Target] | ByGeom[Material] | ByGeom[Target],
         *,
         resolution: int | ByGeom[int | None] | None = None,
         layout: str | ByGeom[str] = "auto",
@@ -123,15 +129,27 @@ class Ripples(Targets):
         operator: str = "fem",
         conserve_volume: bool | ByGeom[bool | None] | None = None,
     ) -> None:
+        self.model = own_model(model)
+        common = {
+            "resolution": resolution,
+            "layout": layout,
+            "rim": rim,
+            "high_pass": high_pass,
+            "pulse": pulse,
+            "modulus": modulus,
+            "conserve_volume": conserve_volume,
+        }
+        targets = named_targets(self.model, materials, common)
         options = {"backend": backend, "operator": operator}
         # what pushes back, and pulses of hits, need all of a force
-        pulses = pulse.values() if isinstance(pulse, Mapping) else [pulse]
-        can_ease = not two_way and all(each == "contact" for each in pulses)
-        super().__init__(own_model(model), materials, resolution, layout, rim, conserve_volume, options, can_ease)
+        can_ease = not two_way and all(target.pulse == "contact" for target in targets.values())
+        self._surfaces, self._easings = rippling_surfaces(self.model, targets, options, can_ease)
+        # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here
+        self._waves = {surface.geom: surface.waves for surface in self._surfaces.values()}
         adopt_warnings()
-        self._contacts = named_collision_geoms(self.model, self, contacts or {})
-        self._moduli = hertz_moduli(self.model, self, pulse, modulus)
-        self._fine = for_each(self.model, self, "high_pass", high_pass)
+        self._contacts = named_collision_geoms(self.model, self, contacts_of(targets, contacts))
+        self._moduli = hertz_moduli(self.model, targets)
+        self._fine = {name: bool(target.high_pass) for name, target in targets.items()}
         self._has_two_way = two_way
         coupled = self._couple(None)
         self._check_tunnelling = TunnellingCheck(coupled, [geom for geom in self._waves if geom not in coupled.soft])
@@ -155,9 +173,143 @@ class Ripples(Targets):
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
                 'impulses are off by some per cent; use integrator="implicitfast", or a short time step'
             )
+        for name, target in targets.items():
+            if not target.limit:
+                self.allow_any_height(name)
         self._scratch = mujoco.MjData(self.model)
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
+
+    def __getitem__(self, name: GeomKey) -> WaveSolver:
+        """Waves of a geom, by name or id."""
+        return self._surface(name).waves
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._surfaces)
+
+    def __len__(self) -> int:
+        return len(self._surfaces)
+
+    @property
+    def geom_ids(self) -> dict[str, int]:
+        """Geom id of every target, by name; a flex or a skin has one after all geoms."""
+        return {name: target.geom for name, target in self._surfaces.items()}
+
+    def change_material(self, name: GeomKey, **coefficients: Any) -> None:
+        """Change coefficients of a geom's material, by their names in `Material`; height and velocity stay.
+
+        Raises
+        ------
+        SceneError
+            For an unknown geom.
+        SolverError
+            For an unknown or invalid coefficient.
+        """
+        names = [field.name for field in dataclasses.fields(Material)]
+        for given in coefficients:
+            if given not in names:
+                raise SolverError(f"a material has no coefficient {given!r}; valid are {', '.join(names)}")
+        self._change(name, material=dataclasses.replace(self._surface(name).material, **coefficients))
+        if "density" in coefficients:
+            self._take_up_all(self._surface(name).geom)
+
+    def poke(self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0) -> Footprint:
+        """Give a geom's surface an impulse at once, as `[[poke]]` in a scene file does.
+
+        Parameters
+        ----------
+        name : str or int
+            Geom.
+        point : [3]
+            In the frame of the geom's body, as places in an MJCF are [m]; the nearest surface point is taken, with a
+            warning where that is far.
+        impulse : float
+            [N s]; positive presses inwards.
+        radius : float
+            Of the footprint, along the surface [m]; at least two texels are used.
+
+        Returns
+        -------
+        Footprint
+            The texels that were hit.
+
+        Raises
+        ------
+        SceneError
+            For an unknown geom.
+        SolverError
+            If the impulse, the point or the radius is not finite, or the radius negative.
+        """
+        waves, place = self._surface(name).waves, self.to_geom(name, point)
+        where = waves.add_impulse(place, impulse, radius)
+        off, size = float(np.linalg.norm(place - where.point)), float(np.ptp(waves.atlas.mesh.V, axis=0).max())
+        if off > _FAR * size:
+            warn_caller(
+                f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its size); the nearest point "
+                f"is poked. Points are in the frame of the geom's body [m]"
+            )
+        return where
+
+    def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
+        """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.
+
+        Parameters
+        ----------
+        name : str or int
+            Geom.
+        point : [3]
+            In the frame of the geom's body [m]; the nearest surface point is taken.
+        radius : float
+            Along the surface [m].
+        """
+        atlas = self._surface(name).waves.atlas
+        disc = np.zeros(atlas.areas.shape)
+        disc.reshape(-1)[footprint(atlas, self.to_geom(name, point), radius).texels] = 1.0
+        self.hold(name, disc)
+
+    def hold(self, name: GeomKey, region: ArrayLike) -> None:
+        """Hold a region of a geom's surface still, as `make_rigid` does with a disc.
+
+        Parameters
+        ----------
+        name : str or int
+            Geom.
+        region : bool or float [C, n, n]
+            The texels to hold; from 0 to 1 for a share of a texel.
+
+        Raises
+        ------
+        SolverError
+            If the region has another shape, or numbers that are not from 0 to 1.
+        """
+        before = self._surface(name).held
+        try:
+            held = np.asarray(region, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise SolverError(f"region is {region!r}; valid are numbers from 0 to 1, one for each texel") from error
+        if before is not None and held.shape == before.shape:
+            held = np.maximum(held, before)
+        self._change(name, held=held)
+
+    def change_operator(self, operator: str) -> None:
+        """Change the wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
+
+        Raises `SolverError` for an unknown operator.
+        """
+        for name, target in list(self._surfaces.items()):
+            self._change(name, options={**target.options, "operator": operator})
+
+    def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
+        """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes.
+
+        The points of `poke` and `make_rigid` are in the body's frame; those of an atlas, and of the waves of one geom,
+        `ripples[name]`, in the geom's.
+        """
+        geom = self._surface(name).geom
+        if is_soft(self.model, geom):  # it is in the world
+            return np.array(point, dtype=np.float64)
+        places = check_points(point) - self.model.geom_pos[geom]
+        return (places @ rotation_in_body(self.model, geom)).reshape(np.shape(point))
 
     @property
     def last_impulses(self) -> list[Impulse]:
@@ -247,7 +399,7 @@ class Ripples(Targets):
 
         Of a geom that was moved by `ripples[name].move` in its own frame; None where nothing has moved them.
         """
-        target = self._target(name)
+        target = self._surface(name)
         soft = self._soft.get(target.geom)
         return target.waves.vertices if soft is None else soft.vertices(data)
 
@@ -258,7 +410,7 @@ class Ripples(Targets):
 
     def allow_any_height(self, name: GeomKey) -> None:
         """Give no warning of waves on a geom that are too high or too steep for it."""
-        self._check_amplitude.ignore(self._target(name).geom)
+        self._check_amplitude.ignore(self._surface(name).geom)
 
     def _follow(self, data: mujoco.MjData) -> None:
         passed = self._clock.look(self.model, data)
@@ -293,7 +445,8 @@ class Ripples(Targets):
         self._check_amplitude()
 
     def _take_up_all(self, geom: int) -> None:
-        super()._take_up_all(geom)
+        """Ease no forces on a target any more: the user gives its density."""
+        self._easings.pop(geom, None)
         if self._eased.pop(geom, None) is not None:
             self._loads.take_up_all(geom)
 
@@ -343,13 +496,38 @@ class Ripples(Targets):
         self._two_way = TwoWay(coupled, self._waves) if can_push else None
         return coupled
 
+    def _surface(self, name: GeomKey) -> RipplingSurface:
+        target = self._surfaces.get(name) if isinstance(name, str) else None
+        if target is None:
+            target = self._surfaces.get(target_name(self.model, find_any(self.model, name)))
+        if target is None:
+            raise SceneError(
+                f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._surfaces))}"
+            )
+        return target
+
+    def _follow_shapes(self) -> list[str]:
+        """Lay new atlases on the targets whose surfaces were changed in the model; return the names of these."""
+        changed = [
+            name
+            for name, target in self._surfaces.items()
+            if target.shape is not None and target.shape.changed(self.model)
+        ]
+        for name in changed:
+            target = self._surfaces[name].on_its_surface(self.model)
+            self._surfaces[name], self._waves[target.geom] = target, target.waves
+        return changed
+
     def _change(self, name: GeomKey, **changes: Any) -> None:
-        super()._change(name, **changes)
-        target = self._target(name)
-        self._loads.waves_changed(target.geom)
-        self._check_amplitude.waves_changed(target.geom, target.waves)
-        if target.geom in self._high_pass:
-            self._high_pass[target.geom] = HighPass(target.waves, self._soft[target.geom])
+        """Change a surface's material, options or what is held; if that fails, nothing has changed."""
+        surface = self._surface(name).rebuilt(**changes)
+        geom = surface.geom
+        self._surfaces[target_name(self.model, geom)] = surface
+        self._waves[geom] = surface.waves
+        self._loads.waves_changed(geom)
+        self._check_amplitude.waves_changed(geom, surface.waves)
+        if geom in self._high_pass:
+            self._high_pass[geom] = HighPass(surface.waves, self._soft[geom])
 
     def _flatten(self) -> None:
         self._check_amplitude.flush()

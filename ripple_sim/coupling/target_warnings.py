@@ -96,8 +96,8 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
             names = ", ".join(repr(coupled.names[each]) for each in colliders)
             yield (
                 f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface "
-                f"that ripples: contacts load it where it is nearest to them; name other geoms in contacts=, or call "
-                f"make_collidable(spec, {name!r})"
+                f"that ripples: contacts load it where it is nearest to them; name other geoms in Target(contacts=...) "
+                f"or call make_collidable(spec, {name!r})"
             )
     elif coupled.has_flex[geom]:
         yield from _flex_warning(coupled, geom)
@@ -131,7 +131,7 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
     if not colliders:
         return (
             f"nothing can touch geom {name!r}: it does not collide (contype and conaffinity are 0), nor does another "
-            f"geom of its body; name the geoms that collide for it, contacts={{{name!r}: [...]}}, or give it a contype"
+            f"geom of its body; name the geoms that collide for it, Target(contacts=[...]), or give it a contype"
         )
     masks = ", ".join(
         f"{coupled.names[each]!r} has contype {model.geom_contype[each]} and conaffinity {model.geom_conaffinity[each]}"

@@ -24,9 +24,9 @@ import numpy as np
 from ripple_sim.coupling.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.geoms import find_target, target_name
 from ripple_sim.coupling.own_model import own_model
+from ripple_sim.coupling.rippling import site_on
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.coupling.suited import typical_hit
-from ripple_sim.coupling.targets import site_on
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, warn_caller
 from ripple_sim.solver.images import open_image

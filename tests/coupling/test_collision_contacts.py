@@ -10,7 +10,7 @@ import trimesh
 from hits import Run
 from mujoco_models import BALL, add_ball, mesh_asset, mesh_spec, model_of
 
-from ripple_sim import Material, Ripples, RippleWarning, make_collidable
+from ripple_sim import Material, Ripples, RippleWarning, Target, make_collidable
 from ripple_sim.coupling import hull_gap, places_facing
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
@@ -116,8 +116,8 @@ def test_a_plank_across_two_targets_weighs_on_both_what_it_weighs() -> None:
 def test_named_geoms_alone_load_a_target_that_names_them() -> None:
     arm = ARM.replace("</body>", '<geom name="knob" size="0.12" pos="0.4 0 0"/></body>')
     model = model_of(arm + BALL.format("0.4 0.01 0.8"))
-    bone, lost = play(model, ("left",), contacts={"left": ["bone"]})
-    knob, _ = play(model, ("right",), contacts={"right": ["knob"]})
+    bone, lost = play(model, ("left",), contacts=["bone"])
+    knob, _ = play(model, ("right",), contacts=["knob"])
     assert not bone.pairs
     assert knob.given() == pytest.approx(lost, rel=0.01)
 
@@ -208,21 +208,29 @@ LINK = '<body name="link">{}</body>' + BALL.format("0 0 2")
 
 
 @pytest.mark.parametrize(
-    ("link", "contacts", "message"),
+    ("link", "target", "message"),
     [
-        (f'<geom name="shell" size="0.3" {SEEN}/>', {}, r"does not collide .*contacts=\{'shell': \[\.\.\.\]\}"),
-        ('<geom name="shell" size="0.3" contype="4" conaffinity="4"/>', {}, "'shell' has contype 4 and conaffinity 4"),
+        (f'<geom name="shell" size="0.3" {SEEN}/>', Target(), r"does not collide .*Target\(contacts=\[\.\.\.\]\)"),
+        (
+            '<geom name="shell" size="0.3" contype="4" conaffinity="4"/>',
+            Target(),
+            "'shell' has contype 4 and conaffinity 4",
+        ),
         (
             f'<geom name="shell" size="0.3" {SEEN}/><geom name="core" size="0.29" contype="0" conaffinity="2"/>',
-            {},
+            Target(),
             "nothing can touch geom 'shell': 'core' has contype 0 and conaffinity 2, which match no geom",
         ),
-        (f'<geom name="shell" size="0.3" {SEEN}/><geom size="0.3"/>', {"shell": []}, "nothing can touch geom 'shell'"),
+        (
+            f'<geom name="shell" size="0.3" {SEEN}/><geom size="0.3"/>',
+            Target(contacts=[]),
+            "nothing can touch geom 'shell'",
+        ),
     ],
 )
-def test_target_that_nothing_can_touch_says_so(link: str, contacts: dict, message: str) -> None:
+def test_target_that_nothing_can_touch_says_so(link: str, target: Target, message: str) -> None:
     with pytest.warns(RippleWarning, match=message):
-        Ripples(model_of(LINK.format(link)), {"shell": Material()}, contacts=contacts, resolution=8, backend="cpu")
+        Ripples(model_of(LINK.format(link)), {"shell": target}, resolution=8, backend="cpu")
 
 
 @pytest.mark.parametrize(
@@ -241,9 +249,9 @@ def test_target_that_nothing_can_touch_says_so(link: str, contacts: dict, messag
 def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: float | None) -> None:
     link = LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}')
     model = model_of(link, '<hfield name="flat" nrow="2" ncol="2" size="1 1 0.1 0.1"/>')
-    contacts = {"shell": ["core"]} if "plane" in core or "hfield" in core else None
+    target = Target(contacts=["core"] if "plane" in core or "hfield" in core else None)
     with warnings.catch_warnings(record=True, action="always") as caught:
-        Ripples(model, {"shell": Material()}, contacts=contacts, resolution=16, backend="cpu")
+        Ripples(model, {"shell": target}, resolution=16, backend="cpu")
     told = [re.search(r"'shell' collides as 'core'.*up to ([\d.]+) m", str(each.message)) for each in caught]
     assert [float(each[1]) for each in told] == ([] if gap is None else [pytest.approx(gap, rel=0.05)])
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mujoco_models import BALL, add_ball, mesh_spec, model_of
 
-from ripple_sim import Material, RippleError, Ripples, coupling
+from ripple_sim import Material, RippleError, Ripples, Target, coupling
 from ripple_sim.coupling import CoupledModel, find_geom, geom_name
 from ripple_sim.scenes.shapes import peanut
 
@@ -54,7 +54,8 @@ def test_targets_go_by_name_or_id_or_place() -> None:
     """Ids and unnamed geoms once ended in a TypeError, or could not be asked for."""
     model = model_of('<geom size="0.5"/><body name="b" pos="0.1 0 0.53"><freejoint/><geom size="0.05"/></body>')
     data = mujoco.MjData(model)
-    ripples = Ripples(model, {0: Material(), "b/0": Material()}, resolution={"world/0": 8, 1: 12}, backend="cpu")
+    targets = {0: Target(resolution=8), "b/0": Target(resolution=12)}
+    ripples = Ripples(model, targets, backend="cpu")
     assert list(ripples) == ["world/0", "b/0"]
     assert ripples[0] is ripples["world/0"]
     assert ripples[np.int32(1)] is ripples["b/0"]

@@ -194,7 +194,7 @@ GROOVE = """<mujoco><option timestep="0.001"/><asset>
 def test_a_wedged_ball_is_told_of_where_it_touches() -> None:
     """The middle of its contacts lies in the air between the two walls."""
     model = mujoco.MjModel.from_xml_string(GROOVE.format(height=0.16 * np.sqrt(2) + 1e-3))
-    run, wedged = Run(model, "groove", density=10, resolution=16, contacts={"groove": ["left", "right"]}), 0
+    run, wedged = Run(model, "groove", density=10, resolution=16, contacts=["left", "right"]), 0
     for _ in range(200):
         hits, contact = run.step(), run.data.contact
         if run.data.ncon == 2 and len(hits) == 2:

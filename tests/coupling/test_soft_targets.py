@@ -8,7 +8,7 @@ import pytest
 from hits import Run, contact_forces
 from numpy.testing import assert_allclose
 
-from ripple_sim import Ripples
+from ripple_sim import Ripples, Target
 from ripple_sim.coupling import HighPass, SoftSurface, coarse_motions, first_flex
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Load, Material
@@ -164,7 +164,7 @@ def flexed(dof: str) -> tuple[mujoco.MjModel, Ripples, SoftSurface]:
         radius=".005" mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3"/></flexcomp>
         </worldbody></mujoco>"""
     )
-    ripples = Ripples(model, {"jelly": Material(speed=1.0, density=5.0)}, resolution=8, high_pass={"jelly": True})
+    ripples = Ripples(model, {"jelly": Target(Material(speed=1.0, density=5.0), high_pass=True)}, resolution=8)
     return model, ripples, SoftSurface(model, first_flex(model))
 
 

@@ -9,7 +9,7 @@ import trimesh
 from hits import contact_forces
 from mujoco_models import BALL, mesh_asset, model_of
 
-from ripple_sim import Material, Ripples, RippleWarning, make_collidable
+from ripple_sim import Material, Ripples, RippleWarning, Target, make_collidable
 from ripple_sim.coupling import PAIR, CoupledModel, TunnellingCheck, too_fast, tunnelling
 from ripple_sim.scenes.shapes import peanut
 
@@ -253,7 +253,7 @@ def test_geoms_that_collide_for_a_target_are_watched() -> None:
     model = model_of(f'<body name="link">{shell}{core}</body>' + BALL.format("0 0 0.5"))
     data = mujoco.MjData(model)
     data.qvel[2] = -80.0
-    ripples = Ripples(model, {"shell": Material()}, contacts={"shell": ["core"]}, resolution=8, backend="cpu")
+    ripples = Ripples(model, {"shell": Target(contacts=["core"])}, resolution=8, backend="cpu")
     mujoco.mj_step(model, data)
     with pytest.warns(RippleWarning, match="body 'ball' meets geom 'core' at 80 m/s"):
         ripples.step(data)

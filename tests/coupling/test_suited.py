@@ -16,7 +16,7 @@ from genus_zero import icosphere
 from hits import Run
 from mujoco_models import limbed_asset
 
-from ripple_sim import Material, Ripples, Simulation, load_scene
+from ripple_sim import Material, Ripples, Simulation, Target, load_scene
 from ripple_sim.coupling.suited import _is_intricate
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene import MaterialEntry
@@ -275,7 +275,7 @@ def test_a_resolution_that_is_given_is_the_one_that_is_taken() -> None:
     model = mujoco.MjModel.from_xml_string(EGG.format(dt=0.002, a=0.3, b=0.5, start=1, ball=0.1))
     for given in (24, {"egg": 24}):
         assert Ripples(model, {"egg": Material()}, resolution=given, backend="cpu")["egg"].atlas.resolution == 24
-    assert Ripples(model, {"egg": Material()}, resolution={"egg": None}, backend="cpu")["egg"].atlas.resolution >= 32
+    assert Ripples(model, {"egg": Target(resolution=None)}, backend="cpu")["egg"].atlas.resolution >= 32
     assert Simulation(load_scene("sphere"), resolution=16).ripples["sphere"].atlas.resolution == 16
 
 

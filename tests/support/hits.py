@@ -5,20 +5,24 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from ripple_sim import Impulse, Material, Ripples
+from ripple_sim import Impulse, Material, Ripples, Target
 
 
 class Run:
     """A model in motion, the waves of its targets, and the impulses of every step, `hits`.
 
-    The model may be a specification, the material its density [kg/m^2] alone; the options are those of `Ripples`.
+    The model may be a specification, the material its density [kg/m^2] alone; `contacts` are those of all targets, the
+    options those of `Ripples`.
     """
 
-    def __init__(self, model, *targets: str, density: float = 50.0, material: Material | None = None, **options):
+    def __init__(
+        self, model, *targets: str, density: float = 50.0, material: Material | None = None, contacts=None, **options
+    ):
         self.model = model.compile() if isinstance(model, mujoco.MjSpec) else model
         self.data = mujoco.MjData(self.model)
         options = {"resolution": 12, "backend": "cpu", "conserve_volume": False, **options}
-        self.ripples = Ripples(self.model, dict.fromkeys(targets, material or Material(density=density)), **options)
+        target = Target(material or Material(density=density), contacts=contacts)
+        self.ripples = Ripples(self.model, dict.fromkeys(targets, target), **options)
         self.hits: list[list[Impulse]] = []
 
     def step(self) -> list[Impulse]:

@@ -1,0 +1,148 @@
+"""The surfaces of the targets of a model: how their waves are made, and made anew after a change."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.errors import SceneError
+from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver.operator.assembly import hold
+
+from .easing import EasingLaw
+from .geoms import find_target, target_name
+from .soft import is_soft, target_pose
+from .suited import suited_targets
+from .target import Target
+from .target_mesh import target_atlas
+from .watched import WatchedShape
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RipplingSurface:
+    """The surface of a target: its waves, and what they are made of.
+
+    Attributes
+    ----------
+    geom : int
+        Geom id.
+    material : Material
+    options : mapping
+        Keyword arguments of `WaveSolver`.
+    waves : WaveSolver
+    held : float64 [C, n, n], optional
+        Shares of the texels that are held still.
+    layout : str
+        Of its atlas, as for `build_atlas`.
+    shape : WatchedShape, optional
+        Its surface in the model, as the atlas has it.
+    """
+
+    geom: int
+    material: Material
+    options: Mapping[str, Any]
+    waves: WaveSolver
+    held: NDArray[np.float64] | None = None
+    layout: str = "auto"
+    shape: WatchedShape | None = None
+
+    def on_its_surface(self, model: mujoco.MjModel) -> RipplingSurface:
+        """The same, flat, on a new atlas of the surface that the model has now.
+
+        Raises `SceneError` if something belongs to single texels of the old atlas.
+        """
+        name, old = target_name(model, self.geom), self.waves
+        bound = [
+            ("a region of it is held still", self.held is not None),
+            ("its material is given texel by texel", _is_mapped(self.material)),
+            ("sensors listen to it", bool(old.listeners.all)),
+        ]
+        for what, so in bound:
+            if so:
+                raise SceneError(
+                    f"the surface of {name!r} was changed in the model, and {what}, which belongs to the old one: make "
+                    "new Ripples for the model as it is now"
+                )
+        atlas = target_atlas(model, self.geom, old.rest.resolution, self.layout)
+        new = WaveSolver(atlas, self.material, **self.options)
+        new.listeners.find_points = old.listeners.find_points
+        return dataclasses.replace(self, waves=new, shape=WatchedShape(model, self.geom))
+
+    def rebuilt(self, **changes: Any) -> RipplingSurface:
+        """The same with a new solver in the state of the old one, after a change of its material, options or `held`."""
+        changed = dataclasses.replace(self, **changes)
+        old, material = self.waves, changed.material
+        if changed.held is not None:
+            material = hold(old.rest, material, changed.held)
+        new = WaveSolver(old.rest, material, **changed.options)
+        if old.vertices is not None:
+            new.move(old.vertices)
+        new.state = old.state
+        new.listeners.use(old.listeners.all)
+        new.listeners.find_points = old.listeners.find_points
+        return dataclasses.replace(changed, waves=new)
+
+
+def _is_mapped(material: Material) -> bool:
+    """Whether a coefficient has a number for each texel."""
+    values = [getattr(material, field.name) for field in dataclasses.fields(material)]
+    return any(isinstance(value, np.ndarray) and value.ndim for value in values)
+
+
+def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
+    """Where a site is in the frame of a target [m], [3]: of a geom on the same body, or welded to it.
+
+    In that of a flex or a skin, the world, it is where it stands in `qpos0`. Raises `SceneError` for an unknown site,
+    or one on a body that moves against the geom's.
+    """
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+    if site < 0:
+        sites = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SITE, i) for i in range(model.nsite))
+        raise SceneError(f"the model has no site {name!r}; its sites are {', '.join(filter(None, sites)) or 'none'}")
+    data = mujoco.MjData(model)
+    bodies = [] if is_soft(model, geom) else [model.site_bodyid[site], model.geom_bodyid[geom]]
+    if len({int(model.body_weldid[body]) for body in bodies}) > 1:
+        names = " and ".join(repr(model.body(body).name) for body in bodies)
+        raise SceneError(
+            f"site {name!r} and the geom it measures are on bodies {names}, which move; put it on the geom's"
+        )
+    mujoco.mj_kinematics(model, data)
+    position, rotation = target_pose(data, geom)
+    return (data.site_xpos[site] - position) @ rotation
+
+
+def rippling_surfaces(
+    model: mujoco.MjModel, targets: Mapping[str, Target], options: Mapping[str, Any], can_ease: bool
+) -> tuple[dict[str, RipplingSurface], dict[int, EasingLaw]]:
+    """The surfaces of targets, by name, and the laws by which forces on them are eased, by geom id.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    targets : mapping
+        By name; see `named_targets`.
+    options : mapping
+        Keyword arguments of `WaveSolver` that are common to all.
+    can_ease : bool
+        Whether a target whose density is chosen may take up less than all of a heavy body's forces, see `Easing`.
+    """
+    materials = {name: target.material for name, target in targets.items()}
+    resolutions = {name: target.resolution for name, target in targets.items()}
+    suited = suited_targets(model, materials, resolutions, can_ease=can_ease)
+    surfaces = {}
+    for name, target in targets.items():
+        geom = find_target(model, name)
+        layout = target.layout or "auto"
+        own_options = {**options, "rim": target.rim, "conserve_volume": target.conserve_volume}
+        material = suited.materials[name]
+        waves = WaveSolver(target_atlas(model, geom, suited.resolutions[name], layout), material, **own_options)
+        waves.listeners.find_points = functools.partial(site_on, model, geom)
+        shape = WatchedShape(model, geom)
+        surfaces[name] = RipplingSurface(geom, material, own_options, waves, layout=layout, shape=shape)
+    return surfaces, {find_target(model, name): law for name, law in suited.easings.items()}
