@@ -92,13 +92,13 @@ class Easing:
         bodies = self._bodies[colliders]
         total = np.bincount(bodies, np.abs(forces), len(self._smoothed))
         fading = math.exp(-self._law.rate * elapsed)
-        carried = self._smoothed * fading
+        remaining = self._smoothed * fading
         added = total * (1 - fading)
         thinnest = np.ones_like(total)
         np.minimum.at(thinnest, bodies, self._thinness[texels])
-        room = np.maximum(self._law.most * thinnest - carried, 0.0)
+        room = np.maximum(self._law.most * thinnest - remaining, 0.0)
         share = np.divide(room, added, out=np.ones_like(added), where=added > room)
-        self._smoothed = carried + share * added
+        self._smoothed = remaining + share * added
         self.least_share = min(self.least_share, float(share[bodies].min(initial=1.0)))
         return share[bodies]
 

@@ -103,8 +103,8 @@ class Pose:
         if self.clip is None or not len(balls):
             return near, far
         depth = (self.eye - balls[:, :3]) @ self.rotation[:, 2]
-        ahead = depth + balls[:, 3] > 0
-        first = float((depth - balls[:, 3])[ahead].min(initial=far))
+        in_front = depth + balls[:, 3] > 0
+        first = float((depth - balls[:, 3])[in_front].min(initial=far))
         return float(np.clip(_SLACK * first, near, max(near, far / 2))), far
 
     @property

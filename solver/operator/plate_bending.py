@@ -144,9 +144,9 @@ def plate_bending(
 
     weights, kept = _regular_weights(texels, regular, stiff, poisson)
     inside = Rows(Curvatures(topology, weights, rigidity).matrix, np.tile(np.arange(count), KINDS))
-    ring_fits = _ring_fits(texels, np.flatnonzero(irregular), near)
+    neighbourhood_fits = _neighbourhood_fits(texels, np.flatnonzero(irregular), near)
     rim_fits = _rim_fits(texels, np.flatnonzero(outer), near, places)
-    rings, kept[irregular] = _bending_rows(ring_fits, stiff, poisson, _RIDGE_INSIDE)
+    rings, kept[irregular] = _bending_rows(neighbourhood_fits, stiff, poisson, _RIDGE_INSIDE)
     rims, kept[outer] = _bending_rows(rim_fits, stiff, poisson, _RIDGE_OUTSIDE)
     missed = _misfit_rows(rim_fits, rigidities)
     clamps = _clamp_rows(texels, places, rigidities, laplacian)
@@ -213,15 +213,15 @@ def _regular_weights(texels: TexelMesh, regular: Bools, stiff: Floats, poisson: 
     return weights.reshape(KINDS, len(STEPS), *texels.shape), kept
 
 
-def _ring_fits(texels: TexelMesh, at: Ints, near: csr_array) -> Fits:
+def _neighbourhood_fits(texels: TexelMesh, at: Ints, near: csr_array) -> Fits:
     """Fits to the texels that share a cell with those at [o]."""
-    ring = near[at].tocoo()
-    itself = ring.col == at[ring.row]
-    importance = np.where(itself, 1.0, np.where(ring.data >= 2, _BESIDE, _ACROSS))
+    beside = near[at].tocoo()
+    itself = beside.col == at[beside.row]
+    importance = np.where(itself, 1.0, np.where(beside.data >= 2, _BESIDE, _ACROSS))
     spacings = _mean_spacings(near[at], texels)
-    weights = np.sqrt(texels.areas.reshape(-1)[ring.col]) / spacings[ring.row] * importance
-    ends = texels.positions.reshape(-1, 3)[ring.col]
-    return _fits(texels, at, spacings, (ring.row, ring.col, ends, weights))
+    weights = np.sqrt(texels.areas.reshape(-1)[beside.col]) / spacings[beside.row] * importance
+    ends = texels.positions.reshape(-1, 3)[beside.col]
+    return _fits(texels, at, spacings, (beside.row, beside.col, ends, weights))
 
 
 def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -> Fits:
