@@ -74,7 +74,7 @@ def test_the_balls_momentum_reaches_the_surface(xml, name, recwarn):
     assert given == pytest.approx(gained, rel=0.06)
     assert 1e-3 < np.abs(waves.height).max() < np.inf
     # the cloth is open, and the limb of the skin is long
-    assert waves.atlas.layout == {"cloth": "patches", "skin": "patches"}.get(name, "cube")
+    assert waves.atlas.layout == {"cloth": "patches", "arm": "patches"}.get(name, "cube")
 
 
 def test_the_stiffness_that_is_left_open_suits_the_speed_that_is_given():
