@@ -19,15 +19,20 @@ def missing() -> str | None:
     except OSError as error:
         return str(error)
     egl.eglGetProcAddress.restype = ctypes.c_void_p
-    addresses = [egl.eglGetProcAddress(name) for name in (b"eglQueryDevicesEXT", b"eglGetPlatformDisplayEXT")]
+    addresses = [
+        egl.eglGetProcAddress(name) for name in (b"eglQueryDevicesEXT", b"eglGetPlatformDisplayEXT")
+    ]
     if not all(addresses):
         return "libEGL.so.1 does not list its devices"
     query_devices = ctypes.CFUNCTYPE(
         ctypes.c_uint, ctypes.c_int, ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(ctypes.c_int)
     )(addresses[0])
-    get_display = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)(addresses[1])
+    get_display = ctypes.CFUNCTYPE(
+        ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p
+    )(addresses[1])
 
-    devices, count = (ctypes.c_void_p * MAX_DEVICES)(), ctypes.c_int(0)
+    devices = (ctypes.c_void_p * MAX_DEVICES)()
+    count = ctypes.c_int(0)
     query_devices(MAX_DEVICES, devices, ctypes.byref(count))
     for device in devices[: count.value]:
         display = ctypes.c_void_p(get_display(EGL_PLATFORM_DEVICE, device, None))

@@ -26,7 +26,14 @@ with tempfile.TemporaryDirectory() as folder:
     small = ["--size", "320x180", "--duration", "0.2", "--resolution", "32"]
     for arguments in (
         ["info"],
-        ["atlas", str(files / "scenes" / "meshes" / "limbed.obj"), "--resolution", "32", "-o", f"{folder}/atlas.npz"],
+        [
+            "atlas",
+            str(files / "scenes" / "meshes" / "limbed.obj"),
+            "--resolution",
+            "32",
+            "-o",
+            f"{folder}/atlas.npz",
+        ],
         ["render", "sphere", "-o", f"{folder}/sphere.mp4", *small],
     ):
         subprocess.run([program, *arguments], check=True, stdout=subprocess.DEVNULL)
@@ -45,4 +52,7 @@ while data.time < 0.5:
     impulse += sum(hit.impulse for hit in ripples.last_impulses)
 if not (impulse > 0 and abs(ripples["egg"].height).max() > 0):
     sys.exit("a ball fell on an egg, and nothing rippled")
-print(f"ripple-sim {ripple_sim.__version__} works on Python {sys.version.split()[0]}, imported in {seconds:.2f} s")
+print(
+    f"ripple-sim {ripple_sim.__version__} works on Python {sys.version.split()[0]}, imported in "
+    f"{seconds:.2f} s"
+)

@@ -2,8 +2,8 @@
 
     python examples/any_mesh.py [MESH]
 
-Makes out/any_mesh.ply with the height as an attribute, and out/any_mesh.png, the atlas. OBJ, PLY, STL, OFF and GLB
-will do.
+Makes out/any_mesh.ply with the height as an attribute, and out/any_mesh.png, the atlas. OBJ, PLY,
+STL, OFF and GLB will do.
 """
 
 import sys
@@ -22,20 +22,31 @@ def main() -> None:
     mesh = load_mesh(path)
     atlas = build_atlas(mesh, resolution=96)
     size = float(np.ptp(mesh.V, axis=0).max())
-    waves = WaveSolver(atlas, Material(speed=size, damping=0.5, stiffness=400.0))  # crosses the object in a second
+    # crosses the object in a second
+    waves = WaveSolver(atlas, Material(speed=size, damping=0.5, stiffness=400.0))
     top = mesh.V[np.argmax(mesh.V[:, 2])]
-    waves.add_height(0.03 * size * np.exp(-((atlas.positions - top) ** 2).sum(axis=-1) / (0.06 * size) ** 2))
+    waves.add_height(
+        0.03 * size * np.exp(-((atlas.positions - top) ** 2).sum(axis=-1) / (0.06 * size) ** 2)
+    )
     waves.step(0.25)
 
     height = atlas.sampling_matrix(atlas.mesh.V) @ waves.height.ravel()  # texels to vertices
     Path("out").mkdir(exist_ok=True)
-    displaced = trimesh.Trimesh(mesh.V + height[:, None] * mesh.vertex_normals, mesh.F, process=False)
+    displaced = trimesh.Trimesh(
+        mesh.V + height[:, None] * mesh.vertex_normals, mesh.F, process=False
+    )
     displaced.vertex_attributes["height"] = height.astype(np.float32)
     displaced.export("out/any_mesh.ply")
     plot_atlas(atlas, "out/any_mesh.png", title=path.stem, up="z")
     quality = atlas.quality()
-    print(f"{len(mesh.F)} triangles, {quality['flipped']} folded, stretch at 99.9 % of the area {quality['q999']:.2f}")
-    print(f"heights {1000 * height.min() / size:.1f} to {1000 * height.max() / size:.1f} thousandths of its size")
+    print(
+        f"{len(mesh.F)} triangles, {quality['flipped']} folded, stretch at 99.9 % of the area "
+        f"{quality['q999']:.2f}"
+    )
+    print(
+        f"heights {1000 * height.min() / size:.1f} to {1000 * height.max() / size:.1f} thousandths "
+        f"of its size"
+    )
     print("out/any_mesh.ply, out/any_mesh.png")
 
 

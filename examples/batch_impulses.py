@@ -2,9 +2,9 @@
 
     python examples/batch_impulses.py [--scenes 20] [--seconds 1.5] [--workers 2]
 
-Makes out/batch_impulses.png: every touch of every scene, its impulse over the height of the ripples at that time, and
-where on the target it fell. No frame is drawn; such a batch is for statistics or for learning. Started again, it makes
-only what is missing in out/batch_impulses.
+Makes out/batch_impulses.png: every touch of every scene, its impulse over the height of the ripples
+at that time, and where on the target it fell. No frame is drawn; such a batch is for statistics or
+for learning. Started again, it makes only what is missing in out/batch_impulses.
 """
 
 import argparse
@@ -65,7 +65,9 @@ def touches(folder: Path) -> np.ndarray:
                 during = highest[touch["frame"][0] : touch["frame"][-1] + 1]
                 x, y = touch[["x", "y"]][0]
                 found.append((scene.number, x, y, touch["impulse"].sum(), during.max()))
-    return np.array(found, [("scene", int), *((name, float) for name in ("x", "y", "impulse", "ripple"))])
+    return np.array(
+        found, [("scene", int), *((name, float) for name in ("x", "y", "impulse", "ripple"))]
+    )
 
 
 def main() -> None:
@@ -76,19 +78,33 @@ def main() -> None:
     options = parser.parse_args()
     folder = Path("out/batch_impulses")
     (folder / "plan").mkdir(parents=True, exist_ok=True)
-    for name, text in (("model.xml", MODEL), ("scene.toml", SCENE), ("plan.toml", PLAN.format(**vars(options)))):
+    for name, text in (
+        ("model.xml", MODEL),
+        ("scene.toml", SCENE),
+        ("plan.toml", PLAN.format(**vars(options))),
+    ):
         (folder / "plan" / name).write_text(text)
-    run_batch(read_plan(folder / "plan" / "plan.toml"), folder / "scenes", RunOptions(workers=options.workers))
+    run_batch(
+        read_plan(folder / "plan" / "plan.toml"),
+        folder / "scenes",
+        RunOptions(workers=options.workers),
+    )
     found = touches(folder / "scenes")
     print(f"{options.scenes} scenes, {len(found)} touches")
     for name, unit in (("impulse", "N s"), ("ripple", "m")):
-        least, mean, most = found[name].min(), found[name].mean(), found[name].max()
+        least = found[name].min()
+        mean = found[name].mean()
+        most = found[name].max()
         print(f"{name}: {least:.3g} to {most:.3g} {unit}, mean {mean:.3g} {unit}")
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
-    left.scatter(found["impulse"], 1000 * found["ripple"], s=30, c="#1f6f8b", alpha=0.7, linewidths=0)
+    left.scatter(
+        found["impulse"], 1000 * found["ripple"], s=30, c="#1f6f8b", alpha=0.7, linewidths=0
+    )
     left.set(xscale="log", yscale="log", xlabel="impulse [N s]", ylabel="highest ripple [mm]")
-    colors = right.scatter(found["x"], found["y"], s=30, c=found["impulse"], cmap="viridis", norm="log")
+    colors = right.scatter(
+        found["x"], found["y"], s=30, c=found["impulse"], cmap="viridis", norm="log"
+    )
     angle = np.linspace(0, 2 * np.pi, 200)
     right.plot(0.45 * np.cos(angle), 0.3 * np.sin(angle), color="#9aa3ad", linewidth=1)
     right.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title="seen from above")

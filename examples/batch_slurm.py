@@ -3,8 +3,9 @@
     pip install 'ripple-sim[batch,dask]' dask-jobqueue
     python examples/batch_slurm.py PLAN.toml DIR [--jobs 25] [--cores 40]
 
-Run it on a node that may submit jobs. PLAN.toml and DIR lie on a file system that all nodes share. A job that ends at
-its time limit gives way to the next one: scenes that were not finished are made again.
+Run it on a node that may submit jobs. PLAN.toml and DIR lie on a file system that all nodes share.
+A job that ends at its time limit gives way to the next one: scenes that were not finished are made
+again.
 """
 
 import argparse
@@ -31,7 +32,11 @@ def main() -> None:
         job_script_prologue=["export LP_NUM_THREADS=0 NUMBA_NUM_THREADS=1 MUJOCO_GL=disable"],
     )
     cluster.adapt(maximum_jobs=options.jobs)
-    print(run_batch(read_plan(options.plan), options.folder, RunOptions(dask=cluster.scheduler_address)))
+    print(
+        run_batch(
+            read_plan(options.plan), options.folder, RunOptions(dask=cluster.scheduler_address)
+        )
+    )
 
 
 if __name__ == "__main__":

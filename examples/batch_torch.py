@@ -3,9 +3,10 @@
     pip install torch webdataset
     python examples/batch_torch.py DIR [--workers 2]
 
-DIR is the folder of a batch with a video, `heights = true` and `impulses = true`. Scenes are read by the loader's own
-processes: from folders and tar files with `load_batch`, and, where the batch has tar files, with webdataset too, which
-reads them one after another as they lie on the disk or behind an address.
+DIR is the folder of a batch with a video, `heights = true` and `impulses = true`. Scenes are read
+by the loader's own processes: from folders and tar files with `load_batch`, and, where the batch
+has tar files, with webdataset too, which reads them one after another as they lie on the disk or
+behind an address.
 """
 
 import argparse
@@ -53,7 +54,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
-    loader = DataLoader(Scenes(options.folder), batch_size=4, shuffle=True, num_workers=options.workers)
+    loader = DataLoader(
+        Scenes(options.folder), batch_size=4, shuffle=True, num_workers=options.workers
+    )
     for batch in loader:
         print({name: tuple(values.shape) for name, values in batch.items()})
     tars = sorted(str(path) for path in (options.folder / "tars").glob("*.tar"))

@@ -2,7 +2,8 @@
 
     python examples/compare_operators.py
 
-writes out/compare_operators.png. The ring's crest should lie on the dashed circle, all the way round.
+writes out/compare_operators.png. The ring's crest should lie on the dashed circle, all the way
+round.
 """
 
 import sys
@@ -18,9 +19,16 @@ from ripple_sim.solver.operator import OPERATORS
 sys.path.append(str(Path(__file__).parents[0] / "benchmarks"))
 from arrival import arrivals, plane_arrival
 
-SIZE, CAPTION, SMOOTH = 360, 76, 2
-RESOLUTION, TIME, WIDTH, SOURCE = 96, 0.8, 0.09, np.array([0.45, 0.25, 0.86])
-CALM, HIGH, LOW = np.array([244, 242, 236]), np.array([200, 60, 40]), np.array([30, 90, 170])
+SIZE = 360
+CAPTION = 76
+SMOOTH = 2
+RESOLUTION = 96
+TIME = 0.8
+WIDTH = 0.09
+SOURCE = np.array([0.45, 0.25, 0.86])
+CALM = np.array([244, 242, 236])
+HIGH = np.array([200, 60, 40])
+LOW = np.array([30, 90, 170])
 # height of the deepest colour, about that of the exact ring's crest
 FULL = 0.2
 
@@ -51,10 +59,13 @@ def view(operator: str) -> Image.Image:
     strength = np.clip(np.abs(height) / FULL, 0, 1)[:, None]
     pixels = np.full((size, size, 3), 255.0)
     shade = 0.55 + 0.45 * z[seen][:, None]
-    pixels[seen] = shade * ((1 - strength) * CALM + strength * np.where(height[:, None] > 0, HIGH, LOW))
+    pixels[seen] = shade * (
+        (1 - strength) * CALM + strength * np.where(height[:, None] > 0, HIGH, LOW)
+    )
     image = Image.fromarray(pixels.astype(np.uint8))
     draw = ImageDraw.Draw(image)
-    radius, middle = np.sin(crest_angle()) * (size - 1) / 2.1, (size - 1) / 2
+    radius = np.sin(crest_angle()) * (size - 1) / 2.1
+    middle = (size - 1) / 2
     box = [middle - radius, middle - radius, middle + radius, middle + radius]
     for start in range(0, 360, 6):
         draw.arc(box, start, start + 2, fill=(20, 20, 20), width=SMOOTH)
@@ -62,16 +73,26 @@ def view(operator: str) -> Image.Image:
 
 
 def main() -> None:
-    modes, times = sphere_modes((16, 32, 64)), arrivals({}, RESOLUTION, sources=1)["limbed"]
+    modes = sphere_modes((16, 32, 64))
+    times = arrivals({}, RESOLUTION, sources=1)["limbed"]
     picture = Image.new("RGB", (SIZE * len(OPERATORS), SIZE + CAPTION), "white")
     draw = ImageDraw.Draw(picture)
-    print("               mode of the sphere, relative error       wave front on a body with limbs, late or early by")
+    print(
+        "               mode of the sphere, relative error       wave front on a body with limbs, "
+        "late or early by"
+    )
     print("               N = 16   N = 32   N = 64   order         median     90 %     under 3 %")
     for i, operator in enumerate(OPERATORS):
-        mode, time = modes[operator], times[operator]
+        mode = modes[operator]
+        time = times[operator]
         row = "".join(f"{mode[n]:9.2g}" for n in ("16", "32", "64"))
-        median, most, share = time["front_median"], time["front_q90"], time["front_under_3_percent"]
-        print(f"{operator:13}{row}{abs(mode['order']):8.2f}{median:15.2%}{most:9.2%}{share:10.0%} of the surface")
+        median = time["front_median"]
+        most = time["front_q90"]
+        share = time["front_under_3_percent"]
+        print(
+            f"{operator:13}{row}{abs(mode['order']):8.2f}{median:15.2%}{most:9.2%}{share:10.0%} of "
+            f"the surface"
+        )
         picture.paste(view(operator), (i * SIZE, 0))
         middle = (i + 0.5) * SIZE
         draw.text((middle, SIZE + 6), operator, fill=(20, 20, 20), font_size=20, anchor="ma")

@@ -18,7 +18,12 @@ from PIL import Image
 from ripple_sim import Material
 from ripple_sim.gymnasium import RippleWrapper
 
-CAMERA = {"lookat": np.array((0.0, 0.0, 1.27)), "distance": 0.7, "azimuth": 165.0, "elevation": -3.0}
+CAMERA = {
+    "lookat": np.array((0.0, 0.0, 1.27)),
+    "distance": 0.7,
+    "azimuth": 165.0,
+    "elevation": -3.0,
+}
 TORSO = ("torso1", "uwaist", "lwaist")
 BALLS = ((0.75, 0.05, 1.27), (1.0, -0.05, 1.30), (1.25, 0.01, 1.31))
 SPEED = (-4.0, 0.0, 1.0)  # m/s
@@ -26,12 +31,16 @@ SPEED = (-4.0, 0.0, 1.0)  # m/s
 
 def humanoid_and_balls() -> str:
     """Gymnasium's model with balls before it, as MJCF."""
-    spec = mujoco.MjSpec.from_file(str(Path(environments.__file__).parent / "assets" / "humanoid.xml"))
+    spec = mujoco.MjSpec.from_file(
+        str(Path(environments.__file__).parent / "assets" / "humanoid.xml")
+    )
     spec.option.timestep = 0.001
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # with its own, RK4, impulses are not exact
+    # with its own, RK4, impulses are not exact
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.default.geom.material = ""
     for name in TORSO:
-        spec.geom(name).material, spec.geom(name).rgba = "", (0.25, 0.55, 0.75, 1)
+        spec.geom(name).material = ""
+        spec.geom(name).rgba = (0.25, 0.55, 0.75, 1)
     for place in BALLS:
         ball = spec.worldbody.add_body(pos=place)
         ball.add_freejoint()
@@ -64,7 +73,9 @@ def main() -> None:
     velocity = world.init_qvel.copy()
     velocity[-6 * len(BALLS) :].reshape(-1, 6)[:, :3] = SPEED
     world.set_state(world.init_qpos, velocity)
-    frames, since_hit, given = [], 0, 0.0
+    frames = []
+    since_hit = 0
+    given = 0.0
     while len(frames) < 3:
         *_, info = env.step(np.zeros(17))
         given += sum(impulse.impulse for impulse in info["impulses"])

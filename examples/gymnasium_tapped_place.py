@@ -3,8 +3,9 @@
     pip install 'ripple-sim[gymnasium]'
     python examples/gymnasium_tapped_place.py
 
-A ball drops on one of four places, 2 cm off at most. The observation has the accelerations of each control step; what
-is learned from 160 drops is a linear map from the levels at the corners and who heard first to the place.
+A ball drops on one of four places, 2 cm off at most. The observation has the accelerations of each
+control step; what is learned from 160 drops is a linear map from the levels at the corners and who
+heard first to the place.
 """
 
 import tempfile
@@ -49,7 +50,9 @@ def drop(env: RippleWrapper, seed: int) -> tuple[np.ndarray, int]:
     heard = np.concatenate([env.step(np.zeros(0))[0]["corners"] for _ in range(4)])
     levels = np.log(np.abs(heard).max(axis=0) + 1e-9)
     first = (np.abs(heard) > 0.1 * np.abs(heard).max()).argmax(axis=0)
-    return np.concatenate([levels - levels.mean(), first - first.mean(), [1.0]]), env.unwrapped.place
+    return np.concatenate(
+        [levels - levels.mean(), first - first.mean(), [1.0]]
+    ), env.unwrapped.place
 
 
 def main() -> None:
@@ -58,11 +61,16 @@ def main() -> None:
         path.write_text(BOARD)
         material = Material(speed=20.0, damping=20.0, viscosity=0.02, density=50.0)
         env = RippleWrapper(Taps(path), {"board": material}, sensors=SENSORS, resolution=16)
-        features, places = map(np.array, zip(*(drop(env, seed) for seed in range(DROPS)), strict=True))
+        features, places = map(
+            np.array, zip(*(drop(env, seed) for seed in range(DROPS)), strict=True)
+        )
     taught = 2 * DROPS // 3
     learned = np.linalg.lstsq(features[:taught], np.eye(4)[places[:taught]], rcond=None)[0]
     right = (features[taught:] @ learned).argmax(axis=1) == places[taught:]
-    print(f"{right.mean():.0%} of {len(right)} taps are found on the right place; by chance it would be 25%")
+    print(
+        f"{right.mean():.0%} of {len(right)} taps are found on the right place; by chance it would "
+        f"be 25%"
+    )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
     python examples/own_deformation.py
 
-Makes out/own_deformation.png: how the middle of a dent moves under no spring, a linear one and a hardening one. The
-solver carries the waves; any law that gives a pressure from heights and velocities, texel by texel, can be added.
+Makes out/own_deformation.png: how the middle of a dent moves under no spring, a linear one and a
+hardening one. The solver carries the waves; any law that gives a pressure from heights and
+velocities, texel by texel, can be added.
 """
 
 from collections.abc import Callable
@@ -15,8 +16,13 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Material, WaveSolver, sphere_atlas
 
-DENSITY, STEP, DURATION = 100.0, 0.002, 1.5  # kg/m^2, s, s
-LINEAR, CUBIC = 2e4, 2e8  # Pa/m, Pa/m^3
+# kg/m^2, s, s
+DENSITY = 100.0
+STEP = 0.002
+DURATION = 1.5
+# Pa/m, Pa/m^3
+LINEAR = 2e4
+CUBIC = 2e8
 
 Field = NDArray[np.float64]
 Law = Callable[[Field], Field]
@@ -42,7 +48,8 @@ def motion(law: Law) -> Field:
     middle = where.texels[np.argmax(where.weights)]
     heights = []
     for _ in range(round(DURATION / STEP)):
-        waves.pressure = law(waves.height.astype(np.float64))  # positive presses inwards: against what stands out
+        # positive presses inwards: against what stands out
+        waves.pressure = law(waves.height.astype(np.float64))
         waves.step(STEP)
         heights.append(float(waves.height.ravel()[middle]))
     return np.array(heights)

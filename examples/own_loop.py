@@ -28,10 +28,13 @@ def main() -> None:
     data = mujoco.MjData(model)
     material = Material(speed=0.6, damping=1.5, stiffness=1500.0, viscosity=3e-4, density=300.0)
     ripples = Ripples(model, {"egg": material}, resolution=96)
-    renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "jelly"}, lighting="studio")
+    renderer = RippleRenderer(
+        model, ripples, width=480, height=400, looks={"egg": "jelly"}, lighting="studio"
+    )
     camera = Camera(lookat=(0.0, 0.0, 0.36), distance=1.5, azimuth=50.0, elevation=-48.0)
 
-    frames, hit = [], np.inf
+    frames = []
+    hit = np.inf
     while len(frames) < 3:
         mujoco.mj_step(model, data)
         ripples.step(data)  # this step's contact forces become impulses, the waves advance

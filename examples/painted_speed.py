@@ -2,7 +2,8 @@
 
     python examples/painted_speed.py
 
-Makes out/painted_speed.png. Here the paint is computed at the mesh's vertices; `texture_map` takes a picture instead.
+Makes out/painted_speed.png. Here the paint is computed at the mesh's vertices; `texture_map` takes
+a picture instead.
 """
 
 from pathlib import Path
@@ -20,7 +21,9 @@ MODEL = """<mujoco>
     <geom name="egg" type="ellipsoid" size="0.45 0.32 0.3" pos="0 0 0.3" rgba="0.5 0.72 0.62 1"/>
   </worldbody>
 </mujoco>"""
-SLOW, FAST = 0.25, 0.7  # m/s
+# m/s
+SLOW = 0.25
+FAST = 0.7
 
 
 def main() -> None:
@@ -28,7 +31,9 @@ def main() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     ripples = Ripples(
-        model, {"egg": Material(damping=0.5, stiffness=400.0, viscosity=2e-4, density=100.0)}, resolution=128
+        model,
+        {"egg": Material(damping=0.5, stiffness=400.0, viscosity=2e-4, density=100.0)},
+        resolution=128,
     )
     atlas = ripples["egg"].atlas
     stripes = 0.5 + 0.5 * np.tanh(8 * np.sin(18 * atlas.mesh.V[:, 0]))
@@ -36,7 +41,9 @@ def main() -> None:
     ripples.change_material("egg", speed=speed)
 
     ripples.poke("egg", (0.02, -0.05, 0.6), 0.6, radius=0.05)  # in the frame of its body, the world
-    renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "clay"}, lighting="studio")
+    renderer = RippleRenderer(
+        model, ripples, width=480, height=400, looks={"egg": "clay"}, lighting="studio"
+    )
     camera = Camera(lookat=(0.0, 0.0, 0.3), distance=1.7, azimuth=90.0, elevation=-50.0)
     frames = []
     for _ in range(3):

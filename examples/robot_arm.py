@@ -2,8 +2,8 @@
 
     python examples/robot_arm.py
 
-Makes out/robot_arm.png: balls fall on the arm while it lifts, and its covers ripple. A cover does not collide, so it
-takes the contacts of its body's collision geoms; nothing has to be named.
+Makes out/robot_arm.png: balls fall on the arm while it lifts, and its covers ripple. A cover does
+not collide, so it takes the contacts of its body's collision geoms; nothing has to be named.
 """
 
 from pathlib import Path
@@ -61,7 +61,9 @@ TIMES = (0.22, 0.26, 0.31)
 
 
 def add_cover(spec: mujoco.MjSpec, name: str, solids: tuple[Sdf, ...]) -> None:
-    V, F = polygonise(smooth_union(0.05, *solids), ((-0.16, -0.16, -0.16), (0.16, 0.16, 0.7)), 0.016)
+    V, F = polygonise(
+        smooth_union(0.05, *solids), ((-0.16, -0.16, -0.16), (0.16, 0.16, 0.7)), 0.016
+    )
     spec.add_mesh(name=name, uservert=V.ravel(), userface=F.ravel())
 
 
@@ -77,7 +79,8 @@ def main() -> None:
     renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks, lighting="studio")
     camera = Camera(lookat=(0.22, 0.0, 0.66), distance=0.95, azimuth=115.0, elevation=-38.0)
 
-    frames, given = [], dict.fromkeys(ripples, 0.0)
+    frames = []
+    given = dict.fromkeys(ripples, 0.0)
     while len(frames) < len(TIMES):
         data.ctrl[:] = -0.25 * data.time, -0.4 * data.time
         mujoco.mj_step(model, data)
@@ -91,7 +94,10 @@ def main() -> None:
     path.parent.mkdir(exist_ok=True)
     Image.fromarray(np.concatenate(frames, axis=1)).save(path)
     for name, impulse in given.items():
-        print(f"{name}: {impulse:.2f} N s, highest ripple {1000 * np.abs(ripples[name].height).max():.1f} mm")
+        print(
+            f"{name}: {impulse:.2f} N s, highest ripple "
+            f"{1000 * np.abs(ripples[name].height).max():.1f} mm"
+        )
     print(path)
 
 

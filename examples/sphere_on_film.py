@@ -2,9 +2,10 @@
 
     python examples/sphere_on_film.py [RESOLUTION ...]
 
-The film is the one of Aguero and others (2022, "Impact of a rigid sphere onto an elastic membrane", Proceedings of the
-Royal Society A): with `two_way` the sphere dents it, and the dent throws it back. Printed are the time in contact, the
-greatest depth, and when the sphere's lowest point is back at the height of the film.
+The film is the one of Aguero and others (2022, "Impact of a rigid sphere onto an elastic membrane",
+Proceedings of the Royal Society A): with `two_way` the sphere dents it, and the dent throws it
+back. Printed are the time in contact, the greatest depth, and when the sphere's lowest point is
+back at the height of the film.
 """
 
 import sys
@@ -15,8 +16,14 @@ from scipy.spatial import Delaunay
 
 from ripple_sim import Material, Ripples
 
-RADIUS, MASS, SPEED = 2.38e-3, 183.5e-6, 0.6312  # of the sphere [m], [kg], [m/s]
-FILM, DENSITY, TENSION = 52.5e-3, 0.3, 107.0  # radius [m], [kg/m^2], [N/m]
+# of the sphere [m], [kg], [m/s]
+RADIUS = 2.38e-3
+MASS = 183.5e-6
+SPEED = 0.6312
+# radius [m], [kg/m^2], [N/m]
+FILM = 52.5e-3
+DENSITY = 0.3
+TENSION = 107.0
 STEP = 1e-5  # [s]
 DURATION = 4.5e-3  # [s]
 RESOLUTIONS = (48, 96, 128)
@@ -27,7 +34,9 @@ def film_mesh(rings: int = 24) -> tuple[np.ndarray, np.ndarray]:
     points = [(0.0, 0.0)]
     for ring in range(1, rings + 1):
         angles = 2 * np.pi * np.arange(6 * ring) / (6 * ring)
-        points += list(zip(ring / rings * np.cos(angles), ring / rings * np.sin(angles), strict=True))
+        points += list(
+            zip(ring / rings * np.cos(angles), ring / rings * np.sin(angles), strict=True)
+        )
     plane = FILM * np.array(points)
     return np.column_stack([plane, np.zeros(len(plane))]), Delaunay(plane).simplices
 
@@ -35,7 +44,9 @@ def film_mesh(rings: int = 24) -> tuple[np.ndarray, np.ndarray]:
 def film_model() -> mujoco.MjModel:
     """A film that is only visible, a plate in its plane that collides for it, and the sphere above."""
     V, F = film_mesh()
-    numbers = {name: " ".join(map(str, values.ravel())) for name, values in (("vertex", V), ("face", F))}
+    numbers = {
+        name: " ".join(map(str, values.ravel())) for name, values in (("vertex", V), ("face", F))
+    }
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{STEP}"/>
         <asset><mesh name="film" inertia="shell" vertex="{numbers["vertex"]}" face="{numbers["face"]}"/></asset>
@@ -53,25 +64,39 @@ def fall(resolution: int) -> None:
     data = mujoco.MjData(model)
     film = Material(speed=np.sqrt(TENSION / DENSITY), density=DENSITY)
     ripples = Ripples(
-        model, {"film": film}, resolution=resolution, rim="fixed", contacts={"film": ["plate"]}, two_way=True
+        model,
+        {"film": film},
+        resolution=resolution,
+        rim="fixed",
+        contacts={"film": ["plate"]},
+        two_way=True,
     )
     ripples.allow_any_height("film")
     data.qvel[2] = -SPEED
-    heights, forces, energies = [], [], []
+    heights = []
+    forces = []
+    energies = []
     while data.time < DURATION:
         ripples.mj_step(data)
         heights.append(data.qpos[2] - RADIUS)
         forces.append(sum(hit.impulse for hit in ripples.last_impulses) / STEP)
         energies.append(ripples.energy(data).total)
-    heights, pressed = np.array(heights), np.flatnonzero(np.array(forces) > 0)
+    heights = np.array(heights)
+    pressed = np.flatnonzero(np.array(forces) > 0)
     times = STEP * np.arange(1, len(heights) + 1)
     lowest = int(heights.argmin())
     back = float(np.interp(0.0, heights[lowest:], times[lowest:]))
-    print(f"resolution {resolution}, texels of {1e3 * np.sqrt(ripples['film'].atlas.areas.mean()):.2f} mm")
+    print(
+        f"resolution {resolution}, texels of "
+        f"{1e3 * np.sqrt(ripples['film'].atlas.areas.mean()):.2f} mm"
+    )
     print(f"  in contact for {1e3 * STEP * (pressed[-1] - pressed[0] + 1):.2f} ms")
     print(f"  greatest depth {-1e3 * heights.min():.3f} mm")
     print(f"  at the film's height again after {1e3 * back:.2f} ms")
-    print(f"  thrown back with {data.qvel[2] / SPEED:.3f} of its speed; energy kept {energies[-1] / energies[0]:.4f}")
+    print(
+        f"  thrown back with {data.qvel[2] / SPEED:.3f} of its speed; energy kept "
+        f"{energies[-1] / energies[0]:.4f}"
+    )
 
 
 def main(*resolutions: int) -> None:

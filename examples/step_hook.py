@@ -1,7 +1,7 @@
 """A Python function that is called before every physics step: here it stirs a sphere with an invisible finger.
 
-Makes out/step_hook.mp4. The function gets the running `Simulation`: MuJoCo's model and data, to steer actuators or move
-mocap bodies, and the ripples, to press on surfaces.
+Makes out/step_hook.mp4. The function gets the running `Simulation`: MuJoCo's model and data, to
+steer actuators or move mocap bodies, and the ripples, to press on surfaces.
 """
 
 import numpy as np
@@ -15,14 +15,18 @@ MIDDLE = (0.0, 0.0, 0.5)  # of the sphere [m]
 
 def stir(simulation: Simulation) -> None:
     """Press on a point that goes round the top."""
-    time, timestep = simulation.data.time, simulation.model.opt.timestep
+    time = simulation.data.time
+    timestep = simulation.model.opt.timestep
     angle = 2 * np.pi * TURNS * time
-    point = MIDDLE + 0.5 * np.array([0.6 * np.cos(angle), 0.6 * np.sin(angle), 0.8])  # in the frame of the body
+    # in the frame of the body
+    point = MIDDLE + 0.5 * np.array([0.6 * np.cos(angle), 0.6 * np.sin(angle), 0.8])
     simulation.ripples.poke("sphere", point, FORCE * timestep, radius=0.04)
 
 
 def main(duration: float = 3.0) -> None:
-    summary = render_video(load_scene("sphere"), "out/step_hook.mp4", VideoOptions(duration=duration), on_step=stir)
+    summary = render_video(
+        load_scene("sphere"), "out/step_hook.mp4", VideoOptions(duration=duration), on_step=stir
+    )
     print(f"{summary.frames} frames in {summary.output}")
 
 

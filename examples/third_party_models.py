@@ -3,9 +3,9 @@
     pip install --no-deps gymnasium dm_control gymnasium-robotics metaworld robosuite playground
     python examples/third_party_models.py [out/third_party_models]
 
-Their code is not run: an MJCF is read from each package, a ball hits the geom, and the model is stepped for half a
-second and drawn. Prints the table of docs/third-party-models.md, and makes a picture of each. A package that is not
-installed is skipped, with a line.
+Their code is not run: an MJCF is read from each package, a ball hits the geom, and the model is
+stepped for half a second and drawn. Prints the table of docs/third-party-models.md, and makes a
+picture of each. A package that is not installed is skipped, with a line.
 """
 
 import importlib.util
@@ -59,7 +59,8 @@ class Case(NamedTuple):
         return float(np.degrees(np.arctan2(-y, -x))) + 40.0 if x or y else 130.0
 
 
-HERE = (0,)  # the group of geoms that collide, where it is drawn and the geoms lie over the visible one
+# the group of geoms that collide, where it is drawn and the geoms lie over the visible one
+HERE = (0,)
 GYM = "gymnasium", "envs/mujoco/assets"
 HANDS = "gymnasium_robotics", "envs/assets"
 SAWYER = "metaworld", "assets/sawyer_xyz"
@@ -78,16 +79,27 @@ CASES = [
     Case(HANDS[0], f"{HANDS[1]}/hand/manipulate_egg.xml", "object"),
     Case(HANDS[0], f"{HANDS[1]}/hand/manipulate_block.xml", "robot0:V_palm"),
     Case(HANDS[0], f"{HANDS[1]}/adroit_hand/adroit_hammer.xml", "board"),
-    Case(HANDS[0], f"{HANDS[1]}/kitchen_franka/kitchen_assets/kitchen_env_model.xml", "panda0_link4/0"),
+    Case(
+        HANDS[0],
+        f"{HANDS[1]}/kitchen_franka/kitchen_assets/kitchen_env_model.xml",
+        "panda0_link4/0",
+    ),
     Case(SAWYER[0], f"{SAWYER[1]}/sawyer_coffee.xml", "mug"),
     Case(SAWYER[0], f"{SAWYER[1]}/sawyer_soccer.xml", "soccer_ball1/0"),
     Case(ROBOTS[0], f"{ROBOTS[1]}/robots/panda/robot.xml", "link7/7", hidden=HERE),
     Case(ROBOTS[0], f"{ROBOTS[1]}/robots/iiwa/robot.xml", "link_4_visual", (1, 0, 0), HERE),
     Case(ROBOTS[0], f"{ROBOTS[1]}/robots/spot/robot.xml", "body/1", hidden=HERE),
-    Case(ROBOTS[0], f"{ROBOTS[1]}/grippers/robotiq_gripper_140.xml", "hand_visual", (0, 1, 0), HERE),
+    Case(
+        ROBOTS[0], f"{ROBOTS[1]}/grippers/robotiq_gripper_140.xml", "hand_visual", (0, 1, 0), HERE
+    ),
     Case(ROBOTS[0], f"{ROBOTS[1]}/objects/bottle.xml", "object/0", (1, 0, 0), HERE),
     Case(ROBOTS[0], f"{ROBOTS[1]}/objects/can.xml", "object/0", (1, 0, 0)),
-    Case("mujoco_playground", "_src/manipulation/leap_hand/xmls/reorientation_cube.xml", "cube/0", (1, 0, 0)),
+    Case(
+        "mujoco_playground",
+        "_src/manipulation/leap_hand/xmls/reorientation_cube.xml",
+        "cube/0",
+        (1, 0, 0),
+    ),
 ]
 
 
@@ -118,16 +130,25 @@ def with_ball(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray, side: n
     radius = 0.2 * half.max()
     mass = 4000 * radius**3
     ball = spec.worldbody.add_body(name="our ball", pos=middle + side * (half + 2 * radius))
-    ball.mass, ball.inertia, ball.explicitinertial = mass, np.full(3, 0.4 * mass * radius**2), True
+    ball.mass = mass
+    ball.inertia = np.full(3, 0.4 * mass * radius**2)
+    ball.explicitinertial = True
     ball.ipos = np.zeros(3)  # without it the mass is at the origin of the world
     ball.add_freejoint(name="our ball")
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    ball.add_geom(type=sphere, size=(radius, 0, 0), contype=1, conaffinity=1, group=1, rgba=(0.8, 0.3, 0.2, 1))
+    ball.add_geom(
+        type=sphere, size=(radius, 0, 0), contype=1, conaffinity=1, group=1, rgba=(0.8, 0.3, 0.2, 1)
+    )
 
 
-def run(case: Case, model: mujoco.MjModel, material: Material, camera: Camera) -> tuple[float, float, np.ndarray]:
+def run(
+    case: Case, model: mujoco.MjModel, material: Material, camera: Camera
+) -> tuple[float, float, np.ndarray]:
     """Impulse on the geom [N s], its highest ripple [m], and a frame just after the first hit."""
-    data, given, highest, frame = begun(model), 0.0, 0.0, None
+    data = begun(model)
+    given = 0.0
+    highest = 0.0
+    frame = None
     data.joint("our ball").qvel[:3] = -SPEED * np.array(case.side)
     option = mujoco.MjvOption()
     option.geomgroup[list(case.hidden)] = 0
@@ -137,7 +158,9 @@ def run(case: Case, model: mujoco.MjModel, material: Material, camera: Camera) -
             ripples.mj_step(data)
             given += sum(hit.impulse for hit in ripples.last_impulses)
             highest = max(highest, float(np.abs(ripples[case.geom].height).max()))
-            if frame is None and ((given > 0 and data.time > DRAWN) or data.time + model.opt.timestep > DURATION):
+            if frame is None and (
+                (given > 0 and data.time > DRAWN) or data.time + model.opt.timestep > DURATION
+            ):
                 renderer.update_scene(data, camera, option)
                 frame = renderer.render()
     return given, highest, frame
@@ -154,8 +177,11 @@ def tried(case: Case, file: Path, picture: Path) -> str:
     middle, half = box_of(spec.compile(), case.geom)
     with_ball(spec, middle, half, np.array(case.side))
     model = spec.compile()
-    size, needed = 2 * float(half.max()), case.needed
-    camera = Camera(lookat=tuple(middle), distance=2.5 * size, azimuth=case.azimuth, elevation=-30.0)
+    size = 2 * float(half.max())
+    needed = case.needed
+    camera = Camera(
+        lookat=tuple(middle), distance=2.5 * size, azimuth=case.azimuth, elevation=-30.0
+    )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RippleWarning)
         given, highest, frame = run(case, model, Material(), camera)
@@ -164,7 +190,9 @@ def tried(case: Case, file: Path, picture: Path) -> str:
             ball = float(model.body("our ball").mass[0]), SPEED
             caught.clear()
             given, highest, frame = run(case, model, Material.suited(size, ball), camera)
-            told = [str(each.message) for each in caught if issubclass(each.category, RippleWarning)]
+            told = [
+                str(each.message) for each in caught if issubclass(each.category, RippleWarning)
+            ]
             needed = ", ".join(filter(None, ("`Material.suited`", case.needed)))
     Image.fromarray(frame).save(picture)
     told = "; ".join(dict.fromkeys(map(shortly, told))) or "-"
@@ -173,7 +201,9 @@ def tried(case: Case, file: Path, picture: Path) -> str:
 
 def main(folder: str = "out/third_party_models") -> None:
     Path(folder).mkdir(parents=True, exist_ok=True)
-    print("| package | model | geom | needed beside the line | N s | highest over size | warned of |")
+    print(
+        "| package | model | geom | needed beside the line | N s | highest over size | warned of |"
+    )
     print("| --- | --- | --- | --- | --- | --- | --- |")
     missing = set()
     for case in CASES:

@@ -1,8 +1,8 @@
 """What a user compares machines with: `ripple-sim bench`.
 
-The speed of the wave step beside the bound of memory, what the coupling costs beside MuJoCo's own step, and the error
-of the waves where theory is exact. `examples/benchmarks` compares with other programs' formulas, and with loops that
-one would write oneself.
+The speed of the wave step beside the bound of memory, what the coupling costs beside MuJoCo's own
+step, and the error of the waves where theory is exact. `examples/benchmarks` compares with other
+programs' formulas, and with loops that one would write oneself.
 """
 
 from __future__ import annotations
@@ -23,7 +23,15 @@ from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.diagnostics import collect
 from ripple_sim.scenes.shapes import DUCK_FILE, duck, ellipsoid, polygonise, smooth_intersection
-from ripple_sim.solver import GLError, Material, Mesh, WaveSolver, build_atlas, load_mesh, sphere_atlas
+from ripple_sim.solver import (
+    GLError,
+    Material,
+    Mesh,
+    WaveSolver,
+    build_atlas,
+    load_mesh,
+    sphere_atlas,
+)
 from ripple_sim.solver.backends.backend import make_backend
 from ripple_sim.solver.kernel import Floats32, kernel
 from ripple_sim.solver.operator.assembly import OPERATORS, build_operator
@@ -33,8 +41,41 @@ Report = dict[str, Any]
 Advance = Callable[[int, float], object]  # takes a number of substeps of some length [s]
 Shape = tuple[NDArray[np.float64], NDArray[np.int64]]
 
+# Speed.
+SUBSTEPS = 9  # of a frame: what contestants are asked for at once
+_ROUNDS = 15
+_SECONDS_A_TURN = 0.04
 
-def measure(meshes: Sequence[Path] = (), say: Callable[[str], object] = lambda stage: None) -> Report:
+# The bound of memory: a loop that reads and writes as many bytes as a substep, and computes next to
+# nothing. Of float32 a texel, a substep reads 4 link weights, gain, height and velocity, and writes
+# velocity and the next height.
+FIELDS = ("east", "north", "northeast", "northwest", "gain", "height", "velocity", "next height")
+
+# Floats of a page of memory. A store and a load at the same place of a page are taken for a
+# conflict: each field begins elsewhere in its page, as in the solver.
+_PAGE = 1024
+
+# The compiler makes vector code of short slices, as the solver's kernel has them.
+_SLICE = 1024
+
+# Coupling: bodies rain on targets that collide as their true surface.
+_GEOM = mujoco.mjtGeom
+_SHAPES = (
+    (_GEOM.mjGEOM_SPHERE, (0.06, 0, 0)),
+    (_GEOM.mjGEOM_BOX, (0.05, 0.05, 0.05)),
+    (_GEOM.mjGEOM_CAPSULE, (0.04, 0.05, 0)),
+    (_GEOM.mjGEOM_ELLIPSOID, (0.07, 0.055, 0.04)),
+    (_GEOM.mjGEOM_CYLINDER, (0.055, 0.03, 0)),
+)
+BODIES = 30
+RESOLUTION = 128
+SECONDS = 1.0  # all have hit, and those that can lie still do
+ROUNDS = 3
+
+
+def measure(
+    meshes: Sequence[Path] = (), say: Callable[[str], object] = lambda stage: None
+) -> Report:
     """Measure everything; `say` is called with the name of each stage as it begins.
 
     Raises
@@ -67,16 +108,12 @@ def measure(meshes: Sequence[Path] = (), say: Callable[[str], object] = lambda s
     return report
 
 
-# Speed.
-
-SUBSTEPS = 9  # of a frame: what contestants are asked for at once
-_ROUNDS = 15
-_SECONDS_A_TURN = 0.04
-
-
-def race(contestants: Mapping[str, Advance], rounds: int = _ROUNDS) -> dict[str, NDArray[np.float64]]:
+def race(
+    contestants: Mapping[str, Advance], rounds: int = _ROUNDS
+) -> dict[str, NDArray[np.float64]]:
     """Seconds a substep of each contestant, [rounds]; they take turns, so that a busy machine slows all alike."""
-    dt, frames = 1e-6, {}
+    dt = 1e-6
+    frames = {}
     for name, advance in contestants.items():
         advance(SUBSTEPS, dt)
         start = time.perf_counter()
@@ -106,7 +143,8 @@ def backend_advance(name: str, operator: WaveOperator) -> Advance:
 def cpu_speed(resolution: int) -> dict[str, float]:
     """Texel updates a second of the CPU backend and of the bound of memory, in all cores; and their ratio.
 
-    The smaller fields of N = 128 and 256 lie in the processor's caches, and so does what the bound streams there.
+    The smaller fields of N = 128 and 256 lie in the processor's caches, and so does what the bound
+    streams there.
     """
     operator = build_operator(sphere_atlas(1.0, resolution), Material(), "fem")
     texels = operator.mass.size
@@ -143,22 +181,12 @@ def mesh_cost(mesh: Mesh, resolution: int = 128) -> dict[str, float]:
     }
 
 
-# The bound of memory: a loop that reads and writes as many bytes as a substep, and computes next to nothing. Of float32
-# a texel, a substep reads 4 link weights, gain, height and velocity, and writes velocity and the next height.
-FIELDS = ("east", "north", "northeast", "northwest", "gain", "height", "velocity", "next height")
-
-# Floats of a page of memory. A store and a load at the same place of a page are taken for a conflict: each field begins
-# elsewhere in its page, as in the solver.
-_PAGE = 1024
-
-# The compiler makes vector code of short slices, as the solver's kernel has them.
-_SLICE = 1024
-
-
 def memory_fields(texels: int) -> Floats32:
     """Fields of a substep, [fields, texels or more]."""
     # filled, since untouched pages are all one page, which a cache holds
-    return np.full((len(FIELDS), -(-texels // _PAGE) * _PAGE + _PAGE // len(FIELDS)), 1e-3, np.float32)
+    return np.full(
+        (len(FIELDS), -(-texels // _PAGE) * _PAGE + _PAGE // len(FIELDS)), 1e-3, np.float32
+    )
 
 
 def memory_stream(fields: Floats32, texels: int, threads: int) -> Advance:
@@ -167,7 +195,9 @@ def memory_stream(fields: Floats32, texels: int, threads: int) -> Advance:
     pool = ThreadPoolExecutor(threads)
 
     def advance(substeps: int, dt: float) -> None:
-        for share in [pool.submit(_stream, fields, substeps, np.float32(dt), *share) for share in shares]:
+        for share in [
+            pool.submit(_stream, fields, substeps, np.float32(dt), *share) for share in shares
+        ]:
             share.result()
 
     return advance
@@ -179,12 +209,18 @@ def _stream(fields: Floats32, substeps: int, dt: np.float32, first: int, last: i
     for _ in range(substeps):
         for start in range(first, last, _SLICE):
             stop = min(start + _SLICE, last)
-            east, north = fields[0, start:stop], fields[1, start:stop]
-            northeast, northwest = fields[2, start:stop], fields[3, start:stop]
-            gain, height = fields[4, start:stop], fields[5, start:stop]
-            velocity, next_height = fields[6, start:stop], fields[7, start:stop]
+            east = fields[0, start:stop]
+            north = fields[1, start:stop]
+            northeast = fields[2, start:stop]
+            northwest = fields[3, start:stop]
+            gain = fields[4, start:stop]
+            height = fields[5, start:stop]
+            velocity = fields[6, start:stop]
+            next_height = fields[7, start:stop]
             for i in range(stop - start):
-                kicked = velocity[i] + dt * gain[i] * (east[i] + north[i] + northeast[i] + northwest[i])
+                kicked = velocity[i] + dt * gain[i] * (
+                    east[i] + north[i] + northeast[i] + northwest[i]
+                )
                 velocity[i] = kicked
                 next_height[i] = height[i] + dt * kicked
 
@@ -200,17 +236,24 @@ def sphere_mode_error(resolution: int, operator: str = "fem") -> float:
     mode = (35 * z**4 - 30 * z**2 + 3) / 8
     waves.height = mode
     waves.step(2 * np.pi / np.sqrt(20))
-    return float(np.sqrt((atlas.areas * (waves.height - mode) ** 2).sum() / (atlas.areas * mode**2).sum()))
+    return float(
+        np.sqrt((atlas.areas * (waves.height - mode) ** 2).sum() / (atlas.areas * mode**2).sum())
+    )
 
 
-def sphere_modes(resolutions: tuple[int, ...] = (16, 32, 64, 128, 256)) -> dict[str, dict[str, float]]:
+def sphere_modes(
+    resolutions: tuple[int, ...] = (16, 32, 64, 128, 256),
+) -> dict[str, dict[str, float]]:
     """Errors of all operators over the resolution, and their order by regression."""
     table = {}
     for operator in OPERATORS:
         sizes = resolutions if operator == "fem" else tuple(n for n in resolutions if n <= 64)
         errors = [sphere_mode_error(n, operator) for n in sizes]
         order = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
-        table[operator] = {**{str(n): e for n, e in zip(sizes, errors, strict=True)}, "order": float(order)}
+        table[operator] = {
+            **{str(n): e for n, e in zip(sizes, errors, strict=True)},
+            "order": float(order),
+        }
     return table
 
 
@@ -236,26 +279,12 @@ def energy_drift(resolution: int = 64, steps: int = 10_000) -> dict[str, float]:
     }
 
 
-# Coupling: bodies rain on targets that collide as their true surface.
-
-_GEOM = mujoco.mjtGeom
-_SHAPES = (
-    (_GEOM.mjGEOM_SPHERE, (0.06, 0, 0)),
-    (_GEOM.mjGEOM_BOX, (0.05, 0.05, 0.05)),
-    (_GEOM.mjGEOM_CAPSULE, (0.04, 0.05, 0)),
-    (_GEOM.mjGEOM_ELLIPSOID, (0.07, 0.055, 0.04)),
-    (_GEOM.mjGEOM_CYLINDER, (0.055, 0.03, 0)),
-)
-BODIES = 30
-RESOLUTION = 128
-SECONDS = 1.0  # all have hit, and those that can lie still do
-ROUNDS = 3
-
-
 def dish(cell: float = 0.03) -> Shape:
     """Model a thick dish of 1.5 m, in which bodies collect."""
     hollow = ellipsoid((0.0, 0.0, 0.65), (0.8, 0.8, 0.5))
-    solid = smooth_intersection(0.05, ellipsoid((0.0, 0.0, 0.4), (0.8, 0.8, 0.4)), lambda points: -hollow(points))
+    solid = smooth_intersection(
+        0.05, ellipsoid((0.0, 0.0, 0.4), (0.8, 0.8, 0.4)), lambda points: -hollow(points)
+    )
     return polygonise(solid, ((-0.9, -0.9, -0.1), (0.9, 0.9, 0.9)), cell)
 
 
@@ -272,8 +301,9 @@ def coupling_cost(
 ) -> dict[str, dict[str, float]]:
     """Seconds a step of `mj_step`, of the coupling (all of `Ripples.step` but the waves), and of the waves, by target.
 
-    The records of impulses, which are made when they are asked for, are counted too. The thread's own time is taken. A
-    run is repeated; it is the same each time, so that the shortest time of each step is what the step costs.
+    The records of impulses, which are made when they are asked for, are counted too. The thread's
+    own time is taken. A run is repeated; it is the same each time, so that the shortest time of
+    each step is what the step costs.
     """
     table = {}
     for name, shape in targets.items():
@@ -292,28 +322,37 @@ def coupling_cost(
 
 def rain(shape: Shape, bodies: int) -> mujoco.MjModel:
     """Bodies of five shapes in a cloud over a target on a floor."""
-    spec, rng, (V, F) = mujoco.MjSpec(), np.random.default_rng(0), shape
+    spec = mujoco.MjSpec()
+    rng = np.random.default_rng(0)
+    (V, F) = shape
     spec.default.geom.solref = [0.01, 1.0]  # stiff enough for 5 m/s
     spec.add_mesh(name="target", uservert=V.ravel(), userface=F.ravel())
     spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_MESH, meshname="target")
     make_collidable(spec, "target")
     spec.worldbody.add_geom(name="floor", type=_GEOM.mjGEOM_PLANE, size=[5, 5, 0.1])
-    low, high = V.min(axis=0), V.max(axis=0)
+    low = V.min(axis=0)
+    high = V.max(axis=0)
     for i in range(bodies):
         x, y = rng.uniform(0.5 * low[:2], 0.5 * high[:2])
-        body = spec.worldbody.add_body(pos=[x, y, high[2] + 0.2 + 0.04 * i], quat=rng.standard_normal(4))
+        body = spec.worldbody.add_body(
+            pos=[x, y, high[2] + 0.2 + 0.04 * i], quat=rng.standard_normal(4)
+        )
         body.add_freejoint()
         kind, size = _SHAPES[i % len(_SHAPES)]
         body.add_geom(name=f"body {i}", type=kind, size=size, density=400)
     return spec.compile()
 
 
-def _run(model: mujoco.MjModel, seconds: float, resolution: int) -> tuple[NDArray[np.float64], float]:
+def _run(
+    model: mujoco.MjModel, seconds: float, resolution: int
+) -> tuple[NDArray[np.float64], float]:
     """Times of every step [s], [steps, 3]: physics, coupling, waves; and the mean number of bodies on the target."""
-    data, material = mujoco.MjData(model), Material(speed=0.6, damping=1.0, density=200.0)
+    data = mujoco.MjData(model)
+    material = Material(speed=0.6, damping=1.0, density=200.0)
     ripples = Ripples(model, {"target": material}, resolution=resolution, backend="cpu")
     ripples.allow_any_height("target")
-    take_steps, in_waves = ripples["target"].step, 0.0
+    take_steps = ripples["target"].step
+    in_waves = 0.0
 
     def timed(*arguments: Any, **options: Any) -> None:
         nonlocal in_waves
@@ -322,9 +361,11 @@ def _run(model: mujoco.MjModel, seconds: float, resolution: int) -> tuple[NDArra
         in_waves += time.thread_time() - begun
 
     ripples["target"].step = timed  # type: ignore[method-assign]
-    times, pairs = [], 0
+    times = []
+    pairs = 0
     for _ in range(round(seconds / model.opt.timestep)):
-        in_waves, start = 0.0, time.thread_time()
+        in_waves = 0.0
+        start = time.thread_time()
         mujoco.mj_step(model, data)
         moved = time.thread_time()
         ripples.step(data)
@@ -338,10 +379,16 @@ def _run(model: mujoco.MjModel, seconds: float, resolution: int) -> tuple[NDArra
 
 def as_text(report: Mapping[str, Any]) -> str:
     """Lay a report out for reading: a title and a table for each measurement."""
-    machine, energy = report["machine"], report["energy"]
+    machine = report["machine"]
+    energy = report["energy"]
     gl = {n: f"{rate / 1e6:,.0f}" for n, rate in report["gl"].items() if rate is not None}
     rates = [
-        [n, *(f"{row[key] / 1e6:,.0f}" for key in ("cpu", "stream")), f"{row['of stream']:.2f}", gl.get(n, "")]
+        [
+            n,
+            *(f"{row[key] / 1e6:,.0f}" for key in ("cpu", "stream")),
+            f"{row['of stream']:.2f}",
+            gl.get(n, ""),
+        ]
         for n, row in report["cpu"].items()
     ]
     meshes = [
@@ -358,19 +405,36 @@ def as_text(report: Mapping[str, Any]) -> str:
     ]
     columns = list(report["sphere"]["fem"])
     modes = [
-        [name, *(f"{row[key]:.3g}" if key in row else "" for key in columns)] for name, row in report["sphere"].items()
+        [name, *(f"{row[key]:.3g}" if key in row else "" for key in columns)]
+        for name, row in report["sphere"].items()
     ]
     return "\n\n".join(
         [
-            f"{machine['processors']} processors, {machine['renderer']}\nripple-sim {machine['version']}",
-            "Texel updates a second, in millions; the memory bound reads 28 bytes and writes 8 a texel, in all cores\n"
+            (
+                f"{machine['processors']} processors, {machine['renderer']}\nripple-sim "
+                f"{machine['version']}"
+            ),
+            (
+                "Texel updates a second, in millions; the memory bound reads 28 bytes and writes 8 "
+                "a "
+                "texel, in all cores\n"
+            )
             + table(["N", "CPU", "memory bound", "of it", "OpenGL"], rates),
             "Meshes at N = 128: seconds for the atlas, and milliseconds a wave step on the CPU\n"
             + table(["mesh", "triangles", "texels", "atlas", "step"], meshes),
-            f"Coupling: {BODIES} bodies rain on a target that collides as its true surface, ms a step\n"
-            + table(["target", "touching", "mj_step", "coupling", "waves", "coupling over mj_step"], coupling),
+            (
+                f"Coupling: {BODIES} bodies rain on a target that collides as its true surface, ms "
+                f"a "
+                f"step\n"
+            )
+            + table(
+                ["target", "touching", "mj_step", "coupling", "waves", "coupling over mj_step"],
+                coupling,
+            ),
             "Unit sphere, mode Y40 after one period: relative L2 error, and order by regression\n"
-            + table(["operator", *(key if key == "order" else f"N = {key}" for key in columns)], modes),
+            + table(
+                ["operator", *(key if key == "order" else f"N = {key}" for key in columns)], modes
+            ),
             "Energy without damping, float32\n"
             f"over {energy['steps']:,} steps: largest relative change {energy['largest']:.1e}, "
             f"trend {energy['trend']:+.1e}",
@@ -382,7 +446,10 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Align columns: the first to the left, the others to the right."""
     widths = [max(len(line[i]) for line in [head, *rows]) for i in range(len(head))]
     lines = (
-        [line[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(line[1:], widths[1:], strict=True))]
+        [
+            line[0].ljust(widths[0]),
+            *(cell.rjust(w) for cell, w in zip(line[1:], widths[1:], strict=True)),
+        ]
         for line in [head, *rows]
     )
     return "\n".join("  ".join(line).rstrip() for line in lines)

@@ -1,8 +1,9 @@
 """The report of `ripple-sim info`: versions, OpenGL driver, wave solver; and what to install to render.
 
-It names common reasons on Linux why OpenGL does not run headless, or not on the GPU, each with its fix. An OpenGL
-program without a window uses libEGL.so.1 (of libglvnd), which reads the vendor files: small JSON files that name each
-driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/renderD*; NVIDIA's opens /dev/nvidia*.
+It names common reasons on Linux why OpenGL does not run headless, or not on the GPU, each with its
+fix. An OpenGL program without a window uses libEGL.so.1 (of libglvnd), which reads the vendor
+files: small JSON files that name each driver's own EGL library. Mesa's driver then opens a render
+node, /dev/dri/renderD*; NVIDIA's opens /dev/nvidia*.
 """
 
 from __future__ import annotations
@@ -30,6 +31,20 @@ _LIBRARIES = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"}
 _NVIDIA_VERSION = Path("/proc/driver/nvidia/version")
 _CONTAINER = "in a container, start that with NVIDIA_DRIVER_CAPABILITIES=all"
 
+PACKAGES = (
+    "ripple-sim",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "numba",
+    "libigl",
+    "trimesh",
+    "embreex",
+    "moderngl",
+    "av",
+    "pyvista",
+)
+
 
 def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[str]:
     """Find what keeps OpenGL off the GPU, or from running at all.
@@ -44,24 +59,32 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[s
     Returns
     -------
     list of str
-        Problems, each with its fix, the likeliest cause first; empty if OpenGL runs on a GPU, or for an unknown cause.
+        Problems, each with its fix, the likeliest cause first; empty if OpenGL runs on a GPU, or
+        for an unknown cause.
     """
     if software is False:
         return []
     if software is None:
         # a missing library explains the rest
-        return list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
+        return (
+            list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
+        )
     found = list(_device_problems(devices))
-    if (devices / "nvidia0").exists() and not any("nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]):
+    if (devices / "nvidia0").exists() and not any(
+        "nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]
+    ):
         found.append(
-            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software: "
+            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in "
+            "software: "
             f"{_install_nvidia()}"
         )
     if found or any(devices.glob("dri/renderD*")) or any(devices.glob("nvidia[0-9]*")):
         return found
     return [
-        f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*): "
-        "nothing to fix; rendering is faster on a machine with a GPU (in a container, pass it through with "
+        f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or "
+        f"{devices}/nvidia*): "
+        "nothing to fix; rendering is faster on a machine with a GPU (in a container, pass it "
+        "through with "
         "--device /dev/dri or --gpus all)"
     ]
 
@@ -74,7 +97,10 @@ def _library_problems() -> Iterator[str]:
             if "No such file" in str(error):
                 yield f"the library {library} is missing: apt-get install {package}"
             else:
-                yield f"the library {library} cannot be loaded ({error}): apt-get install --reinstall {package}"
+                yield (
+                    f"the library {library} cannot be loaded ({error}): apt-get install "
+                    f"--reinstall {package}"
+                )
 
 
 def _vendor_problems() -> Iterator[str]:
@@ -82,12 +108,16 @@ def _vendor_problems() -> Iterator[str]:
     if not files:
         yield (
             f"there is no EGL vendor file (*.json) in {where}: "
-            "apt-get install libegl-mesa0 libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl of the driver's "
+            "apt-get install libegl-mesa0 libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl "
+            "of the driver's "
             f"version, or, {_CONTAINER}"
         )
     for file in files:
         if (library := _library_of(file)) is None:
-            yield f"the EGL vendor file {file} is damaged: reinstall the package it belongs to: dpkg -S {file}"
+            yield (
+                f"the EGL vendor file {file} is damaged: reinstall the package it belongs to: "
+                f"dpkg -S {file}"
+            )
             continue
         try:
             ctypes.CDLL(library)
@@ -107,13 +137,22 @@ def _device_problems(devices: Path) -> Iterator[str]:
                 group = str(number)
             yield (
                 f"this user has no access to the GPU's render node {node}: "
-                f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add {group})"
+                f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add "
+                f"{group})"
             )
 
 
 def _install_nvidia() -> str:
-    version = re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text()) if _NVIDIA_VERSION.exists() else None
-    package = f"libnvidia-gl-{version[1]}" if version else "libnvidia-gl-NNN, where NNN is the driver's version"
+    version = (
+        re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text())
+        if _NVIDIA_VERSION.exists()
+        else None
+    )
+    package = (
+        f"libnvidia-gl-{version[1]}"
+        if version
+        else "libnvidia-gl-NNN, where NNN is the driver's version"
+    )
     return f"apt-get install {package}; {_CONTAINER}"
 
 
@@ -123,7 +162,9 @@ def _vendor_files() -> tuple[list[Path], str]:
         return [Path(name) for name in names.split(":")], f"__EGL_VENDOR_LIBRARY_FILENAMES={names}"
     folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS")
     places = folders.split(":") if folders else list(_VENDOR_FOLDERS)
-    return sorted(file for place in places for file in Path(place).glob("*.json")), " or ".join(places)
+    return sorted(file for place in places for file in Path(place).glob("*.json")), " or ".join(
+        places
+    )
 
 
 def _library_of(file: Path) -> str | None:
@@ -140,24 +181,10 @@ def find_drawing_threads(renderer: str) -> list[str]:
     if "llvmpipe" not in renderer.lower() or threads == "0":
         return []
     return [
-        f"{DRAWING_THREADS}={threads} has llvmpipe draw in threads, which may write into freed memory and so end the "
+        f"{DRAWING_THREADS}={threads} has llvmpipe draw in threads, which may write into freed "
+        f"memory and so end the "
         f"program: unset {DRAWING_THREADS}, or set it to 0"
     ]
-
-
-PACKAGES = (
-    "ripple-sim",
-    "mujoco",
-    "numpy",
-    "scipy",
-    "numba",
-    "libigl",
-    "trimesh",
-    "embreex",
-    "moderngl",
-    "av",
-    "pyvista",
-)
 
 
 def collect() -> dict[str, Any]:
@@ -171,32 +198,43 @@ def collect() -> dict[str, Any]:
         Operating system and architecture.
     processors : int
     opengl : dict or None
-        The driver's `renderer`, `vendor` and `version` in its own words, whether it is `software`, and whether it
-        `computes`, as waves in OpenGL need; None if there is no usable context; `advice` then says what to install.
+        The driver's `renderer`, `vendor` and `version` in its own words, whether it is `software`,
+        and whether it `computes`, as waves in OpenGL need; None if there is no usable context;
+        `advice` then says what to install.
     backend : str
         The wave solver of "auto": "gl" or "cpu".
     measured : str
         What was measured to choose it, once on this machine; "" where nothing was.
     advice : str
-        Problems that prevent or slow down rendering, with their fixes, one per line; "" if there is none.
+        Problems that prevent or slow down rendering, with their fixes, one per line; "" if there is
+        none.
     """
-    opengl, failure = None, ""
+    opengl = None
+    failure = ""
     try:
         context = shared_context()
     except GLError as error:
         failure = str(error)
     else:
-        opengl = {name: getattr(context, name) for name in ("renderer", "vendor", "version", "software", "computes")}
+        opengl = {
+            name: getattr(context, name)
+            for name in ("renderer", "vendor", "version", "software", "computes")
+        }
     findings = find_problems(opengl["software"] if opengl else None)
     if opengl is not None:
         findings += find_drawing_threads(opengl["renderer"])
     return {
-        "versions": {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: _version(name) for name in PACKAGES},
+        },
         "system": platform.platform(),
         "processors": os.cpu_count() or 1,
         "opengl": opengl,
         "backend": auto_backend(),
-        "measured": str(measured(context)) if opengl and opengl["computes"] and not opengl["software"] else "",
+        "measured": str(measured(context))
+        if opengl and opengl["computes"] and not opengl["software"]
+        else "",
         "advice": "\n".join(findings) or failure,
     }
 

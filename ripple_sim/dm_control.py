@@ -28,13 +28,13 @@ def couple(
 ) -> Ripples:
     """Make a dm_control `Physics` or environment ripple: from now on each of its physics steps drives the ripples.
 
-    `physics.step(nstep)` couples every one of its steps, also where dm_control begins the next one already
-    (`legacy_step`), so that tasks and environments of dm_control need no change; `physics.reset` flattens the surfaces.
-    `physics.render` takes what it took before, and draws with the ripples, through `RippleRenderer`; text (`overlays`)
-    is not drawn.
+    `physics.step(nstep)` couples every one of its steps, also where dm_control begins the next one
+    already (`legacy_step`), so that tasks and environments of dm_control need no change;
+    `physics.reset` flattens the surfaces. `physics.render` takes what it took before, and draws
+    with the ripples, through `RippleRenderer`; text (`overlays`) is not drawn.
 
-    An environment of `composer` makes a new physics for each episode: give the environment, and the ripples are made
-    anew with it, in the same `Ripples`.
+    An environment of `composer` makes a new physics for each episode: give the environment, and the
+    ripples are made anew with it, in the same `Ripples`.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ def couple(
     RippleError
         As `Ripples` does.
     """
-    environment, physics = physics, getattr(physics, "physics", physics)
+    environment = physics
+    physics = getattr(physics, "physics", physics)
     ripples = Ripples(physics.model, materials, **options)
     _follow(physics, ripples, looks=looks, lighting=lighting)
     if hasattr(environment, "add_extra_hook"):
@@ -98,12 +99,15 @@ def _refuse_with_surfaces(**options: Any) -> None:
     """Raise if an option is given that dm_control takes for colours alone."""
     for name, value in options.items():
         if value:
-            raise RenderError(f"{name} are not supported with depth or segmentation; leave {name} empty")
+            raise RenderError(
+                f"{name} are not supported with depth or segmentation; leave {name} empty"
+            )
 
 
 def _follow(physics: Any, ripples: Ripples, **looks: Any) -> None:
     """Have a physics drive the ripples and draw with them; `looks` are keyword arguments of `RippleRenderer`."""
-    step, reset = physics.step, physics.reset
+    step = physics.step
+    reset = physics.reset
 
     def rippling_step(*args: Any, **kwargs: Any) -> None:
         with ripples.following(physics.data):
@@ -147,4 +151,6 @@ def _follow(physics: Any, ripples: Ripples, **looks: Any) -> None:
         with _overridden(renderer.scene, render_flag_overrides or {}):
             return renderer.render()
 
-    physics.step, physics.reset, physics.render = rippling_step, rippling_reset, rippling_render
+    physics.step = rippling_step
+    physics.reset = rippling_reset
+    physics.render = rippling_render

@@ -41,7 +41,8 @@ def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
     holder = getattr(env, "physics", env)
     if not (hasattr(holder, "model") and hasattr(holder, "data")):
         raise SceneError(
-            f"the environment {env} has no `model` and `data`; valid are MuJoCo environments, such as those derived "
+            f"the environment {env} has no `model` and `data`; valid are MuJoCo environments, such "
+            f"as those derived "
             "from gymnasium.envs.mujoco.MujocoEnv"
         )
     model = own_model(holder.model)
@@ -54,14 +55,19 @@ def frame_size(env: Any) -> tuple[int, int]:
     return getattr(viewer, "width", None) or _SIZE, getattr(viewer, "height", None) or _SIZE
 
 
-def environment_camera(env: Any, model: mujoco.MjModel, lookat: NDArray[np.float64]) -> mujoco.MjvCamera:
+def environment_camera(
+    env: Any, model: mujoco.MjModel, lookat: NDArray[np.float64]
+) -> mujoco.MjvCamera:
     """The camera with which an unwrapped `MujocoEnv` renders offscreen.
 
-    That is the one of its `camera_id` or `camera_name`, or else MuJoCo's free camera with the environment's
-    `default_camera_config`, aimed at a point [m]: in Gymnasium the median of the geoms when the first frame is drawn.
+    That is the one of its `camera_id` or `camera_name`, or else MuJoCo's free camera with the
+    environment's `default_camera_config`, aimed at a point [m]: in Gymnasium the median of the
+    geoms when the first frame is drawn.
     """
-    viewer, camera = getattr(env, "mujoco_renderer", None), mujoco.MjvCamera()
-    camera.lookat, camera.distance = lookat, model.stat.extent
+    viewer = getattr(env, "mujoco_renderer", None)
+    camera = mujoco.MjvCamera()
+    camera.lookat = lookat
+    camera.distance = model.stat.extent
     for name, value in (getattr(viewer, "default_cam_config", None) or {}).items():
         setattr(camera, name, value)
     camera.fixedcamid = int(getattr(viewer, "camera_id", -1))
@@ -73,23 +79,25 @@ def environment_camera(env: Any, model: mujoco.MjModel, lookat: NDArray[np.float
 class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
     """A MuJoCo environment with ripples on some of its geoms.
 
-    Each physics step within `step` drives the ripples, however many the environment takes (`frame_skip`), and `reset`
-    flattens them. `info` has two more entries:
+    Each physics step within `step` drives the ripples, however many the environment takes
+    (`frame_skip`), and `reset` flattens them. `info` has two more entries:
 
-    - `"impulses"`: list of `Impulse`, those that the surfaces received since the last `step` or `reset`;
+    - `"impulses"`: list of `Impulse`, those that the surfaces received since the last `step` or
+      `reset`;
     - `"heights"`: geom name to the heights of its ripples [m], float32 [C, n, n].
 
-    With the modes "rgb_array", "depth_array" and "rgbd_tuple", `render` returns what Gymnasium's own would, with the
-    ripples: the environment's own `render` runs, with its camera and its markers, and ripple-sim draws in place of
-    Gymnasium's `MujocoRenderer` or `mujoco.Renderer`. Where it uses neither, the model is drawn with MuJoCo's free
-    camera, and a warning says so. Other modes draw without ripples. Observation, reward and their spaces are those of
-    the environment. A pickled or copied environment begins anew, as Gymnasium's own ones do.
+    With the modes "rgb_array", "depth_array" and "rgbd_tuple", `render` returns what Gymnasium's
+    own would, with the ripples: the environment's own `render` runs, with its camera and its
+    markers, and ripple-sim draws in place of Gymnasium's `MujocoRenderer` or `mujoco.Renderer`.
+    Where it uses neither, the model is drawn with MuJoCo's free camera, and a warning says so.
+    Other modes draw without ripples. Observation, reward and their spaces are those of the
+    environment. A pickled or copied environment begins anew, as Gymnasium's own ones do.
 
     Parameters
     ----------
     env : gymnasium.Env
-        One whose unwrapped environment has MuJoCo's `model` and `data` (or dm_control's `physics`), and that steps
-        through `mujoco.mj_step` or `mujoco.mj_step2`.
+        One whose unwrapped environment has MuJoCo's `model` and `data` (or dm_control's `physics`),
+        and that steps through `mujoco.mj_step` or `mujoco.mj_step2`.
     materials : mapping
         Geom to its `Material`, as for `Ripples`.
     looks : mapping, optional
@@ -98,10 +106,11 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         What lights the frames, as for `RippleRenderer`: "model", "studio" or "auto".
     sensors : mapping, optional
         Name to the arguments of a sensor: its `geom`, and those of `WaveSolver.sensor`, as in
-        `{"tap": {"geom": "board", "at": "site", "rate": 2000}}`. The observation is then a `Dict`: what it was, under
-        "observation" unless it is one already, and under each name the samples of a control step, float32
-        [samples, points], in one unbroken row from step to step, late by the sensor's `latency`, 0 before the reset.
-        Their spaces have no bounds: nothing limits how hard a body may hit.
+        `{"tap": {"geom": "board", "at": "site", "rate": 2000}}`. The observation is then a `Dict`:
+        what it was, under "observation" unless it is one already, and under each name the samples
+        of a control step, float32 [samples, points], in one unbroken row from step to step, late by
+        the sensor's `latency`, 0 before the reset. Their spaces have no bounds: nothing limits how
+        hard a body may hit.
     **options
         Keyword arguments of `Ripples`: resolution, backend, two_way and so on.
 
@@ -112,8 +121,8 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
     Raises
     ------
     RippleError
-        If the environment has no MuJoCo model, a sensor's rate gives no whole number of samples in a control step, or
-        its name is taken, or as `Ripples` does.
+        If the environment has no MuJoCo model, a sensor's rate gives no whole number of samples in
+        a control step, or its name is taken, or as `Ripples` does.
     """
 
     _in_place: RenderedInPlace | None
@@ -137,28 +146,36 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
                 f"render_mode is {self.render_mode!r}, which shows no ripples; with "
                 f"{', '.join(map(repr, DRAWN_MODES))} `render` returns frames with them"
             )
-        self._materials, self._looks, self._options = materials, looks, options
+        self._materials = materials
+        self._looks = looks
+        self._options = options
         self._lighting = lighting
         self._lookat: NDArray[np.float64] | None = None
         self._renders_by_itself = True
         self._in_place = None
-        self._given, self._counts = sensors or {}, dict[str, int]()  # samples of each sensor in a control step
+        # samples of each sensor in a control step
+        self._given = sensors or {}
+        self._counts = dict[str, int]()
         self._blocks: dict[str, NDArray[np.float32]] = {}
         self._couple()
         if not self._given:
             return
         own = self.env.observation_space
-        spaces = dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
+        spaces = (
+            dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
+        )
         control = float(getattr(self.unwrapped, "dt", 0.0))
         for name, sensor in self._sensors.items():
             count = sensor.rate * control
             if name in spaces or round(count) < 1 or abs(count - round(count)) > 1e-6 * count:
                 raise SceneError(
-                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s; valid are whole "
+                    f"sensor {name!r} has {count:g} samples in a control step of {control:g} s; "
+                    f"valid are whole "
                     f"numbers, and names other than {', '.join(map(repr, spaces))}"
                 )
             shape = round(count), len(sensor.points)
-            self._counts[name], spaces[name] = shape[0], gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+            self._counts[name] = shape[0]
+            spaces[name] = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
         self.observation_space = gymnasium.spaces.Dict(spaces)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -168,7 +185,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             observation, reward, terminated, truncated, info = self.env.step(action)
         return self._sensed(observation), reward, terminated, truncated, {**info, **self._info()}
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Reset the environment, and flatten the ripples."""
         observation, info = self.env.reset(seed=seed, options=options)
         model, _ = model_and_data(self.unwrapped)
@@ -178,13 +197,16 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             self._couple()
         for name, sensor in self._sensors.items():
             late = int(np.ceil(sensor.latency * sensor.rate))
-            self._blocks[name] = np.zeros((late + self._counts[name], len(sensor.points)), np.float32)
+            self._blocks[name] = np.zeros(
+                (late + self._counts[name], len(sensor.points)), np.float32
+            )
         return self._sensed(observation), {**info, **self._info()}
 
     def render(self) -> Any:
         """Return a frame, uint8 [height, width, 3], its depth buffer, float32 [height, width], or both, by the mode.
 
-        The depth buffer is 0 at MuJoCo's near plane and 1 at its far one. Other modes are the environment's.
+        The depth buffer is 0 at MuJoCo's near plane and 1 at its far one. Other modes are the
+        environment's.
         """
         if self.render_mode not in DRAWN_MODES:
             return self.env.render()
@@ -194,7 +216,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         if not self._renders_by_itself:
             return self._drawn_from_outside(self._in_place)
         before = self._in_place.frames
-        problem: str | None = "returns frames that neither Gymnasium's MujocoRenderer nor mujoco.Renderer has drawn"
+        problem: str | None = (
+            "returns frames that neither Gymnasium's MujocoRenderer nor mujoco.Renderer has drawn"
+        )
         try:
             with self._in_place.replacing():
                 frame = self.env.render()
@@ -211,7 +235,8 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         self._renders_by_itself = False
         if problem is not None:
             warn_caller(
-                f"the environment's own render {problem}; the model is drawn with MuJoCo's free camera in its place, "
+                f"the environment's own render {problem}; the model is drawn with MuJoCo's free "
+                f"camera in its place, "
                 "without what that render adds"
             )
         return self._drawn_from_outside(self._in_place)
@@ -243,7 +268,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             self._in_place.close()
         self._in_place = None
         self._sensors = {
-            name: self.ripples[given["geom"]].sensor(**{key: value for key, value in given.items() if key != "geom"})
+            name: self.ripples[given["geom"]].sensor(
+                **{key: value for key, value in given.items() if key != "geom"}
+            )
             for name, given in self._given.items()
         }
 

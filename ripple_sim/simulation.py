@@ -29,7 +29,8 @@ _MOST_STEPS_PER_FRAME = 100_000
 class Simulation:
     """A running scene: MuJoCo's state and the ripples on its targets, advanced frame by frame.
 
-    The model's time step is shortened a little if needed, so that a frame is a whole number of steps.
+    The model's time step is shortened a little if needed, so that a frame is a whole number of
+    steps.
 
     Parameters
     ----------
@@ -47,7 +48,8 @@ class Simulation:
     operator : str
         Likewise.
     on_step : callable, optional
-        Called with the simulation before each physics step: to steer actuators, move mocap bodies, press on surfaces.
+        Called with the simulation before each physics step: to steer actuators, move mocap bodies,
+        press on surfaces.
 
     Attributes
     ----------
@@ -70,7 +72,12 @@ class Simulation:
     impulses: list[Impulse]
     _steps: int  # of the next frame, already taken
 
-    @checked(SceneError, scene=instance(Scene, ", from load_scene or drop_scene"), fps=POSITIVE, on_step=FUNCTION)
+    @checked(
+        SceneError,
+        scene=instance(Scene, ", from load_scene or drop_scene"),
+        fps=POSITIVE,
+        on_step=FUNCTION,
+    )
     def __init__(
         self,
         scene: Scene,
@@ -91,7 +98,8 @@ class Simulation:
         steps = 1 / (fps * timestep)
         if not steps < _MOST_STEPS_PER_FRAME:
             raise SceneError(
-                f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are at most "
+                f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are "
+                f"at most "
                 f"{_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
             )
         self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
@@ -109,18 +117,28 @@ class Simulation:
             apply_maps(self.ripples, entry)
             self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
         shaped = {entry.geom: entry.height for entry in scene.targets if entry.height is not None}
-        self._heights = {geom: height.heights(self.ripples, geom) for geom, height in shaped.items()}
+        self._heights = {
+            geom: height.heights(self.ripples, geom) for geom, height in shaped.items()
+        }
         self._materials = {name: self.ripples[name].material for name in self.ripples}
         self.physics_seconds = self.wave_seconds = 0.0
         self.reset()
         self.sensors = {}
         for sensor in scene.sensors:
             points = [sensor.point] if sensor.point is not None else sensor.points
-            at = sensor.site if sensor.site is not None else self.ripples.to_geom(sensor.geom, points)
+            at = (
+                sensor.site
+                if sensor.site is not None
+                else self.ripples.to_geom(sensor.geom, points)
+            )
             waves = self.ripples[sensor.geom]
-            self.sensors[sensor.name] = waves.sensor(at, sensor.kind, sensor.rate, thickness=sensor.thickness)
+            self.sensors[sensor.name] = waves.sensor(
+                at, sensor.kind, sensor.rate, thickness=sensor.thickness
+            )
 
-    def _target(self, entry: RippleEntry, resolution: int | None, layout: str | None, rim: str | None) -> Target:
+    def _target(
+        self, entry: RippleEntry, resolution: int | None, layout: str | None, rim: str | None
+    ) -> Target:
         """What an entry of the scene says of a target, with the overrides of the simulation."""
         return Target(
             uniform_material(entry),
@@ -137,10 +155,17 @@ class Simulation:
 
     @classmethod
     def of(
-        cls, scene: Scene, options: Any, *, operator: str = "fem", on_step: Callable[[Simulation], None] | None = None
+        cls,
+        scene: Scene,
+        options: Any,
+        *,
+        operator: str = "fem",
+        on_step: Callable[[Simulation], None] | None = None,
     ) -> Self:
         """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
-        chosen = {name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")}
+        chosen = {
+            name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")
+        }
         return cls(scene, fps=options.rate, operator=operator, on_step=on_step, **chosen)
 
     @property

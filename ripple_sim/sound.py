@@ -1,12 +1,13 @@
 """Sound: the pressure that rippling surfaces make at a place in the air, by Rayleigh's integral.
 
-p(x, t) = rho_0 / (2 pi) integral of a(y, t - r / c_0) / r over the surface, with a the acceleration along the outward
-normal and r the way from y to x (Rayleigh 1896, section 278). It holds for plane surfaces in a rigid wall; here texels
-that face away are left out instead. No air loads the surface, and there is no room.
+p(x, t) = rho_0 / (2 pi) integral of a(y, t - r / c_0) / r over the surface, with a the acceleration
+along the outward normal and r the way from y to x (Rayleigh 1896, section 278). It holds for plane
+surfaces in a rigid wall; here texels that face away are left out instead. No air loads the surface,
+and there is no room.
 
-Texels of one delay act together: they are one sum of `Probes` after every substep, a texel on the two delays between
-which its own lies. The sums of all delays are added up late, each by its delay, in whole substeps. A place that moves
-is interpolated to every sample; see `Ear`.
+Texels of one delay act together: they are one sum of `Probes` after every substep, a texel on the
+two delays between which its own lies. The sums of all delays are added up late, each by its delay,
+in whole substeps. A place that moves is interpolated to every sample; see `Ear`.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ from ripple_sim.solver.kernel import Floats, Ints
 from ripple_sim.solver.waves.finite import count_substeps
 from ripple_sim.solver.waves.sensor import filtered, hertz
 
-DENSITY, SPEED = 1.204, 343.2  # of dry air at 20 degrees Celsius [kg/m^3], [m/s]
+# of dry air at 20 degrees Celsius [kg/m^3], [m/s]
+DENSITY = 1.204
+SPEED = 343.2
 RATE = 48_000  # samples a second of what is heard
 
 _PEAK = 0.9  # of full scale: codecs may overshoot a little
@@ -60,19 +63,23 @@ class Microphone:
     """
 
     def __init__(self, ripples: Ripples, slow_motion: float = 1.0) -> None:
-        self.rate, self._ripples = RATE * slow_motion, ripples
+        self.rate = RATE * slow_motion
+        self._ripples = ripples
         self._ears = {name: Ear(ripples[name], ripples.model.opt.timestep) for name in ripples}
         for name in ripples:
             # long waves may be too slow to be heard
-            material, atlas = ripples[name].material, ripples[name].atlas
+            material = ripples[name].material
+            atlas = ripples[name].atlas
             size = float(np.ptp(atlas.positions.reshape(-1, 3), axis=0).max())
             texels = range(0, atlas.areas.size, 97)
             highest = max(hertz(material, texel, size / _PARTS) for texel in texels) / slow_motion
             if highest < _HEARD:
                 ringing = 200 * size / 0.77 * slow_motion
                 warn_caller(
-                    f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound at {highest:.2g} Hz at "
-                    f"most, below hearing ({_HEARD:g} Hz); a speed of {ringing:.2g} m/s would ring at 200 Hz"
+                    f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound at "
+                    f"{highest:.2g} Hz at "
+                    f"most, below hearing ({_HEARD:g} Hz); a speed of {ringing:.2g} m/s would ring "
+                    f"at 200 Hz"
                 )
 
     def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:
@@ -84,7 +91,10 @@ class Microphone:
     def follow(self, simulation: Simulation) -> None:
         """Stand where the scene's camera is now."""
         data = simulation.data
-        self.place(data, viewpoint(simulation.model, data, simulation.scene.camera, data.time).pose().position)
+        self.place(
+            data,
+            viewpoint(simulation.model, data, simulation.scene.camera, data.time).pose().position,
+        )
 
     def pressure(self, duration: float) -> NDArray[np.float64]:
         """The pressure from time 0 on, over a duration of the simulation [s]: [k] [Pa], k = rate times duration."""
@@ -110,10 +120,11 @@ class Placement(NamedTuple):
 class Ear:
     """A listener to one target, from a place that may move.
 
-    What a texel gives is heard r / c_0 later, with r the way from it. Most of that is the way from the surface's
-    middle, which changes from sample to sample as the place moves: `heard` takes it off where the samples are made. So
-    tones rise and fall as they should (Doppler). What a texel's own way differs by is in the `Placement`. Over the
-    time between two placements sound fades from the one before the last to the last, so that nothing jumps.
+    What a texel gives is heard r / c_0 later, with r the way from it. Most of that is the way from
+    the surface's middle, which changes from sample to sample as the place moves: `heard` takes it
+    off where the samples are made. So tones rise and fall as they should (Doppler). What a texel's
+    own way differs by is in the `Placement`. Over the time between two placements sound fades from
+    the one before the last to the last, so that nothing jumps.
 
     Parameters
     ----------
@@ -173,14 +184,18 @@ class Ear:
             changes[:, count:] *= faded
         size = int(when[-1] + self._delays.max()) + 3
         if size > len(self._series):
-            self._series = np.append(self._series, np.zeros(max(size, 2 * len(self._series)) - len(self._series)))
+            self._series = np.append(
+                self._series, np.zeros(max(size, 2 * len(self._series)) - len(self._series))
+            )
         if abs(dt - self._dt) < 1e-9 * dt:
-            first, each = round(when[0]), np.ascontiguousarray(changes.T)
+            first = round(when[0])
+            each = np.ascontiguousarray(changes.T)
             for delay, change in zip((first + self._delays).tolist(), each, strict=True):
                 self._series[delay : delay + len(change)] += change
         else:  # substeps have another length since the material changed: a change lies between two entries
             whole = np.maximum(np.floor(when), 0).astype(np.int64)
-            late, places = (when - whole)[:, None], whole[:, None] + self._delays
+            late = (when - whole)[:, None]
+            places = whole[:, None] + self._delays
             np.add.at(self._series, places, changes * (1 - late))
             np.add.at(self._series, places + 1, changes * late)
 
@@ -188,7 +203,9 @@ class Ear:
         """The pressure at some times [s], filtered for samples at a rate; nothing, where it stood nowhere."""
         if not self._ways or not len(at):
             return np.zeros(len(at))
-        ways = np.stack([np.interp(at, self._times, each) for each in np.transpose(self._ways)], axis=1)
+        ways = np.stack(
+            [np.interp(at, self._times, each) for each in np.transpose(self._ways)], axis=1
+        )
         left_at = at - (np.linalg.norm(ways, axis=1) - self._reach) / SPEED
         reach = np.zeros(max(len(self._series), int(left_at.max() / self._dt) + 2) + 64)
         reach[: len(self._series)] = self._series
@@ -200,7 +217,11 @@ class Ear:
         if begun.any():
             blocks = np.array_split(left_at[begun], max(1, len(at) // 4096))
             spans = np.full(len(times), self._dt)
-            heard = [filtered(times, spans, reach[:, None], block, base)[:, 0] for block in blocks if len(block)]
+            heard = [
+                filtered(times, spans, reach[:, None], block, base)[:, 0]
+                for block in blocks
+                if len(block)
+            ]
             pressure[begun] = np.concatenate(heard)
         return pressure
 
@@ -210,7 +231,13 @@ class Ear:
         way = here - atlas.positions.reshape(-1, 3)
         distance = np.maximum(np.linalg.norm(way, axis=1), _NEAREST)
         cosine = np.einsum("ij,ij->i", way, atlas.normals.reshape(-1, 3)) / distance
-        weight = DENSITY / (2 * np.pi) * atlas.areas.reshape(-1) / distance * np.clip(cosine / _GRAZING, 0, 1)
+        weight = (
+            DENSITY
+            / (2 * np.pi)
+            * atlas.areas.reshape(-1)
+            / distance
+            * np.clip(cosine / _GRAZING, 0, 1)
+        )
         texels = np.flatnonzero(weight * waves.operator.movable.reshape(-1))
         if not len(texels):
             texels = np.zeros(1, np.int64)  # it faces away everywhere: a texel without weight
@@ -218,7 +245,8 @@ class Ear:
         own = np.maximum(distance[texels] - common + self._reach, 0.0)
         delay = own / SPEED / (every * self._dt)
         first = np.floor(delay).astype(np.int64)
-        slots, late = np.concatenate([first, first + 1]), delay - first
+        slots = np.concatenate([first, first + 1])
+        late = delay - first
         shares = np.concatenate([(1 - late) * weight[texels], late * weight[texels]])
         order = np.argsort(slots, kind="stable")
         delays, begins = np.unique(slots[order], return_index=True)
@@ -233,7 +261,9 @@ class Ear:
     def _faded(self, times: NDArray) -> NDArray:
         """How much of the last placement is heard at some times [s], [k]: all after as long as the one before took."""
         span = self._times[-1] - self._times[-2]
-        return np.clip((times - self._times[-1]) / span, 0.0, 1.0) if span > 0 else np.ones(len(times))
+        return (
+            np.clip((times - self._times[-1]) / span, 0.0, 1.0) if span > 0 else np.ones(len(times))
+        )
 
 
 def gain(pressure: NDArray[np.float64]) -> float:

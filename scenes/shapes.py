@@ -2,10 +2,12 @@
 
 `python -m ripple_sim.scenes.shapes` writes `meshes/duck.obj` and `meshes/limbed.obj` again.
 
-Implicit solids: signed-distance functions, smooth blends of them, and the triangle mesh of their surface.
+Implicit solids: signed-distance functions, smooth blends of them, and the triangle mesh of their
+surface.
 
-A solid is a function from points [k, 3] to distances [k] in metres, negative inside. Blends join solids over a width
-`k` in metres. Distances may be approximate away from the surface; the surface itself is exact.
+A solid is a function from points [k, 3] to distances [k] in metres, negative inside. Blends join
+solids over a width `k` in metres. Distances may be approximate away from the surface; the surface
+itself is exact.
 """
 
 from __future__ import annotations
@@ -24,6 +26,9 @@ __all__ = ["DUCK_FILE", "LIMBED_FILE", "duck", "limbed", "peanut", "polygonise",
 Array = NDArray[np.float64]
 Sdf = Callable[[Array], Array]
 
+DUCK_FILE = Path(__file__).parent / "meshes" / "duck.obj"
+LIMBED_FILE = DUCK_FILE.with_name("limbed.obj")
+
 
 def sphere(centre: ArrayLike, radius: float) -> Sdf:
     """Ball of a radius [m] about a centre [m]."""
@@ -34,9 +39,11 @@ def sphere(centre: ArrayLike, radius: float) -> Sdf:
 def ellipsoid(centre: ArrayLike, radii: ArrayLike, rotation: ArrayLike | None = None) -> Sdf:
     """Ellipsoid with semi-axes `radii` [m] along the columns of `rotation` (by default x, y, z).
 
-    The distance is the first-order one, |q|(|q| - 1) / |grad|, with q the point in units of the semi-axes.
+    The distance is the first-order one, |q|(|q| - 1) / |grad|, with q the point in units of the
+    semi-axes.
     """
-    c, r = np.asarray(centre, dtype=np.float64), np.asarray(radii, dtype=np.float64)
+    c = np.asarray(centre, dtype=np.float64)
+    r = np.asarray(radii, dtype=np.float64)
     axes = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64)
 
     def distance(p: Array) -> Array:
@@ -51,7 +58,8 @@ def ellipsoid(centre: ArrayLike, radii: ArrayLike, rotation: ArrayLike | None = 
 
 def rounded_cone(a: ArrayLike, b: ArrayLike, radius_a: float, radius_b: float) -> Sdf:
     """Hull of two balls at `a` and `b` [m] whose radius [m] goes linearly from one to the other."""
-    start, axis = np.asarray(a, dtype=np.float64), np.subtract(b, a).astype(np.float64)
+    start = np.asarray(a, dtype=np.float64)
+    axis = np.subtract(b, a).astype(np.float64)
     length = float(np.linalg.norm(axis))
     sine = (radius_a - radius_b) / length
     cosine = np.sqrt(1.0 - sine * sine)
@@ -71,7 +79,9 @@ def capsule(a: ArrayLike, b: ArrayLike, radius: float) -> Sdf:
     return rounded_cone(a, b, radius, radius)
 
 
-def pebble(centre: ArrayLike, radius: float, rounding: float, rotation: ArrayLike | None = None) -> Sdf:
+def pebble(
+    centre: ArrayLike, radius: float, rounding: float, rotation: ArrayLike | None = None
+) -> Sdf:
     """All points within `rounding` [m] of a flat disc; its normal is the third column of `rotation`."""
     c = np.asarray(centre, dtype=np.float64)
     axes = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64)
@@ -168,9 +178,6 @@ def _relaxed(V: Array, F: NDArray[np.int64]) -> Array:
     return (adjacency @ V) / np.asarray(adjacency.sum(axis=1))
 
 
-DUCK_FILE = Path(__file__).parent / "meshes" / "duck.obj"
-LIMBED_FILE = DUCK_FILE.with_name("limbed.obj")
-
 Triangles = NDArray[np.int64]
 
 
@@ -193,7 +200,11 @@ def duck(cell: float = 0.0235) -> tuple[Array, Triangles]:
 
 def limbed(cell: float = 0.02) -> tuple[Array, Triangles]:
     """Model a plump animal on four legs, 0.7 m long, standing on z = 0: concave between the legs and under the chin."""
-    legs = [capsule((x, y, 0.22), (1.25 * x, 1.4 * y, 0.05), 0.05) for x in (-0.17, 0.17) for y in (-0.09, 0.09)]
+    legs = [
+        capsule((x, y, 0.22), (1.25 * x, 1.4 * y, 0.05), 0.05)
+        for x in (-0.17, 0.17)
+        for y in (-0.09, 0.09)
+    ]
     trunk = ellipsoid((0.0, 0.0, 0.3), (0.27, 0.15, 0.14))
     neck = rounded_cone((0.18, 0.0, 0.34), (0.3, 0.0, 0.5), 0.08, 0.06)
     head = ellipsoid((0.33, 0.0, 0.52), (0.12, 0.085, 0.085))
@@ -237,8 +248,13 @@ def _duck_solid() -> Sdf:
 
 def _turned(pitch: float = 0.0, yaw: float = 0.0) -> Array:
     """Rotation by `pitch` about y (positive noses down), then by `yaw` about z [rad]."""
-    cp, sp, cy, sy = np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
-    return np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    cp = np.cos(pitch)
+    sp = np.sin(pitch)
+    cy = np.cos(yaw)
+    sy = np.sin(yaw)
+    return np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ np.array(
+        [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]]
+    )
 
 
 def write_obj(path: Path, V: Array, F: Triangles) -> None:

@@ -1,6 +1,7 @@
 """Surface waves on meshes: mesh -> layout -> atlas -> operator -> waves. Knows nothing of MuJoCo.
 
-The public names load their modules when they are first used, so that importing this package is quick.
+The public names load their modules when they are first used, so that importing this package is
+quick.
 """
 
 import lazy_loader

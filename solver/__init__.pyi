@@ -12,7 +12,11 @@ from .mesh.files import load_mesh as load_mesh
 from .mesh.mesh import Mesh as Mesh
 from .mesh.volume import Volume as Volume, load_volume as load_volume
 from .mesh.wrap import Wrap as Wrap, wrap as wrap
-from .operator.assembly import absorbing_damping as absorbing_damping, build_operator as build_operator, hold as hold
+from .operator.assembly import (
+    absorbing_damping as absorbing_damping,
+    build_operator as build_operator,
+    hold as hold,
+)
 from .operator.material import Material as Material
 from .operator.modes import Modes as Modes, modes as modes
 from .texels.atlas import Atlas as Atlas, texel_atlas as texel_atlas

@@ -1,8 +1,9 @@
 """What took long to make, kept: in the user's cache folder, and in memory.
 
-A file in the folder lies under a hash of what it was made from. The folder is kept under a limit: what was used longest
-ago goes first. Several processes may use it at once: a file appears whole, and whoever misses one makes it again. In
-memory, results are for the next one who asks for the same: the next scene of a batch, or the next target.
+A file in the folder lies under a hash of what it was made from. The folder is kept under a limit:
+what was used longest ago goes first. Several processes may use it at once: a file appears whole,
+and whoever misses one makes it again. In memory, results are for the next one who asks for the
+same: the next scene of a batch, or the next target.
 """
 
 from __future__ import annotations
@@ -55,13 +56,20 @@ def _private_folder(reason: str) -> Path:
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         status = folder.lstat()
-        safe = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
+        safe = (
+            stat.S_ISDIR(status.st_mode)
+            and status.st_uid == os.getuid()
+            and not status.st_mode & 0o077
+        )
     except OSError:
         safe = False
     if not safe:  # somebody else's
         folder = Path(tempfile.mkdtemp(prefix="ripple-sim-"))
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    warn_caller(f"{reason}: kernels and atlases are kept in {folder}; set XDG_CACHE_HOME to a folder that lasts")
+    warn_caller(
+        f"{reason}: kernels and atlases are kept in {folder}; set XDG_CACHE_HOME to a folder that "
+        f"lasts"
+    )
     return folder
 
 
@@ -91,7 +99,9 @@ def cache_limit() -> int:
         if not 0 <= limit < np.inf:
             raise ValueError
     except ValueError:
-        raise RippleError(f"{LIMIT} is {given!r}; valid is a number of megabytes, 0 or more") from None
+        raise RippleError(
+            f"{LIMIT} is {given!r}; valid is a number of megabytes, 0 or more"
+        ) from None
     return int(limit * _MEGABYTE)
 
 
@@ -104,7 +114,10 @@ def cached_files() -> dict[Path, int]:
                 if _OURS.fullmatch(path.name) and path.is_file():
                     status = path.stat()
                     files[path] = status.st_mtime, status.st_size
-    return {path: size for path, (_, size) in sorted(files.items(), key=lambda file: (file[1][0], file[0].name))}
+    return {
+        path: size
+        for path, (_, size) in sorted(files.items(), key=lambda file: (file[1][0], file[0].name))
+    }
 
 
 def mark_used(path: Path) -> None:
@@ -115,7 +128,8 @@ def mark_used(path: Path) -> None:
 
 def make_room(newest: Path) -> None:
     """Remove what was used longest ago until the cache is under its limit; the newest file stays, unless that is 0."""
-    files, limit = cached_files(), cache_limit()
+    files = cached_files()
+    limit = cache_limit()
     total = sum(files.values())
     for path, size in files.items():
         if total <= limit:
@@ -143,7 +157,8 @@ class ResultCache(Generic[Result]):
     """
 
     def __init__(self, count: int, small: Callable[[Result], bool]) -> None:
-        self._count, self._small = count, small
+        self._count = count
+        self._small = small
         self._results: OrderedDict[str, Result] = OrderedDict()
 
     def get(self, key: str, make: Callable[[], Result]) -> Result:

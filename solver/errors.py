@@ -20,6 +20,16 @@ from typing import Any, ParamSpec, TypeVar
 
 import msgspec
 
+# Of a value in a message [characters].
+_LONGEST = 120
+
+# Packages whose frames are never the user's: this one, and what runs its context managers, threads
+# and processes.
+_NOT_THE_USERS = ("ripple_sim", "contextlib", "threading", "concurrent", "multiprocessing")
+
+# What a warning names where no thread said for whom it works.
+_NO_LINE = ("ripple_sim", 0)
+
 
 class RippleError(Exception):
     """Root of all errors that ripple-sim raises on purpose.
@@ -54,16 +64,8 @@ class RippleWarning(UserWarning):
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
-
-# Of a value in a message [characters].
-_LONGEST = 120
-
-# Packages whose frames are never the user's: this one, and what runs its context managers, threads and processes.
-_NOT_THE_USERS = ("ripple_sim", "contextlib", "threading", "concurrent", "multiprocessing")
 # `user_line`: the line that this thread works for.
 _thread = threading.local()
-# What a warning names where no thread said for whom it works.
-_NO_LINE = ("ripple_sim", 0)
 # Which warnings without a frame of the user's were shown, as Python keeps it for each module.
 _shown_warnings: dict[Any, Any] = {}
 
@@ -99,13 +101,19 @@ PATH = Valid(_is_path, "a path: a str or pathlib.Path without a NUL")
 
 def whole(least: int) -> Valid:
     """A whole number from `least` on."""
-    return Valid(lambda x: isinstance(x, numbers.Integral) and int(x) >= least, f"a whole number, {least} or greater")
+    return Valid(
+        lambda x: isinstance(x, numbers.Integral) and int(x) >= least,
+        f"a whole number, {least} or greater",
+    )
 
 
 def instance(kind: type, hint: str = "", *, optional: bool = False) -> Valid:
     """An instance of a class, or None where it is optional, with a hint where to get one."""
     article = "an" if kind.__name__[0] in "AEIO" else "a"
-    return Valid(lambda x: isinstance(x, kind) or (optional and x is None), f"{article} {kind.__name__}{hint}")
+    return Valid(
+        lambda x: isinstance(x, kind) or (optional and x is None),
+        f"{article} {kind.__name__}{hint}",
+    )
 
 
 def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
@@ -118,21 +126,30 @@ def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
         try:
             msgspec.convert(value, hint)
         except msgspec.ValidationError:
-            raise error(f"{name.replace('_', ' ')} is {shown(value)}; valid is {_words(hint)}") from None
+            raise error(
+                f"{name.replace('_', ' ')} is {shown(value)}; valid is {_words(hint)}"
+            ) from None
         if name in valid and value is not None and not valid[name].holds(value):
             raise error(f"{name.replace('_', ' ')} is {shown(value)}; valid is {valid[name].words}")
 
 
 def _words(hint: Any) -> str:
     """What an annotation allows, as a message says it: "int or None"."""
-    kind, inner = typing.get_origin(hint), typing.get_args(hint)
+    kind = typing.get_origin(hint)
+    inner = typing.get_args(hint)
     if kind is typing.Literal:
         return " or ".join(map(repr, inner))
     if kind is tuple:
         return f"({', '.join(map(_words, inner))})"
     if kind is Sequence:
         return f"a list of {_words(inner[0])}"
-    return "None" if hint is type(None) else " or ".join(map(_words, inner)) if inner else hint.__name__
+    return (
+        "None"
+        if hint is type(None)
+        else " or ".join(map(_words, inner))
+        if inner
+        else hint.__name__
+    )
 
 
 def shown(value: object) -> str:
@@ -197,7 +214,9 @@ def checked(
             given = signature.bind(*args, **kwargs).arguments
             for name, each in valid.items():
                 if name in given and not each.holds(given[name]):
-                    raise error(f"{name.replace('_', ' ')} is {shown(given[name])}; valid is {each.words}")
+                    raise error(
+                        f"{name.replace('_', ' ')} is {shown(given[name])}; valid is {each.words}"
+                    )
             return function(*args, **kwargs)
 
         return checking

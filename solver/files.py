@@ -15,7 +15,14 @@ except ImportError:  # on Windows
 
 
 # Errors of the system that another name would have avoided.
-OF_THE_NAME = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EINVAL, errno.ELOOP)
+OF_THE_NAME = (
+    errno.ENAMETOOLONG,
+    errno.ENOENT,
+    errno.ENOTDIR,
+    errno.EISDIR,
+    errno.EINVAL,
+    errno.ELOOP,
+)
 
 
 # Those of them that hold in every folder.
@@ -33,8 +40,8 @@ _LONGEST_SUFFIX = ".0123456789.part"
 def final_path(path: Path) -> Path:
     """Where a path to be written leads, its symbolic links followed.
 
-    Raises `OSError` if links lead in a circle, or the name is too long for the system, or too long to be written beside
-    first.
+    Raises `OSError` if links lead in a circle, or the name is too long for the system, or too long
+    to be written beside first.
     """
     final = Path(os.path.realpath(path))
     if final.is_symlink():
@@ -51,8 +58,8 @@ def final_path(path: Path) -> Path:
 def atomic_write(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path` to write to, renamed to `path` at the end, removed after an exception.
 
-    Symbolic links are followed, missing folders made. Raises `OSError` if the path exists and is not a regular file
-    (renaming would destroy a device, say), or cannot be written.
+    Symbolic links are followed, missing folders made. Raises `OSError` if the path exists and is
+    not a regular file (renaming would destroy a device, say), or cannot be written.
     """
     path = final_path(path)
     if path.exists() and not path.is_file():

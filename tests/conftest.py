@@ -15,17 +15,19 @@ import pytest
 if TYPE_CHECKING:
     from ripple_sim.solver import Atlas
 
-# reasons to skip a test that hold on a machine that has everything else: extras under another licence, data that is not
-# shipped, and what new systems do not have any more
+# reasons to skip a test that hold on a machine that has everything else: extras under another
+# licence, data that is not shipped, and what new systems do not have any more
 _ALLOWED_SKIPS = ("pymeshfix", "bpy", "known meshes", "OSMesa")
 
 # of the first process: those that it starts find atlases there
 if "RIPPLE_SIM_TESTS" not in os.environ:
     _cache = tempfile.TemporaryDirectory(prefix="ripple-sim-tests-")
     os.environ |= dict.fromkeys(("RIPPLE_SIM_TESTS", "XDG_CACHE_HOME"), _cache.name)
-    # what a software driver has compiled, under a hash of the shaders, is good for the next tests too
+    # what a software driver has compiled, under a hash of the shaders, is good for the next tests
+    # too
     _shaders = Path(__file__).parents[1] / ".pytest_cache" / "shaders"
-    _shaders.mkdir(parents=True, exist_ok=True)  # the driver makes one folder and not two, and complains
+    # the driver makes one folder and not two, and complains
+    _shaders.mkdir(parents=True, exist_ok=True)
     os.environ["MESA_SHADER_CACHE_DIR"] = str(_shaders)
 
 
@@ -35,16 +37,25 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         return
     reporter = session.config.pluginmanager.getplugin("terminalreporter")
     skipped = reporter.stats.get("skipped", ())
-    wrong = [report for report in skipped if not any(word in str(report.longrepr) for word in _ALLOWED_SKIPS)]
+    wrong = [
+        report
+        for report in skipped
+        if not any(word in str(report.longrepr) for word in _ALLOWED_SKIPS)
+    ]
     for report in wrong:
-        reporter.write_line(f"skipped where nothing may be: {report.nodeid}: {report.longrepr}", red=True)
+        reporter.write_line(
+            f"skipped where nothing may be: {report.nodeid}: {report.longrepr}", red=True
+        )
     if wrong:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 @pytest.fixture
 def signals_as_found() -> Iterator[None]:
-    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    kept = {
+        number: signal.getsignal(number)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    }
     yield
     for number, handler in kept.items():
         signal.signal(number, handler)

@@ -16,15 +16,26 @@ from ripple_sim.solver.operator import OPERATORS
 
 
 def test_report_reads_as_text() -> None:
-    cost = {"touching": 3.2, "mj_step [s]": 2e-3, "coupling [s]": 3e-4, "waves [s]": 2e-4, "of mj_step": 0.15}
+    cost = {
+        "touching": 3.2,
+        "mj_step [s]": 2e-3,
+        "coupling [s]": 3e-4,
+        "waves [s]": 2e-4,
+        "of mj_step": 0.15,
+    }
     text = bench.as_text(
         {
             "machine": {"version": "1", "processors": 2, "renderer": "none"},
             "cpu": {"256": {"cpu": 6e8, "stream": 8e8, "of stream": 0.75}},
             "gl": {"256": None, "512": 1.2e9},
-            "meshes": {"duck": {"triangles": 9000, "texels": 98_304, "atlas [s]": 1.5, "substep [s]": 5e-5}},
+            "meshes": {
+                "duck": {"triangles": 9000, "texels": 98_304, "atlas [s]": 1.5, "substep [s]": 5e-5}
+            },
             "coupling": {"dish": cost},
-            "sphere": {"fem": {"16": 0.1, "128": 1e-3, "order": 2.0}, "paper": {"16": 0.5, "order": 0.0}},
+            "sphere": {
+                "fem": {"16": 0.1, "128": 1e-3, "order": 2.0},
+                "paper": {"16": 0.5, "order": 0.0},
+            },
             "energy": {"steps": 10_000, "largest": 1e-7, "trend": -2e-8},
         }
     )
@@ -42,7 +53,10 @@ def test_the_modes_have_errors_for_every_operator_and_ours_is_of_second_order() 
     """Only ours is measured beyond 64 texels."""
     errors = bench.sphere_modes((8, 16, 32, 65))
     assert list(errors) == list(OPERATORS)
-    assert all(list(row) == ["8", "16", "32", *["65"] * (name == "fem"), "order"] for name, row in errors.items())
+    assert all(
+        list(row) == ["8", "16", "32", *["65"] * (name == "fem"), "order"]
+        for name, row in errors.items()
+    )
     assert 1.7 < errors["fem"]["order"] < 2.6
     assert errors["paper"]["order"] < 0.5
     numbers = (8, 16, 32, 65)
@@ -71,7 +85,9 @@ def test_contestants_take_turns() -> None:
 def test_the_memory_stream_passes_once_over_every_texel_each_substep(threads: int) -> None:
     fields = bench.memory_fields(5000)
     streams = dict(zip(bench.FIELDS, fields[:, :5000], strict=True))
-    streams["velocity"][:], streams["height"][:], streams["gain"][:] = np.arange(5000), 1.0, 0.5
+    streams["velocity"][:] = np.arange(5000)
+    streams["height"][:] = 1.0
+    streams["gain"][:] = 0.5
     for value, name in enumerate(("east", "north", "northeast", "northwest"), start=1):
         streams[name][:] = value
     bench.memory_stream(fields, 5000, threads)(3, 0.25)
@@ -87,8 +103,12 @@ def test_a_mesh_has_the_time_of_its_atlas_and_of_its_wave_step() -> None:
 
 
 def test_coupling_is_measured_on_bodies_that_touch() -> None:
-    egg = polygonise(ellipsoid((0.0, 0.0, 0.2), (0.4, 0.3, 0.2)), ((-0.5, -0.5, -0.1), (0.5, 0.5, 0.5)), 0.1)
-    cost = bench.coupling_cost({"egg": lambda: egg}, seconds=0.5, bodies=2, resolution=8, rounds=1)["egg"]
+    egg = polygonise(
+        ellipsoid((0.0, 0.0, 0.2), (0.4, 0.3, 0.2)), ((-0.5, -0.5, -0.1), (0.5, 0.5, 0.5)), 0.1
+    )
+    cost = bench.coupling_cost({"egg": lambda: egg}, seconds=0.5, bodies=2, resolution=8, rounds=1)[
+        "egg"
+    ]
     assert cost["touching"] > 0
     assert min(cost["mj_step [s]"], cost["coupling [s]"], cost["waves [s]"]) > 0
     assert cost["of mj_step"] == pytest.approx(cost["coupling [s]"] / cost["mj_step [s]"])

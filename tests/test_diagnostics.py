@@ -26,7 +26,11 @@ pytestmark = pytest.mark.usefixtures("opengl")  # what is to be taken away must 
 
 def info(**environment: str) -> dict:
     """Report of a process with other environment variables."""
-    return json.loads(ended("-m", "ripple_sim", "info", "--json", env={**os.environ, **environment}, check=True).stdout)
+    return json.loads(
+        ended(
+            "-m", "ripple_sim", "info", "--json", env={**os.environ, **environment}, check=True
+        ).stdout
+    )
 
 
 @pytest.fixture
@@ -43,7 +47,10 @@ def plain_user(tmp_path: Path) -> Iterator[None]:
     root = os.geteuid() == 0
     if root:
         # up to the folder of the user's tests; a process among several has one of its own below
-        for folder in (tmp_path, *list(tmp_path.parents)[: 3 if "PYTEST_XDIST_WORKER" in os.environ else 2]):
+        for folder in (
+            tmp_path,
+            *list(tmp_path.parents)[: 3 if "PYTEST_XDIST_WORKER" in os.environ else 2],
+        ):
             folder.chmod(0o755)
         os.seteuid(NOBODY)
     yield
@@ -59,7 +66,8 @@ def test_no_vendor_file(tmp_path: Path) -> None:
 
 
 def test_a_vendor_file_that_is_damaged_or_whose_library_is_missing(tmp_path, monkeypatch) -> None:
-    file, gone = tmp_path / "10_nvidia.json", "libEGL_nvidia_gone.so.0"
+    file = tmp_path / "10_nvidia.json"
+    gone = "libEGL_nvidia_gone.so.0"
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
     lost = f"names {gone}, which cannot be loaded: apt-get install libnvidia-gl-"
     for text, said in (("{", "is damaged"), (f'{{"ICD": {{"library_path": "{gone}"}}}}', lost)):
@@ -98,13 +106,19 @@ def test_no_permission_on_the_render_node(devices: Path, plain_user: None) -> No
         node.chmod(0)
     for software in (True, None):
         [finding] = find_problems(software, devices)
-        assert finding.startswith(f"this user has no access to the GPU's render node {node}: sudo usermod -aG ")
+        assert finding.startswith(
+            f"this user has no access to the GPU's render node {node}: sudo usermod -aG "
+        )
         assert f" {grp.getgrgid(group_of_node).gr_name} $USER" in finding
 
 
-def test_an_nvidia_gpu_without_its_egl_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_nvidia_gpu_without_its_egl_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "nvidia0").touch()
-    (tmp_path / "version").write_text("NVRM version: NVIDIA UNIX x86_64 Kernel Module  550.54.15  Tue Mar 5\n")
+    (tmp_path / "version").write_text(
+        "NVRM version: NVIDIA UNIX x86_64 Kernel Module  550.54.15  Tue Mar 5\n"
+    )
     monkeypatch.setattr("ripple_sim.diagnostics._NVIDIA_VERSION", tmp_path / "version")
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
     (tmp_path / "50_mesa.json").write_text('{"ICD": {"library_path": "libEGL_mesa.so.0"}}')
@@ -129,7 +143,9 @@ def test_on_a_gpu_there_is_nothing_to_say(devices: Path) -> None:
         ("8", "NVIDIA H200/PCIe/SSE2", 0),
     ],
 )
-def test_threads_that_the_user_gives_llvmpipe_are_named(monkeypatch, threads, renderer, count) -> None:
+def test_threads_that_the_user_gives_llvmpipe_are_named(
+    monkeypatch, threads, renderer, count
+) -> None:
     if threads is None:
         monkeypatch.delenv("LP_NUM_THREADS", raising=False)
     else:
@@ -147,7 +163,9 @@ def report(capsys) -> dict:
 def test_info_names_versions_driver_and_the_backend_that_auto_takes(capsys):
     got = report(capsys)
     assert all(got["versions"].values())
-    assert {"ripple-sim", "python", "mujoco", "numpy", "numba", "moderngl", "av"} <= set(got["versions"])
+    assert {"ripple-sim", "python", "mujoco", "numpy", "numba", "moderngl", "av"} <= set(
+        got["versions"]
+    )
     context = gl.shared_context()
     assert got["opengl"]["renderer"] == context.renderer
     assert got["opengl"]["software"] is context.software
@@ -157,14 +175,18 @@ def test_info_names_versions_driver_and_the_backend_that_auto_takes(capsys):
 def test_without_egl_info_says_what_to_install(capsys, monkeypatch):
     """Every EGL library is missing, as on a machine without Mesa."""
     monkeypatch.setattr(gl, "_shared", {})
-    monkeypatch.setattr(gl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
+    monkeypatch.setattr(
+        gl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},)
+    )
     with pytest.raises(GLError):
         gl.shared_context()
     got = report(capsys)
     assert (got["opengl"], got["backend"]) == (None, "cpu")
     assert "libegl1" in got["advice"]
     assert cli.main(["info"]) == 0
-    assert re.search(r"none: rendering is impossible[\s\S]*apt-get install", capsys.readouterr().out)
+    assert re.search(
+        r"none: rendering is impossible[\s\S]*apt-get install", capsys.readouterr().out
+    )
 
 
 def test_mujocos_version_is_that_which_runs_also_where_its_package_is_mujoco_core(monkeypatch):

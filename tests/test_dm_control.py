@@ -37,7 +37,8 @@ def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.M
     physics.legacy_step = legacy
     ripples = couple(physics, MATERIALS, **OPTIONS)
     model = mujoco.MjModel.from_xml_string(MODEL)
-    data, plain = mujoco.MjData(model), Ripples(model, MATERIALS, **OPTIONS)
+    data = mujoco.MjData(model)
+    plain = Ripples(model, MATERIALS, **OPTIONS)
     with warnings.catch_warnings(action="error", category=RippleWarning):
         for _ in range(2):
             given = 0.0
@@ -61,7 +62,8 @@ def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
     ripples = couple(physics, MATERIALS, looks={"block": "clay"}, lighting="studio", **OPTIONS)
     size = {"height": 24, "width": 32}
     plain = physics.render(**size)
-    depth, segmentation = physics.render(**size, depth=True), physics.render(**size, segmentation=True)
+    depth = physics.render(**size, depth=True)
+    segmentation = physics.render(**size, segmentation=True)
     assert (plain.shape, depth.shape) == ((24, 32, 3), (24, 32))
     assert {tuple(each) for each in segmentation.reshape(-1, 2)} == {(-1, -1), (0, 5), (1, 5)}
     ripples["block"].velocity = np.random.default_rng(2).standard_normal((6, 16, 16)) / 10
@@ -74,8 +76,16 @@ def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
     assert (physics.render(**size, segmentation=True, scene_option=option) == -1).all()
 
     def added(_: Any, scene: mujoco.MjvScene) -> None:
-        ball, size = mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.2)
-        mujoco.mjv_initGeom(scene.geoms[scene.ngeom], ball, size, np.zeros(3), np.eye(3).ravel(), [1.0, 0.0, 0.0, 1.0])
+        ball = mujoco.mjtGeom.mjGEOM_SPHERE
+        size = np.full(3, 0.2)
+        mujoco.mjv_initGeom(
+            scene.geoms[scene.ngeom],
+            ball,
+            size,
+            np.zeros(3),
+            np.eye(3).ravel(),
+            [1.0, 0.0, 0.0, 1.0],
+        )
         scene.ngeom += 1
 
     assert np.abs(physics.render(**size, scene_callback=added).astype(int) - plain).max() > 50
@@ -93,13 +103,17 @@ def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
 
 @pytest.mark.parametrize("make", KINDS)
 @pytest.mark.parametrize("shown", ["depth", "segmentation"])
-@pytest.mark.parametrize("option", [{"overlays": ["text"]}, {"render_flag_overrides": {"shadow": False}}])
+@pytest.mark.parametrize(
+    "option", [{"overlays": ["text"]}, {"render_flag_overrides": {"shadow": False}}]
+)
 def test_what_only_colours_have_is_refused_with_depth_and_segmentation_as_in_dm_control(
     make: Any, shown: str, option: dict[str, Any]
 ) -> None:
     physics = make(MODEL)
     couple(physics, MATERIALS, **OPTIONS)
-    with pytest.raises(ValueError, match=f"{next(iter(option))} are not supported with depth or segmentation"):
+    with pytest.raises(
+        ValueError, match=f"{next(iter(option))} are not supported with depth or segmentation"
+    ):
         physics.render(24, 32, **{shown: True}, **option)
 
 
@@ -107,7 +121,8 @@ class Composed:
     """As `dm_control.composer.Environment`: a new physics for each episode, of which hooks are told."""
 
     def __init__(self) -> None:
-        self.physics, self._hooks = StandIn(MODEL), []
+        self.physics = StandIn(MODEL)
+        self._hooks = []
 
     def add_extra_hook(self, name: str, hook: Any) -> None:
         assert name == "after_compile"

@@ -13,10 +13,23 @@ import ripple_sim
 from ripple_sim import errors as of_application
 from ripple_sim.errors import RenderError, RippleWarning, SceneError
 from ripple_sim.solver import errors as of_solver
-from ripple_sim.solver.errors import GLError, RippleError, deprecated, user_line, warn_caller, work_for
+from ripple_sim.solver.errors import (
+    GLError,
+    RippleError,
+    deprecated,
+    user_line,
+    warn_caller,
+    work_for,
+)
 
-MEMBERS = [each for module in (of_solver, of_application) for _, each in inspect.getmembers(module, inspect.isclass)]
-CLASSES = sorted({each for each in MEMBERS if issubclass(each, Exception)}, key=lambda each: each.__name__)
+MEMBERS = [
+    each
+    for module in (of_solver, of_application)
+    for _, each in inspect.getmembers(module, inspect.isclass)
+]
+CLASSES = sorted(
+    {each for each in MEMBERS if issubclass(each, Exception)}, key=lambda each: each.__name__
+)
 ERRORS = [each for each in CLASSES if not issubclass(each, Warning)]
 
 
@@ -26,11 +39,18 @@ def test_there_is_one_root_for_the_solver_and_the_application() -> None:
 
 
 @pytest.mark.parametrize("error", ERRORS, ids=lambda each: each.__name__)
-def test_every_error_is_caught_as_a_ripple_error_and_keeps_its_message(error: type[RippleError]) -> None:
+def test_every_error_is_caught_as_a_ripple_error_and_keeps_its_message(
+    error: type[RippleError],
+) -> None:
     with pytest.raises(RippleError, match=r"^height is nan; valid are numbers$"):
         raise error("height is nan; valid are numbers")
-    # a mistake in the code itself must not look like one of the user; two are also what mujoco.Renderer raises
-    others = {RippleError: (Exception,), RenderError: (SceneError, ValueError), GLError: (RippleError, RuntimeError)}
+    # a mistake in the code itself must not look like one of the user; two are also what
+    # mujoco.Renderer raises
+    others = {
+        RippleError: (Exception,),
+        RenderError: (SceneError, ValueError),
+        GLError: (RippleError, RuntimeError),
+    }
     assert error.__bases__ == others.get(error, (RippleError,))
 
 
@@ -44,7 +64,9 @@ def test_what_is_deprecated_works_and_warns_where_it_is_used() -> None:
         deprecated("old_name", "new_name", "2.0")
         return 1
 
-    with pytest.warns(DeprecationWarning, match=r"^old_name is deprecated and goes with 2.0; use new_name$") as told:
+    with pytest.warns(
+        DeprecationWarning, match=r"^old_name is deprecated and goes with 2.0; use new_name$"
+    ) as told:
         assert old_name() == 1
     assert told[0].filename == __file__
 
@@ -77,7 +99,11 @@ def test_a_warning_of_a_users_function_in_a_thread_names_the_function() -> None:
 
 def test_no_module_counts_frames_for_a_warning_by_itself() -> None:
     root = Path(of_solver.__file__).parents[1]
-    modules = [path for folder in ("ripple_sim", "solver") for path in (root / folder).rglob("*.py")]
+    modules = [
+        path for folder in ("ripple_sim", "solver") for path in (root / folder).rglob("*.py")
+    ]
     assert len(modules) > 100
-    counting = [path.name for path in modules if "warnings.warn(" in path.read_text(encoding="utf-8")]
+    counting = [
+        path.name for path in modules if "warnings.warn(" in path.read_text(encoding="utf-8")
+    ]
     assert counting == ["errors.py"]

@@ -7,7 +7,7 @@ import sys
 import types
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -24,7 +24,8 @@ from ripple_sim.gymnasium import RippleWrapper, environment_camera, frame_size, 
 from ripple_sim.render import find_viewpoint  # noqa: E402
 
 N = 16
-MASS, GRAVITY = 0.3, 9.81
+MASS = 0.3
+GRAVITY = 9.81
 MODEL = f"""<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 <geom name="block" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" solref="0.01 0.3"/>
 <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
@@ -39,7 +40,10 @@ SPACE = gymnasium.spaces.Box(-np.inf, np.inf, (8,))
 class BallEnv(MujocoEnv):
     """As Gymnasium's own: five physics steps at once."""
 
-    metadata = {"render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"], "render_fps": 100}  # noqa: RUF012
+    metadata: ClassVar = {
+        "render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"],
+        "render_fps": 100,
+    }
 
     def __init__(self, path: Path, **options: Any) -> None:
         super().__init__(str(path), 5, SPACE, width=64, height=48, **options)
@@ -55,7 +59,8 @@ class BallEnv(MujocoEnv):
 class NewModelEnv(gymnasium.Env):
     """Another's: no `MujocoEnv`, a loop of its own, and a new model for each episode."""
 
-    observation_space, action_space = SPACE, gymnasium.spaces.Box(-1, 1, (1,))
+    observation_space = SPACE
+    action_space = gymnasium.spaces.Box(-1, 1, (1,))
 
     def __init__(self) -> None:
         self.reset()
@@ -85,7 +90,8 @@ def path(tmp_path: Path) -> Path:
 def test_each_physics_step_counts(kind: type, path: Path) -> None:
     env = RippleWrapper(kind(path) if kind is BallEnv else kind(), MATERIALS, **OPTIONS)
     model = mujoco.MjModel.from_xml_string(MODEL)
-    data, ripples = mujoco.MjData(model), Ripples(model, MATERIALS, **OPTIONS)
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, MATERIALS, **OPTIONS)
     for _ in range(2):
         env.reset()
         mujoco.mj_resetData(model, data)
@@ -115,7 +121,9 @@ def test_info_of_the_environment_stays_and_a_reset_flattens(path: Path) -> None:
 @pytest.mark.parametrize("mode", ["rgb_array", "depth_array", "rgbd_tuple"])
 def test_frames_show_the_ripples_in_the_size_of_the_environment(path: Path, mode: str) -> None:
     near = {"distance": 0.7, "lookat": np.zeros(3)}
-    ball = BallEnv(path, render_mode=mode, default_camera_config=near, visual_options={STATIC: True})
+    ball = BallEnv(
+        path, render_mode=mode, default_camera_config=near, visual_options={STATIC: True}
+    )
     env = RippleWrapper(ball, MATERIALS, looks={"block": "jelly"}, **OPTIONS)
 
     def frames() -> list[np.ndarray]:
@@ -139,7 +147,8 @@ def test_frames_show_the_ripples_in_the_size_of_the_environment(path: Path, mode
     env.close()
 
 
-GOAL, MARKER = [0.2, 0.0, 0.3], [-0.2, 0.0, 0.2]
+GOAL = [0.2, 0.0, 0.3]
+MARKER = [-0.2, 0.0, 0.2]
 
 
 class MarkedEnv(BallEnv):
@@ -155,8 +164,11 @@ class MarkedEnv(BallEnv):
 class HoldingEnv(gymnasium.Env):
     """As mazes and kitchens: the environment with the camera is inside."""
 
-    observation_space, action_space = SPACE, gymnasium.spaces.Box(-1, 1, (1,))
-    metadata, model, data = BallEnv.metadata, property(lambda e: e.inner.model), property(lambda e: e.inner.data)
+    observation_space = SPACE
+    action_space = gymnasium.spaces.Box(-1, 1, (1,))
+    metadata = BallEnv.metadata
+    model = property(lambda e: e.inner.model)
+    data = property(lambda e: e.inner.data)
 
     def __init__(self, path: Path, render_mode: str, **options: Any) -> None:
         self.inner = BallEnv(path, render_mode=render_mode, **options)
@@ -199,19 +211,26 @@ def camera_with(config: dict[str, Any]) -> mujoco.MjvCamera:
 
 
 def add_ball(scene: mujoco.MjvScene) -> None:
-    ball, turned, white = mujoco.mjtGeom.mjGEOM_SPHERE, np.eye(3).ravel(), np.ones(4, np.float32)
-    mujoco.mjv_initGeom(scene.geoms[scene.ngeom], ball, np.full(3, 0.05), np.array(MARKER), turned, white)
+    ball = mujoco.mjtGeom.mjGEOM_SPHERE
+    turned = np.eye(3).ravel()
+    white = np.ones(4, np.float32)
+    mujoco.mjv_initGeom(
+        scene.geoms[scene.ngeom], ball, np.full(3, 0.05), np.array(MARKER), turned, white
+    )
     scene.ngeom += 1
 
 
 @pytest.mark.parametrize("kind", [BallEnv, MarkedEnv, HoldingEnv, RendererEnv])
-def test_an_environment_draws_by_its_own_render_and_with_its_own_camera(kind: type, path: Path) -> None:
+def test_an_environment_draws_by_its_own_render_and_with_its_own_camera(
+    kind: type, path: Path
+) -> None:
     env = RippleWrapper(kind(path, render_mode="depth_array", default_camera_config=CAMERA), {})
     env.reset()
     mujoco.mj_forward(env.unwrapped.model, env.unwrapped.data)
     with warnings.catch_warnings(action="error", category=RippleWarning):
         frame = [env.render() for _ in range(2)][-1]
-    model, data = env.unwrapped.model, mujoco.MjData(env.unwrapped.model)
+    model = env.unwrapped.model
+    data = mujoco.MjData(env.unwrapped.model)
     mujoco.mj_forward(model, data)
     marked = kind in (MarkedEnv, RendererEnv)
     if marked:
@@ -247,7 +266,10 @@ class PaintingEnv(HoldingEnv):
 def test_a_render_that_cannot_be_drawn_for_is_told_of(path: Path) -> None:
     env = RippleWrapper(PaintingEnv(path, "rgb_array"), MATERIALS, **OPTIONS)
     env.reset()
-    with pytest.warns(RippleWarning, match="neither Gymnasium's MujocoRenderer nor mujoco.Renderer has drawn; the mod"):
+    with pytest.warns(
+        RippleWarning,
+        match="neither Gymnasium's MujocoRenderer nor mujoco.Renderer has drawn; the mod",
+    ):
         assert np.ptp(env.render()) > 0
     with warnings.catch_warnings(action="error", category=RippleWarning):
         env.render()
@@ -259,7 +281,9 @@ def test_depths_are_those_of_a_depth_buffer() -> None:
     model = mujoco.MjModel.from_xml_string(VIEWED)
     near, far = model.stat.extent * np.array([model.vis.map.znear, model.vis.map.zfar])
     depth = np.array([near, 2 * near, far], np.float32)
-    np.testing.assert_allclose(depth_buffer(model, depth), [0.0, 0.5 / (1 - near / far), 1.0], atol=1e-6)
+    np.testing.assert_allclose(
+        depth_buffer(model, depth), [0.0, 0.5 / (1 - near / far), 1.0], atol=1e-6
+    )
 
 
 def test_modes_without_ripples_say_so(path: Path) -> None:
@@ -268,10 +292,17 @@ def test_modes_without_ripples_say_so(path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize(("mode", "count", "keywords"), [("sync", 2, {}), ("async", 1, {"context": "spawn"})])
-def test_make_vec_makes_ripples_in_this_process_and_in_another(mode: str, count: int, keywords: dict[str, Any]) -> None:
-    materials, feel = {"torso_geom": Material(density=100.0)}, {"geom": "torso_geom", "at": [0, 0, 1.0], "rate": 1000}
-    wrapper = functools.partial(RippleWrapper, materials=materials, sensors={"feel": feel}, **OPTIONS)
+@pytest.mark.parametrize(
+    ("mode", "count", "keywords"), [("sync", 2, {}), ("async", 1, {"context": "spawn"})]
+)
+def test_make_vec_makes_ripples_in_this_process_and_in_another(
+    mode: str, count: int, keywords: dict[str, Any]
+) -> None:
+    materials = {"torso_geom": Material(density=100.0)}
+    feel = {"geom": "torso_geom", "at": [0, 0, 1.0], "rate": 1000}
+    wrapper = functools.partial(
+        RippleWrapper, materials=materials, sensors={"feel": feel}, **OPTIONS
+    )
     how = {"num_envs": count, "vectorization_mode": mode, "vector_kwargs": keywords}
     envs = gymnasium.make_vec("Ant-v5", **how, wrappers=[wrapper], max_episode_steps=3)
     _, info = envs.reset(seed=1)
@@ -296,7 +327,9 @@ def test_frames_and_limits_of_gymnasiums_wrappers_go_around_it(path: Path) -> No
     env.close()
 
 
-def test_record_video_gets_every_frame_with_its_ripples(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_record_video_gets_every_frame_with_its_ripples(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A stand-in for moviepy, which writes the files and is no dependency."""
     written: dict[str, tuple[list[np.ndarray], int]] = {}
 
@@ -307,12 +340,19 @@ def test_record_video_gets_every_frame_with_its_ripples(path: Path, monkeypatch:
         def write_videofile(self, file: str, logger: object) -> None:
             written[Path(file).name] = self.made
 
-    for name in ("moviepy", "moviepy.video", "moviepy.video.io", "moviepy.video.io.ImageSequenceClip"):
+    for name in (
+        "moviepy",
+        "moviepy.video",
+        "moviepy.video.io",
+        "moviepy.video.io.ImageSequenceClip",
+    ):
         module = types.ModuleType(name)
         module.ImageSequenceClip = Clip  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, name, module)
     rippling = RippleWrapper(BallEnv(path, render_mode="rgb_array"), MATERIALS, **OPTIONS)
-    env = gymnasium.wrappers.RecordVideo(rippling, str(path.parent), episode_trigger=lambda episode: episode < 2)
+    env = gymnasium.wrappers.RecordVideo(
+        rippling, str(path.parent), episode_trigger=lambda episode: episode < 2
+    )
     for _ in range(3):
         env.reset(seed=0)
         for _ in range(3):
@@ -328,7 +368,9 @@ def test_record_video_gets_every_frame_with_its_ripples(path: Path, monkeypatch:
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_gymnasium_finds_no_fault_with_its_own_ant_which_is_made_anew_by_spec_or_pickle() -> None:
-    env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS)
+    env = RippleWrapper(
+        gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS
+    )
     check_env(env, skip_render_check=True)
     env.reset(seed=0)
     env.step(env.action_space.sample())
@@ -350,7 +392,9 @@ def test_gymnasium_finds_no_fault_where_a_target_is_touched_at_the_first_step(pa
 
 
 def test_environments_without_a_model_are_refused() -> None:
-    with pytest.raises(RippleError, match=r"CartPole.* has no `model` and `data`; valid are MuJoCo environments"):
+    with pytest.raises(
+        RippleError, match=r"CartPole.* has no `model` and `data`; valid are MuJoCo environments"
+    ):
         RippleWrapper(gymnasium.make("CartPole-v1"), MATERIALS)
 
 
@@ -365,18 +409,29 @@ def test_without_gymnasium_the_message_names_the_extra(monkeypatch: pytest.Monke
 VIEWED = """<mujoco><visual><global fovy="38"/></visual><worldbody><geom type="plane" size="2 2 1"/>
 <body pos="0.3 -0.2 1"><freejoint/><geom size="0.1"/><geom size="0.1" pos="0.2 0 0"/>
 <camera name="track" mode="trackcom" pos="0 -3 0.3" xyaxes="1 0 0 0 0 1" fovy="50"/></body></worldbody></mujoco>"""
-TRACKING = {"trackbodyid": 1, "lookat": np.array([0.0, 0.1, 2.0]), "elevation": -20.0, "azimuth": 30.0}
+TRACKING = {
+    "trackbodyid": 1,
+    "lookat": np.array([0.0, 0.1, 2.0]),
+    "elevation": -20.0,
+    "azimuth": 30.0,
+}
 
 
 def pose_of_mujoco(model: mujoco.MjModel, data: mujoco.MjData, camera_id: int, config: dict):
     """Position and view of Gymnasium's camera: free by default, aimed at the median, with the settings on top."""
-    camera, scene = mujoco.MjvCamera(), mujoco.MjvScene(model, 100)
-    camera.type = mujoco.mjtCamera.mjCAMERA_FREE if camera_id < 0 else mujoco.mjtCamera.mjCAMERA_FIXED
+    camera = mujoco.MjvCamera()
+    scene = mujoco.MjvScene(model, 100)
+    camera.type = (
+        mujoco.mjtCamera.mjCAMERA_FREE if camera_id < 0 else mujoco.mjtCamera.mjCAMERA_FIXED
+    )
     camera.fixedcamid = camera_id
-    camera.lookat, camera.distance = np.median(data.geom_xpos, axis=0), model.stat.extent
+    camera.lookat = np.median(data.geom_xpos, axis=0)
+    camera.distance = model.stat.extent
     for name, value in config.items():
         setattr(camera, name, value)
-    option, perturb, everything = mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.mjtCatBit.mjCAT_ALL
+    option = mujoco.MjvOption()
+    perturb = mujoco.MjvPerturb()
+    everything = mujoco.mjtCatBit.mjCAT_ALL
     mujoco.mjv_updateScene(model, data, option, perturb, camera, everything, scene)
     eyes = scene.camera[:2]
     return np.mean([eye.pos for eye in eyes], axis=0), np.array([eyes[0].forward, eyes[0].up])
@@ -386,7 +441,9 @@ def pose_of_mujoco(model: mujoco.MjModel, data: mujoco.MjData, camera_id: int, c
 @pytest.mark.parametrize("config", [{}, {"distance": 4.0}, TRACKING])
 def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
     model, data = posed(VIEWED)
-    viewer = types.SimpleNamespace(camera_id=camera_id, default_cam_config=config or None, width=320, height=200)
+    viewer = types.SimpleNamespace(
+        camera_id=camera_id, default_cam_config=config or None, width=320, height=200
+    )
     env = types.SimpleNamespace(model=model, data=data, mujoco_renderer=viewer)
     camera = environment_camera(env, model, np.median(data.geom_xpos, axis=0))
     pose = find_viewpoint(model, data, camera).pose()
@@ -394,13 +451,16 @@ def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> 
     np.testing.assert_allclose(pose.position, position, atol=1e-5)
     np.testing.assert_allclose(-pose.rotation[:, 2], forward, atol=1e-5)
     np.testing.assert_allclose(pose.rotation[:, 1], up, atol=1e-5)
-    assert pose.fovy == pytest.approx(38 if camera_id < 0 else 50, rel=1e-6)  # of numbers that MuJoCo holds as float32
+    # of numbers that MuJoCo holds as float32
+    assert pose.fovy == pytest.approx(38 if camera_id < 0 else 50, rel=1e-6)
     assert frame_size(env) == (320, 200)
 
 
 def test_environments_that_do_not_say_have_defaults() -> None:
     model, data = posed(VIEWED)
-    wrapped = types.SimpleNamespace(model=types.SimpleNamespace(ptr=model), data=types.SimpleNamespace(ptr=data))
+    wrapped = types.SimpleNamespace(
+        model=types.SimpleNamespace(ptr=model), data=types.SimpleNamespace(ptr=data)
+    )
     env = types.SimpleNamespace(physics=wrapped)
     assert model_and_data(env) == (model, data)
     assert frame_size(env) == (480, 480)
@@ -428,8 +488,14 @@ def test_observations_with_sensors(path: Path) -> None:
     for _ in range(30):
         other.step(np.zeros(1))
     late = len(blocks) - int(np.argmax(np.abs(blocks) > 0))
-    np.testing.assert_array_equal(blocks[-late:], alone.samples[np.argmax(np.abs(alone.samples) > 0) :][:late])
+    np.testing.assert_array_equal(
+        blocks[-late:], alone.samples[np.argmax(np.abs(alone.samples) > 0) :][:late]
+    )
     again, _ = env.reset(seed=0)
     assert not again["sag"].any()
-    with pytest.raises(RippleError, match=r"'tap' has 5\.01 samples in a control step of 0\.01 s; valid"):
-        RippleWrapper(BallEnv(path), materials, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS)
+    with pytest.raises(
+        RippleError, match=r"'tap' has 5\.01 samples in a control step of 0\.01 s; valid"
+    ):
+        RippleWrapper(
+            BallEnv(path), materials, sensors={"tap": sensors["tap"] | {"rate": 501}}, **OPTIONS
+        )

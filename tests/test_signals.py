@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from scene_files import write_scene
 
-from ripple_sim import ExportOptions, Simulation, VideoOptions, export_scene, load_scene, render_video
+from ripple_sim import (
+    ExportOptions,
+    Simulation,
+    VideoOptions,
+    export_scene,
+    load_scene,
+    render_video,
+)
 from ripple_sim.batch.worker import FrameRecord, StoreEntry
 from ripple_sim.encode.replace import MARK
 from ripple_sim.errors import SceneError
@@ -62,24 +69,37 @@ def test_exports_hold_the_samples(tmp_path: Path, samples) -> None:
         if ending in ("parquet", "zarr"):
             pytest.importorskip({"parquet": "pyarrow"}.get(ending, ending))
         export_scene(scene, tmp_path / f"a.{ending}", ExportOptions(signals=True, **OPTIONS))
-        export_scene(scene, tmp_path / f"a.{ending}", ExportOptions(signals=True, **OPTIONS))  # over what was made here
+        # over what was made here
+        export_scene(scene, tmp_path / f"a.{ending}", ExportOptions(signals=True, **OPTIONS))
     with wave.open(str(tmp_path / "a.wav")) as file:
         assert (file.getnchannels(), file.getframerate(), file.getnframes()) == (3, 500, len(both))
         codes = np.frombuffer(file.readframes(len(both)), "<i2").reshape(-1, 3) / 32767
     np.testing.assert_allclose(codes, 0.9 * both / np.abs(both).max(), atol=1e-4)
     with (tmp_path / "a.csv").open(newline="") as file:
-        table = [row for row in csv.DictReader(file) if (row["sensor"], row["point"]) == ("both sides", "1")]
+        table = [
+            row
+            for row in csv.DictReader(file)
+            if (row["sensor"], row["point"]) == ("both sides", "1")
+        ]
     np.testing.assert_allclose([float(row["time [s]"]) for row in table], samples["both sides"][0])
-    np.testing.assert_allclose([float(row["value"]) for row in table], samples["both sides"][1][:, 1])
+    np.testing.assert_allclose(
+        [float(row["value"]) for row in table], samples["both sides"][1][:, 1]
+    )
     import pyarrow.parquet
     import zarr
 
-    assert pyarrow.parquet.read_table(tmp_path / "a.parquet").num_rows == sum(v.size for _, v in samples.values())
-    np.testing.assert_array_equal(zarr.open_group(tmp_path / "a.zarr")["sensor_both_sides"], samples["both sides"][1])
+    assert pyarrow.parquet.read_table(tmp_path / "a.parquet").num_rows == sum(
+        v.size for _, v in samples.values()
+    )
+    np.testing.assert_array_equal(
+        zarr.open_group(tmp_path / "a.zarr")["sensor_both_sides"], samples["both sides"][1]
+    )
 
 
 def test_a_wav_without_sensors_is_what_the_camera_hears(tmp_path: Path) -> None:
-    export_scene(scene_of(tmp_path, ""), tmp_path / "a.wav", ExportOptions(slow_motion=2.0, **OPTIONS))
+    export_scene(
+        scene_of(tmp_path, ""), tmp_path / "a.wav", ExportOptions(slow_motion=2.0, **OPTIONS)
+    )
     content = (tmp_path / "a.wav").read_bytes()
     assert MARK.encode() in content[:200]
     with wave.open(str(tmp_path / "a.wav")) as file:
@@ -105,7 +125,8 @@ def test_batches_store_the_samples(tmp_path: Path, samples) -> None:
 
 
 def test_traces_are_drawn(opengl: None, tmp_path: Path) -> None:
-    scene, frames = scene_of(tmp_path), {}
+    scene = scene_of(tmp_path)
+    frames = {}
     for overlay in ((), ("sensors",)):
         options = VideoOptions(size=(640, 360), duration=0.3, overlay=overlay, **OPTIONS)
         render_video(scene, tmp_path / f"frames{len(overlay)}", options)
@@ -119,7 +140,10 @@ def test_traces_are_drawn(opengl: None, tmp_path: Path) -> None:
         (SENSORS + SENSORS, "two sensors are called 'top'"),
         (SENSORS.replace('site = "top"', ""), "sensor 'top' needs one of site, point and points"),
         (SENSORS.replace('site = "top"', 'site = "tip"'), "no site 'tip'; its sites are top"),
-        (SENSORS.replace('geom = "ball"', 'geom = "bell"'), "on 'bell', which does not ripple; valid are 'ball'"),
+        (
+            SENSORS.replace('geom = "ball"', 'geom = "bell"'),
+            "on 'bell', which does not ripple; valid are 'ball'",
+        ),
     ],
 )
 def test_invalid_sensors_are_refused(sensors: str, message: str, tmp_path: Path) -> None:

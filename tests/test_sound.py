@@ -22,7 +22,10 @@ from ripple_sim.sound import DENSITY, RATE, SPEED, Ear, gain, write_wav
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
 def test_a_piston_on_its_axis(opengl: None, backend: str) -> None:
     """A velocity v that begins at once sounds as rho c v until the edge is heard, too (Stepanishen 1971)."""
-    atlas, timestep, speed, away = texel_atlas(disk(24)), 2e-5, 0.01, 0.8
+    atlas = texel_atlas(disk(24))
+    timestep = 2e-5
+    speed = 0.01
+    away = 0.8
     waves = WaveSolver(atlas, Material(speed=0.01), backend=backend, conserve_volume=False)
     ear = Ear(waves, timestep)
     ear.stand(waves, atlas.positions.reshape(-1, 3).mean(axis=0) + np.array([0, 0, away]))
@@ -48,17 +51,25 @@ def square_mesh(side: float) -> Mesh:
     count = 13
     x, y = np.meshgrid(*2 * [np.linspace(0, side, count)], indexing="ij")
     node = np.arange(count**2).reshape(count, count)
-    a, b, c, d = (each.ravel() for each in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]))
+    a, b, c, d = (
+        each.ravel() for each in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])
+    )
     triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     return Mesh.from_arrays(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), triangles)
 
 
 def test_a_place_that_moves_hears_a_tone_without_clicks_and_lower_as_it_recedes() -> None:
     """Placed anew 30 times a second; delays that jumped then left nothing of a tone at each."""
-    side, tone, away, frames, fps = 0.2, 1000.0, 3.0, 12, 30
+    side = 0.2
+    tone = 1000.0
+    away = 3.0
+    frames = 12
+    fps = 30
     atlas = build_atlas(square_mesh(side), resolution=8, cache=False)
     for speed in (0.0, 3.0):
-        waves = WaveSolver(atlas, Material(speed=math.sqrt(2) * side * tone), rim="fixed", backend="cpu")
+        waves = WaveSolver(
+            atlas, Material(speed=math.sqrt(2) * side * tone), rim="fixed", backend="cpu"
+        )
         x, y, _ = np.moveaxis(atlas.positions, -1, 0)
         waves.velocity = np.sin(np.pi * x / side) * np.sin(np.pi * y / side)
         ear = Ear(waves, 1e-3)
@@ -102,14 +113,20 @@ SKIN = sorted(jn_zeros(0, 2)[:1].tolist() + jn_zeros(1, 1).tolist() + jn_zeros(2
 FREE = [5.358, 9.003, 12.439]
 
 
-@pytest.mark.parametrize(("name", "radius", "duration"), [("low", 0.16, 0.3), ("bronze", 0.1185, 0.15)])
-def test_partials_of_the_drums_are_at_their_modes(name: str, radius: float, duration: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "radius", "duration"), [("low", 0.16, 0.3), ("bronze", 0.1185, 0.15)]
+)
+def test_partials_of_the_drums_are_at_their_modes(
+    name: str, radius: float, duration: float
+) -> None:
     scene = load_scene("drums")
     (entry,) = (each for each in scene.targets if each.geom == name)
     mesh = load_mesh(Path(__file__).parents[1] / "scenes" / "meshes" / "drum_skin.obj")
     atlas = build_atlas(type(mesh)(radius / 0.4 * mesh.V, mesh.F), entry.resolution, cache=False)
     material = uniform_material(entry)
-    waves = WaveSolver(atlas, material, rim=entry.rim, backend="cpu", conserve_volume=entry.conserve_volume)
+    waves = WaveSolver(
+        atlas, material, rim=entry.rim, backend="cpu", conserve_volume=entry.conserve_volume
+    )
     center = atlas.mesh.V.mean(axis=0)
     ear = Ear(waves, duration)
     ear.stand(waves, center + np.array([0.3, 0, 0.5]))
@@ -150,12 +167,16 @@ def test_the_track_of_a_video_is_what_was_given(tmp_path: Path) -> None:
 
 
 def test_a_video_with_sound(opengl: None, tmp_path: Path) -> None:
-    options = VideoOptions(size=(32, 32), fps=10, duration=0.3, slow_motion=2.0, sound=True, overlay=())
+    options = VideoOptions(
+        size=(32, 32), fps=10, duration=0.3, slow_motion=2.0, sound=True, overlay=()
+    )
     said = "is hardly heard: waves of .* m and longer sound at .* Hz at most, below hearing"
     with pytest.warns(UserWarning, match=said):
         render_video(egg_scene(tmp_path), tmp_path / "a.mp4", options)
     with av.open(str(tmp_path / "a.mp4")) as file:
-        assert float(file.streams.audio[0].duration * file.streams.audio[0].time_base) == pytest.approx(0.6, abs=0.03)
+        assert float(
+            file.streams.audio[0].duration * file.streams.audio[0].time_base
+        ) == pytest.approx(0.6, abs=0.03)
     with pytest.raises(VideoError, match=r"has no sound; valid are \.mp4 and \.webm"):
         render_video(egg_scene(tmp_path), tmp_path / "a.gif", options)
 

@@ -40,6 +40,7 @@ def help_of(command: str) -> str:
             os.environ["COLUMNS"] = columns
     # tyro breaks the text of options, and not that of the command
     lines = [
-        textwrap.fill(line, _WIDTH) if line[:1].strip() else line.rstrip() for line in printed.getvalue().splitlines()
+        textwrap.fill(line, _WIDTH) if line[:1].strip() else line.rstrip()
+        for line in printed.getvalue().splitlines()
     ]
     return "\n".join(lines).strip()

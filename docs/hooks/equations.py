@@ -16,7 +16,13 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 def _with_equations(text: str) -> str:
     text = re.sub(
-        r"\$\$(.+?)\$\$", lambda m: latex2mathml.converter.convert(m[1].strip(), "block"), text, flags=re.DOTALL
+        r"\$\$(.+?)\$\$",
+        lambda m: latex2mathml.converter.convert(m[1].strip(), "block"),
+        text,
+        flags=re.DOTALL,
     )
-    # in a span: at the beginning of a line Markdown takes <math> for a block, and ends the list that it is in
-    return re.sub(r"\$([^$\n]+)\$", lambda m: f"<span>{latex2mathml.converter.convert(m[1])}</span>", text)
+    # in a span: at the beginning of a line Markdown takes <math> for a block, and ends the list
+    # that it is in
+    return re.sub(
+        r"\$([^$\n]+)\$", lambda m: f"<span>{latex2mathml.converter.convert(m[1])}</span>", text
+    )

@@ -7,7 +7,13 @@ import re
 from typing import Any
 
 # Where users find names, the shortest first.
-PUBLIC = ("ripple_sim", "ripple_sim.gymnasium", "ripple_sim.dm_control", "ripple_sim.solver", "ripple_sim.render")
+PUBLIC = (
+    "ripple_sim",
+    "ripple_sim.gymnasium",
+    "ripple_sim.dm_control",
+    "ripple_sim.solver",
+    "ripple_sim.render",
+)
 
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:

@@ -12,7 +12,13 @@ from ripple_sim import ExportOptions, export_scene, load_scene
 # By scene: how much of it is played.
 PLAYED = {
     scene: ExportOptions(fps=30, duration=duration, resolution=48)
-    for scene, duration in {"sphere": 2.0, "pretzel": 2.0, "duck": 3.0, "jelly": 1.5, "arm": 2.0}.items()
+    for scene, duration in {
+        "sphere": 2.0,
+        "pretzel": 2.0,
+        "duck": 3.0,
+        "jelly": 1.5,
+        "arm": 2.0,
+    }.items()
 }
 # The theme would frame what opens as a note, with a pencil beside the picture.
 _STYLE = (
@@ -28,7 +34,9 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put a player where one is asked for, and behind the pictures of its scene, which open it."""
     for scene in PLAYED:
         markdown = markdown.replace(f"<!-- player: {scene} -->", _frame(scene))
-    opening, count = _PICTURE.subn(lambda found: _opening(html.escape(found[1]), found[2]), markdown)
+    opening, count = _PICTURE.subn(
+        lambda found: _opening(html.escape(found[1]), found[2]), markdown
+    )
     return f"{opening}\n\n{_STYLE}" if count else markdown
 
 

@@ -17,7 +17,13 @@ from ripple_sim.batch.plan import Distribution, MeshesEntry, PlanFile, StoreEntr
 from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
 from ripple_sim.scene.bodies import BODY_SHAPES
-from ripple_sim.scene.material_entry import LAWS, MapEntry, MaterialChange, MaterialEntry, PresetEntry
+from ripple_sim.scene.material_entry import (
+    LAWS,
+    MapEntry,
+    MaterialChange,
+    MaterialEntry,
+    PresetEntry,
+)
 from ripple_sim.scene.overlays import NAMES as OVERLAYS
 from ripple_sim.solver import Material
 from ripple_sim.solver.layouts.build import LAYOUTS
@@ -54,7 +60,10 @@ _WORDS: dict[str, Iterable[str]] = {
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Fill in the tables of a page that asks for them."""
-    for mark, tables in (("<!-- scene file -->", scene_tables), ("<!-- plan file -->", plan_tables)):
+    for mark, tables in (
+        ("<!-- scene file -->", scene_tables),
+        ("<!-- plan file -->", plan_tables),
+    ):
         if mark in markdown:
             markdown = markdown.replace(mark, tables())
     return markdown
@@ -73,7 +82,9 @@ def plan_tables() -> str:
     )
 
 
-def tables(outer: type[msgspec.Struct], before: str = "") -> Iterator[tuple[str, type[msgspec.Struct]]]:
+def tables(
+    outer: type[msgspec.Struct], before: str = ""
+) -> Iterator[tuple[str, type[msgspec.Struct]]]:
     """The tables in a table, with their names in a scene file."""
     for field in msgspec.structs.fields(outer):
         entry = scene_file.table_of(field.type)
@@ -123,9 +134,13 @@ def key_texts(entry: type[msgspec.Struct]) -> dict[str, str]:
     texts: dict[str, list[str]] = {"name": ["The preset."]} if entry is PresetEntry else {}
     for where, source in sources.get(entry, {}).items():
         for name, kind, text in re.findall(
-            r"^(\w+) : (.*)(?:\n|$)((?:    .*(?:\n|$))*)", inspect.getdoc(source) or "", re.MULTILINE
+            r"^(\w+) : (.*)(?:\n|$)((?:    .*(?:\n|$))*)",
+            inspect.getdoc(source) or "",
+            re.MULTILINE,
         ):
-            texts.setdefault(name, []).append(where + ": ".join(filter(None, [kind, " ".join(text.split())])))
+            texts.setdefault(name, []).append(
+                where + ": ".join(filter(None, [kind, " ".join(text.split())]))
+            )
     return {name: "; ".join(each) for name, each in texts.items()} | _own_texts(entry)
 
 
@@ -134,7 +149,11 @@ def _own_texts(entry: type[msgspec.Struct]) -> dict[str, str]:
     assert isinstance(body, ast.ClassDef)
     texts = {}
     for field, text in itertools.pairwise(body.body):
-        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+        if (
+            isinstance(field, ast.AnnAssign)
+            and isinstance(text, ast.Expr)
+            and isinstance(text.value, ast.Constant)
+        ):
             texts[ast.unparse(field.target)] = " ".join(str(text.value.value).split())
     return texts
 

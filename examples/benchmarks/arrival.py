@@ -2,20 +2,23 @@
 
     python examples/benchmarks/arrival.py [MESH ...] [--resolution 96] [--sources 3] [--elements]
 
-A Gaussian bump of height exp(-d^2 / 2 w^2) is let go. On the plane its wave is known in closed form, with a crest that
-lags behind the distance and a tail, as waves in two dimensions have them; so the time that is expected at an exact
-geodesic distance is that of the same bump on the plane, and the bump's width is no error. Two times are taken: that of
-the first crest itself, and the one at which the wave's front reaches half of that crest. On a surface with limbs
-several ways lead to a point, and their waves run into one another's crests, but hardly into the front: the front tells
+A Gaussian bump of height exp(-d^2 / 2 w^2) is let go. On the plane its wave is known in closed
+form, with a crest that lags behind the distance and a tail, as waves in two dimensions have them;
+so the time that is expected at an exact geodesic distance is that of the same bump on the plane,
+and the bump's width is no error. Two times are taken: that of the first crest itself, and the one
+at which the wave's front reaches half of that crest. On a surface with limbs several ways lead to a
+point, and their waves run into one another's crests, but hardly into the front: the front tells
 more of the solver.
 
-A plane is not the object, though: curvature bends and focuses waves, and behind a handle the wave that comes the other
-way round lifts the front of the one that is awaited. With `--elements` fronts are compared with those of linear finite
-elements on the mesh itself, cut into triangles of half a texel, and so are those of the plane.
+A plane is not the object, though: curvature bends and focuses waves, and behind a handle the wave
+that comes the other way round lifts the front of the one that is awaited. With `--elements` fronts
+are compared with those of linear finite elements on the mesh itself, cut into triangles of half a
+texel, and so are those of the plane.
 
-Each formula is measured as it stands, at 1 m/s. Dynamic Paint's is measured once more with its speed calibrated, as
-Blender's users do it by eye: one factor for the whole target, by which the median arrival is right. Nobody else gets
-that. The paper's formula is also measured on the map that the paper takes, the conformal one.
+Each formula is measured as it stands, at 1 m/s. Dynamic Paint's is measured once more with its
+speed calibrated, as Blender's users do it by eye: one factor for the whole target, by which the
+median arrival is right. Nobody else gets that. The paper's formula is also measured on the map that
+the paper takes, the conformal one.
 """
 
 from __future__ import annotations
@@ -33,24 +36,47 @@ from scipy.special import j0
 
 from ripple_sim.bench import table
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import Atlas, Material, Mesh, MeshError, RippleError, WaveSolver, build_atlas, load_mesh
+from ripple_sim.solver import (
+    Atlas,
+    Material,
+    Mesh,
+    MeshError,
+    RippleError,
+    WaveSolver,
+    build_atlas,
+    load_mesh,
+)
 from ripple_sim.solver.operator import OPERATORS
-from ripple_sim.solver.texels import TexelMesh, clean, distance_scratch, march, sampling_matrix, seeded
+from ripple_sim.solver.texels import (
+    TexelMesh,
+    clean,
+    distance_scratch,
+    march,
+    sampling_matrix,
+    seeded,
+)
 
 # A ripple below this share of the strongest signal is no crest.
 _LEAST = 0.2
 
 
-def front_and_crest(times: NDArray, signal: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def front_and_crest(
+    times: NDArray, signal: NDArray
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times [k] of the front and of the first crest in signals [time, k], interpolated between the samples.
 
-    The front is where the signal first reaches half of that crest. Both are NaN where there is no crest.
+    The front is where the signal first reaches half of that crest. Both are NaN where there is no
+    crest.
     """
     probe = np.arange(signal.shape[1])
-    before, here, after = signal[:-2], signal[1:-1], signal[2:]
+    before = signal[:-2]
+    here = signal[1:-1]
+    after = signal[2:]
     crests = (here >= before) & (here > after) & (here > _LEAST * signal.max(axis=0))
     i = np.argmax(crests, axis=0) + 1
-    a, b, c = signal[i - 1, probe], signal[i, probe], signal[i + 1, probe]
+    a = signal[i - 1, probe]
+    b = signal[i, probe]
+    c = signal[i + 1, probe]
     curvature = np.where(a - 2 * b + c < 0, a - 2 * b + c, -1)
     dt = times[1] - times[0]
     crest = times[i] + (a - c) / curvature / 2 * dt
@@ -58,7 +84,8 @@ def front_and_crest(times: NDArray, signal: NDArray) -> tuple[NDArray[np.float64
     above = signal >= half
     above[0] = False
     j = np.maximum(np.argmax(above, axis=0), 1)
-    low, high = signal[j - 1, probe], signal[j, probe]
+    low = signal[j - 1, probe]
+    high = signal[j, probe]
     front = times[j - 1] + (half - low) / np.where(high > low, high - low, 1) * dt
     found = crests.any(axis=0)
     return np.where(found, front, np.nan), np.where(found, crest, np.nan)
@@ -66,9 +93,12 @@ def front_and_crest(times: NDArray, signal: NDArray) -> tuple[NDArray[np.float64
 
 def geodesic_distance(mesh: Mesh, source: int) -> NDArray[np.float64]:
     """Exact distance along the surface of every vertex from one of them [m]; infinite on other parts of the mesh."""
-    vertices, none = _reached_vertices(mesh, source), np.empty(0, dtype=np.int64)
+    vertices = _reached_vertices(mesh, source)
+    none = np.empty(0, dtype=np.int64)
     distance = np.full(len(mesh.V), np.inf)
-    distance[vertices] = igl.exact_geodesic(mesh.V, mesh.F, np.array([source]), none, vertices, none)
+    distance[vertices] = igl.exact_geodesic(
+        mesh.V, mesh.F, np.array([source]), none, vertices, none
+    )
     return distance
 
 
@@ -85,7 +115,8 @@ NEAREST = 5.0
 
 def plane_arrival(distance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times of the front and the crest on the plane for the same bump; lengths in widths, wave speed 1."""
-    # as far as the next power of 2: a table takes a second, and every source has another farthest vertex
+    # as far as the next power of 2: a table takes a second, and every source has another farthest
+    # vertex
     farthest = 2 ** np.ceil(np.log2(max(np.max(distance, initial=0), NEAREST + 1)))
     grid, front, crest = _plane_table(float(farthest))
     return np.interp(distance, grid, front), np.interp(distance, grid, crest)
@@ -107,7 +138,8 @@ def _plane_table(farthest: float) -> tuple[NDArray[np.float64], ...]:
     return grid, front, crest
 
 
-# Width of the bump in texels of an ideal even grid: wide enough to be resolved, narrow beside the object's limbs.
+# Width of the bump in texels of an ideal even grid: wide enough to be resolved, narrow beside the
+# object's limbs.
 WIDTH = 4.0
 
 _SAMPLES_PER_WIDTH = 6
@@ -147,7 +179,11 @@ class Arrival:
         figures: list[float] = []
         for ratio in (self.front, self.crest):
             error = np.nan_to_num(np.abs(ratio - 1), nan=1.0)
-            figures += [float(np.median(error)), float(np.quantile(error, 0.9)), float((error < 0.03).mean())]
+            figures += [
+                float(np.median(error)),
+                float(np.quantile(error, 0.9)),
+                float((error < 0.03).mean()),
+            ]
         return ArrivalError(*figures)
 
 
@@ -190,19 +226,22 @@ def elements_waves(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times [s], [t], and heights at all vertices, [t, n], of the same bump's wave, by linear elements and leapfrog.
 
-    Masses are lumped. The triangles are cut in four until there are `FINENESS` vertices in a texel, of which the bump's
-    width [m] has `texels`; a wave of 1 m/s is followed for `distance` [m].
+    Masses are lumped. The triangles are cut in four until there are `FINENESS` vertices in a texel,
+    of which the bump's width [m] has `texels`; a wave of 1 m/s is followed for `distance` [m].
     """
-    V, F = mesh.V, mesh.F
+    V = mesh.V
+    F = mesh.F
     while np.sqrt(mesh.area / len(V)) > width / (FINENESS * texels):
         V, F = igl.upsample(V, F, 1)
     stiffness = -igl.cotmatrix(V, F).tocsr()
     inverse_mass = 1 / igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_BARYCENTRIC).diagonal()
     height = np.exp(-((_distance_near(V, F, source, 6 * width) / width) ** 2) / 2)
-    longest = 1.9 / np.sqrt((abs(stiffness).sum(axis=1).A1 * inverse_mass).max())  # by Gershgorin's circles
+    # by Gershgorin's circles
+    longest = 1.9 / np.sqrt((abs(stiffness).sum(axis=1).A1 * inverse_mass).max())
     times = _times(width, distance)
     substeps = int(np.ceil(times[1] / longest))
-    dt, heights = times[1] / substeps, [height[: len(mesh.V)].copy()]
+    dt = times[1] / substeps
+    heights = [height[: len(mesh.V)].copy()]
     velocity = -dt / 2 * inverse_mass * (stiffness @ height)
     for _ in times[1:]:
         for _ in range(substeps):
@@ -226,9 +265,12 @@ def _distance_near(V: NDArray, F: NDArray, source: int, limit: float) -> NDArray
     _, part = igl.facet_components(triangles)
     triangles = triangles[part == part[(triangles == source).any(axis=1)][0]]
     used, local = np.unique(triangles, return_inverse=True)
-    start, none = np.searchsorted(used, [source]), np.empty(0, dtype=np.int64)
+    start = np.searchsorted(used, [source])
+    none = np.empty(0, dtype=np.int64)
     distance = np.full(len(V), np.inf)
-    distance[used] = igl.exact_geodesic(V[used], local.reshape(-1, 3), start, none, np.arange(len(used)), none)
+    distance[used] = igl.exact_geodesic(
+        V[used], local.reshape(-1, 3), start, none, np.arange(len(used)), none
+    )
     return np.where(distance < limit, distance, np.inf)
 
 
@@ -245,22 +287,45 @@ def against_elements(meshes: dict[str, Mesh], resolution: int, sources: int) -> 
     rows = []
     for name, mesh in meshes.items():
         atlas = paper_atlas(mesh, resolution)
-        width, coordinates = ideal_width(atlas), vertex_coordinates(atlas)
+        width = ideal_width(atlas)
+        coordinates = vertex_coordinates(atlas)
         for source in spread_sources(mesh, sources):
             distance = geodesic_distance(atlas.mesh, source)
             far = np.isfinite(distance) & (distance > NEAREST * width)
             farthest = distance[far].max()
             elements = front_and_crest(*elements_waves(atlas.mesh, source, width, farthest))[0][far]
-            ours, _ = front_and_crest(*waves_of(atlas, atlas.mesh.V[source], coordinates[far], width, farthest))
+            ours, _ = front_and_crest(
+                *waves_of(atlas, atlas.mesh.V[source], coordinates[far], width, farthest)
+            )
             plane = plane_arrival(distance[far] / width)[0] * width
             figures = [
                 np.nan_to_num(np.abs(a / b - 1), nan=1.0)
                 for a, b in ((ours, elements), (ours, plane), (elements, plane))
             ]
             rows.append(
-                [name, str(source), *(f"{100 * np.quantile(each, q):.2f} %" for each in figures for q in (0.5, 0.9))]
+                [
+                    name,
+                    str(source),
+                    *(
+                        f"{100 * np.quantile(each, q):.2f} %"
+                        for each in figures
+                        for q in (0.5, 0.9)
+                    ),
+                ]
             )
-    return table(["mesh", "source", "ours, elements", "90 %", "ours, plane", "90 %", "elements, plane", "90 %"], rows)
+    return table(
+        [
+            "mesh",
+            "source",
+            "ours, elements",
+            "90 %",
+            "ours, plane",
+            "90 %",
+            "elements, plane",
+            "90 %",
+        ],
+        rows,
+    )
 
 
 def distance_from_point(
@@ -312,13 +377,20 @@ def waves_of(
         Wave speed [m/s].
     """
     shape = atlas.areas.shape
-    sample = sampling_matrix(atlas.texels.topology, *atlas.chart_map.chart_points(probes, atlas.resolution))
-    waves = WaveSolver(atlas, Material(speed=speed), operator=operator, backend="cpu", conserve_volume=False)
-    texels, away = distance_from_point(atlas.texels, int(atlas.nearest_texel(source)[0]), source, 6 * width)
+    sample = sampling_matrix(
+        atlas.texels.topology, *atlas.chart_map.chart_points(probes, atlas.resolution)
+    )
+    waves = WaveSolver(
+        atlas, Material(speed=speed), operator=operator, backend="cpu", conserve_volume=False
+    )
+    texels, away = distance_from_point(
+        atlas.texels, int(atlas.nearest_texel(source)[0]), source, 6 * width
+    )
     bump = np.zeros(atlas.areas.size)
     bump[texels] = np.exp(-((away / width) ** 2) / 2)
     waves.height = bump.reshape(shape)
-    times, heights = _times(width, distance), [sample @ waves.height.ravel()]
+    times = _times(width, distance)
+    heights = [sample @ waves.height.ravel()]
     for _ in times[1:]:
         waves.step(times[1])
         heights.append(sample @ waves.height.ravel())
@@ -330,7 +402,8 @@ def spread_sources(mesh: Mesh, count: int) -> list[int]:
 
     No map has a say in them, so that maps can be compared.
     """
-    areas, part = mesh.triangle_areas, mesh.components
+    areas = mesh.triangle_areas
+    part = mesh.components
     share = np.cumsum(np.where(part == np.argmax(np.bincount(part, areas)), areas, 0.0))
     return mesh.F[np.searchsorted(share, (np.arange(count) + 0.5) / count * share[-1]), 0].tolist()
 
@@ -338,12 +411,14 @@ def spread_sources(mesh: Mesh, count: int) -> list[int]:
 CALIBRATED = "dynamic-paint, calibrated"
 CONFORMAL = "paper, conformal map"
 
-# Errors by their names in `ArrivalError`, and "speed factor" where the speed was calibrated; None where the sphere map
-# was refused.
+# Errors by their names in `ArrivalError`, and "speed factor" where the speed was calibrated; None
+# where the sphere map was refused.
 Row = dict[str, float] | None
 
 
-def arrivals(meshes: dict[str, Mesh], resolution: int = 96, sources: int = 3) -> dict[str, dict[str, Row]]:
+def arrivals(
+    meshes: dict[str, Mesh], resolution: int = 96, sources: int = 3
+) -> dict[str, dict[str, Row]]:
     """Errors of arrival on the project's own test body and on given meshes, mean over the sources."""
     bodies = {"limbed": Mesh.from_arrays(*limbed())} | meshes
     return {name: _rows(mesh, resolution, sources) for name, mesh in bodies.items()}
@@ -383,7 +458,17 @@ def mean_error(arrivals: Sequence[Arrival]) -> dict[str, float]:
 
 def as_text(table_of: dict[str, dict[str, Row]]) -> str:
     """Lay the errors of `arrivals` out for reading."""
-    head = ["mesh", "operator", "front: median", "90 %", "under 3 %", "crest: median", "90 %", "under 3 %", "speed"]
+    head = [
+        "mesh",
+        "operator",
+        "front: median",
+        "90 %",
+        "under 3 %",
+        "crest: median",
+        "90 %",
+        "under 3 %",
+        "speed",
+    ]
     rows = []
     for mesh, operators in table_of.items():
         for operator, row in operators.items():
@@ -391,7 +476,14 @@ def as_text(table_of: dict[str, dict[str, Row]]) -> str:
                 rows.append([mesh, operator, "refused: no sphere map without folds", *[""] * 6])
                 continue
             errors = [f"{100 * value:.2f} %" for key, value in row.items() if key != "speed factor"]
-            rows.append([mesh, operator, *errors, f"x {row['speed factor']:.3f}" if "speed factor" in row else ""])
+            rows.append(
+                [
+                    mesh,
+                    operator,
+                    *errors,
+                    f"x {row['speed factor']:.3f}" if "speed factor" in row else "",
+                ]
+            )
     return table(head, rows)
 
 
@@ -400,7 +492,9 @@ def main() -> None:
     parser.add_argument("meshes", type=Path, nargs="*")
     parser.add_argument("--resolution", type=int, default=96)
     parser.add_argument("--sources", type=int, default=3)
-    parser.add_argument("--elements", action="store_true", help="compare with finite elements on the mesh instead")
+    parser.add_argument(
+        "--elements", action="store_true", help="compare with finite elements on the mesh instead"
+    )
     options = parser.parse_args()
     meshes = {path.stem: load_mesh(path) for path in options.meshes}
     if options.elements:

@@ -2,8 +2,9 @@
 
     python examples/benchmarks/atlas.py MESH [--resolution 512] [--rays 64]
 
-The paper casts every texel's ray against every triangle. That takes hours, so a few rays are timed and the rest is
-reckoned from them. Each figure is the least of several runs; the compiled kernels are warm.
+The paper casts every texel's ray against every triangle. That takes hours, so a few rays are timed
+and the rest is reckoned from them. Each figure is the least of several runs; the compiled kernels
+are warm.
 """
 
 import argparse
@@ -26,11 +27,13 @@ def cast_rays_exhaustively(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Intersect rays from the origin with all triangles (Moeller and Trumbore 1997): slow, simple, the oracle.
 
-    Parameters and results are those of `cast_rays`. The cost is the number of rays times that of triangles. Where
-    a ray meets several triangles on the edge that they share, the one in which it lies deepest is taken.
+    Parameters and results are those of `cast_rays`. The cost is the number of rays times that of
+    triangles. Where a ray meets several triangles on the edge that they share, the one in which it
+    lies deepest is taken.
     """
     corner = sphere[F[:, 0]]
-    edge1, edge2 = sphere[F[:, 1]] - corner, sphere[F[:, 2]] - corner
+    edge1 = sphere[F[:, 1]] - corner
+    edge2 = sphere[F[:, 2]] - corner
     to_origin = -corner
     q = np.cross(to_origin, edge1)
     triangles = np.empty(len(directions), dtype=np.int64)
@@ -45,7 +48,8 @@ def cast_rays_exhaustively(
             inside = np.minimum(np.minimum(u, v), 1 - u - v)
         depth = np.where((distance > 0) & np.isfinite(inside), inside, -np.inf)
         hit = int(np.argmax(depth))
-        triangles[i], barycentrics[i] = hit, (1 - u[hit] - v[hit], u[hit], v[hit])
+        triangles[i] = hit
+        barycentrics[i] = (1 - u[hit] - v[hit], u[hit], v[hit])
     return triangles, barycentrics
 
 
@@ -59,25 +63,35 @@ def seconds(runs: int, work: Callable[[], Any]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Times of an atlas: whole, from the cache, by exhaustive rays.")
+    parser = argparse.ArgumentParser(
+        description="Times of an atlas: whole, from the cache, by exhaustive rays."
+    )
     parser.add_argument("mesh", type=Path)
     parser.add_argument("--resolution", type=int, default=512)
     parser.add_argument("--rays", type=int, default=64, help="exhaustive rays to time")
     options = parser.parse_args()
-    mesh, n = load_mesh(options.mesh), options.resolution
+    mesh = load_mesh(options.mesh)
+    n = options.resolution
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_CACHE_HOME"] = folder  # what an earlier run left behind must not count
         atlas = build_atlas(mesh, 8, cache=False, layout="cube")
         whole = seconds(3, lambda: build_atlas(mesh, n, cache=False, layout="cube"))
         build_atlas(mesh, n, layout="cube")
         cached = seconds(3, lambda: build_atlas(mesh, n, layout="cube"))
-    directions = np.random.default_rng(0).permutation(texel_directions(n).reshape(-1, 3))[: options.rays]
-    a_ray = seconds(3, lambda: cast_rays_exhaustively(atlas.sphere, mesh.F, directions)) / options.rays
+    directions = np.random.default_rng(0).permutation(texel_directions(n).reshape(-1, 3))[
+        : options.rays
+    ]
+    a_ray = (
+        seconds(3, lambda: cast_rays_exhaustively(atlas.sphere, mesh.F, directions)) / options.rays
+    )
     exhaustive = 6 * n * n * a_ray
     print(f"{options.mesh.name}: {len(mesh.F)} triangles, N = {n}, {6 * n * n} texels")
     print(f"whole atlas       {whole:10.2f} s")
     print(f"from the cache    {cached:10.3f} s   {whole / cached:8.0f} times quicker")
-    print(f"exhaustive rays   {exhaustive:10.0f} s   {exhaustive / whole:8.0f} times slower (from {options.rays} rays)")
+    print(
+        f"exhaustive rays   {exhaustive:10.0f} s   {exhaustive / whole:8.0f} times slower (from "
+        f"{options.rays} rays)"
+    )
 
 
 if __name__ == "__main__":

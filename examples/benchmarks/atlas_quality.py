@@ -1,10 +1,12 @@
 """How good and how quick are the atlases of all the meshes in a folder?
 
-    python examples/benchmarks/atlas_quality.py FOLDER [--resolution 96] [--method progressive|conformal]
+    python examples/benchmarks/atlas_quality.py FOLDER [--resolution 96] [--method
+    progressive|conformal]
 
-One line a mesh: folded triangles, stretch below which 99.9 % of the area lies (1 is an even spread of texels), starved
-area, texel area over mesh area, the stable time step relative to that of an even square grid with as many texels on
-the same area, and the seconds that reading, sphere map, rays and a second atlas from the cache took.
+One line a mesh: folded triangles, stretch below which 99.9 % of the area lies (1 is an even spread
+of texels), starved area, texel area over mesh area, the stable time step relative to that of an
+even square grid with as many texels on the same area, and the seconds that reading, sphere map,
+rays and a second atlas from the cache took.
 """
 
 import argparse
@@ -32,8 +34,11 @@ def line(path: Path, resolution: int, method: str) -> str:
     loaded = time.perf_counter() - start
     atlas = build_atlas(mesh, resolution, method, layout="cube")
     cached = build_atlas(mesh, resolution, method, layout="cube")
-    quality, seconds = atlas.quality(), atlas.timings
-    step = WaveSolver(atlas, backend="cpu").stable_timestep / even_grid_timestep(mesh.area, atlas.areas.size)
+    quality = atlas.quality()
+    seconds = atlas.timings
+    step = WaveSolver(atlas, backend="cpu").stable_timestep / even_grid_timestep(
+        mesh.area, atlas.areas.size
+    )
     return ROW.format(
         path.name,
         len(mesh.F),
@@ -50,7 +55,9 @@ def line(path: Path, resolution: int, method: str) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Quality and times of the atlases of all meshes in a folder.")
+    parser = argparse.ArgumentParser(
+        description="Quality and times of the atlases of all meshes in a folder."
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--resolution", type=int, default=96)
     parser.add_argument("--method", default="progressive")

@@ -2,12 +2,13 @@
 
     python examples/benchmarks/batch_cluster.py DIR [--workers 1000] [--seed 0]
 
-DIR is the folder of a batch that was made by the plan `examples/benchmarks/batch_movi.toml` or one like it; the index
-tells what each scene took. These times are drawn again for the whole set, and a cluster is simulated on which each
-worker takes the next scene as soon as it is free, after a start of its own and a first scene that compiles the kernels.
-What the scheduler and this program do for a scene, one scene after another, is measured with a Dask cluster of two
-processes whose scenes take no time. `--cpu` takes processor times in place of the clock's, for a machine that was busy
-with other things.
+DIR is the folder of a batch that was made by the plan `examples/benchmarks/batch_movi.toml` or one
+like it; the index tells what each scene took. These times are drawn again for the whole set, and a
+cluster is simulated on which each worker takes the next scene as soon as it is free, after a start
+of its own and a first scene that compiles the kernels. What the scheduler and this program do for a
+scene, one scene after another, is measured with a Dask cluster of two processes whose scenes take
+no time. `--cpu` takes processor times in place of the clock's, for a machine that was busy with
+other things.
 """
 
 import argparse
@@ -22,9 +23,11 @@ from numpy.typing import NDArray
 from ripple_sim import load_batch
 from ripple_sim.batch import DaskExecutor, Outcome
 
-SCENES, FRAMES = 10_000, 24
+SCENES = 10_000
+FRAMES = 24
 START = 20.0  # of a worker: Python, its imports, the driver [s]
-FIRST = 60.0  # of the first scene on a machine, which the others wait for: the kernels are compiled [s]
+# of the first scene on a machine, which the others wait for: the kernels are compiled [s]
+FIRST = 60.0
 
 
 def handed_out(count: int = 2000) -> float:
@@ -64,19 +67,30 @@ def main() -> None:
     parser.add_argument("--cpu", action="store_true", help="take processor times")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    scenes = [row for row in load_batch(options.folder).table().to_pylist() if row["status"] == "finished"]
+    scenes = [
+        row for row in load_batch(options.folder).table().to_pylist() if row["status"] == "finished"
+    ]
     measured = np.array([row["cpu_seconds" if options.cpu else "seconds"] for row in scenes])
-    frames, size = scenes[0]["frames"], fmean(row["bytes"] for row in scenes)
-    measured = measured[measured < 5 * np.median(measured)]  # without the first ones, which compile kernels
+    frames = scenes[0]["frames"]
+    size = fmean(row["bytes"] for row in scenes)
+    # without the first ones, which compile kernels
+    measured = measured[measured < 5 * np.median(measured)]
     rng = np.random.default_rng(options.seed)
     seconds = rng.choice(measured, SCENES) * FRAMES / frames
-    work, books = seconds.sum(), handed_out()
-    print(f"measured: {len(measured)} scenes of {frames} frames, median {np.median(measured):.2f} s a scene and worker")
+    work = seconds.sum()
+    books = handed_out()
+    print(
+        f"measured: {len(measured)} scenes of {frames} frames, median {np.median(measured):.2f} s "
+        f"a scene and worker"
+    )
     print(f"a scene takes the scheduler and the program {1000 * books:.2f} ms")
     print(f"{SCENES} scenes of {FRAMES} frames, {size * SCENES / 1e9:.1f} GB:")
     for workers in (1, 2, options.workers):
         total = makespan(seconds, workers, books)
-        print(f"  {workers} workers: {total / 3600:.2f} h, efficiency {100 * work / workers / total:.0f} %")
+        print(
+            f"  {workers} workers: {total / 3600:.2f} h, efficiency "
+            f"{100 * work / workers / total:.0f} %"
+        )
 
 
 if __name__ == "__main__":

@@ -2,9 +2,10 @@
 
     python examples/benchmarks/batch_kills.py [SCENE] [--kills 20] [--scenes 60] [--workers 2]
 
-`ripple-sim batch` is started, and killed (SIGKILL) at random moments, itself and one of its workers in turn: when some
-more scenes have been finished, or soon after the last kill, while processes start. It is started again whenever it has
-died. Then it is left to finish, and the hashes of all files are compared with those of a batch that was left alone.
+`ripple-sim batch` is started, and killed (SIGKILL) at random moments, itself and one of its workers
+in turn: when some more scenes have been finished, or soon after the last kill, while processes
+start. It is started again whenever it has died. Then it is left to finish, and the hashes of all
+files are compared with those of a batch that was left alone.
 """
 
 import argparse
@@ -31,7 +32,11 @@ def workers_of(parent: int) -> list[int]:
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
             if int(path.read_text().rsplit(")", 1)[1].split()[1]) == parent:
-                found += [int(path.parent.name)] if b"spawn_main" in (path.parent / "cmdline").read_bytes() else []
+                found += (
+                    [int(path.parent.name)]
+                    if b"spawn_main" in (path.parent / "cmdline").read_bytes()
+                    else []
+                )
         except (OSError, ValueError):
             continue
     return found
@@ -72,13 +77,18 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         plan = write_plan(folder / "plan.toml", [options.scene], options.scenes, STORE)
-        whole, broken = folder / "whole", folder / "broken"
+        whole = folder / "whole"
+        broken = folder / "broken"
         workers = ("--workers", str(options.workers))
         start(plan, whole, *workers).wait()
-        process, killed, target = start(plan, broken, *workers), [], 0
+        process = start(plan, broken, *workers)
+        killed = []
+        target = 0
         while len(killed) < options.kills and process.poll() is None:
             target += random.randrange(2 * options.scenes // options.kills)
-            while process.poll() is None and len(finished(broken)) < min(target, options.scenes - 1):
+            while process.poll() is None and len(finished(broken)) < min(
+                target, options.scenes - 1
+            ):
                 time.sleep(0.05)
             time.sleep(random.uniform(0, 3))
             killed.append(kill(process, parent=len(killed) % 2 == 0))
@@ -86,13 +96,21 @@ def main() -> None:
                 process = start(plan, broken, *workers)
         ended = process.wait()
         logs = sorted(path.name for path in (broken / "failed").glob("*.log"))
-        expected, found = hashes(whole), hashes(broken)
+        expected = hashes(whole)
+        found = hashes(broken)
         bytes_equal = all(
-            tar.read_bytes() == (broken / "tars" / tar.name).read_bytes() for tar in (whole / "tars").glob("*.tar")
+            tar.read_bytes() == (broken / "tars" / tar.name).read_bytes()
+            for tar in (whole / "tars").glob("*.tar")
         )
         work = sorted(path.name for path in (broken / "work").iterdir() if path.name.isdecimal())
-    print(f"killed {len(killed)} times: {killed.count('parent')} times the parent, {killed.count('worker')} a worker")
-    print(f"last exit status {ended}; scenes {len(found)} of {len(expected)}, logs left {logs}, unfinished {work}")
+    print(
+        f"killed {len(killed)} times: {killed.count('parent')} times the parent, "
+        f"{killed.count('worker')} a worker"
+    )
+    print(
+        f"last exit status {ended}; scenes {len(found)} of {len(expected)}, logs left {logs}, "
+        f"unfinished {work}"
+    )
     print(f"hashes of all scenes and files {'equal' if expected == found else 'DIFFER'}")
     print(f"tar files {'equal byte for byte' if bytes_equal else 'DIFFER'}")
     sys.exit(expected != found or not bytes_equal)

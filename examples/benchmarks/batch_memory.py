@@ -2,8 +2,8 @@
 
     python examples/benchmarks/batch_memory.py [SCENE ...] [--scenes 200]
 
-Makes scenes one after another in this process, as a worker does, and prints the resident memory (RSS) now and then; of
-several scenes they take turns.
+Makes scenes one after another in this process, as a worker does, and prints the resident memory
+(RSS) now and then; of several scenes they take turns.
 """
 
 import argparse
@@ -19,7 +19,11 @@ from ripple_sim.batch import BatchFolder, keep_plan, make_scene, stored
 
 def resident() -> float:
     """Memory of this process [MB]."""
-    line = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmRSS"))
+    line = next(
+        line
+        for line in Path("/proc/self/status").read_text().splitlines()
+        if line.startswith("VmRSS")
+    )
     return int(line.split()[1]) / 1024
 
 

@@ -2,8 +2,9 @@
 
     python examples/benchmarks/batch_shards.py [SCENE] [--scenes 16]
 
-The same plan is made whole by one worker, in 2 and in 4 shards that run at the same time in one folder, and by a Dask
-cluster of two processes; videos, passes, heights, impulses and tar files are compared byte for byte.
+The same plan is made whole by one worker, in 2 and in 4 shards that run at the same time in one
+folder, and by a Dask cluster of two processes; videos, passes, heights, impulses and tar files are
+compared byte for byte.
 """
 
 import argparse
@@ -19,7 +20,9 @@ VERDICT = {True: "the same bytes", False: "DIFFERENT"}
 
 def digests(output: Path) -> dict[str, str]:
     """Of all files of the scenes, but for those that tell who made them."""
-    files = [path for name in ("scenes", "tars") for path in (output / name).rglob("*") if path.is_file()]
+    files = [
+        path for name in ("scenes", "tars") for path in (output / name).rglob("*") if path.is_file()
+    ]
     return {
         str(path.relative_to(output)): hashlib.blake2b(path.read_bytes()).hexdigest()
         for path in files
@@ -46,7 +49,8 @@ def main() -> None:
             for shards in (2, 4) if form == "folders" else (2,):
                 output = folder / f"shards{shards}"
                 parts = [
-                    start(plan, output, "--workers", "1", "--shard", f"{part + 1}/{shards}") for part in range(shards)
+                    start(plan, output, "--workers", "1", "--shard", f"{part + 1}/{shards}")
+                    for part in range(shards)
                 ]
                 status = [part.wait() for part in parts]
                 same = digests(output) == expected

@@ -2,10 +2,11 @@
 
     python examples/benchmarks/batch_workers.py [SCENE] [--scenes 16] [--frames 24]
 
-Makes a batch of small scenes (256x256, N = 64) by two workers with a core each, by one with both cores, and by one that
-has one core alone; then scenes of twice as many frames by one worker. Rates are taken from when scenes were finished,
-from the first of each worker on, so that the start of the program does not count. What a scene costs beside its frames
-is what is left of its time if frames take what the additional ones took.
+Makes a batch of small scenes (256x256, N = 64) by two workers with a core each, by one with both
+cores, and by one that has one core alone; then scenes of twice as many frames by one worker. Rates
+are taken from when scenes were finished, from the first of each worker on, so that the start of the
+program does not count. What a scene costs beside its frames is what is left of its time if frames
+take what the additional ones took.
 """
 
 import argparse
@@ -40,7 +41,10 @@ def make_on_one_core(folder: Path, scene: str, count: int, frames: int) -> Path:
 
 def times(batch: Path) -> list[dict]:
     """What each scene took, and when it was finished, in that order."""
-    found = [(path.stat().st_mtime, json.loads(path.read_text())) for path in batch.glob("scenes/*/times.json")]
+    found = [
+        (path.stat().st_mtime, json.loads(path.read_text()))
+        for path in batch.glob("scenes/*/times.json")
+    ]
     return [{**taken, "end": end} for end, taken in sorted(found, key=lambda each: each[0])]
 
 
@@ -64,17 +68,29 @@ def main() -> None:
         both = make(folder / "both", *asked, 1)
         one = make_on_one_core(folder / "one", *asked)
         long = make(folder / "long", options.scene, options.scenes // 2, 2 * options.frames, 1)
-        double, single, alone = seconds_each(two, 2), seconds_each(both, 1), seconds_each(one, 1)
+        double = seconds_each(two, 2)
+        single = seconds_each(both, 1)
+        alone = seconds_each(one, 1)
         frame = (seconds_each(long, 1) - single) / options.frames
-        busy = [statistics.mean(scene["cpu_seconds"] for scene in times(batch)[1:]) for batch in (both, one)]
+        busy = [
+            statistics.mean(scene["cpu_seconds"] for scene in times(batch)[1:])
+            for batch in (both, one)
+        ]
         facts = json.loads((both / "scenes" / "000000" / "scene.json").read_text())
     print(f"{options.scene}, {facts['frames']} frames of 256x256, N = 64")
-    for who, seconds in (("2 workers, a core each", double), ("1 worker, both", single), ("1 worker, one core", alone)):
+    for who, seconds in (
+        ("2 workers, a core each", double),
+        ("1 worker, both", single),
+        ("1 worker, one core", alone),
+    ):
         rate = f"{3600 / seconds:.0f} scenes an hour, {seconds:.2f} s each"
         print(f"{who}: {rate}; 2 workers make {seconds / double:.2f} times as many")
     print(f"processor time of a scene: {busy[0]:.2f} s on both cores, {busy[1]:.2f} s on one")
     beside = single - options.frames * frame
-    print(f"1 worker, both: a frame {1000 * frame:.1f} ms; beside its frames a scene takes {1000 * beside:.0f} ms,")
+    print(
+        f"1 worker, both: a frame {1000 * frame:.1f} ms; beside its frames a scene takes "
+        f"{1000 * beside:.0f} ms,"
+    )
     print(f"                {100 * beside / (options.frames * frame):.0f} % of them")
 
 

@@ -2,7 +2,8 @@
 
     python examples/benchmarks/cycles.py [--samples 16]
 
-Makes out/cycles.webp. Needs the extra cycles (or RIPPLE_SIM_BPY_PYTHON) and the package flip-evaluator.
+Makes out/cycles.webp. Needs the extra cycles (or RIPPLE_SIM_BPY_PYTHON) and the package
+flip-evaluator.
 """
 
 import argparse
@@ -20,7 +21,9 @@ from ripple_sim.cycles import blender_settings, frames_of_cycles, python_with_bp
 from ripple_sim.export import scene_source
 from ripple_sim.render import tone_mapped
 
-WIDTH, HEIGHT, FPS = 480, 270, 20
+WIDTH = 480
+HEIGHT = 270
+FPS = 20
 SCENES = (("sphere", 0.9), ("face", 0.8), ("duck", 1.65))  # and the moment [s]
 
 
@@ -35,7 +38,9 @@ def main() -> None:
         simulation = Simulation(load_scene(name), fps=FPS, resolution=96)
         ours, our_time = by_us(simulation, moment)
         theirs, their_time = by_cycles(name, simulation, samples)
-        _, difference, _ = flip_evaluator.evaluate(theirs / np.float32(255), ours / np.float32(255), "LDR")
+        _, difference, _ = flip_evaluator.evaluate(
+            theirs / np.float32(255), ours / np.float32(255), "LDR"
+        )
         print(f"{name}: FLIP {difference:.3f}, ours {our_time:.2f} s, Cycles {their_time:.1f} s")
         rows.append(np.concatenate([ours, theirs], axis=1))
     path = Path("out/cycles.webp")
@@ -55,7 +60,9 @@ def by_us(simulation: Simulation, moment: float) -> tuple[NDArray[np.uint8], flo
 
 
 def by_cycles(name: str, simulation: Simulation, samples: int) -> tuple[NDArray[np.uint8], float]:
-    source = scene_source(load_scene(name), simulation, ExportOptions(fps=FPS, size=(WIDTH, HEIGHT)))
+    source = scene_source(
+        load_scene(name), simulation, ExportOptions(fps=FPS, size=(WIDTH, HEIGHT))
+    )
     with tempfile.TemporaryDirectory() as folder:
         stage = Path(folder) / "stage.usdc"
         with Exporter.of(source, stage) as exporter:

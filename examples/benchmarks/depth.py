@@ -2,8 +2,9 @@
 
     python examples/benchmarks/depth.py [--count 1000] [--frames 10] [--rounds 3] [--size 640x480]
 
-Geoms of one shape fill a cube that fills the frame; one of them ripples. Each renderer has a process of its own, and
-the two take turns. What counts is the processor time of `update_scene` and `render`, the least of the rounds.
+Geoms of one shape fill a cube that fills the frame; one of them ripples. Each renderer has a
+process of its own, and the two take turns. What counts is the processor time of `update_scene` and
+`render`, the least of the rounds.
 """
 
 import argparse
@@ -27,7 +28,9 @@ HALF = 5.0  # of the cube that the geoms fill [m]
 def mjcf(shape: str, count: int, width: int, height: int) -> str:
     random = np.random.default_rng(0)
     geoms = []
-    for position, turn in zip(random.uniform(-HALF, HALF, (count, 3)), random.uniform(0, 180, (count, 3)), strict=True):
+    for position, turn in zip(
+        random.uniform(-HALF, HALF, (count, 3)), random.uniform(0, 180, (count, 3)), strict=True
+    ):
         place = " ".join(f"{x:.3f}" for x in position)
         angles = " ".join(f"{angle:.1f}" for angle in turn)
         geoms.append(f'<geom type="{shape}" size="{SIZES[shape]}" pos="{place}" euler="{angles}"/>')
@@ -65,7 +68,9 @@ def serve(pipe: Connection, ours: bool, shape: str, count: int, width: int, heig
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--frames", type=int, default=10)
     parser.add_argument("--rounds", type=int, default=3)
@@ -89,7 +94,10 @@ def main() -> None:
             pipe.send(0)
         for kind, theirs, own in zip(("depth", "segmentation"), *times, strict=True):
             milliseconds = f"{1e3 * own:.0f} ms, MuJoCo {1e3 * theirs:.0f} ms"
-            print(f"{arguments.count} geoms, {shape}, {kind}: {milliseconds}, ratio {own / theirs:.2f}")
+            print(
+                f"{arguments.count} geoms, {shape}, {kind}: {milliseconds}, ratio "
+                f"{own / theirs:.2f}"
+            )
 
 
 if __name__ == "__main__":

@@ -2,16 +2,17 @@
 
     python examples/benchmarks/eigenvalues.py [--resolutions 32 64 96 128] [--meshes MESH ...]
 
-Mean relative error of the eigenvalues 2 to 20 (1 to 20 with a fixed rim, where none is zero) of five surfaces, at some
-resolutions, and its order by regression over the texels along a side. The meshes' vertices lie on the true surfaces,
-and the texels of curved ones are put there too, so that no facet counts as an error; the square is taken as it is
-built. The operator is that of `WaveSolver`, with masses evened out for the sake of the time step. After the sphere
-comes the cube layout of the same sphere, and how the patches' errors stand to it at equal texels.
+Mean relative error of the eigenvalues 2 to 20 (1 to 20 with a fixed rim, where none is zero) of
+five surfaces, at some resolutions, and its order by regression over the texels along a side. The
+meshes' vertices lie on the true surfaces, and the texels of curved ones are put there too, so that
+no facet counts as an error; the square is taken as it is built. The operator is that of
+`WaveSolver`, with masses evened out for the sake of the time step. After the sphere comes the cube
+layout of the same sphere, and how the patches' errors stand to it at equal texels.
 
-With `--meshes` those are taken as they are instead, texels on their facets, in each layout that fits them; the first
-line of a mesh says which of them `layout="auto"` takes. The reference are quadratic finite elements on the same
-polyhedron; beside it stand linear ones with lumped masses, as triangle meshes are often solved, on its triangles cut in
-four, once and twice.
+With `--meshes` those are taken as they are instead, texels on their facets, in each layout that
+fits them; the first line of a mesh says which of them `layout="auto"` takes. The reference are
+quadratic finite elements on the same polyhedron; beside it stand linear ones with lumped masses, as
+triangle meshes are often solved, on its triangles cut in four, once and twice.
 """
 
 import argparse
@@ -28,18 +29,30 @@ from scipy.sparse.linalg import eigsh
 from scipy.spatial import Delaunay
 from scipy.special import jn_zeros, jnp_zeros
 
-from ripple_sim.solver import Atlas, Material, Mesh, MeshError, TexelMesh, build_atlas, build_operator, load_mesh
+from ripple_sim.solver import (
+    Atlas,
+    Material,
+    Mesh,
+    MeshError,
+    TexelMesh,
+    build_atlas,
+    build_operator,
+    load_mesh,
+)
 from ripple_sim.solver.mesh.mesh import check_genus_zero
 from ripple_sim.solver.texels import stiffness_matrix
 
 COUNT = 20
-RING, TUBE = 1.0, 0.4  # radii of the torus and of its tube
+# radii of the torus and of its tube
+RING = 1.0
+TUBE = 0.4
 RINGS = 40  # of vertices on disk and hemisphere
 
 Points = Values = np.ndarray
 
 
-# Meshes -------------------------------------------------------------------------------------------------------------
+# Meshes
+# -------------------------------------------------------------------------------------------------------------
 
 
 def grid(columns: int, rows: int, place: Callable, closed: bool = False) -> Mesh:
@@ -49,7 +62,10 @@ def grid(columns: int, rows: int, place: Callable, closed: bool = False) -> Mesh
     node = np.arange(len(V)).reshape(columns + 1, rows + 1)
     if closed:
         node[-1], node[:, -1] = node[0], node[:, 0]
-    p, q, r, s = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
+    p = node[:-1, :-1].ravel()
+    q = node[1:, :-1].ravel()
+    r = node[1:, 1:].ravel()
+    s = node[:-1, 1:].ravel()
     F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
     used, F = np.unique(F, return_inverse=True)
     return Mesh.from_arrays(V[used], F.reshape(-1, 3))
@@ -60,9 +76,14 @@ def rings(place: Callable) -> Mesh:
     radius = np.repeat(np.arange(RINGS + 1), np.maximum(6 * np.arange(RINGS + 1), 1))
     number = np.concatenate([np.arange(max(6 * k, 1)) for k in range(RINGS + 1)])
     angle = number * 2 * np.pi / np.maximum(6 * radius, 1)
-    x, y, r = np.cos(angle), np.sin(angle), radius / RINGS
+    x = np.cos(angle)
+    y = np.sin(angle)
+    r = radius / RINGS
     F = Delaunay(np.stack([r * x, r * y], axis=1)).simplices
-    u, v = (np.stack([(r * x)[F[:, k]] - (r * x)[F[:, 0]], (r * y)[F[:, k]] - (r * y)[F[:, 0]]]) for k in (1, 2))
+    u, v = (
+        np.stack([(r * x)[F[:, k]] - (r * x)[F[:, 0]], (r * y)[F[:, k]] - (r * y)[F[:, 0]]])
+        for k in (1, 2)
+    )
     F[u[0] * v[1] < u[1] * v[0]] = F[u[0] * v[1] < u[1] * v[0]][:, ::-1]
     return Mesh.from_arrays(np.stack(place(r, x, y), axis=1), F)
 
@@ -74,7 +95,8 @@ def sphere() -> Mesh:
 
 def torus() -> Mesh:
     def place(a: Points, b: Points) -> tuple[Points, Points, Points]:
-        u, v = 2 * np.pi * a, 2 * np.pi * b
+        u = 2 * np.pi * a
+        v = 2 * np.pi * b
         rho = RING + TUBE * np.cos(v)
         return rho * np.cos(u), rho * np.sin(u), TUBE * np.sin(v)
 
@@ -82,7 +104,13 @@ def torus() -> Mesh:
 
 
 def hemisphere() -> Mesh:
-    return rings(lambda r, x, y: (np.sin(np.pi / 2 * r) * x, np.sin(np.pi / 2 * r) * y, np.cos(np.pi / 2 * r)))
+    return rings(
+        lambda r, x, y: (
+            np.sin(np.pi / 2 * r) * x,
+            np.sin(np.pi / 2 * r) * y,
+            np.cos(np.pi / 2 * r),
+        )
+    )
 
 
 def disk() -> Mesh:
@@ -93,7 +121,8 @@ def square() -> Mesh:
     return grid(40, 40, lambda a, b: (a, b, 0 * a))
 
 
-# The true surface nearest to a point of its mesh --------------------------------------------------------------------
+# The true surface nearest to a point of its mesh
+# --------------------------------------------------------------------
 
 
 def on_sphere(points: Points) -> Points:
@@ -113,7 +142,8 @@ def on_disk(points: Points) -> Points:
     return points * (np.cos(within) / np.cos(side / 2))[..., None]
 
 
-# Exact eigenvalues --------------------------------------------------------------------------------------------------
+# Exact eigenvalues
+# --------------------------------------------------------------------------------------------------
 
 
 def degrees(multiplicity: Callable[[int], int]) -> Values:
@@ -131,7 +161,9 @@ def torus_values() -> Values:
     values = []
     for m in range(40):
         stiffness = slope.T @ np.diag(rho) @ slope / TUBE**2 + np.diag(m**2 / rho)
-        values.append(np.repeat(eigh(stiffness, np.diag(rho), eigvals_only=True)[:40], 1 if m == 0 else 2))
+        values.append(
+            np.repeat(eigh(stiffness, np.diag(rho), eigvals_only=True)[:40], 1 if m == 0 else 2)
+        )
     return np.concatenate(values)
 
 
@@ -169,7 +201,8 @@ def cases() -> dict[str, Case]:
     }
 
 
-# Measured -----------------------------------------------------------------------------------------------------------
+# Measured
+# -----------------------------------------------------------------------------------------------------------
 
 
 def placed(atlas: Atlas, project: Callable[[Points], Points] | None) -> Atlas:
@@ -179,13 +212,18 @@ def placed(atlas: Atlas, project: Callable[[Points], Points] | None) -> Atlas:
     texels = atlas.texels
     beyond = None if texels.beyond is None else project(texels.beyond)
     return dataclasses.replace(
-        atlas, texels=TexelMesh.of(texels.topology, project(texels.positions), normals=texels.normals, beyond=beyond)
+        atlas,
+        texels=TexelMesh.of(
+            texels.topology, project(texels.positions), normals=texels.normals, beyond=beyond
+        ),
     )
 
 
 def mean_error(atlas: Atlas, case: Case) -> float:
     """Mean relative error of the eigenvalues up to the twentieth but for that of the constant mode."""
-    return float(errors_against(np.sort(case.exact)[:COUNT], placed(atlas, case.project), case.rim).mean())
+    return float(
+        errors_against(np.sort(case.exact)[:COUNT], placed(atlas, case.project), case.rim).mean()
+    )
 
 
 def errors_against(exact: Values, atlas: Atlas, rim: str = "free") -> Values:
@@ -199,13 +237,19 @@ def least(stiffness: csr_array, mass: csr_array) -> Values:
     """The twenty least eigenvalues; of equal ones at the end of those that are asked for one may be missed."""
     scale = float(mass.diagonal().sum())
     values = eigsh(
-        scale * stiffness.tocsc(), COUNT + 4, mass.tocsc(), sigma=-0.5, which="LM", return_eigenvectors=False
+        scale * stiffness.tocsc(),
+        COUNT + 4,
+        mass.tocsc(),
+        sigma=-0.5,
+        which="LM",
+        return_eigenvectors=False,
     )
     return np.sort(values)[:COUNT] / scale
 
 
 def halved(mesh: Mesh, times: int) -> tuple[Points, Values]:
-    V, F = mesh.V, mesh.F
+    V = mesh.V
+    F = mesh.F
     for _ in range(times):
         V, F = trimesh.remesh.subdivide(V, F)
     return V, F
@@ -213,7 +257,10 @@ def halved(mesh: Mesh, times: int) -> tuple[Points, Values]:
 
 def of_linear_elements(V: Points, F: Values) -> Values:
     """The twenty least eigenvalues of a mesh, rims free, by its vertices' cotangent weights and shares of the area."""
-    return least(csr_array(-igl.cotmatrix(V, F)), csr_array(igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_BARYCENTRIC)))
+    return least(
+        csr_array(-igl.cotmatrix(V, F)),
+        csr_array(igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_BARYCENTRIC)),
+    )
 
 
 def of_polyhedron(mesh: Mesh, halvings: int) -> Values:
@@ -224,26 +271,36 @@ def of_polyhedron(mesh: Mesh, halvings: int) -> Values:
     nodes = np.hstack([F, len(V) + of_side.reshape(-1, 3)])
     across = V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]]  # the side opposite to each corner
     areas = np.linalg.norm(np.cross(across[:, 0], across[:, 1]), axis=1) / 2
-    slopes = np.einsum("tik,tjk->tij", across, across) / (4 * areas**2)[:, None, None]  # of barycentrics, multiplied
+    # of barycentrics, multiplied
+    slopes = np.einsum("tik,tjk->tij", across, across) / (4 * areas**2)[:, None, None]
     stiffness = np.zeros((len(F), 6, 6))
-    for place in ((0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5)):  # exact for products of linear slopes
+    # exact for products of linear slopes
+    for place in ((0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 0, 0.5)):
         share = np.zeros((6, 3))  # of each barycentric's slope in those of the six functions
         for i in range(3):
             j = (i + 1) % 3
-            share[i, i], share[3 + i, i], share[3 + i, j] = 4 * place[i] - 1, 4 * place[j], 4 * place[i]
+            share[i, i] = 4 * place[i] - 1
+            share[3 + i, i] = 4 * place[j]
+            share[3 + i, j] = 4 * place[i]
         stiffness += np.einsum("ai,tij,bj->tab", share, slopes, share) * (areas / 3)[:, None, None]
-    corner, side = 7 * np.eye(3) - 1, 16 * np.eye(3) + 16
+    corner = 7 * np.eye(3) - 1
+    side = 16 * np.eye(3) + 16
     far = -4 * np.eye(3)[[1, 2, 0]]  # a corner and the side opposite to it
     mass = areas[:, None, None] / 180 * np.block([[corner, far], [far.T, side]])
-    rows, columns = np.repeat(nodes, 6, axis=1).ravel(), np.tile(nodes, 6).ravel()
+    rows = np.repeat(nodes, 6, axis=1).ravel()
+    columns = np.tile(nodes, 6).ravel()
     size = len(V) + len(edges)
-    K, M = (csr_array((each.ravel(), (rows, columns)), shape=(size, size)) for each in (stiffness, mass))
+    K, M = (
+        csr_array((each.ravel(), (rows, columns)), shape=(size, size)) for each in (stiffness, mass)
+    )
     return least(K, M)
 
 
 def line(name: str, texels: list[int], errors: list[float]) -> str:
     order = -np.polyfit(np.log(texels) / 2, np.log(errors), 1)[0]
-    figures = "".join(f"{count:>9,} {error:8.2e}" for count, error in zip(texels, errors, strict=True))
+    figures = "".join(
+        f"{count:>9,} {error:8.2e}" for count, error in zip(texels, errors, strict=True)
+    )
     return f"{name:<20}{figures}  {order:5.2f}"
 
 
@@ -273,15 +330,24 @@ def polyhedra(names: list[str], resolutions: list[int]) -> None:
             print(line(f"{layout}, mean", texels, errors.mean(axis=1)))
             print(line(f"{layout}, worst", texels, errors.max(axis=1)), flush=True)
         meshes = [halved(mesh, times) for times in (1, 2)]
-        errors = np.array([np.abs(of_linear_elements(*each)[1:] / exact[1:] - 1) for each in meshes])
+        errors = np.array(
+            [np.abs(of_linear_elements(*each)[1:] / exact[1:] - 1) for each in meshes]
+        )
         print(line("triangles, mean", [len(V) for V, _ in meshes], errors.mean(axis=1)))
         print(line("triangles, worst", [len(V) for V, _ in meshes], errors.max(axis=1)), flush=True)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Eigenvalues of the patch layout against exact ones.")
+    parser = argparse.ArgumentParser(
+        description="Eigenvalues of the patch layout against exact ones."
+    )
     parser.add_argument("--resolutions", type=int, nargs="+", default=[32, 64, 96, 128])
-    parser.add_argument("--meshes", nargs="+", default=[], help="meshes to take as they are, facets and all, instead")
+    parser.add_argument(
+        "--meshes",
+        nargs="+",
+        default=[],
+        help="meshes to take as they are, facets and all, instead",
+    )
     options = parser.parse_args()
     resolutions = options.resolutions
     if options.meshes:
@@ -301,9 +367,13 @@ def main() -> None:
             reference = [mean_error(atlas, case) for atlas in cube]
             sizes = [atlas.areas.size for atlas in cube]
             print(line("sphere, cube layout", sizes, reference))
-            # errors go with the area of a texel, by which the few texels more or less are made up for
+            # errors go with the area of a texel, by which the few texels more or less are made up
+            # for
             ratios = patches / np.multiply(sizes, reference)
-            print("patches over cube, at equal texels: " + ", ".join(f"{ratio:.2f}" for ratio in ratios))
+            print(
+                "patches over cube, at equal texels: "
+                + ", ".join(f"{ratio:.2f}" for ratio in ratios)
+            )
 
 
 if __name__ == "__main__":

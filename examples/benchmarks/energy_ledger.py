@@ -2,11 +2,12 @@
 
     python examples/benchmarks/energy_ledger.py [SCENES] [SEED]
 
-A body falls on a target, or flies at it. Masses, time steps, materials, geom types, joints of the target, contact
-damping and MuJoCo's options are random: its solver, integrator, cone, Jacobian, noslip iterations, and all flags but
-those that leave nothing to see, as without contacts or gravity. What counts is the greatest rise of the energy of
-bodies and waves together over its largest value so far, as a share of that; potential energy counts from where the
-body touches. No actuators act.
+A body falls on a target, or flies at it. Masses, time steps, materials, geom types, joints of the
+target, contact damping and MuJoCo's options are random: its solver, integrator, cone, Jacobian,
+noslip iterations, and all flags but those that leave nothing to see, as without contacts or
+gravity. What counts is the greatest rise of the energy of bodies and waves together over its
+largest value so far, as a share of that; potential energy counts from where the body touches. No
+actuators act.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ def random_options(rng: np.random.Generator) -> tuple[str, str]:
     solver, jacobian, cone = (str(rng.choice(each)) for each in (SOLVERS, JACOBIANS, CONES))
     known = hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE") and solver != "PGS"
     integrator = str(rng.choice(INTEGRATORS if known else INTEGRATORS[:-1]))
-    noslip, impratio = rng.choice([0, 0, 5]), rng.choice([1, 1, 10])
+    noslip = rng.choice([0, 0, 5])
+    impratio = rng.choice([1, 1, 10])
     options = (
         f'solver="{solver}" jacobian="{jacobian}" cone="{cone}" integrator="{integrator}" '
         f'noslip_iterations="{noslip}" impratio="{impratio}"'
@@ -95,11 +97,18 @@ class Scene(NamedTuple):
 def random_scene(rng: np.random.Generator) -> Scene:
     """A body on its way to a target."""
     shape, target, joint = (str(rng.choice(list(each))) for each in (GEOMS, TARGETS, JOINTS))
-    dt, mass = float(rng.uniform(0.5e-3, 4e-3)), float(10 ** rng.uniform(-3, 3))
+    dt = float(rng.uniform(0.5e-3, 4e-3))
+    mass = float(10 ** rng.uniform(-3, 3))
     radius = float(rng.uniform(0.04, 0.12))
     size = GEOMS[shape].format(r=radius, s=0.7 * radius)
     kind = f'type="{shape}" mesh="stone"' if shape == "mesh" else f'type="{shape}" size="{size}"'
-    contact = ["", 'solref="0.02 1"', 'solref="0.02 0.05"', 'solref="-10000 0"', 'solref="-3000 -20"'][rng.integers(5)]
+    contact = [
+        "",
+        'solref="0.02 1"',
+        'solref="0.02 0.05"',
+        'solref="-10000 0"',
+        'solref="-3000 -20"',
+    ][rng.integers(5)]
     fall = float(rng.uniform(0.02, 0.4))
     weight = float(10 ** rng.uniform(0, 3))
     spring = JOINTS[joint].format(k=weight * 400, d=rng.choice([0.0, weight]))
@@ -143,16 +152,20 @@ def random_scene(rng: np.random.Generator) -> Scene:
 def rise(scene: Scene, *, own: bool = True, rigid: bool = False) -> tuple[float, str]:
     """Greatest rise over the largest energy so far, as its share, and what the waves are in words.
 
-    Steps are our own, or `mujoco.mj_step` and `step`; or those of MuJoCo alone, where the target is rigid.
+    Steps are our own, or `mujoco.mj_step` and `step`; or those of MuJoCo alone, where the target is
+    rigid.
     """
-    model, data = scene.model, mujoco.MjData(scene.model)
+    model = scene.model
+    data = mujoco.MjData(scene.model)
     if not model.opt.gravity[2]:
         data.qvel[-4] = -2.0
     ripples = Ripples(model, {"target": scene.material}, resolution=24, backend="cpu", two_way=True)
     energy = ripples.energy(data)
     # potential energy counts from where the body touches
     largest = model.body_mass[2] * (-model.opt.gravity[2] * _drop(scene) + data.qvel[-4] ** 2 / 2)
-    touch, worst, waves = energy.total - largest, 0.0, 0.0
+    touch = energy.total - largest
+    worst = 0.0
+    waves = 0.0
     while data.time < scene.duration:
         if own and not rigid:
             ripples.mj_step(data)
@@ -162,10 +175,15 @@ def rise(scene: Scene, *, own: bool = True, rigid: bool = False) -> tuple[float,
                 ripples.step(data)
         energy = ripples.energy(data)
         worst = max(worst, (energy.total - touch - largest) / largest)
-        largest, waves = max(largest, energy.total - touch), max(waves, energy.waves)
+        largest = max(largest, energy.total - touch)
+        waves = max(waves, energy.waves)
     material = ripples["target"].material
-    speed, density, stiffness = (np.mean(each) for each in (material.speed, material.density, material.stiffness))
-    words = f"c {speed:.3g}, rho {density:.3g}, sqrt(k) dt {stiffness**0.5 * model.opt.timestep:.2f}"
+    speed, density, stiffness = (
+        np.mean(each) for each in (material.speed, material.density, material.stiffness)
+    )
+    words = (
+        f"c {speed:.3g}, rho {density:.3g}, sqrt(k) dt {stiffness**0.5 * model.opt.timestep:.2f}"
+    )
     return float(worst), f"{words}; waves have up to {waves / largest:.2%}"
 
 
@@ -183,21 +201,36 @@ def _drop(scene: Scene) -> float:
 def main(count: int = 300, seed: int = 0) -> None:
     """Run the scenes, and print those beyond the bar and how many pass."""
     warnings.simplefilter("ignore")
-    for own, way in ((True, "ripples.mj_step(data)"), (False, "mujoco.mj_step, ripples.step(data)")):
-        found, begun = [], time.perf_counter()
+    for own, way in (
+        (True, "ripples.mj_step(data)"),
+        (False, "mujoco.mj_step, ripples.step(data)"),
+    ):
+        found = []
+        begun = time.perf_counter()
         for index in range(count):
             scene = random_scene(np.random.default_rng([seed, index]))
             try:
                 rises, words = rise(scene, own=own)
             except RippleError as error:
-                rises, words = np.inf, str(error)
+                rises = np.inf
+                words = str(error)
             found.append(rises)
             if rises > BAR:
                 alone = rise(scene, rigid=True)[0]
-                print(f"  {index}: {rises:.2%}, {alone:.2%} with a rigid target: {scene.words}; {words}", flush=True)
+                print(
+                    (
+                        f"  {index}: {rises:.2%}, {alone:.2%} with a rigid target: {scene.words}; "
+                        f"{words}"
+                    ),
+                    flush=True,
+                )
         took = time.perf_counter() - begun
-        passed, beyond = np.sum(np.array(found) <= BAR), max(found)
-        print(f"{way}: {passed} of {count} within {BAR:.0%}, the worst {beyond:.2%}; {took:.0f} s", flush=True)
+        passed = np.sum(np.array(found) <= BAR)
+        beyond = max(found)
+        print(
+            f"{way}: {passed} of {count} within {BAR:.0%}, the worst {beyond:.2%}; {took:.0f} s",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

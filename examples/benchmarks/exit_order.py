@@ -2,7 +2,8 @@
 
     python examples/benchmarks/exit_order.py [ours mujoco pyvista]
 
-A row for each order, without arguments for all orders of two and three; status 1 if a process did not end with 0.
+A row for each order, without arguments for all orders of two and three; status 1 if a process did
+not end with 0.
 """
 
 import itertools
@@ -55,14 +56,21 @@ def end(order: tuple[str, ...], drop: bool) -> int:
     program = BEGIN + "".join(USES[name] for name in order) + DROP * drop
     environment = {**os.environ, "MUJOCO_GL": "egl"}
     result = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", program], env=environment, capture_output=True, check=False
+        [sys.executable, "-W", "ignore", "-c", program],
+        env=environment,
+        capture_output=True,
+        check=False,
     )
     return result.returncode
 
 
 def main() -> None:
     given = tuple(sys.argv[1:])
-    orders = [given] if given else [order for count in (2, 3) for order in itertools.permutations(USES, count)]
+    orders = (
+        [given]
+        if given
+        else [order for count in (2, 3) for order in itertools.permutations(USES, count)]
+    )
     statuses = []
     print("| order | kept | dropped |\n| --- | --- | --- |")
     for order in orders:

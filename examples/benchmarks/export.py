@@ -2,8 +2,8 @@
 
     python examples/benchmarks/export.py [FRAMES]
 
-Writes a sphere of 124,416 points with waves all over it to a USD file. The first frames, which load kernels, do not
-count. Linux tells the memory of a process.
+Writes a sphere of 124,416 points with waves all over it to a USD file. The first frames, which load
+kernels, do not count. Linux tells the memory of a process.
 """
 
 import sys
@@ -15,7 +15,9 @@ import numpy as np
 
 from ripple_sim import Exporter, Simulation, load_scene
 
-RESOLUTION, TRIANGLES, WARM_UP = 144, 200_000, 25
+RESOLUTION = 144
+TRIANGLES = 200_000
+WARM_UP = 25
 
 
 def memory() -> float:
@@ -33,7 +35,9 @@ def main(frames: int = 75) -> None:
     seconds = []
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder) / "run.usdc"
-        with Exporter(simulation.model, simulation.ripples, output, triangles=TRIANGLES) as exporter:
+        with Exporter(
+            simulation.model, simulation.ripples, output, triangles=TRIANGLES
+        ) as exporter:
             for frame in range(frames):
                 waves.step(1 / 60)
                 start = time.perf_counter()
@@ -42,7 +46,10 @@ def main(frames: int = 75) -> None:
                 if frame == WARM_UP - 1:
                     before = memory()
         rate = (frames - WARM_UP) / sum(seconds[WARM_UP:])
-        print(f"{rate:.1f} frames a second, {before:.0f} MB after {WARM_UP} frames, {memory():.0f} MB after {frames}")
+        print(
+            f"{rate:.1f} frames a second, {before:.0f} MB after {WARM_UP} frames, {memory():.0f} "
+            f"MB after {frames}"
+        )
         print(f"{output.stat().st_size / 1e6:.0f} MB")
 
 

@@ -1,4 +1,6 @@
-"""Fingerprints of every shipped scene: of its frames, and of its heights. A refactoring leaves both as they are.
+"""Fingerprints of every shipped scene: of its frames, and of its heights.
+
+A refactoring leaves both as they are.
 
 python examples/benchmarks/fingerprint.py [SCENE ...] > before.txt
 """
@@ -32,7 +34,8 @@ def frames(scene: str) -> str:
 
 def heights(name: str) -> str:
     """Fingerprint of all heights and impulses, frame by frame."""
-    scene, hasher = load_scene(name), hashlib.sha256()
+    scene = load_scene(name)
+    hasher = hashlib.sha256()
     simulation = Simulation(scene, fps=FPS, backend="cpu")
     for _ in range(round(scene.duration * FPS)):
         simulation.advance_frame()

@@ -25,13 +25,19 @@ def least(call: Callable[[], object]) -> float:
 
 def main() -> None:
     """Print a row for each resolution."""
-    print("| N | step of one substep [ms] | one look [ms] | share of the steps' time |\n| --- | --- | --- | --- |")
+    print(
+        "| N | step of one substep [ms] | one look [ms] | share of the steps' time |\n| --- | --- "
+        "| --- | --- |"
+    )
     for n in (32, 64, 128, 256):
         waves = WaveSolver(sphere_atlas(resolution=n), Material(speed=1.0), backend="cpu")
         waves.add_impulse([0.0, 0.0, 1.0], 1.0, 0.3)
         dt = waves.stable_timestep
-        step, look = least(functools.partial(waves.step, dt)), least(waves._backend.finite)
-        print(f"| {n} | {1e3 * step:.3f} | {1e3 * look:.3f} | {look / EVERY / step:.2%} |", flush=True)
+        step = least(functools.partial(waves.step, dt))
+        look = least(waves._backend.finite)
+        print(
+            f"| {n} | {1e3 * step:.3f} | {1e3 * look:.3f} | {look / EVERY / step:.2%} |", flush=True
+        )
 
 
 if __name__ == "__main__":

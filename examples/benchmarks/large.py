@@ -2,9 +2,9 @@
 
     python examples/benchmarks/large.py [mesh|atlas|targets|bodies ...]
 
-`mesh`: the duck, subdivided to 1,000,000 triangles. `atlas`: the duck at N = 1024. `targets`: 100 balls that ripple,
-with a body on each. `bodies`: 500 bodies on the duck. Each runs in a process of its own, with warm kernels; memory is
-the most that was resident so far (ru_maxrss).
+`mesh`: the duck, subdivided to 1,000,000 triangles. `atlas`: the duck at N = 1024. `targets`: 100
+balls that ripple, with a body on each. `bodies`: 500 bodies on the duck. Each runs in a process of
+its own, with warm kernels; memory is the most that was resident so far (ru_maxrss).
 """
 
 import argparse
@@ -25,16 +25,22 @@ from ripple_sim.scene import CameraEntry, MaterialEntry, RippleEntry
 from ripple_sim.scenes.shapes import duck
 from ripple_sim.solver import build_atlas, load_mesh
 
-TRIANGLES, RESOLUTION, TARGETS, BODIES = 1_000_000, 1024, 100, 500
-SIZE, STEPS = (1280, 720), 10
+TRIANGLES = 1_000_000
+RESOLUTION = 1024
+TARGETS = 100
+BODIES = 500
+SIZE = (1280, 720)
+STEPS = 10
 
 
 @contextmanager
 def stage(name: str) -> Iterator[None]:
     """Print how long a stage takes, on the clock and of all cores, and the memory that was resident at most so far."""
-    clock, processor = time.perf_counter(), time.process_time()
+    clock = time.perf_counter()
+    processor = time.process_time()
     yield
-    clock, processor = time.perf_counter() - clock, time.process_time() - processor
+    clock = time.perf_counter() - clock
+    processor = time.process_time() - processor
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(f"| {name} | {clock:.1f} s | {processor:.1f} s | {memory:.2f} GiB |", flush=True)
 
@@ -43,12 +49,21 @@ def subdivided(count: int) -> tuple[np.ndarray, np.ndarray]:
     """The duck with so many triangles: all cut into four while there is room, then some of them into three."""
     V, F = duck()
     while 4 * len(F) <= count:
-        edges, at = np.unique(np.sort(F[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0, return_inverse=True)
-        (a, b, c), (ab, bc, ca) = F.T, len(V) + at.reshape(-1, 3).T
+        edges, at = np.unique(
+            np.sort(F[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0, return_inverse=True
+        )
+        (a, b, c) = F.T
+        (ab, bc, ca) = len(V) + at.reshape(-1, 3).T
         V = np.concatenate([V, V[edges].mean(axis=1)])
-        F = np.concatenate([np.stack(each, axis=1) for each in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+        F = np.concatenate(
+            [
+                np.stack(each, axis=1)
+                for each in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))
+            ]
+        )
     more = (count - len(F)) // 2
-    (a, b, c), middle = F[:more].T, len(V) + np.arange(more)
+    (a, b, c) = F[:more].T
+    middle = len(V) + np.arange(more)
     V = np.concatenate([V, V[F[:more]].mean(axis=1)])
     split = [np.stack(each, axis=1) for each in ((a, b, middle), (b, c, middle), (c, a, middle))]
     return V, np.concatenate([*split, F[more:]])
@@ -56,7 +71,8 @@ def subdivided(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def write_ply(path: Path, V: np.ndarray, F: np.ndarray) -> None:
     rows = np.zeros(len(F), [("count", "u1"), ("corners", "<i4", 3)])
-    rows["count"], rows["corners"] = 3, F
+    rows["count"] = 3
+    rows["corners"] = F
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(V)}\n"
         "property double x\nproperty double y\nproperty double z\n"
@@ -107,11 +123,15 @@ def grid_scene(spec: mujoco.MjSpec, targets: list[str], width: float) -> Scene:
 
 
 def targets() -> None:
-    spec, names = mujoco.MjSpec(), []
+    spec = mujoco.MjSpec()
+    names = []
     for i in range(TARGETS):
-        x, y = 0.5 * (i % 10) - 2.25, 0.5 * (i // 10) - 2.25
+        x = 0.5 * (i % 10) - 2.25
+        y = 0.5 * (i // 10) - 2.25
         names.append(f"target {i}")
-        spec.worldbody.add_geom(name=names[i], type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.2, 0, 0], pos=[x, y, 0])
+        spec.worldbody.add_geom(
+            name=names[i], type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.2, 0, 0], pos=[x, y, 0]
+        )
         body = spec.worldbody.add_body(pos=[x, y, 0.24])
         body.add_freejoint()
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0, 0])
@@ -123,7 +143,8 @@ def targets() -> None:
 def bodies() -> None:
     V, F = duck()
     with stage(f"model with {BODIES} bodies"):
-        spec, rng = mujoco.MjSpec(), np.random.default_rng(0)
+        spec = mujoco.MjSpec()
+        rng = np.random.default_rng(0)
         spec.add_mesh(name="duck", uservert=V.ravel(), userface=F.ravel())
         spec.worldbody.add_geom(name="duck", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="duck")
         make_collidable(spec, "duck")
@@ -136,11 +157,18 @@ def bodies() -> None:
     first_frame(scene)
 
 
-CASES: dict[str, Callable[[], None]] = {"mesh": mesh, "atlas": atlas, "targets": targets, "bodies": bodies}
+CASES: dict[str, Callable[[], None]] = {
+    "mesh": mesh,
+    "atlas": atlas,
+    "targets": targets,
+    "bodies": bodies,
+}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time and memory of big things to the first frame.")
+    parser = argparse.ArgumentParser(
+        description="Time and memory of big things to the first frame."
+    )
     parser.add_argument("cases", nargs="*", default=list(CASES), choices=[*CASES, []])
     # an OpenGL context does not outlive a fork
     spawn = multiprocessing.get_context("spawn")

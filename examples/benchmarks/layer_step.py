@@ -12,11 +12,14 @@ import numpy as np
 
 from ripple_sim.solver import Material, WaveSolver, sphere_atlas
 
-TURNS, SUBSTEPS = 15, 40
+TURNS = 15
+SUBSTEPS = 40
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Cost of a wave step with a thickness map, and on water.")
+    parser = argparse.ArgumentParser(
+        description="Cost of a wave step with a thickness map, and on water."
+    )
     parser.add_argument("--resolution", type=int, default=128)
     atlas = sphere_atlas(1.0, parser.parse_args().resolution)
     thickness = 0.3 + 0.05 * atlas.positions[..., 0]
@@ -26,7 +29,9 @@ def main() -> None:
         "layer with a thickness map": Material.layer(500.0, 0.5, 1000.0, thickness),
         "water": Material.water(),
     }
-    waves = {name: WaveSolver(atlas, material, backend="cpu") for name, material in materials.items()}
+    waves = {
+        name: WaveSolver(atlas, material, backend="cpu") for name, material in materials.items()
+    }
     fastest = dict.fromkeys(waves, np.inf)
     for _ in range(TURNS):
         for name, each in waves.items():
@@ -36,7 +41,10 @@ def main() -> None:
             fastest[name] = min(fastest[name], (time.perf_counter() - start) / substeps)
     uniform = fastest["layer of one thickness"]
     for name, seconds in fastest.items():
-        print(f"{name:28} {1e3 * seconds:8.3f} ms a substep, {seconds / uniform:6.2f} of the uniform layer's")
+        print(
+            f"{name:28} {1e3 * seconds:8.3f} ms a substep, {seconds / uniform:6.2f} of the uniform "
+            f"layer's"
+        )
 
 
 if __name__ == "__main__":

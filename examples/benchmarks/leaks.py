@@ -1,8 +1,10 @@
 """Does anything stay of what is made and dropped? Memory, file descriptors and objects of OpenGL, 500 times each.
 
-    python examples/benchmarks/leaks.py [--times 500] [solver-cpu solver-gl renderer everything viewer]
+    python examples/benchmarks/leaks.py [--times 500] [solver-cpu solver-gl renderer everything
+    viewer]
 
-Each kind in a process of its own: a window of the viewer makes other OpenGL contexts of its process unusable.
+Each kind in a process of its own: a window of the viewer makes other OpenGL contexts of its process
+unusable.
 """
 
 import argparse
@@ -42,7 +44,9 @@ def renderer() -> Callable[[], None]:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    ripples = Ripples(model, {"ball": Material(speed=1.0, density=10.0)}, resolution=8, backend="cpu")
+    ripples = Ripples(
+        model, {"ball": Material(speed=1.0, density=10.0)}, resolution=8, backend="cpu"
+    )
 
     def use() -> None:
         RippleRenderer(model, ripples, width=64, height=48).render(data)
@@ -98,7 +102,8 @@ def objects() -> int:
     from ripple_sim.solver.gl import context, shared_context
 
     find = context.load_egl().eglGetProcAddress
-    find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+    find.restype = ctypes.c_void_p
+    find.argtypes = [ctypes.c_char_p]
     with shared_context() as ctx:
         texture = ctx.texture((1, 1), 4)
         program = ctx.program(vertex_shader="#version 430\nvoid main() { gl_Position = vec4(0); }")
@@ -134,22 +139,31 @@ def measure(kind: str, times: int) -> None:
         use()
     memory_then, files_then, count_then = look()
     kept = (memory_then - memory) / times / 1e3
-    print(f"| {kind} | {times} | {kept:.1f} | {files_then - files:+d} | {count_then - count:+d} |", flush=True)
+    print(
+        f"| {kind} | {times} | {kept:.1f} | {files_then - files:+d} | {count_then - count:+d} |",
+        flush=True,
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kinds", nargs="*", default=list(KINDS))
     parser.add_argument("--times", type=int, default=500)
-    parser.add_argument("--one", action="store_true", help="in this process, without the head of the table")
+    parser.add_argument(
+        "--one", action="store_true", help="in this process, without the head of the table"
+    )
     options = parser.parse_args()
     if options.one:
         measure(options.kinds[0], options.times)
         return
-    print("| made and dropped | times | kept of each [kB] | files | objects of OpenGL |", flush=True)
+    print(
+        "| made and dropped | times | kept of each [kB] | files | objects of OpenGL |", flush=True
+    )
     print("| --- | --- | --- | --- | --- |", flush=True)
     for kind in options.kinds:
-        subprocess.run([sys.executable, __file__, kind, "--one", "--times", str(options.times)], check=True)
+        subprocess.run(
+            [sys.executable, __file__, kind, "--one", "--times", str(options.times)], check=True
+        )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
     python examples/benchmarks/loops.py
 
-A ball of 0.3 kg falls on a block for 0.2 s. The share is the sum of the impulses that the ripples report over the
-momentum that the ball has gained against gravity. Loops of packages that are not installed are left out.
+A ball of 0.3 kg falls on a block for 0.2 s. The share is the sum of the impulses that the ripples
+report over the momentum that the ball has gained against gravity. Loops of packages that are not
+installed are left out.
 """
 
 import importlib.util
@@ -18,8 +19,10 @@ import numpy as np
 
 from ripple_sim import Material, Ripples, RippleWarning
 
-STEPS, AT_ONCE = 100, 5
-MASS, GRAVITY = 0.3, 9.81
+STEPS = 100
+AT_ONCE = 5
+MASS = 0.3
+GRAVITY = 9.81
 MODEL = f"""<mujoco><option timestep="0.002"/><worldbody>
   <geom name="block" type="box" size="0.5 0.5 0.2" pos="0 0 -0.2" solref="0.01 0.3"/>
   <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
@@ -68,7 +71,9 @@ def own_loops() -> Iterator[tuple[str, float, mujoco.MjData]]:
     }
     for name, loop in loops.items():
         model = mujoco.MjModel.from_xml_string(MODEL)
-        ripples, data, total = Ripples(model, MATERIALS, resolution=16, backend="cpu"), mujoco.MjData(model), 0.0
+        ripples = Ripples(model, MATERIALS, resolution=16, backend="cpu")
+        data = mujoco.MjData(model)
+        total = 0.0
         while data.time < 0.002 * STEPS - 1e-6:
             loop(ripples, model, data)
             total += given(ripples)
@@ -119,7 +124,8 @@ def dm_control_loop() -> tuple[str, float, mujoco.MjData]:
 
 
 def main() -> None:
-    os.environ.setdefault("MUJOCO_GL", "disable")  # read by dm_control and gymnasium, which have nothing to draw
+    # read by dm_control and gymnasium, which have nothing to draw
+    os.environ.setdefault("MUJOCO_GL", "disable")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RippleWarning)
         rows = list(own_loops())

@@ -2,8 +2,9 @@
 
     python examples/benchmarks/momentum.py [CASE ...]
 
-A plate of 5 kg that can move up and down alone is pushed from above, without gravity: by thrown, driven, tied, sticky
-and scripted bodies. All that it gains must be in the impulses that its surface receives.
+A plate of 5 kg that can move up and down alone is pushed from above, without gravity: by thrown,
+driven, tied, sticky and scripted bodies. All that it gains must be in the impulses that its surface
+receives.
 """
 
 import argparse
@@ -14,13 +15,20 @@ import mujoco
 
 from ripple_sim import Material, Ripples
 
-MASS, STEPS = 5.0, 400
+MASS = 5.0
+STEPS = 400
 PLATE = f"""<body name="plate"><joint name="plate" type="slide" axis="0 0 1"/>
     <geom name="target" type="box" size="0.3 0.3 0.05" mass="{MASS}"/></body>"""
 BALL = '<geom name="ball" size="0.05" mass="1" {}/>'
-FREE = '<body name="ball" pos="0.1 0 0.12"><freejoint name="ball"/><site name="on"/>' + BALL + "</body>"
+FREE = (
+    '<body name="ball" pos="0.1 0 0.12"><freejoint name="ball"/><site name="on"/>'
+    + BALL
+    + "</body>"
+)
 DRIVEN = (
-    '<body name="ball" pos="0.1 0 0.12"><joint name="ball" type="slide" axis="0 0 1"/>' + BALL.format("") + "</body>"
+    '<body name="ball" pos="0.1 0 0.12"><joint name="ball" type="slide" axis="0 0 1"/>'
+    + BALL.format("")
+    + "</body>"
 )
 MOCAP = '<body name="hand" mocap="true" pos="0.1 0 {}">{}</body>'
 
@@ -65,7 +73,9 @@ CASES = {
         '<equality><connect body1="ball" body2="heavy" anchor="0 0 0"/></equality>',
         speed=-1.0,
     ),
-    "pressed by a motor": Case(DRIVEN, '<actuator><motor joint="ball" gear="-20"/></actuator>', script=full_power),
+    "pressed by a motor": Case(
+        DRIVEN, '<actuator><motor joint="ball" gear="-20"/></actuator>', script=full_power
+    ),
     "pressed by a position servo": Case(
         DRIVEN, '<actuator><position joint="ball" kp="-200" kv="5"/></actuator>', script=full_power
     ),
@@ -88,11 +98,16 @@ CASES = {
     "with margin and gap": Case(FREE.format('margin="0.01" gap="0.02"'), speed=-1.0),
     "as a pair of its own": Case(
         FREE.format('contype="0" conaffinity="0"'),
-        '<contact><pair geom1="ball" geom2="target" condim="1" solref="-2000 -20" margin="0.01"/></contact>',
+        (
+            '<contact><pair geom1="ball" geom2="target" condim="1" solref="-2000 -20" '
+            'margin="0.01"/></contact>'
+        ),
         speed=-1.0,
     ),
     "contact parameters overridden": Case(
-        FREE.format(""), option='o_solref="-3000 -30" o_margin="0.005"><flag override="enable"/></option>', speed=-1.0
+        FREE.format(""),
+        option='o_solref="-3000 -30" o_margin="0.005"><flag override="enable"/></option>',
+        speed=-1.0,
     ),
     "target in a chain": Case(
         FREE.format(""),
@@ -122,12 +137,15 @@ def measure(case: Case) -> tuple[float, float]:
             data.joint(joint).qvel[-1 if joint == "heavy" else 2] = case.speed
     data.joint("plate").qvel[0] = before = case.plate_speed
     materials = {name: Material(density=1e5) for name in case.targets}
-    ripples, given = Ripples(model, materials, resolution=16, backend="cpu", conserve_volume=False), 0.0
+    ripples = Ripples(model, materials, resolution=16, backend="cpu", conserve_volume=False)
+    given = 0.0
     for _ in range(STEPS):
         case.script(data)
         mujoco.mj_step(model, data)
         ripples.step(data)
-        given += sum(impulse.impulse for impulse in ripples.last_impulses if impulse.geom == "target")
+        given += sum(
+            impulse.impulse for impulse in ripples.last_impulses if impulse.geom == "target"
+        )
     return MASS * abs(data.joint("plate").qvel[0] - before), given
 
 

@@ -2,9 +2,9 @@
 
     python examples/benchmarks/overlap.py [SCENE] [--size 1280x720] [--frames 48] [--rounds 3]
 
-Set-up, simulation, drawing and encoding run one after the other, each alone with what it needs ready in memory, then
-the whole `render_video`; all that several times in turn, so that everything meets the same machine. The least times
-count.
+Set-up, simulation, drawing and encoding run one after the other, each alone with what it needs
+ready in memory, then the whole `render_video`; all that several times in turn, so that everything
+meets the same machine. The least times count.
 """
 
 import argparse
@@ -24,7 +24,9 @@ FPS = 60
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="The whole of a render against the sum of its stages.")
+    parser = argparse.ArgumentParser(
+        description="The whole of a render against the sum of its stages."
+    )
     parser.add_argument("scene", nargs="?", default="duck")
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--frames", type=int, default=48)
@@ -36,9 +38,12 @@ def main() -> None:
 
     def timed(name: str, work: Callable[[], Result]) -> Result:
         """Note the seconds on the clock, and those of all cores together."""
-        clock, processor = time.perf_counter(), time.process_time()
+        clock = time.perf_counter()
+        processor = time.process_time()
         result = work()
-        rounds.setdefault(name, []).append((time.perf_counter() - clock, time.process_time() - processor))
+        rounds.setdefault(name, []).append(
+            (time.perf_counter() - clock, time.process_time() - processor)
+        )
         return result
 
     def set_up() -> tuple[Simulation, FrameSource]:
@@ -60,7 +65,10 @@ def main() -> None:
             simulation, frames = timed("set-up", set_up)
             states = snapshots(simulation, options.frames, alive=options.frames)
             states = timed("simulation", lambda states=states: list(states))
-            images = timed("drawing", lambda states=states, frames=frames: [frames.render(state) for state in states])
+            images = timed(
+                "drawing",
+                lambda states=states, frames=frames: [frames.render(state) for state in states],
+            )
             timed("encoding", lambda images=images: encode(path, images))
             del simulation, frames, states, images
             timed(
@@ -68,15 +76,23 @@ def main() -> None:
                 lambda: render_video(scene, path, video),
             )
 
-    least = {name: [min(times) for times in zip(*each, strict=True)] for name, each in rounds.items()}
+    least = {
+        name: [min(times) for times in zip(*each, strict=True)] for name, each in rounds.items()
+    }
     cores = os.cpu_count() or 1
-    print(f"{options.scene}, {options.frames} frames of {width}x{height}, {cores} cores; seconds, least of rounds")
+    print(
+        f"{options.scene}, {options.frames} frames of {width}x{height}, {cores} cores; seconds, "
+        f"least of rounds"
+    )
     print("              clock  all cores")
     for name, (clock, processor) in least.items():
         print(f"{name:11} {clock:8.2f} {processor:8.2f}")
     alone = sum(clock for name, (clock, _) in least.items() if name != "whole")
     work = sum(processor for name, (_, processor) in least.items() if name != "whole")
-    print(f"stages alone, added up: {alone:.2f} s; their work spread evenly over the cores: {work / cores:.2f} s")
+    print(
+        f"stages alone, added up: {alone:.2f} s; their work spread evenly over the cores: "
+        f"{work / cores:.2f} s"
+    )
     print(f"whole / stages alone: {least['whole'][0] / alone:.2f}")
 
 

@@ -2,7 +2,8 @@
 
     python examples/benchmarks/overlay.py [--scene duck] [--size 1280x720] [--frames 12]
 
-The simulation is not counted, but for what the overlays ask of it (energy, contacts, the field), given by itself.
+The simulation is not counted, but for what the overlays ask of it (energy, contacts, the field),
+given by itself.
 """
 
 import argparse
@@ -18,8 +19,17 @@ from ripple_sim.scene import parse_request
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.video import Film
 
-KINDS = ([], ["height"], ["grid"], ["contacts"], ["time"], ["energy"], ["height", "contacts", "grid", "time", "energy"])
-RATE, START = 30, 1.0
+KINDS = (
+    [],
+    ["height"],
+    ["grid"],
+    ["contacts"],
+    ["time"],
+    ["energy"],
+    ["height", "contacts", "grid", "time", "energy"],
+)
+RATE = 30
+START = 1.0
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -29,13 +39,16 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Processor seconds a frame with overlays and without.")
+    parser = argparse.ArgumentParser(
+        description="Processor seconds a frame with overlays and without."
+    )
     parser.add_argument("--scene", default="duck")
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--frames", type=int, default=12)
     options = parser.parse_args()
     width, height = (int(n) for n in options.size.split("x"))
-    scene, first = load_scene(options.scene), round(START * RATE)
+    scene = load_scene(options.scene)
+    first = round(START * RATE)
 
     # one film shows everything there is to know; each kind draws of it what it needs
     total = first + options.frames
@@ -47,7 +60,9 @@ def main() -> None:
     for shot in islice(source.shots(), first, None):
         for kind, (film, book) in enumerate(zip(films, books, strict=True)):
             frame = shot.number - first
-            drawing[kind, frame] = seconds(lambda film=film, shot=shot: list(film.render_all([shot])))
+            drawing[kind, frame] = seconds(
+                lambda film=film, shot=shot: list(film.render_all([shot]))
+            )
             noting[kind, frame] = seconds(book.follow)
     print(shared_context().renderer)
     print(f"{options.scene}, {width}x{height}; processor time, least of {options.frames} frames")

@@ -3,9 +3,10 @@
     ripple-sim export duck -o duck.html --resolution 64 --fps 30 --duration 5
     python examples/benchmarks/page.py duck.html [MORE.html ...]
 
-Plays the pages at 640x360 pixels, in turns, and prints for each the frames that it showed in a second, the processor
-time of all of Chromium's processes for each of them, the share of the pixels each way that it drew, and the processor
-time of drawing a frame with all pixels alone, without what the browser does to show it. Linux tells the time.
+Plays the pages at 640x360 pixels, in turns, and prints for each the frames that it showed in a
+second, the processor time of all of Chromium's processes for each of them, the share of the pixels
+each way that it drew, and the processor time of drawing a frame with all pixels alone, without what
+the browser does to show it. Linux tells the time.
 """
 
 import os
@@ -18,8 +19,16 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import sync_playwright
 
-SIZE, ROUNDS, WARM_UP, SECONDS = (640, 360), 3, 3.0, 6.0
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+SIZE = (640, 360)
+ROUNDS = 3
+WARM_UP = 3.0
+SECONDS = 6.0
+FLAGS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]
 DRAWINGS = 40
 DRAW = f"""const player = ripplePlayer.player, gl = player.drawing.gl;
 player.playing = false;
@@ -32,7 +41,8 @@ TICK = os.sysconf("SC_CLK_TCK")
 
 def processor_time() -> float:
     """Of all processes that descend from this one, but for the driver of the browser [s]."""
-    parents, times = {}, {}
+    parents = {}
+    times = {}
     for status in Path("/proc").glob("[0-9]*/stat"):
         try:
             name, fields = status.read_text().split("(", 1)[1].rsplit(")", 1)
@@ -40,7 +50,9 @@ def processor_time() -> float:
             continue
         parent, *_, user, kernel = fields.split()[1:13]
         parents[int(status.parent.name)] = int(parent)
-        times[int(status.parent.name)] = (int(user) + int(kernel)) / TICK if "chrom" in name else 0.0
+        times[int(status.parent.name)] = (
+            (int(user) + int(kernel)) / TICK if "chrom" in name else 0.0
+        )
     ours = {os.getpid()}
     for _ in range(8):  # generations
         ours |= {process for process, parent in parents.items() if parent in ours}
@@ -53,11 +65,15 @@ def played(browser: Any, page: Path) -> tuple[float, float, float, float]:
     tab.goto(page.resolve().as_uri())
     tab.evaluate("ripplePlayer.ready.then(() => 0)")
     time.sleep(WARM_UP)
-    before, start, spent = tab.evaluate("ripplePlayer.player.shown"), time.perf_counter(), processor_time()
+    before = tab.evaluate("ripplePlayer.player.shown")
+    start = time.perf_counter()
+    spent = processor_time()
     time.sleep(SECONDS)
     spent = processor_time() - spent
     seconds = time.perf_counter() - start
-    shown, share = tab.evaluate("[ripplePlayer.player.shown, ripplePlayer.player.canvas.width / innerWidth]")
+    shown, share = tab.evaluate(
+        "[ripplePlayer.player.shown, ripplePlayer.player.canvas.width / innerWidth]"
+    )
     drawing = processor_time()
     tab.evaluate(f"() => {{ {DRAW} }}")
     drawing = 1e3 * (processor_time() - drawing) / DRAWINGS
@@ -66,7 +82,11 @@ def played(browser: Any, page: Path) -> tuple[float, float, float, float]:
 
 
 def main(pages: list[Path]) -> None:
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    chromium = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     results: dict[Path, list[tuple[float, ...]]] = {page: [] for page in pages}
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
@@ -77,7 +97,14 @@ def main(pages: list[Path]) -> None:
     for page, rounds in results.items():
         rates, spent, shares, drawing = np.array(rounds).T
         print(f"{page.name}: {rates.min():.1f} to {rates.max():.1f} frames a second,", end=" ")
-        print(f"{np.median(spent):.1f} ({spent.min():.1f} to {spent.max():.1f}) ms of processor time a frame,", end=" ")
+        print(
+            (
+                f"{np.median(spent):.1f} ({spent.min():.1f} to {spent.max():.1f}) ms of processor "
+                f"time "
+                f"a frame,"
+            ),
+            end=" ",
+        )
         print(f"drawn with {shares.min():.2f} of the pixels each way;", end=" ")
         print(f"drawing alone {np.median(drawing):.1f} ms")
 

@@ -2,12 +2,14 @@
 
     python examples/benchmarks/patches.py [MESH or FOLDER ...] [--arrival-sources 2]
 
-Without arguments: generated surfaces (sphere, torus, disk, hemisphere, a strip a hundred times as long as wide) and
-meshes that are shipped. Columns: triangles; parts, handles and rims; charts and texels along their sides at N = 128;
-folded texels at N = 48, 96 and 128; at N = 96 the area of the texel mesh over that of the mesh, texel areas at 0.1 %
-and 99.9 % over the median, and the stable time step over that of an even grid of as many texels; at N = 128 the seconds
-of processor time for the layout and for its texels, once compiled, and how many times quicker the cache is. With
-`--arrival-sources`, the error of the front's arrival against exact geodesics at N = 96, median and 90 %, in percent.
+Without arguments: generated surfaces (sphere, torus, disk, hemisphere, a strip a hundred times as
+long as wide) and meshes that are shipped. Columns: triangles; parts, handles and rims; charts and
+texels along their sides at N = 128; folded texels at N = 48, 96 and 128; at N = 96 the area of the
+texel mesh over that of the mesh, texel areas at 0.1 % and 99.9 % over the median, and the stable
+time step over that of an even grid of as many texels; at N = 128 the seconds of processor time for
+the layout and for its texels, once compiled, and how many times quicker the cache is. With
+`--arrival-sources`, the error of the front's arrival against exact geodesics at N = 96, median and
+90 %, in percent.
 """
 
 import argparse
@@ -28,24 +30,42 @@ from ripple_sim.solver.layouts.patches import atlas_from_patch_map, cells_for, p
 
 SHIPPED = ("pretzel", "duck", "limbed", "teapot")
 RESOLUTIONS = (48, 96, 128)
-HEAD = ("mesh", "triangles", "parts, handles, rims", "charts", "folded", "spanned", "areas", "step", "seconds", "cache")
+HEAD = (
+    "mesh",
+    "triangles",
+    "parts, handles, rims",
+    "charts",
+    "folded",
+    "spanned",
+    "areas",
+    "step",
+    "seconds",
+    "cache",
+)
 
 T = TypeVar("T")
 
 
 def grid(columns: int, rows: int, place: Callable) -> Mesh:
-    """Squares cut into triangles; place takes two arrays from 0 to 1 to x, y, z. Points in one place become one."""
+    """Squares cut into triangles; place takes two arrays from 0 to 1 to x, y, z.
+
+    Points in one place become one.
+    """
     a, b = np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows, indexing="ij")
     V = np.stack(np.broadcast_arrays(*place(a, b)), axis=-1).reshape(-1, 3)
     corner = np.arange(len(V)).reshape(columns + 1, rows + 1)
-    p, q, r, s = (each.ravel() for each in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]))
+    p, q, r, s = (
+        each.ravel()
+        for each in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
+    )
     F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
     merged = trimesh.Trimesh(V.round(12), F)  # without the triangles that are none
     return Mesh.from_arrays(merged.vertices, merged.faces[merged.nondegenerate_faces()])
 
 
 def generated() -> Iterator[tuple[str, Mesh]]:
-    turn, solid = 2 * np.pi, trimesh.creation.icosphere(4)
+    turn = 2 * np.pi
+    solid = trimesh.creation.icosphere(4)
     yield "sphere", Mesh.from_arrays(solid.vertices, solid.faces)
     yield (
         "torus",
@@ -78,7 +98,9 @@ def generated() -> Iterator[tuple[str, Mesh]]:
 
 
 def named(paths: list[Path]) -> Iterator[tuple[str, Mesh]]:
-    files = [each for path in paths for each in (sorted(path.rglob("*")) if path.is_dir() else [path])]
+    files = [
+        each for path in paths for each in (sorted(path.rglob("*")) if path.is_dir() else [path])
+    ]
     for file in files:
         if file.suffix.lower() in (".obj", ".off", ".ply", ".stl", ".glb"):
             yield file.stem, load_mesh(file)
@@ -97,8 +119,14 @@ def cached_seconds(mesh: Mesh) -> float:
 
 
 def arrival(atlas: Atlas, sources: int) -> str:
-    errors = [arrivals.arrival(atlas, source).error() for source in arrivals.spread_sources(atlas.mesh, sources)]
-    median, q90 = (100 * np.mean([getattr(each, name) for each in errors]) for name in ("front_median", "front_q90"))
+    errors = [
+        arrivals.arrival(atlas, source).error()
+        for source in arrivals.spread_sources(atlas.mesh, sources)
+    ]
+    median, q90 = (
+        100 * np.mean([getattr(each, name) for each in errors])
+        for name in ("front_median", "front_q90")
+    )
     return f"{median:.2f} / {q90:.2f}"
 
 
@@ -111,7 +139,11 @@ def cells_of_line(name: str, mesh: Mesh, sources: int) -> list[str]:
         folded.append(f"{quality['folded']}")
         if resolution == 96:
             low, high = np.quantile(atlas.areas / np.median(atlas.areas), [0.001, 0.999])
-            shape = [f"{quality['spanned']:.3f}", f"{low:.2f} / {high:.1f}", f"{quality['timestep']:.2f}"]
+            shape = [
+                f"{quality['spanned']:.3f}",
+                f"{low:.2f} / {high:.1f}",
+                f"{quality['timestep']:.2f}",
+            ]
             front = [arrival(atlas, sources)] if sources else []
     topology = f"{mesh.components.max() + 1}, {int(mesh.genus.sum())}, {len(mesh.rims)}"
     charts = f"{atlas.areas.shape[0]} x {atlas.areas.shape[1]}^2"
@@ -125,7 +157,9 @@ def row(entries: list[str]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("meshes", nargs="*", type=Path, help="files, or folders of them")
     parser.add_argument("--arrival-sources", type=int, default=0)
     args = parser.parse_args()

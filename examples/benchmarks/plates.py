@@ -2,9 +2,10 @@
 
     python examples/benchmarks/plates.py [--resolutions 32 64] [--cost]
 
-Square plates on patches with each kind of rim, in the units of the tables that they are compared with, and a round one
-whose texels lie on the true disk. lambda^2 is the angular frequency times side^2 (radius^2) over sqrt(D / sigma).
-With --cost: time of a step beside that of the same plate without rims of its own, which is "fixed".
+Square plates on patches with each kind of rim, in the units of the tables that they are compared
+with, and a round one whose texels lie on the true disk. lambda^2 is the angular frequency times
+side^2 (radius^2) over sqrt(D / sigma). With --cost: time of a step beside that of the same plate
+without rims of its own, which is "fixed".
 """
 
 import argparse
@@ -65,7 +66,12 @@ def atlas_of(plate: Plate, resolution: int) -> Atlas:
 
 def frequencies(plate: Plate, atlas: Atlas) -> np.ndarray:
     """The lowest modes, in the table's unit."""
-    return modes(atlas, plate.material, len(plate.table), rim=plate.rim).frequencies * 2 * np.pi / plate.unit
+    return (
+        modes(atlas, plate.material, len(plate.table), rim=plate.rim).frequencies
+        * 2
+        * np.pi
+        / plate.unit
+    )
 
 
 def row(name: str, values: np.ndarray, digits: int) -> str:
@@ -86,7 +92,10 @@ def print_cost(resolution: int) -> None:
     for rim in rims[1:]:
         steps = solvers["fixed"].stable_timestep / solvers[rim].stable_timestep
         cost = least[rim] / least["fixed"]
-        print(f"N = {resolution}, {rim}: a step takes {cost:.2f} times as long, a second {cost * steps:.2f} times")
+        print(
+            f"N = {resolution}, {rim}: a step takes {cost:.2f} times as long, a second "
+            f"{cost * steps:.2f} times"
+        )
 
 
 def main() -> None:

@@ -2,8 +2,9 @@
 
     python examples/benchmarks/pulsating_sphere.py
 
-All of a sphere of radius R swings with a velocity v. Its pressure at a distance r is rho c v (R / r) k R / sqrt(1 + (k
-R)^2), with k the wave number in air. Rayleigh's integral takes each texel that is faced for a part of a plane wall.
+All of a sphere of radius R swings with a velocity v. Its pressure at a distance r is rho c v (R /
+r) k R / sqrt(1 + (k R)^2), with k the wave number in air. Rayleigh's integral takes each texel that
+is faced for a part of a plane wall.
 """
 
 import numpy as np
@@ -22,9 +23,12 @@ def level(size: float, distance: float) -> float:
     """Level heard over the closed form's [dB], for k R and for r / R."""
     atlas = sphere_atlas(RADIUS, 24)
     swing = size * SPEED / RADIUS
-    waves = WaveSolver(atlas, Material(speed=1e-3, stiffness=swing**2), backend="cpu", conserve_volume=False)
+    waves = WaveSolver(
+        atlas, Material(speed=1e-3, stiffness=swing**2), backend="cpu", conserve_volume=False
+    )
     waves.velocity = VELOCITY
-    step, late = 1e-3, distance * RADIUS / SPEED
+    step = 1e-3
+    late = distance * RADIUS / SPEED
     duration = PERIODS * 2 * np.pi / swing
     ear = Ear(waves, step)
     ear.stand(waves, RADIUS * distance * np.array([0.48, 0.6, 0.64]))
@@ -42,7 +46,12 @@ def main() -> None:
     """Print a table."""
     print("k R     " + "".join(f"{size:>8}" for size in SIZES))
     for distance in DISTANCES:
-        print(f"r = {distance:<2} R" + "".join(f"{level(size, distance):+8.1f}" for size in SIZES) + "  dB", flush=True)
+        print(
+            f"r = {distance:<2} R"
+            + "".join(f"{level(size, distance):+8.1f}" for size in SIZES)
+            + "  dB",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

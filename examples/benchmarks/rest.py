@@ -2,8 +2,8 @@
 
     python examples/benchmarks/rest.py
 
-Each case runs with the filter and without it on the same physics, and the velocities of the two surfaces are compared
-(root of the mean square over the mass).
+Each case runs with the filter and without it on the same physics, and the velocities of the two
+surfaces are compared (root of the mean square over the mass).
 """
 
 import mujoco
@@ -31,7 +31,10 @@ BODIES = {
 
 def model_of(target: str, bodies: str, dt: float, solref: str = "0.02 1") -> mujoco.MjModel:
     V, F = limbed(0.03)
-    mesh = f'<mesh name="animal" vertex="{" ".join(map(str, V.ravel()))}" face="{" ".join(map(str, F.ravel()))}"/>'
+    mesh = (
+        f'<mesh name="animal" vertex="{" ".join(map(str, V.ravel()))}" '
+        f'face="{" ".join(map(str, F.ravel()))}"/>'
+    )
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{dt}" sdf_initpoints="10"/>
         <default><geom solref="{solref}" friction="1 0.05 0.05" condim="6"/></default><asset>{mesh}</asset>
@@ -46,7 +49,8 @@ def velocity(waves: WaveSolver) -> float:
 
 def run(model: mujoco.MjModel, seconds: float, act=lambda data: None) -> np.ndarray:
     """Velocities with the filter and without [m/s], [steps, 2]; `act` is called before each step."""
-    data, dt = mujoco.MjData(model), model.opt.timestep
+    data = mujoco.MjData(model)
+    dt = model.opt.timestep
     options = {"backend": "cpu", "conserve_volume": False}
     ripples = Ripples(model, {"target": MATERIAL}, resolution=24, **options)
     unfiltered = WaveSolver(ripples["target"].atlas, MATERIAL, **options)
@@ -65,7 +69,10 @@ def run(model: mujoco.MjModel, seconds: float, act=lambda data: None) -> np.ndar
 
 
 def noise() -> None:
-    print("velocity 5 s after a body has fallen from 0.2 m, over the highest: without the filter, with it")
+    print(
+        "velocity 5 s after a body has fallen from 0.2 m, over the highest: without the filter, "
+        "with it"
+    )
     for target, body, solref, dt in (
         ("sphere", "ball", "0.02 1", 0.002),
         ("sphere", "ball", "0.01 0.2", 0.002),
@@ -78,11 +85,20 @@ def noise() -> None:
         ("sdf", "capsule", "0.02 1", 0.002),
         ("sdf", "cylinder", "0.02 1", 0.002),
     ):
-        place = f'<body pos="0 0 {TARGETS[target][1] + 0.2}"><freejoint/><geom {BODIES[body]} mass="0.5"/></body>'
+        place = (
+            f'<body pos="0 0 {TARGETS[target][1] + 0.2}"><freejoint/><geom {BODIES[body]} '
+            f'mass="0.5"/></body>'
+        )
         history = run(model_of(target, place, dt, solref), 5.0)
-        filtered, unfiltered = np.sqrt((history[-round(0.5 / dt) :] ** 2).mean(axis=0)) / history.max(axis=0)
+        filtered, unfiltered = np.sqrt(
+            (history[-round(0.5 / dt) :] ** 2).mean(axis=0)
+        ) / history.max(axis=0)
         print(
-            f"{body:9}on {target:7} solref {solref:9} dt {1e3 * dt:3g} ms {unfiltered:9.2%} {filtered:9.3%}", flush=True
+            (
+                f"{body:9}on {target:7} solref {solref:9} dt {1e3 * dt:3g} ms {unfiltered:9.2%} "
+                f"{filtered:9.3%}"
+            ),
+            flush=True,
         )
 
 
@@ -94,12 +110,14 @@ def hit(target: str, rest: float, mass: float, speed: float, off: float) -> floa
         <body name="hammer" pos="{off} 0 {top + 0.5}" gravcomp="1"><joint name="hammer" type="slide" axis="0 0 1"/>
         <geom size="0.03" mass="{mass}" contype="2" conaffinity="2"/></body>"""
     model = model_of(target, bodies, 0.002)
-    joint, struck = model.joint("hammer"), []
+    joint = model.joint("hammer")
+    struck = []
 
     def strike(data: mujoco.MjData) -> None:
         if data.time >= rest and not struck:
             above = data.body("block").xpos[2] + 0.04 + 0.03 + 0.002
-            data.qpos[joint.qposadr], data.qvel[joint.dofadr] = above - model.body("hammer").pos[2], -speed
+            data.qpos[joint.qposadr] = above - model.body("hammer").pos[2]
+            data.qvel[joint.dofadr] = -speed
             struck.append(True)
 
     filtered, unfiltered = run(model, rest + 0.2, strike)[round(rest / 0.002) :].max(axis=0)
@@ -108,7 +126,11 @@ def hit(target: str, rest: float, mass: float, speed: float, off: float) -> floa
 
 def hits() -> None:
     rests = (0.05, 0.2, 1.0, 3.0, 10.0)
-    print("\na hammer strikes a block after a rest of", *rests, "s: velocity over that without the filter")
+    print(
+        "\na hammer strikes a block after a rest of",
+        *rests,
+        "s: velocity over that without the filter",
+    )
     for target, off, mass, speed in (
         ("box", 0.0, 1.0, 3.0),
         ("box", 0.03, 1.0, 3.0),
@@ -121,7 +143,10 @@ def hits() -> None:
 
 
 def driving() -> None:
-    print("\na rod pushed with 0.8 of its weight, in unbroken contact for 6 s: velocity over that without the filter")
+    print(
+        "\na rod pushed with 0.8 of its weight, in unbroken contact for 6 s: velocity over that "
+        "without the filter"
+    )
     for target in TARGETS:
         rod = f"""<body pos="0 0 {TARGETS[target][1] + 0.06}"><joint name="rod" type="slide" axis="0 0 1"/>
             <geom type="capsule" size="0.03 0.03" mass="1"/></body>"""

@@ -1,10 +1,12 @@
 """Is a render that is killed again and again the same as an unbroken one? Tried on the program itself.
 
-    python examples/benchmarks/resume.py [SCENE] [--kills 20] [--step 1] [--output clip.mp4] [-- OPTIONS OF render]
+    python examples/benchmarks/resume.py [SCENE] [--kills 20] [--step 1] [--output clip.mp4] [--
+    OPTIONS OF render]
 
-`ripple-sim render SCENE -o FILE --resume` is started and killed (SIGKILL) at random moments as often as asked: within
-seconds of its start, or of the next clip or picture that it has stored (the `--step`th at the latest). Then it is left
-to finish, and compared byte for byte with the video of a run that was left alone.
+`ripple-sim render SCENE -o FILE --resume` is started and killed (SIGKILL) at random moments as
+often as asked: within seconds of its start, or of the next clip or picture that it has stored (the
+`--step`th at the latest). Then it is left to finish, and compared byte for byte with the video of a
+run that was left alone.
 """
 
 import argparse
@@ -18,7 +20,17 @@ from pathlib import Path
 
 
 def start(scene: str, output: Path, options: list[str]) -> subprocess.Popen:
-    command = [sys.executable, "-m", "ripple_sim", "render", scene, "-o", output, "--resume", *options]
+    command = [
+        sys.executable,
+        "-m",
+        "ripple_sim",
+        "render",
+        scene,
+        "-o",
+        output,
+        "--resume",
+        *options,
+    ]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
@@ -36,16 +48,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Kills a render, resumes it, and compares.")
     parser.add_argument("scene", nargs="?", default="sphere")
     parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--step", type=int, default=1, help="stored clips or pictures between kills, at most")
+    parser.add_argument(
+        "--step", type=int, default=1, help="stored clips or pictures between kills, at most"
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", default="clip.mp4", help="name of the video; its ending chooses the format")
+    parser.add_argument(
+        "--output", default="clip.mp4", help="name of the video; its ending chooses the format"
+    )
     arguments = sys.argv[1:]
     cut = arguments.index("--") if "--" in arguments else len(arguments)
-    options, passed = parser.parse_args(arguments[:cut]), arguments[cut + 1 :]
+    options = parser.parse_args(arguments[:cut])
+    passed = arguments[cut + 1 :]
     chance = random.Random(options.seed)
 
     with tempfile.TemporaryDirectory() as folder:
-        whole, broken = Path(folder) / "whole" / options.output, Path(folder) / "broken" / options.output
+        whole = Path(folder) / "whole" / options.output
+        broken = Path(folder) / "broken" / options.output
         process = start(options.scene, whole, passed)
         said = process.communicate()[0]
         if process.returncode:
@@ -64,7 +82,11 @@ def main() -> None:
         process = start(options.scene, broken, passed)
         print(process.communicate()[0].splitlines()[0])
         left = sorted(path.name for path in broken.parent.iterdir())
-        same = process.returncode == 0 and contents(whole) == contents(broken) and left == [broken.name]
+        same = (
+            process.returncode == 0
+            and contents(whole) == contents(broken)
+            and left == [broken.name]
+        )
     print("identical" if same else "DIFFERENT")
     sys.exit(not same)
 

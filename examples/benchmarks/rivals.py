@@ -2,11 +2,12 @@
 
     python examples/benchmarks/rivals.py [--resolutions 128,256,512]
 
-The naive loop is the nine-point stencil over charts with halo, as a competent user of numba writes it first, in one
-thread or, with `prange`, in all: it has the solver's own weights, and no tuning. This is the rival that counts, since
-anyone has it in a quarter of an hour. SciPy's sparse matrix, in one thread, is what one would write in an afternoon.
-The plain compute shader has one thread a texel, everything in storage buffers, no tiles and nothing packed. All take
-turns, so that a busy machine slows all alike; rates are texel updates a second, in millions.
+The naive loop is the nine-point stencil over charts with halo, as a competent user of numba writes
+it first, in one thread or, with `prange`, in all: it has the solver's own weights, and no tuning.
+This is the rival that counts, since anyone has it in a quarter of an hour. SciPy's sparse matrix,
+in one thread, is what one would write in an afternoon. The plain compute shader has one thread a
+texel, everything in storage buffers, no tiles and nothing packed. All take turns, so that a busy
+machine slows all alike; rates are texel updates a second, in millions.
 """
 
 import argparse
@@ -35,7 +36,8 @@ class NaiveLoop:
         self._gain = (1 / operator.mass).astype(np.float32)
         _, self._halo, self._source = operator.topology.addresses
         self._h = np.zeros((6, n + 2, n + 2), np.float32)
-        self._h_next, self._v = np.zeros_like(self._h), np.zeros((6, n, n), np.float32)
+        self._h_next = np.zeros_like(self._h)
+        self._v = np.zeros((6, n, n), np.float32)
         self._update = _update_parallel if parallel else _update
 
     def set_height(self, height: Floats32) -> None:
@@ -75,13 +77,18 @@ class Fields(NamedTuple):
 def _update_row(fields: Fields, dt: np.float32, i: int) -> None:
     w, h, h_next, v, gain = fields
     n = v.shape[1]
-    f, r = i // n, i % n + 1
+    f = i // n
+    r = i % n + 1
     for c in range(1, n + 1):
         x = h[f, r, c]
         force = w[f, 0, r, c] * (h[f, r, c + 1] - x) + w[f, 0, r, c - 1] * (h[f, r, c - 1] - x)
         force += w[f, 1, r, c] * (h[f, r + 1, c] - x) + w[f, 1, r - 1, c] * (h[f, r - 1, c] - x)
-        force += w[f, 2, r, c] * (h[f, r + 1, c + 1] - x) + w[f, 2, r - 1, c - 1] * (h[f, r - 1, c - 1] - x)
-        force += w[f, 3, r, c - 1] * (h[f, r + 1, c - 1] - x) + w[f, 3, r - 1, c] * (h[f, r - 1, c + 1] - x)
+        force += w[f, 2, r, c] * (h[f, r + 1, c + 1] - x) + w[f, 2, r - 1, c - 1] * (
+            h[f, r - 1, c - 1] - x
+        )
+        force += w[f, 3, r, c - 1] * (h[f, r + 1, c - 1] - x) + w[f, 3, r - 1, c] * (
+            h[f, r - 1, c + 1] - x
+        )
         v[f, r - 1, c - 1] += dt * gain[f, r - 1, c - 1] * force
         h_next[f, r, c] = x + dt * v[f, r - 1, c - 1]
 
@@ -123,7 +130,9 @@ class PlainShader:
         self._n = n = operator.mass.shape[1]
         _, ghosts, sources = operator.topology.addresses
         with self._gl as ctx:
-            self._h, self._h_next, self._v = (ctx.buffer(reserve=4 * 6 * (n + 2) ** 2) for _ in range(3))
+            self._h, self._h_next, self._v = (
+                ctx.buffer(reserve=4 * 6 * (n + 2) ** 2) for _ in range(3)
+            )
             for buffer in (self._h, self._h_next, self._v):
                 buffer.clear()
             self._stencil = ctx.buffer(operator.stencil.weights.astype(np.float32).tobytes())
@@ -131,7 +140,8 @@ class PlainShader:
             self._pairs = ctx.buffer(np.stack([ghosts, sources], axis=1).astype(np.int32).tobytes())
             version = "#version 430\n"
             update = UPDATE.read_text().replace(version, f"{version}#define N {n}\n")
-            self._update, self._halo = ctx.compute_shader(update), ctx.compute_shader(_HALO)
+            self._update = ctx.compute_shader(update)
+            self._halo = ctx.compute_shader(_HALO)
         self._count = len(ghosts)
 
     def set_height(self, height: Floats32) -> None:
@@ -144,13 +154,16 @@ class PlainShader:
         """Height [m] and velocity [m/s], [C, n, n]."""
         shape = (6, self._n + 2, self._n + 2)
         with self._gl:
-            h, v = (np.frombuffer(each.read(), np.float32).reshape(shape) for each in (self._h, self._v))
+            h, v = (
+                np.frombuffer(each.read(), np.float32).reshape(shape) for each in (self._h, self._v)
+            )
         return h[:, 1:-1, 1:-1].copy(), v[:, 1:-1, 1:-1].copy()
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take substeps, and wait for them."""
         with self._gl as ctx:
-            self._update["dt"], self._halo["count"] = dt, self._count
+            self._halo["count"] = self._count
+            self._update["dt"] = dt
             for _ in range(substeps):
                 self._h.bind_to_storage_buffer(0)
                 self._pairs.bind_to_storage_buffer(1)
@@ -171,7 +184,9 @@ class SparseLeapfrog:
     def __init__(self, operator: WaveOperator) -> None:
         self._shape = operator.mass.shape
         self._matrix = (
-            (diags_array(-1 / operator.mass.ravel()) @ stiffness_matrix(operator.stencil)).tocsr().astype(np.float32)
+            (diags_array(-1 / operator.mass.ravel()) @ stiffness_matrix(operator.stencil))
+            .tocsr()
+            .astype(np.float32)
         )
         self._h, self._v = np.zeros((2, operator.mass.size), np.float32)
 
@@ -202,7 +217,10 @@ def rates(resolution: int) -> tuple[list[str], list[str]]:
         "stream": memory_stream(memory_fields(texels), texels, 1),
     }
     try:
-        contestants |= {"gl": backend_advance("gl", operator), "plain": PlainShader(operator).advance}
+        contestants |= {
+            "gl": backend_advance("gl", operator),
+            "plain": PlainShader(operator).advance,
+        }
     except GLError as error:
         print(error)
     seconds = race(contestants)
@@ -214,14 +232,23 @@ def rates(resolution: int) -> tuple[list[str], list[str]]:
         return f"{np.median(seconds[rival] / seconds[name]):.2f}" if name in seconds else ""
 
     ratios = [over("cpu", name) for name in ("naive", "prange", "scipy", "stream")]
-    processor = [f"{resolution}", rate("cpu"), *ratios, *map(rate, ("naive", "prange", "scipy", "stream"))]
+    processor = [
+        f"{resolution}",
+        rate("cpu"),
+        *ratios,
+        *map(rate, ("naive", "prange", "scipy", "stream")),
+    ]
     return processor, [f"{resolution}", over("gl", "plain"), rate("gl"), rate("plain")]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="The wave step against loops that one would write oneself.")
+    parser = argparse.ArgumentParser(
+        description="The wave step against loops that one would write oneself."
+    )
     parser.add_argument("--resolutions", default="128,256,512")
-    processor, opengl = zip(*(rates(int(n)) for n in parser.parse_args().resolutions.split(",")), strict=True)
+    processor, opengl = zip(
+        *(rates(int(n)) for n in parser.parse_args().resolutions.split(",")), strict=True
+    )
     names = ["naive loop", "prange", "scipy", "memory, one thread"]
     print(table(["N", "ripple-sim", *(f"over {name}" for name in names), *names], processor))
     print("\n" + table(["N", "over plain shader", "ripple-sim, OpenGL", "plain shader"], opengl))

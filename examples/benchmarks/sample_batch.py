@@ -5,7 +5,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-SMALL = 'size = [64, 64]\nduration = 0.5\nresolution = 32\nheights = true\npasses = ["depth", "flow"]\n'
+SMALL = (
+    'size = [64, 64]\nduration = 0.5\nresolution = 32\nheights = true\npasses = ["depth", "flow"]\n'
+)
 
 PLAN = """
 scenes = {scenes}
@@ -20,7 +22,9 @@ fps = 24
 
 def write_plan(path: Path, scenes: Sequence[str], count: int, store: str = SMALL) -> Path:
     """Write a plan; `store` is what stands under [store] beside the rate. Return the path."""
-    path.write_text(PLAN.format(scenes=str(list(scenes)).replace("'", '"'), count=count, store=store))
+    path.write_text(
+        PLAN.format(scenes=str(list(scenes)).replace("'", '"'), count=count, store=store)
+    )
     return path
 
 

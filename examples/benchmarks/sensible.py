@@ -34,7 +34,9 @@ def mesh_under_ball(path: str, mass: float) -> mujoco.MjModel:
 
 def run(case: str, model: mujoco.MjModel, material: Material, seconds: float) -> None:
     """Print a row: the greatest height, the material, and whether a warning was given."""
-    ripples, data, top = Ripples(model, {"target": material}, resolution=64, backend="cpu"), mujoco.MjData(model), 0.0
+    ripples = Ripples(model, {"target": material}, resolution=64, backend="cpu")
+    data = mujoco.MjData(model)
+    top = 0.0
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         while data.time < seconds:
@@ -42,15 +44,21 @@ def run(case: str, model: mujoco.MjModel, material: Material, seconds: float) ->
             ripples.step(data)
             top = max(top, float(np.abs(ripples["target"].height).max()))
     m = ripples["target"].material
-    chosen = ", ".join(f"{getattr(m, name):.3g}" for name in ("speed", "damping", "stiffness", "density"))
+    chosen = ", ".join(
+        f"{getattr(m, name):.3g}" for name in ("speed", "damping", "stiffness", "density")
+    )
     print(f"| {case} | {chosen} | {top:.2g} m | {'yes' if caught else 'no'} |", flush=True)
 
 
 def main() -> None:
-    print("| case | speed, damping, stiffness, density | highest | warned |\n| --- | --- | --- | --- |")
+    print(
+        "| case | speed, damping, stiffness, density | highest | warned |\n| --- | --- | --- | --- "
+        "|"
+    )
     free = Material(speed=1.0, damping=0.0, stiffness=0.0, density=1.0)
     slow = dataclasses.replace(free, speed=0.6, damping=1.0)
-    light, heavy = mesh_under_ball(sys.argv[1], 0.36), mesh_under_ball(sys.argv[1], 1.7)
+    light = mesh_under_ball(sys.argv[1], 0.36)
+    heavy = mesh_under_ball(sys.argv[1], 1.7)
     for name, before, after in (
         ("`Material()`", free, Material()),
         ("`Material(speed=0.6, damping=1.0)`", slow, Material(speed=0.6, damping=1.0)),
@@ -61,7 +69,12 @@ def main() -> None:
     run("box of 20 kg at rest, `Material()`, before", box, free, 3.0)
     run("box of 20 kg at rest, `Material()`, now", box, Material(), 3.0)
     run("ball of 1.7 kg, `Material.jelly()`", heavy, Material.jelly(), 1.3)
-    run("ball of 1.7 kg, `Material.suited(1.0, (1.7, 4.5))`", heavy, Material.suited(1.0, (1.7, 4.5)), 1.3)
+    run(
+        "ball of 1.7 kg, `Material.suited(1.0, (1.7, 4.5))`",
+        heavy,
+        Material.suited(1.0, (1.7, 4.5)),
+        1.3,
+    )
 
 
 if __name__ == "__main__":

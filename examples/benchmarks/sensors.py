@@ -17,14 +17,19 @@ from ripple_sim.scene import load_scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.sound import Microphone
 
-FRAMES, SOUND = 240, 0.5  # [s]
+# [s]
+FRAMES = 240
+SOUND = 0.5
 
 
 def add_sensors(simulation: Simulation) -> None:
     """Eight points of the drum's skin, at random."""
-    waves, rng = simulation.ripples["skin"], np.random.default_rng(0)
+    waves = simulation.ripples["skin"]
+    rng = np.random.default_rng(0)
     chosen = rng.choice(waves.atlas.areas.size, 8, replace=False)
-    simulation.sensors["skin"] = waves.sensor(waves.atlas.positions.reshape(-1, 3)[chosen], rate=2000)
+    simulation.sensors["skin"] = waves.sensor(
+        waves.atlas.positions.reshape(-1, 3)[chosen], rate=2000
+    )
 
 
 BOARD = """
@@ -44,8 +49,11 @@ BANDS = (100, 500, 1000, 5000)  # [Hz]
 def levels(pulse: str) -> list[float]:
     """Levels of an accelerometer's signal in these bands [dB re 1 m/s^2], of a steel ball on a wooden board."""
     model = mujoco.MjModel.from_xml_string(BOARD)
-    data, board = mujoco.MjData(model), Material(speed=200.0, density=5.0, damping=100.0)
-    ripples = Ripples(model, {"board": board}, resolution=24, backend="cpu", pulse=pulse, modulus=1e9)
+    data = mujoco.MjData(model)
+    board = Material(speed=200.0, density=5.0, damping=100.0)
+    ripples = Ripples(
+        model, {"board": board}, resolution=24, backend="cpu", pulse=pulse, modulus=1e9
+    )
     sensor = ripples["board"].sensor([0.1, 0.05, 0.01], rate=16_000)
     ripples.mj_step(data, nstep=400)
     samples = sensor.read().values[:, 0]
@@ -67,7 +75,10 @@ def main() -> None:
         runs[1].sensors["skin"].read()
         seconds[2].append((time.process_time() - begun) / runs[1].steps_per_frame)
     plain, measured, read = (1e3 * np.median(each) for each in seconds)
-    print(f"drum: a step {plain:.3f} ms, with eight points {measured:.3f} ms, and {read:.3f} ms more with reading")
+    print(
+        f"drum: a step {plain:.3f} ms, with eight points {measured:.3f} ms, and {read:.3f} ms more "
+        f"with reading"
+    )
 
     drums = Simulation(load_scene("drums"), fps=60, backend="cpu")
     drums.advance_frame()
@@ -83,7 +94,10 @@ def main() -> None:
         if microphone is not None:
             microphone.pressure(SOUND)
         taken.append((time.process_time() - begun) / SOUND)
-    print(f"drums: {taken[0]:.1f} s of processor time a second of the scene, {taken[1]:.1f} s with sound")
+    print(
+        f"drums: {taken[0]:.1f} s of processor time a second of the scene, {taken[1]:.1f} s with "
+        f"sound"
+    )
 
     for pulse in ("contact", "hertz"):
         told = (

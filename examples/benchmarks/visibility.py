@@ -2,9 +2,9 @@
 
     python examples/benchmarks/visibility.py
 
-A ball of half a metre with waves of 5 mm from crest to trough and 6 cm long, under the headlight and one more lamp. The
-measure is the standard deviation of what the waves change in the middle of the ball, over the brightness there, both on
-the screen.
+A ball of half a metre with waves of 5 mm from crest to trough and 6 cm long, under the headlight
+and one more lamp. The measure is the standard deviation of what the waves change in the middle of
+the ball, over the brightness there, both on the screen.
 """
 
 import concurrent.futures
@@ -17,14 +17,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 SIZE = (320, 240)
-RADIUS, AMPLITUDE, LENGTH = 0.25, 0.0025, 0.06  # [m]
-LOOKAT, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.28), 1.6, 60.0, -25.0
+# [m]
+RADIUS = 0.25
+AMPLITUDE = 0.0025
+LENGTH = 0.06
+LOOKAT = (0.0, 0.0, 0.28)
+DISTANCE = 1.6
+AZIMUTH = 60.0
+ELEVATION = -25.0
 SUN = '<light directional="true" pos="1 -1 3" dir="-.3 .4 -1"/>'
-GEOM = '<geom name="ball" pos="0 0 .28" rgba=".8 .5 .3 1" {}/><geom type="plane" size="4 4 .1" rgba="{} 1"/>'
-BRIGHT, DARK = ".8 .8 .8", ".1 .1 .1"  # of the floor
+GEOM = (
+    '<geom name="ball" pos="0 0 .28" rgba=".8 .5 .3 1" {}/><geom type="plane" size="4 4 .1" '
+    'rgba="{} 1"/>'
+)
+# of the floor
+BRIGHT = ".8 .8 .8"
+DARK = ".1 .1 .1"
 BALL = f'type="sphere" size="{RADIUS}"'
 MJCF = "<mujoco><visual>{}</visual><asset>{}</asset><worldbody>{}{}</worldbody></mujoco>"
-WEAK, OFF = '<headlight diffuse=".15 .15 .15"/>', '<headlight active="0"/>'
+WEAK = '<headlight diffuse=".15 .15 .15"/>'
+OFF = '<headlight active="0"/>'
 
 
 def heights(points: NDArray) -> NDArray:
@@ -52,13 +64,19 @@ def theirs(headlight: str) -> float:
     for height in (0.0 * ball.vertices[:, 0], heights(ball.vertices)):
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "ball.obj"
-            trimesh.Trimesh(ball.vertices * (1 + height[:, None] / RADIUS), ball.faces, process=False).export(file)
-            asset, geom = f'<mesh name="ball" file="{file}"/>', GEOM.format('type="mesh" mesh="ball"', BRIGHT)
+            trimesh.Trimesh(
+                ball.vertices * (1 + height[:, None] / RADIUS), ball.faces, process=False
+            ).export(file)
+            asset = f'<mesh name="ball" file="{file}"/>'
+            geom = GEOM.format('type="mesh" mesh="ball"', BRIGHT)
             model = mujoco.MjModel.from_xml_string(MJCF.format(headlight, asset, SUN, geom))
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         camera = mujoco.MjvCamera()
-        camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = LOOKAT, DISTANCE, AZIMUTH, ELEVATION
+        camera.lookat[:] = LOOKAT
+        camera.distance = DISTANCE
+        camera.azimuth = AZIMUTH
+        camera.elevation = ELEVATION
         with mujoco.Renderer(model, SIZE[1], SIZE[0]) as renderer:
             renderer.update_scene(data, camera)
             frames.append(renderer.render().copy())
@@ -76,7 +94,9 @@ def ours(headlight: str, look: str, lighting: str = "model", floor: str = BRIGHT
     from ripple_sim.solver import HeightMap, sphere_atlas
     from ripple_sim.solver.gl import shared_context
 
-    model = mujoco.MjModel.from_xml_string(MJCF.format(headlight, "", SUN, GEOM.format(BALL, floor)))
+    model = mujoco.MjModel.from_xml_string(
+        MJCF.format(headlight, "", SUN, GEOM.format(BALL, floor))
+    )
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     atlas = sphere_atlas(RADIUS, 128)
@@ -84,14 +104,23 @@ def ours(headlight: str, look: str, lighting: str = "model", floor: str = BRIGHT
     height_map = HeightMap(atlas.texels)(heights(atlas.positions).astype(np.float32))
     camera = Camera(LOOKAT, DISTANCE, AZIMUTH, ELEVATION)
     with Renderer(shared_context(), model, {0: surface}, size=SIZE, lighting=lighting) as renderer:
-        return contrast(*(renderer.render(data, maps, camera).copy() for maps in ({}, {0: height_map})))
+        return contrast(
+            *(renderer.render(data, maps, camera).copy() for maps in ({}, {0: height_map}))
+        )
 
 
 def main() -> None:
     spawn = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=spawn) as process:
-        for name, headlight in (("headlight as by default", ""), ("headlight 0.15", WEAK), ("no headlight", OFF)):
-            print(f"{name:24}  mujoco.Renderer {process.submit(theirs, headlight).result():.3f}", flush=True)
+        for name, headlight in (
+            ("headlight as by default", ""),
+            ("headlight 0.15", WEAK),
+            ("no headlight", OFF),
+        ):
+            print(
+                f"{name:24}  mujoco.Renderer {process.submit(theirs, headlight).result():.3f}",
+                flush=True,
+            )
             for look in ("model", "rubber", "metal"):
                 print(f"{name:24}  {look:15} {ours(headlight, look):.3f}", flush=True)
     print(f"{'dark floor':24}  {'model':15} {ours('', 'model', floor=DARK):.3f}", flush=True)

@@ -2,11 +2,12 @@
 
     python examples/benchmarks/waveforms.py [MESH ...] [--resolution 64] [--width 8]
 
-A bump so many texels wide, the deviation of a Gaussian, is let go at a vertex, and its wave followed until it has
-passed the farthest one; five receivers lie at equal shares of the area. The elements are linear with lumped masses,
-with two vertices or more in a texel's width; texels are in the cube layout where a mesh fits it. Columns: the layout,
-how far the receiver is from the source along the surface, in widths of the bump, the correlation of the two waveforms
-over the whole time, and their difference over the elements' in the L2 norm.
+A bump so many texels wide, the deviation of a Gaussian, is let go at a vertex, and its wave
+followed until it has passed the farthest one; five receivers lie at equal shares of the area. The
+elements are linear with lumped masses, with two vertices or more in a texel's width; texels are in
+the cube layout where a mesh fits it. Columns: the layout, how far the receiver is from the source
+along the surface, in widths of the bump, the correlation of the two waveforms over the whole time,
+and their difference over the elements' in the L2 norm.
 """
 
 import argparse
@@ -27,7 +28,10 @@ from arrival import (
 from ripple_sim.bench import table
 from ripple_sim.solver import Mesh, load_mesh
 
-MESHES = [Path(__file__).parents[2] / "scenes" / "meshes" / f"{name}.obj" for name in ("limbed", "pretzel")]
+MESHES = [
+    Path(__file__).parents[2] / "scenes" / "meshes" / f"{name}.obj"
+    for name in ("limbed", "pretzel")
+]
 RECEIVERS = 5
 
 
@@ -44,7 +48,15 @@ def rows(name: str, mesh: Mesh, resolution: int, texels: float) -> list[list[str
     for vertex, wave, reference in zip(receivers, ours.T, exact[:, receivers].T, strict=True):
         correlation = np.corrcoef(wave, reference)[0, 1]
         off = np.linalg.norm(wave - reference) / np.linalg.norm(reference)
-        found.append([name, atlas.layout, f"{distance[vertex] / width:.1f}", f"{correlation:.4f}", f"{off:.1%}"])
+        found.append(
+            [
+                name,
+                atlas.layout,
+                f"{distance[vertex] / width:.1f}",
+                f"{correlation:.4f}",
+                f"{off:.1%}",
+            ]
+        )
     return found
 
 
@@ -52,10 +64,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Waveforms against finite elements.")
     parser.add_argument("meshes", type=Path, nargs="*", default=MESHES)
     parser.add_argument("--resolution", type=int, default=64)
-    parser.add_argument("--width", type=float, default=8.0, help="of the bump, in texels of an even grid")
+    parser.add_argument(
+        "--width", type=float, default=8.0, help="of the bump, in texels of an even grid"
+    )
     options = parser.parse_args()
     found = [
-        row for path in options.meshes for row in rows(path.stem, load_mesh(path), options.resolution, options.width)
+        row
+        for path in options.meshes
+        for row in rows(path.stem, load_mesh(path), options.resolution, options.width)
     ]
     print(table(["mesh", "layout", "distance", "correlation", "L2"], found))
 

@@ -16,13 +16,28 @@ RESOLUTION = 96
 
 def make(folder: Path) -> Part:
     mesh = load_mesh(LIMBED_FILE)
-    pictures, rows = [], [["sphere map", "folds", "widest 0.1 % of the area", "starved area", "covered"]]
+    pictures = []
+    rows = [["sphere map", "folds", "widest 0.1 % of the area", "starved area", "covered"]]
     for method, words in (("conformal", "as in the paper"), ("progressive", "ours")):
         atlas = build_atlas(mesh, RESOLUTION, method=method, layout="cube")
         file = folder / f"figure_2_{method}.png"
-        plot_atlas(atlas, file, title=f"{method}, {words}", subtitle=f"6 x {RESOLUTION} x {RESOLUTION} texels", up="z")
+        plot_atlas(
+            atlas,
+            file,
+            title=f"{method}, {words}",
+            subtitle=f"6 x {RESOLUTION} x {RESOLUTION} texels",
+            up="z",
+        )
         figures = atlas.quality()
-        pictures.append((file, f"{method.capitalize()}: blue texels are finer than an even spread, red ones coarser."))
+        pictures.append(
+            (
+                file,
+                (
+                    f"{method.capitalize()}: blue texels are finer than an even spread, red ones "
+                    f"coarser."
+                ),
+            )
+        )
         rows.append(
             [
                 f"{method} ({words})",
@@ -34,7 +49,8 @@ def make(folder: Path) -> Part:
         )
     return Part(
         "Figure 2: an object and its sphere map",
-        "A conformal map preserves angles but leaves the legs almost no area on the sphere: they get few texels, "
+        "A conformal map preserves angles but leaves the legs almost no area on the sphere: they "
+        "get few texels, "
         "and waves die there. The progressive map spreads the texels evenly, without folds.",
         pictures,
         rows,

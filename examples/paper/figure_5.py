@@ -29,7 +29,10 @@ def make(folder: Path) -> Part:
         file = strip(scene, [1.0, 2.0, 3.0], folder / "figure_5.png", (534, 400))
     return Part(
         "Figure 5: a complex mesh",
-        f"{len(mesh.F):,} triangles; sphere map and atlas of 6 x 128 x 128 texels took {seconds:.2f} s.",
+        (
+            f"{len(mesh.F):,} triangles; sphere map and atlas of 6 x 128 x 128 texels took "
+            f"{seconds:.2f} s."
+        ),
         [(file, "Bodies rain on a jelly duck, after 1, 2 and 3 s.")],
     )
 

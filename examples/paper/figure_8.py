@@ -15,7 +15,8 @@ from stills import strip
 from ripple_sim import Scene, load_scene
 from ripple_sim.scene import MapEntry, MaterialEntry
 
-TIMES, SIZE = [0.25, 0.4, 0.6, 0.8], (400, 400)
+TIMES = [0.25, 0.4, 0.6, 0.8]
+SIZE = (400, 400)
 MATERIALS = {"speed": (0.15, 0.6), "damping": (0.5, 20.0)}  # black and white: m/s, 1/s
 
 
@@ -28,7 +29,9 @@ def half(path: Path) -> None:
 
 def scene_with(material: MaterialEntry) -> Scene:
     scene = load_scene("face")
-    return dataclasses.replace(scene, targets=(msgspec.structs.replace(scene.targets[0], material=material),))
+    return dataclasses.replace(
+        scene, targets=(msgspec.structs.replace(scene.targets[0], material=material),)
+    )
 
 
 def make(folder: Path) -> Part:
@@ -39,7 +42,9 @@ def make(folder: Path) -> Part:
     for name, (low, high) in MATERIALS.items():
         material = msgspec.structs.replace(base, **{name: MapEntry(str(texture), low, high)})
         file = strip(scene_with(material), TIMES, folder / f"figure_8_{name}.png", SIZE)
-        pictures.append((file, f"As {name}, from {low:g} to {high:g}, at {', '.join(map(str, TIMES))} s."))
+        pictures.append(
+            (file, f"As {name}, from {low:g} to {high:g}, at {', '.join(map(str, TIMES))} s.")
+        )
     return Part(
         "Figure 8: speed and damping from a texture",
         "An image in the object's own texture coordinates is sampled once per texel. "

@@ -36,12 +36,15 @@ def write_page(path: Path, title: str, lead: str, parts: Sequence[tuple[str, Par
         for file, caption in part.pictures:
             source = html.escape(file.relative_to(path.parent).as_posix())
             pieces.append(
-                f'<figure><img src="{source}" alt=""><figcaption>{html.escape(caption)}</figcaption></figure>'
+                f'<figure><img src="{source}" '
+                f'alt=""><figcaption>{html.escape(caption)}</figcaption></figure>'
             )
         if part.table:
             rows = [
                 "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row)
-                for tag, row in zip(["th"] + ["td"] * (len(part.table) - 1), part.table, strict=True)
+                for tag, row in zip(
+                    ["th"] + ["td"] * (len(part.table) - 1), part.table, strict=True
+                )
             ]
             pieces.append("<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>")
         pieces.append(f"<p><code>{html.escape(command)}</code></p>")

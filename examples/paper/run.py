@@ -2,8 +2,9 @@
 
 python examples/paper/run.py
 
-Writes out/paper/index.html with its pictures, and with --docs also docs/paper.md; each part also runs alone. The paper
-is by Kira, Nakayama and Fujishiro (The Journal of the Society for Art and Science).
+Writes out/paper/index.html with its pictures, and with --docs also docs/paper.md; each part also
+runs alone. The paper is by Kira, Nakayama and Fujishiro (The Journal of the Society for Art and
+Science).
 """
 
 import importlib
@@ -17,7 +18,8 @@ FOLDER = Path("out/paper")
 PARTS = ("figure_1", "figure_2", "figure_5", "figures_6_7", "figure_8", "section_6_4", "table_1")
 TITLE = "The paper, part by part"
 LEAD = (
-    'The figures of Kira, Nakayama and Fujishiro, "Jacobian-free Deformation of Genus-0 Surfaces", with other '
+    'The figures of Kira, Nakayama and Fujishiro, "Jacobian-free Deformation of Genus-0 Surfaces", '
+    "with other "
     "objects, drawn and measured by one command: `python examples/paper/run.py`."
 )
 
@@ -38,7 +40,9 @@ def main() -> None:
     parts = []
     for name in PARTS:
         print(name, file=sys.stderr)
-        parts.append((f"python examples/paper/{name}.py", importlib.import_module(name).make(FOLDER)))
+        parts.append(
+            (f"python examples/paper/{name}.py", importlib.import_module(name).make(FOLDER))
+        )
     page = FOLDER / "index.html"
     write_page(page, TITLE, LEAD, parts)
     if "--docs" in sys.argv[1:]:

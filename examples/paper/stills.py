@@ -13,14 +13,23 @@ RATE = 20  # frames a second, the grid of times to choose from
 
 
 def strip(
-    scene: Scene, times: Sequence[float], file: Path, size: tuple[int, int], columns: int = 4, **options: Any
+    scene: Scene,
+    times: Sequence[float],
+    file: Path,
+    size: tuple[int, int],
+    columns: int = 4,
+    **options: Any,
 ) -> Path:
     """Write frames of a scene at the given times [s], so many side by side."""
     width, height = size
     columns = min(columns, len(times))
     with tempfile.TemporaryDirectory() as folder:
         frames = Path(folder) / "frames"
-        render_video(scene, frames, VideoOptions(size=size, fps=RATE, duration=max(times) + 1 / RATE, **options))
+        render_video(
+            scene,
+            frames,
+            VideoOptions(size=size, fps=RATE, duration=max(times) + 1 / RATE, **options),
+        )
         drawn = sorted(frames.glob("*.png"))
         picture = Image.new("RGB", (width * columns, height * -(-len(times) // columns)))
         for i, time in enumerate(times):

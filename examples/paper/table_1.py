@@ -23,7 +23,9 @@ _SECONDS = 0.1
 
 
 def steps_per_second(
-    resolutions: tuple[int, ...] = RESOLUTIONS, polygons: tuple[int, ...] = POLYGONS, backend: str = "cpu"
+    resolutions: tuple[int, ...] = RESOLUTIONS,
+    polygons: tuple[int, ...] = POLYGONS,
+    backend: str = "cpu",
 ) -> dict[str, dict[str, float]]:
     """Substeps a second, and seconds for the atlas, by polygon count and resolution."""
     table = {}
@@ -38,7 +40,8 @@ def steps_per_second(
             row[f"atlas {n} [s]"] = time.perf_counter() - start
             solver = make_backend(backend, operator)
             solver.advance(4, 1e-6)
-            steps, best = 4, np.inf
+            steps = 4
+            best = np.inf
             until = time.perf_counter() + _SECONDS
             while time.perf_counter() < until:
                 start = time.perf_counter()
@@ -65,8 +68,10 @@ def make(folder: Path) -> Part:
         )
     return Part(
         "Table 1: steps per second, and the precomputation",
-        "Wave steps per second on the CPU, without rendering. The polygons matter in the precomputation only: the "
-        f"waves run on texels. The paper gives {PAPER['seconds']} s for casting the rays of {PAPER['texels']} texels "
+        "Wave steps per second on the CPU, without rendering. The polygons matter in the "
+        "precomputation only: the "
+        f"waves run on texels. The paper gives {PAPER['seconds']} s for casting the rays of "
+        f"{PAPER['texels']} texels "
         f"against each of {PAPER['polygons']} polygons; an atlas of N = 56 has 18,816 texels.",
         table=rows,
     )

@@ -2,8 +2,8 @@
 
     python examples/plots/architecture.py
 
-writes out/plots/architecture.svg and .png; with --docs it replaces docs/pictures/architecture.svg. A red arrow closes a
-circle of imports.
+writes out/plots/architecture.svg and .png; with --docs it replaces docs/pictures/architecture.svg.
+A red arrow closes a circle of imports.
 """
 
 import argparse
@@ -24,7 +24,8 @@ from matplotlib.path import Path as Curve
 
 DOCS = ROOT / "docs" / "pictures"
 SUBTITLE = (
-    "an arrow means: imports (those that others imply are left out); blue: solver/, which knows nothing of MuJoCo"
+    "an arrow means: imports (those that others imply are left out); blue: solver/, which "
+    "knows nothing of MuJoCo"
 )
 # everybody may import these: no arrow is drawn to them
 COMMON = (
@@ -36,20 +37,28 @@ COMMON = (
 )
 ENTRY = "ripple_sim.__main__"
 
-WIDTH, HEIGHT, GAP, RISE = 2.5, 0.92, 0.3, 0.42  # of a box, between boxes, between layers [inches]
+# of a box, between boxes, between layers [inches]
+WIDTH = 2.5
+HEIGHT = 0.92
+GAP = 0.3
+RISE = 0.42
 INK, SOLVER, SIDE, WRONG = "#1f5fa8", "#e9f1f9", "#fbf6ee", "#c03020"
 
 
 def description(name: str) -> tuple[str, list[str]]:
     """First sentence of a package's or module's docstring, and the packages inside."""
-    folder, package = next((f, p) for f, p in reversed(FOLDERS.items()) if name == p or name.startswith(f"{p}."))
-    path = ROOT.joinpath(folder, *name.removeprefix(package).split(".")[1:])
-    text = (path / "__init__.py" if (path / "__init__.py").exists() else path.with_suffix(".py")).read_text(
-        encoding="utf-8"
+    folder, package = next(
+        (f, p) for f, p in reversed(FOLDERS.items()) if name == p or name.startswith(f"{p}.")
     )
+    path = ROOT.joinpath(folder, *name.removeprefix(package).split(".")[1:])
+    text = (
+        path / "__init__.py" if (path / "__init__.py").exists() else path.with_suffix(".py")
+    ).read_text(encoding="utf-8")
     sentence = " ".join((ast.get_docstring(ast.parse(text)) or "").split("\n\n")[0].split())
     sentence = sentence.split(". ")[0].rstrip(".").replace("`", "")
-    inside = [each.parent.name for each in sorted(path.glob("*/*.py")) if each.name == "__init__.py"]
+    inside = [
+        each.parent.name for each in sorted(path.glob("*/*.py")) if each.name == "__init__.py"
+    ]
     return sentence, [each for each in inside if each != "shaders"]
 
 
@@ -59,11 +68,17 @@ class Drawing:
     def __init__(self, arrows: dict[str, set[str]]) -> None:
         self._layout = Layout(arrows, layers(arrows))
         x = {node: place * (WIDTH + GAP) for node, place in self._layout.x.items()}
-        left, right = min(x.values()) - WIDTH / 2, max(x.values()) + WIDTH / 2
+        left = min(x.values()) - WIDTH / 2
+        right = max(x.values()) + WIDTH / 2
         top = len(self._layout.rows) * (HEIGHT + RISE) - RISE
-        self._y = {node: i * (HEIGHT + RISE) + HEIGHT / 2 for i, row in enumerate(self._layout.rows) for node in row}
+        self._y = {
+            node: i * (HEIGHT + RISE) + HEIGHT / 2
+            for i, row in enumerate(self._layout.rows)
+            for node in row
+        }
         self._x = {node: place - left for node, place in x.items()}
-        self.width, self.height = right - left, top
+        self.width = right - left
+        self.height = top
 
     def draw(self, axes: Axes) -> None:
         for way in self._layout.ways.values():
@@ -76,11 +91,17 @@ class Drawing:
         """An arrow that points upwards, and closes a circle."""
         start = self._x[importer] + WIDTH / 2, self._y[importer]
         end = self._x[imported] + WIDTH / 2, self._y[imported]
-        style = {"arrowstyle": "-|>", "connectionstyle": "arc3,rad=0.4", "color": WRONG, "linewidth": 1.6}
+        style = {
+            "arrowstyle": "-|>",
+            "connectionstyle": "arc3,rad=0.4",
+            "color": WRONG,
+            "linewidth": 1.6,
+        }
         axes.annotate("", end, start, arrowprops=style, zorder=5)
 
     def _box(self, axes: Axes, name: str) -> None:
-        x, y = self._x[name] - WIDTH / 2, self._y[name] - HEIGHT / 2
+        x = self._x[name] - WIDTH / 2
+        y = self._y[name] - HEIGHT / 2
         in_solver = name.startswith("ripple_sim.solver.")
         axes.add_patch(
             FancyBboxPatch(
@@ -90,20 +111,45 @@ class Drawing:
         )  # fmt: skip
         sentence, inside = description(name)
         left = {"ha": "left", "va": "top", "zorder": 4}
-        axes.text(x + 0.09, y + HEIGHT - 0.07, short(name), fontsize=10.5, fontweight="bold", color=TEXT, **left)
+        axes.text(
+            x + 0.09,
+            y + HEIGHT - 0.07,
+            short(name),
+            fontsize=10.5,
+            fontweight="bold",
+            color=TEXT,
+            **left,
+        )
         lines = textwrap.wrap(sentence, 39, max_lines=2 if inside else 4, placeholder=" ...")
-        axes.text(x + 0.09, y + HEIGHT - 0.28, "\n".join(lines), fontsize=7.6, color=TEXT, linespacing=1.2, **left)
+        axes.text(
+            x + 0.09,
+            y + HEIGHT - 0.28,
+            "\n".join(lines),
+            fontsize=7.6,
+            color=TEXT,
+            linespacing=1.2,
+            **left,
+        )
         if inside:
-            words = "\n".join(textwrap.wrap("  ".join(f"{each}/" for each in inside), 43, max_lines=2))
-            axes.text(x + 0.09, y + 0.06, words, fontsize=7.4, color=INK, ha="left", va="bottom", zorder=4)
+            words = "\n".join(
+                textwrap.wrap("  ".join(f"{each}/" for each in inside), 43, max_lines=2)
+            )
+            axes.text(
+                x + 0.09, y + 0.06, words, fontsize=7.4, color=INK, ha="left", va="bottom", zorder=4
+            )
 
     def _arrow(self, axes: Axes, way: list[Node]) -> None:
-        first, last = way[0], way[-1]
+        first = way[0]
+        last = way[-1]
         points = [(self._port(first, way[1], False), self._y[first] - HEIGHT / 2)]
         for node in way[1:-1]:
-            points += [(self._x[node], self._y[node] + HEIGHT / 2), (self._x[node], self._y[node] - HEIGHT / 2)]
+            points += [
+                (self._x[node], self._y[node] + HEIGHT / 2),
+                (self._x[node], self._y[node] - HEIGHT / 2),
+            ]
         points.append((self._port(last, way[-2], True), self._y[last] + HEIGHT / 2 + 0.07))
-        vertices, codes = [points[0]], [Curve.MOVETO]
+        vertices = [points[0]]
+        codes = [Curve.MOVETO]
         for i, (a, b) in enumerate(itertools.pairwise(points)):
             if i % 2:  # straight through a layer
                 vertices.append(b)
@@ -112,14 +158,24 @@ class Drawing:
                 bend = 0.55 * (a[1] - b[1])
                 vertices += [(a[0], a[1] - bend), (b[0], b[1] + bend), b]
                 codes += [Curve.CURVE4] * 3
-        axes.add_patch(PathPatch(Curve(vertices, codes), fill=False, edgecolor=FAINT, linewidth=1.1, zorder=2))
+        axes.add_patch(
+            PathPatch(Curve(vertices, codes), fill=False, edgecolor=FAINT, linewidth=1.1, zorder=2)
+        )
         x, y = points[-1]
-        axes.fill([x - 0.045, x + 0.045, x], [y + 0.03, y + 0.03, y - 0.07], color=FAINT, linewidth=0, zorder=2)
+        axes.fill(
+            [x - 0.045, x + 0.045, x],
+            [y + 0.03, y + 0.03, y - 0.07],
+            color=FAINT,
+            linewidth=0,
+            zorder=2,
+        )
 
     def _port(self, node: Node, towards: Node, above: bool) -> float:
         """Where on its edge a box is left or entered: arrows fan out in the order of their other ends."""
         ends = [
-            way[-2] if above else way[1] for way in self._layout.ways.values() if (way[-1] if above else way[0]) == node
+            way[-2] if above else way[1]
+            for way in self._layout.ways.values()
+            if (way[-1] if above else way[0]) == node
         ]
         ends.sort(key=lambda end: self._x[end])
         step = min(0.3, 0.8 * WIDTH / max(len(ends), 1))
@@ -135,7 +191,9 @@ def arrows() -> tuple[dict[str, set[str]], list[tuple[str, str]]]:
     while circles := cycles(found):
         # the thinnest arrow of the circle is the one that goes the wrong way
         thickness = Counter(
-            (rooms.get(name), rooms.get(other)) for name, each in modules.items() for other in each.imports
+            (rooms.get(name), rooms.get(other))
+            for name, each in modules.items()
+            for other in each.imports
         )
         pairs = [(a, b) for a in circles[0] for b in found[a] if b in circles[0]]
         wrong = min(pairs, key=lambda pair: (thickness[pair], pair))
@@ -158,10 +216,15 @@ def make(folder: Path) -> Path:
     """Draw a PNG, whose path is returned, and an SVG beside it."""
     imports, closing = arrows()
     drawing = Drawing(imports)
-    margin, head, foot = 0.35, 1.15, 0.75
-    width, height = drawing.width + 2 * margin, drawing.height + head + foot
+    margin = 0.35
+    head = 1.15
+    foot = 0.75
+    width = drawing.width + 2 * margin
+    height = drawing.height + head + foot
     figure: Figure = sheet(width, height, "The packages", SUBTITLE)
-    axes = figure.add_axes((margin / width, foot / height, drawing.width / width, drawing.height / height))
+    axes = figure.add_axes(
+        (margin / width, foot / height, drawing.width / width, drawing.height / height)
+    )
     axes.set_xlim(0, drawing.width)
     axes.set_ylim(0, drawing.height)
     axes.set_axis_off()
@@ -171,18 +234,29 @@ def make(folder: Path) -> Path:
     for artist in axes.get_children():
         artist.set_clip_on(False)
     common = ", ".join(map(short, COMMON))
-    figure.text(0.35 / width, 0.3 / height, f"open to all, without an arrow: {common}", fontsize=9, color=FAINT)
+    figure.text(
+        0.35 / width,
+        0.3 / height,
+        f"open to all, without an arrow: {common}",
+        fontsize=9,
+        color=FAINT,
+    )
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "architecture.png"
     figure.savefig(path)
     with mpl.rc_context({"svg.hashsalt": "architecture", "svg.fonttype": "path"}):
-        figure.savefig(path.with_suffix(".svg"), metadata={"Date": None, "Description": ", ".join(summary(imports))})
+        figure.savefig(
+            path.with_suffix(".svg"),
+            metadata={"Date": None, "Description": ", ".join(summary(imports))},
+        )
     return path
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--docs", action="store_true", help="replace the drawing of the documentation")
+    parser.add_argument(
+        "--docs", action="store_true", help="replace the drawing of the documentation"
+    )
     path = make(FOLDER)
     if parser.parse_args().docs:
         path = Path(path.with_suffix(".svg")).replace(DOCS / "architecture.svg")

@@ -15,21 +15,30 @@ from ripple_sim.solver import Material, Mesh, build_atlas, modes
 
 SIDE = 0.24  # [m]
 STEEL = Material.plate(modulus=200e9, thickness=0.001, density=7850.0, poisson=0.3)
-COLUMNS, ROWS, MODES = 4, 2, 24
-GRAINS, HOPS, HOP = 9000, 500, 0.03  # a grain hops so many sides far where the plate moves most
+COLUMNS = 4
+ROWS = 2
+MODES = 24
+# a grain hops so many sides far where the plate moves most
+GRAINS = 9000
+HOPS = 500
+HOP = 0.03
 
 
 def square_plate() -> Mesh:
     x, y = np.meshgrid(*2 * [np.linspace(0, SIDE, 17)])
     node = np.arange(17 * 17).reshape(17, 17)
-    a, b, c, d = (each.ravel() for each in (node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]))
+    a, b, c, d = (
+        each.ravel() for each in (node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1])
+    )
     F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     return Mesh.from_arrays(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), F)
 
 
 def raster(points: np.ndarray, shape: np.ndarray, size: int = 200) -> np.ndarray:
     """Heights on a grid of size x size places over the plate."""
-    places = np.stack(np.meshgrid(*2 * [(np.arange(size) + 0.5) / size * SIDE], indexing="ij"), axis=-1)
+    places = np.stack(
+        np.meshgrid(*2 * [(np.arange(size) + 0.5) / size * SIDE], indexing="ij"), axis=-1
+    )
     values = LinearNDInterpolator(points, shape)(places)
     return np.where(np.isnan(values), NearestNDInterpolator(points, shape)(places), values)
 
@@ -37,7 +46,8 @@ def raster(points: np.ndarray, shape: np.ndarray, size: int = 200) -> np.ndarray
 def sand(heights: np.ndarray) -> np.ndarray:
     """Where grains end, [k, 2], from 0 to 1."""
     random = np.random.default_rng(0)
-    grains, size = random.random((GRAINS, 2)), len(heights)
+    grains = random.random((GRAINS, 2))
+    size = len(heights)
     for _ in range(HOPS):
         moved = np.abs(map_coordinates(heights, grains.T * size - 0.5, order=1, mode="nearest"))
         grains += HOP * moved[:, None] * random.standard_normal(grains.shape)
@@ -56,7 +66,10 @@ def main() -> None:
     apart = np.diff(hertz, prepend=0.0, append=np.inf) / hertz.max() > 2e-3
     chosen = [k for k in range(2, MODES) if apart[k] and apart[k + 1]][: COLUMNS * ROWS]
     figure = sheet(
-        9.6, 5.9, "Chladni's figures", "Sand on the modes of a free steel plate, 24 cm square and 1 mm thick"
+        9.6,
+        5.9,
+        "Chladni's figures",
+        "Sand on the modes of a free steel plate, 24 cm square and 1 mm thick",
     )
     points = atlas.positions.reshape(-1, 3)[:, :2]
     for number, k in enumerate(chosen):

@@ -17,8 +17,13 @@ from standing_wave import flat_torus, plane_wave, swung
 
 from ripple_sim.solver import Material, sphere_atlas
 
-DAMPINGS, VISCOSITIES = (0.25, 0.5, 1.0, 2.0, 4.0), (0.002, 0.005, 0.01, 0.02)  # 1/s, m^2/s
-MODULUS, VISCOSITY, DENSITY = 2010.0, 0.6, 1000.0  # gelatine of 3 %
+# 1/s, m^2/s
+DAMPINGS = (0.25, 0.5, 1.0, 2.0, 4.0)
+VISCOSITIES = (0.002, 0.005, 0.01, 0.02)
+# gelatine of 3 %
+MODULUS = 2010.0
+VISCOSITY = 0.6
+DENSITY = 1000.0
 DEPTH = 1.3 / (2 * np.pi)
 
 
@@ -32,9 +37,15 @@ def draw(axes: Axes, title: str, x: list[float], measured: list[float], exact: l
 
 
 def make(folder: Path, texels: int = 96) -> Path:
-    figure = sheet(13.0, 4.5, "Decay, and the modes of a sphere", "dots are measured from the swing, lines are theory")
+    figure = sheet(
+        13.0,
+        4.5,
+        "Decay, and the modes of a sphere",
+        "dots are measured from the swing, lines are theory",
+    )
     panels = [figure.add_axes((0.06 + 0.242 * k, 0.15, 0.185, 0.57)) for k in range(4)]
-    torus, q = flat_torus(texels), 4 * np.pi
+    torus = flat_torus(texels)
+    q = 4 * np.pi
     plain(panels[0], "damping zeta [1/s]", "decay rate [1/s]")
     rates = [plane_wave(torus, Material(damping=zeta), q)[1] for zeta in DAMPINGS]
     draw(panels[0], "damping", list(DAMPINGS), rates, [zeta / 2 for zeta in DAMPINGS])
@@ -48,7 +59,8 @@ def make(folder: Path, texels: int = 96) -> Path:
     exact = [VISCOSITY / DENSITY * lowest_square(depth) / DEPTH**2 / 2 for depth in depths]
     draw(panels[2], "Kelvin-Voigt layer", depths, rates, exact)
     plain(panels[3], "degree of the harmonic", "frequency [1/s]")
-    ball, degrees = sphere_atlas(1.0, texels // 2), list(range(1, 11))
+    ball = sphere_atlas(1.0, texels // 2)
+    degrees = list(range(1, 11))
     exact = [float(np.sqrt(degree * (degree + 1))) for degree in degrees]
     tones = [
         swung(ball, Material(), eval_legendre(degree, ball.positions[..., 2]), rough)[0]
@@ -59,8 +71,12 @@ def make(folder: Path, texels: int = 96) -> Path:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Decay of waves, and modes of a sphere, against theory.")
-    parser.add_argument("--texels", type=int, default=96, help="along the side of the square; half on the sphere")
+    parser = argparse.ArgumentParser(
+        description="Decay of waves, and modes of a sphere, against theory."
+    )
+    parser.add_argument(
+        "--texels", type=int, default=96, help="along the side of the square; half on the sphere"
+    )
     print(make(FOLDER, parser.parse_args().texels))
 
 

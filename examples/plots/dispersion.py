@@ -20,8 +20,10 @@ ACROSS = (1, 2, 3, 4, 6, 8, 10)  # waves on the side of the square
 Theory = Callable[[float], float]
 
 DEPTH = 1.3 / (2 * np.pi)  # m: the longest wave on a square of 1 m has q d = 1.3
-MODULUS, DENSITY = 2010.0, 1000.0
-TENSION, GRAVITY = 0.072, 9.81
+MODULUS = 2010.0
+DENSITY = 1000.0
+TENSION = 0.072
+GRAVITY = 9.81
 CROSSOVER = np.sqrt(DENSITY * GRAVITY / TENSION)  # 1/m
 
 
@@ -42,7 +44,12 @@ def plate(q: float) -> float:
 CASES: dict[str, tuple[Material, Theory, tuple[float, ...], tuple[int, ...]]] = {
     "membrane": (Material.membrane(), lambda q: q, (1.0,), ACROSS),
     "plate": (Material.plate(1e6, 0.01, 1000.0), plate, (1.0,), ACROSS),
-    "layer of 0.21 m": (Material.layer(MODULUS, 0.0, DENSITY, DEPTH), layer, (1.0,), (1, 2, 3, 4, 5, 6)),
+    "layer of 0.21 m": (
+        Material.layer(MODULUS, 0.0, DENSITY, DEPTH),
+        layer,
+        (1.0,),
+        (1, 2, 3, 4, 5, 6),
+    ),
     "water": (
         Material.water(DENSITY, TENSION, GRAVITY, 0.0),
         water,
@@ -66,7 +73,10 @@ def speeds(name: str, texels: int) -> np.ndarray:
 
 def make(folder: Path, texels: int = 96) -> Path:
     figure = sheet(
-        13.0, 4.5, "Phase speed", f"standing waves on squares of {texels} x {texels} texels; lines are theory"
+        13.0,
+        4.5,
+        "Phase speed",
+        f"standing waves on squares of {texels} x {texels} texels; lines are theory",
     )
     for k, name in enumerate(CASES):
         q, measured, exact = speeds(name, texels).T
@@ -75,7 +85,12 @@ def make(folder: Path, texels: int = 96) -> Path:
         axes = figure.add_axes((0.06 + 0.242 * k, 0.15, 0.185, 0.59))
         plain(axes, "wave number [1/m]", "phase speed [m/s]" if k == 0 else "")
         finer = np.geomspace(q.min(), q.max(), 100)
-        axes.plot(finer, [CASES[name][1](each) / each for each in finer], color=COLORS["paper"], linewidth=1.4)
+        axes.plot(
+            finer,
+            [CASES[name][1](each) / each for each in finer],
+            color=COLORS["paper"],
+            linewidth=1.4,
+        )
         axes.plot(q, measured, "o", color=COLORS["fem"], markersize=4.5)
         if q.max() > 20 * q.min():
             axes.set_xscale("log")
@@ -85,7 +100,9 @@ def make(folder: Path, texels: int = 96) -> Path:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Phase speed of waves on four materials against theory.")
+    parser = argparse.ArgumentParser(
+        description="Phase speed of waves on four materials against theory."
+    )
     parser.add_argument("--texels", type=int, default=96, help="along the side of the square")
     print(make(FOLDER, parser.parse_args().texels))
 

@@ -2,7 +2,8 @@
 
     python examples/plots/energy.py [--steps 4000]
 
-writes out/plots/energy.png. All are measured alike, as `WaveSolver.energy` does for the finite elements.
+writes out/plots/energy.png. All are measured alike, as `WaveSolver.energy` does for the finite
+elements.
 """
 
 import argparse
@@ -28,7 +29,8 @@ def energies(atlas: Atlas, operator: str, material: Material, times: np.ndarray)
     for dt in np.diff(times, prepend=0.0):
         waves.step(dt)
         if measure is not waves:
-            measure.height, measure.velocity = waves.height, waves.velocity
+            measure.height = waves.height
+            measure.velocity = waves.velocity
         result.append(measure.energy())
     return np.array(result) / result[0]
 
@@ -49,10 +51,27 @@ def make(folder: Path, steps: int = 4000, resolution: int = 64) -> Path:
     for operator, name in NAMES.items():
         share = energies(atlas, operator, Material(), times)
         change = 100 * np.abs(share - 1).max()
-        label = f"{name}: {change:.0f} %" if change > 1 else f"{name}: below {10 ** np.ceil(np.log10(change)):.6f} %"
-        kept.plot(times, share, color=COLORS[operator], linewidth=1.8 if operator == "fem" else 1.2, label=label)
+        label = (
+            f"{name}: {change:.0f} %"
+            if change > 1
+            else f"{name}: below {10 ** np.ceil(np.log10(change)):.6f} %"
+        )
+        kept.plot(
+            times,
+            share,
+            color=COLORS[operator],
+            linewidth=1.8 if operator == "fem" else 1.2,
+            label=label,
+        )
     kept.set_ylim(0, 5.0)
-    kept.legend(frameon=False, fontsize=9.5, labelcolor=TEXT, ncols=2, loc="upper left", title="largest change")
+    kept.legend(
+        frameon=False,
+        fontsize=9.5,
+        labelcolor=TEXT,
+        ncols=2,
+        loc="upper left",
+        title="largest change",
+    )
 
     lost = figure.add_axes((0.56, 0.13, 0.40, 0.61))
     plain(lost, "time [s]", "energy / energy at the start")

@@ -9,7 +9,12 @@ TEXT, FAINT, HAIR = "#1b2432", "#6b7685", "#cfd5dd"
 FOLDER = Path("out/plots")
 
 # one colour for each wave operator in all plots, told apart with every colour vision
-COLORS = {"fem": "#1f5fa8", "paper": "#d1632f", "uncorrected": "#a9a33c", "dynamic-paint": "#7a7f89"}
+COLORS = {
+    "fem": "#1f5fa8",
+    "paper": "#d1632f",
+    "uncorrected": "#a9a33c",
+    "dynamic-paint": "#7a7f89",
+}
 NAMES = {
     "fem": "ripple-sim",
     "paper": "the paper's operator",
@@ -21,7 +26,15 @@ NAMES = {
 def sheet(width: float, height: float, title: str, subtitle: str) -> Figure:
     """An empty figure [inches] with a title."""
     figure = Figure(figsize=(width, height), dpi=120, facecolor="white")
-    figure.text(0.35 / width, 1 - 0.42 / height, title, fontsize=17, fontweight="bold", color=TEXT, va="center")
+    figure.text(
+        0.35 / width,
+        1 - 0.42 / height,
+        title,
+        fontsize=17,
+        fontweight="bold",
+        color=TEXT,
+        va="center",
+    )
     figure.text(0.35 / width, 1 - 0.76 / height, subtitle, fontsize=10.5, color=FAINT, va="center")
     return figure
 

@@ -2,9 +2,11 @@
 
     python examples/plots/gelatine_ring.py [--texels 192]
 
-writes out/plots/gelatine_ring.png and prints the speeds. Nguyen et al. 2014 (Ultrasound in Medicine and Biology 40,
-168) measured shear moduli of 2.01 +- 0.26, 4.18 +- 0.84 and 10.24 +- 1.80 kPa in gelatine of 3, 5 and 7 %; surface
-waves much shorter than the depth run at 0.955 of the shear wave speed (Rayleigh, an incompressible half space).
+writes out/plots/gelatine_ring.png and prints the speeds. Nguyen et al. 2014 (Ultrasound in Medicine
+and Biology 40,
+168) measured shear moduli of 2.01 +- 0.26, 4.18 +- 0.84 and 10.24 +- 1.80 kPa in gelatine of 3, 5
+  and 7 %; surface waves much shorter than the depth run at 0.955 of the shear wave speed (Rayleigh,
+  an incompressible half space).
 """
 
 import argparse
@@ -20,9 +22,20 @@ from standing_wave import flat_torus
 
 from ripple_sim.solver import Material, WaveSolver
 
-MEASURED = {"gelatine-3": (2010.0, 260.0), "gelatine-5": (4180.0, 840.0), "gelatine-7": (10240.0, 1800.0)}  # Pa
-VISCOSITY, DENSITY, RAYLEIGH = 0.6, 1000.0, 0.9553
-SIDE, DEPTH, RADIUS, IMPULSE = 0.4, 0.05, 0.006, 1e-3  # m: of the pool, its depth, of the drop; N s
+# Pa
+MEASURED = {
+    "gelatine-3": (2010.0, 260.0),
+    "gelatine-5": (4180.0, 840.0),
+    "gelatine-7": (10240.0, 1800.0),
+}
+VISCOSITY = 0.6
+DENSITY = 1000.0
+RAYLEIGH = 0.9553
+# m: of the pool, its depth, of the drop; N s
+SIDE = 0.4
+DEPTH = 0.05
+RADIUS = 0.006
+IMPULSE = 1e-3
 
 
 def spread(name: str, texels: int, times: np.ndarray, short: bool) -> np.ndarray:
@@ -42,7 +55,9 @@ def spread(name: str, texels: int, times: np.ndarray, short: bool) -> np.ndarray
 def modes() -> np.ndarray:
     """Wave numbers [1/depth], squared frequencies and masses of the exact mode, widths of the wave numbers; [4, k]."""
     q = np.concatenate([np.linspace(1.0, 8.0, 71), np.linspace(8.3, 40.0, 100)])
-    return np.array([q, [lowest_square(each) for each in q], [moving_mass(each) for each in q], np.gradient(q)])
+    return np.array(
+        [q, [lowest_square(each) for each in q], [moving_mass(each) for each in q], np.gradient(q)]
+    )
 
 
 def exact_ring(modulus: float, distances: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -63,8 +78,8 @@ def leading_crest(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] at which the crest that leads the ring passes, and the distances [m] of the ring, [k].
 
-    It is the greatest height on the side to which the drop pressed, of what runs with 0.84 to 1.1 of a speed [m/s]:
-    farther out some of what follows is higher, and long low waves run ahead.
+    It is the greatest height on the side to which the drop pressed, of what runs with 0.84 to 1.1
+    of a speed [m/s]: farther out some of what follows is higher, and long low waves run ahead.
     """
     ring = distances[(distances > 0.35 * SIDE / 2) & (distances < 0.8 * SIDE / 2)]
     pressed = -heights[:, np.isin(distances, ring)]
@@ -74,7 +89,10 @@ def leading_crest(
 
 def make(folder: Path, texels: int = 192) -> Path:
     figure = sheet(
-        13.0, 4.7, "A ring on gelatine", "height over distance and time; lines: 0.955 of the measured shear speed"
+        13.0,
+        4.7,
+        "A ring on gelatine",
+        "height over distance and time; lines: 0.955 of the measured shear speed",
     )
     for k, (name, (modulus, spread_of_it)) in enumerate(MEASURED.items()):
         speed = RAYLEIGH * np.sqrt(modulus / DENSITY)
@@ -88,21 +106,33 @@ def make(folder: Path, texels: int = 192) -> Path:
         for short in (False, True):
             heights = spread(name, texels, times, short)
             arrival = leading_crest(heights, distances, times, speed)[0]
-            late, crest = arrival / due - 1, 1 / np.polyfit(ring, arrival, 1)[0]
+            late = arrival / due - 1
+            crest = 1 / np.polyfit(ring, arrival, 1)[0]
             both = [each[:, np.isin(distances, ring)] for each in (heights, exact)]
-            like, high = np.corrcoef(both[0].ravel(), both[1].ravel())[0, 1], np.divide(*np.abs(both).max(axis=1))
+            like = np.corrcoef(both[0].ravel(), both[1].ravel())[0, 1]
+            high = np.divide(*np.abs(both).max(axis=1))
             print(
-                f"  short={short!s:5}: crest {crest:.2f} m/s, late by {late.min():.1%} to {late.max():.1%} of the "
-                f"time; all waves {high.min():.2f} to {high.max():.2f} as high, correlation {like:.2f}"
+                f"  short={short!s:5}: crest {crest:.2f} m/s, late by {late.min():.1%} to "
+                f"{late.max():.1%} of the "
+                f"time; all waves {high.min():.2f} to {high.max():.2f} as high, correlation "
+                f"{like:.2f}"
             )
         axes = figure.add_axes((0.06 + 0.32 * k, 0.14, 0.27, 0.60))
         panel(axes, heights, distances, times)
         axes.plot([0, SIDE / 2], [0, SIDE / 2 / speed], color=COLORS["paper"], linewidth=1.4)
         for end in ends:
-            axes.plot([0, SIDE / 2], [0, SIDE / 2 / end], color=COLORS["paper"], linewidth=0.8, linestyle="--")
+            axes.plot(
+                [0, SIDE / 2],
+                [0, SIDE / 2 / end],
+                color=COLORS["paper"],
+                linewidth=0.8,
+                linestyle="--",
+            )
         axes.set_xlim(0, SIDE / 2)
         axes.set_ylim(0, times[-1])
-        axes.set_title(f"{name}: {crest:.2f} m/s, measured {speed:.2f}", fontsize=11, color=TEXT, loc="left")
+        axes.set_title(
+            f"{name}: {crest:.2f} m/s, measured {speed:.2f}", fontsize=11, color=TEXT, loc="left"
+        )
     return save(figure, folder, "gelatine_ring")
 
 
@@ -110,11 +140,15 @@ def panel(axes: Axes, heights: np.ndarray, distances: np.ndarray, times: np.ndar
     plain(axes, "distance [m]", "time [s]")
     even = heights * np.sqrt(np.maximum(distances, distances[1]))  # rings fall as they grow
     even = even / np.maximum(np.abs(even).max(axis=1, keepdims=True), 1e-12)
-    axes.pcolormesh(distances, times, even, cmap="RdBu_r", vmin=-1, vmax=1, shading="nearest", rasterized=True)
+    axes.pcolormesh(
+        distances, times, even, cmap="RdBu_r", vmin=-1, vmax=1, shading="nearest", rasterized=True
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="A ring on gelatine against measured shear wave speeds.")
+    parser = argparse.ArgumentParser(
+        description="A ring on gelatine against measured shear wave speeds."
+    )
     parser.add_argument("--texels", type=int, default=192, help="along the side of the pool")
     print(make(FOLDER, parser.parse_args().texels))
 

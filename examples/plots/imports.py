@@ -1,9 +1,9 @@
 """Which module of the project imports which, read from the source tree (nothing is imported for it).
 
-Folders stand where they are installed: solver/ is ripple_sim.solver, scenes/ is ripple_sim.scenes. An import of a
-public name, such as `from ripple_sim.solver import Material`, counts as one of the module that the name comes from.
-What a room offers stands in its `__init__.pyi`; the `__init__` files, which only hand such names on, are not counted
-as modules.
+Folders stand where they are installed: solver/ is ripple_sim.solver, scenes/ is ripple_sim.scenes.
+An import of a public name, such as `from ripple_sim.solver import Material`, counts as one of the
+module that the name comes from. What a room offers stands in its `__init__.pyi`; the `__init__`
+files, which only hand such names on, are not counted as modules.
 """
 
 import ast
@@ -41,7 +41,11 @@ def read(root: Path = ROOT) -> dict[str, Module]:
     texts = {name: path.read_text(encoding="utf-8") for name, path in paths.items()}
     trees = {name: ast.parse(text) for name, text in texts.items()}
     stubs = {name: path.with_suffix(".pyi") for name, path in paths.items()}
-    offers = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in stubs.items() if path.is_file()}
+    offers = {
+        name: ast.parse(path.read_text(encoding="utf-8"))
+        for name, path in stubs.items()
+        if path.is_file()
+    }
     public = {
         f"{name.removesuffix('.__init__')}.{given}": f"{module}.{original}"
         for name, tree in offers.items()
@@ -51,7 +55,10 @@ def read(root: Path = ROOT) -> dict[str, Module]:
     for name, tree in trees.items():
         if name.endswith("__init__"):
             continue
-        targets = (_home(f"{module}.{imported}", trees, public) for module, imported, _ in _imported(name, tree))
+        targets = (
+            _home(f"{module}.{imported}", trees, public)
+            for module, imported, _ in _imported(name, tree)
+        )
         imports = frozenset(target for target in targets if target not in (None, name))
         modules[name] = Module(name, paths[name], texts[name], tree, imports)
     return modules

@@ -2,8 +2,8 @@
 
     python examples/plots/layer_mode.py
 
-prints the errors of its phase and group speed. Shear modulus, density and thickness are 1 here, so that frequencies are
-in c_T / d and wave numbers in 1 / d.
+prints the errors of its phase and group speed. Shear modulus, density and thickness are 1 here, so
+that frequencies are in c_T / d and wave numbers in 1 / d.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,11 @@ def lowest_square(q: float) -> float:
     squares = np.linspace(max(1.0, 0.8 * q**2), q**2 + 20.0, 100)
     signs = np.sign([determinant(q, square) for square in squares])
     first = int(np.flatnonzero(np.diff(signs) != 0)[0])
-    return float(brentq(lambda square: determinant(q, square), squares[first], squares[first + 1], xtol=1e-12))
+    return float(
+        brentq(
+            lambda square: determinant(q, square), squares[first], squares[first + 1], xtol=1e-12
+        )
+    )
 
 
 def group_speed(q: float) -> float:
@@ -38,7 +42,8 @@ def moving_mass(q: float) -> float:
     sizes = np.abs(rows).max(axis=0)
     mode = np.linalg.svd(rows / sizes)[2][-1].conj() / sizes
     waves = mode * np.exp(rates * z - tops)
-    across, along = waves.sum(axis=1), (rates * waves).sum(axis=1) / q
+    across = waves.sum(axis=1)
+    along = (rates * waves).sum(axis=1) / q
     energy = np.abs(across) ** 2 + np.abs(along) ** 2
     return float(np.trapezoid(energy, z[:, 0]) / np.abs(across[-1]) ** 2)
 
@@ -53,15 +58,19 @@ def determinant(q: float, square: float) -> float:
 def conditions(q: float, square: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The lowest modes' conditions, in rows: no motion at the base, no shear and no pressure at the surface.
 
-    The normal displacement is a sum of exp(r z - t) with rates r of q and -q, which carry the pressure, and of s and
-    -s with s^2 = q^2 - omega^2, which do not; t keeps each within 1. The tangential one follows, since the volume is
-    kept. Returns r, t and the rows.
+    The normal displacement is a sum of exp(r z - t) with rates r of q and -q, which carry the
+    pressure, and of s and -s with s^2 = q^2 - omega^2, which do not; t keeps each within 1. The
+    tangential one follows, since the volume is kept. Returns r, t and the rows.
     """
     s = np.sqrt(complex(q**2 - square, 1e-30))
-    rates, tops = np.array([q, -q, s, -s]), np.array([q, 0, s, 0])
-    base, surface = np.exp(-tops), np.exp(rates - tops)
+    rates = np.array([q, -q, s, -s])
+    tops = np.array([q, 0, s, 0])
+    base = np.exp(-tops)
+    surface = np.exp(rates - tops)
     pressure = square * np.array([1 / q, -1 / q, 0, 0])
-    rows = np.array([base, rates * base, (rates**2 + q**2) * surface, (2 * rates - pressure) * surface])
+    rows = np.array(
+        [base, rates * base, (rates**2 + q**2) * surface, (2 * rates - pressure) * surface]
+    )
     return rates, tops, rows
 
 
@@ -69,7 +78,9 @@ def main() -> None:
     for short, wave_numbers in ((False, np.linspace(1.3, 8, 68)), (True, np.geomspace(5, 40, 60))):
         material = Material.layer(1.0, 0.0, 1.0, 1.0, short=short)
         step = 1e-3
-        ours = np.array([[frequency(material, q + d) for d in (-step, 0, step)] for q in wave_numbers])
+        ours = np.array(
+            [[frequency(material, q + d) for d in (-step, 0, step)] for q in wave_numbers]
+        )
         exact = np.sqrt([lowest_square(q) for q in wave_numbers])
         phase = ours[:, 1] / exact - 1
         group = (ours[:, 2] - ours[:, 0]) / (2 * step) / [group_speed(q) for q in wave_numbers] - 1
@@ -88,7 +99,8 @@ def three_fields() -> None:
 
     The faster the hidden waves may run, the closer is the best fit.
     """
-    wave_numbers, step = np.linspace(1.3, 8, 68), 1e-3
+    wave_numbers = np.linspace(1.3, 8, 68)
+    step = 1e-3
     exact = np.sqrt([lowest_square(q) for q in wave_numbers])
     exact_group = np.array([group_speed(q) for q in wave_numbers])
     fits = (
@@ -98,21 +110,28 @@ def three_fields() -> None:
     )
     for fit in fits:
         below, at, above = (three_field_frequency(wave_numbers + d, *fit) for d in (-step, 0, step))
-        phase, group = at / exact - 1, (above - below) / (2 * step) / exact_group - 1
+        phase = at / exact - 1
+        group = (above - below) / (2 * step) / exact_group - 1
         print(
-            f"three fields, hidden waves at {fit[0][1] ** 0.5:.2f} c_T: phase within {np.abs(phase).max():.1%}, "
+            f"three fields, hidden waves at {fit[0][1] ** 0.5:.2f} c_T: phase within "
+            f"{np.abs(phase).max():.1%}, "
             f"group within {np.abs(group).max():.1%}"
         )
 
 
 def three_field_frequency(
-    q: np.ndarray, fast: Sequence[float], stiff: Sequence[float], slopes: Sequence[float], between: float
+    q: np.ndarray,
+    fast: Sequence[float],
+    stiff: Sequence[float],
+    slopes: Sequence[float],
+    between: float,
 ) -> np.ndarray:
     """Lowest angular frequency of the surface and two hidden fields that are coupled, of wave numbers [n].
 
-    omega^2 are the eigenvalues of a matrix [3, 3]: squares of the fields' own speeds and stiffnesses, surface first.
-    The hidden fields are potentials of what moves along the layer inside: the surface's coupling to them goes with q,
-    by these two slopes, that of one to the other does not. The matrix of each fit is positive for all q.
+    omega^2 are the eigenvalues of a matrix [3, 3]: squares of the fields' own speeds and
+    stiffnesses, surface first. The hidden fields are potentials of what moves along the layer
+    inside: the surface's coupling to them goes with q, by these two slopes, that of one to the
+    other does not. The matrix of each fit is positive for all q.
     """
     matrix = np.zeros((len(q), 3, 3))
     matrix[:, range(3), range(3)] = np.array(stiff) + np.outer(q**2, fast)

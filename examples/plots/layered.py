@@ -1,7 +1,8 @@
 """A layered drawing of a graph without cycles: arrows point downwards, and rarely cross.
 
-Layers come from the longest path, arrows over several layers run through places kept free for them, the order within
-each layer is improved by barycentres, and positions by least movement (Sugiyama, Tagawa and Toda 1981).
+Layers come from the longest path, arrows over several layers run through places kept free for them,
+the order within each layer is improved by barycentres, and positions by least movement (Sugiyama,
+Tagawa and Toda 1981).
 """
 
 import itertools
@@ -26,7 +27,8 @@ def without_detours(arrows: Arrows) -> dict[str, set[str]]:
         return reach[node]
 
     return {
-        node: {b for b in ends if not any(b in reached(c) for c in ends if c != b)} for node, ends in arrows.items()
+        node: {b for b in ends if not any(b in reached(c) for c in ends if c != b)}
+        for node, ends in arrows.items()
     }
 
 
@@ -53,7 +55,9 @@ def layers(arrows: Arrows) -> dict[str, int]:
 class Layout:
     """Places of the nodes, [unit widths] across and layers upwards, and the ways of the arrows between them."""
 
-    def __init__(self, arrows: Arrows, level: Mapping[str, int], passage: float = 0.3, trials: int = 60) -> None:
+    def __init__(
+        self, arrows: Arrows, level: Mapping[str, int], passage: float = 0.3, trials: int = 60
+    ) -> None:
         self._passage = passage
         self._segments: list[tuple[Node, Node]] = []
         self.ways: dict[tuple[str, str], list[Node]] = {}
@@ -62,7 +66,9 @@ class Layout:
             rows.setdefault(row, []).append(node)
         for node, ends in arrows.items():
             for end in sorted(ends):  # sets have another order in each process
-                passed: list[Node] = [(node, end, row) for row in range(level[node] - 1, level[end], -1)]
+                passed: list[Node] = [
+                    (node, end, row) for row in range(level[node] - 1, level[end], -1)
+                ]
                 for place, row in zip(passed, range(level[node] - 1, level[end], -1), strict=True):
                     rows[row].append(place)
                 self.ways[node, end] = [node, *passed, end]
@@ -86,21 +92,29 @@ class Layout:
         return count
 
     def _order(self, rng: np.random.Generator, trials: int) -> None:
-        best, found = None, None
+        best = None
+        found = None
         for _ in range(trials):
             for row in self.rows:
                 rng.shuffle(row)
             for sweep in range(12):
                 for i in range(len(self.rows)) if sweep % 2 else reversed(range(len(self.rows))):
-                    place = {node: k / max(len(row) - 1, 1) for row in self.rows for k, node in enumerate(row)}
-                    self.rows[i].sort(key=lambda node: fmean([place[n] for n in self._neighbours[node]] or [0.5]))
+                    place = {
+                        node: k / max(len(row) - 1, 1)
+                        for row in self.rows
+                        for k, node in enumerate(row)
+                    }
+                    self.rows[i].sort(
+                        key=lambda node: fmean([place[n] for n in self._neighbours[node]] or [0.5])
+                    )
                 crossed = self.crossings()
                 if best is not None and crossed > best[0]:
                     continue
                 x = self._positions(8)
                 cost = (crossed, sum(abs(x[a] - x[b]) for a, b in self._segments))
                 if best is None or cost < best:
-                    best, found = cost, [list(row) for row in self.rows]
+                    best = cost
+                    found = [list(row) for row in self.rows]
         self.rows = found or self.rows
 
     def _positions(self, rounds: int = 200) -> dict[Node, float]:
@@ -120,7 +134,9 @@ class Layout:
     def _wanted(self, node: Node, x: dict[Node, float]) -> float:
         """Mean place of a node's neighbours; long arrows pull at their own passages, so that they run straight."""
         near = self._neighbours[node] or [node]
-        pull = [8.0 if isinstance(node, tuple) and isinstance(each, tuple) else 1.0 for each in near]
+        pull = [
+            8.0 if isinstance(node, tuple) and isinstance(each, tuple) else 1.0 for each in near
+        ]
         return fmean([x[each] for each in near], pull)
 
     def _gap(self, a: Node, b: Node) -> float:

@@ -2,8 +2,8 @@
 
     python examples/plots/skull.py [--resolution 96]
 
-writes out/plots/skull.png: the scene `skull` with the bone from its mesh, and from a scan of the head, 10 mm voxels
-with noise.
+writes out/plots/skull.png: the scene `skull` with the bone from its mesh, and from a scan of the
+head, 10 mm voxels with noise.
 """
 
 import argparse
@@ -22,7 +22,10 @@ from ripple_sim.scene import InsideEntry
 sys.path.append(str(Path(__file__).parents[1] / "scene_meshes"))
 from head import BONE_THRESHOLD, head_volume
 
-FPS, SHOWN, VOXEL = 240, 1.2, 0.01  # 1/s, s, m
+# 1/s, s, m
+FPS = 240
+SHOWN = 1.2
+VOXEL = 0.01
 NAMES = {"forehead": "forehead", "cheek": "cheek", "nose": "nose tip"}
 COLORS = {"bone from a mesh": "#1f5fa8", "bone from voxels": "#d1632f"}
 
@@ -32,7 +35,10 @@ def from_scan(scene: Scene, folder: Path) -> Scene:
     values, origin = head_volume(VOXEL)
     np.save(folder / "head.npy", values)
     scan = InsideEntry(
-        volume=str(folder / "head.npy"), threshold=BONE_THRESHOLD, spacing=VOXEL, origin=tuple(origin.tolist())
+        volume=str(folder / "head.npy"),
+        threshold=BONE_THRESHOLD,
+        spacing=VOXEL,
+        origin=tuple(origin.tolist()),
     )
     [target] = scene.targets
     return dataclasses.replace(scene, targets=(msgspec.structs.replace(target, inside=[scan]),))
@@ -41,7 +47,8 @@ def from_scan(scene: Scene, folder: Path) -> Scene:
 def curves(scene: Scene, resolution: int) -> dict[str, tuple[float, np.ndarray]]:
     """Thickness [m] where each ball first strikes, and the heights there [m] from the frame before on."""
     simulation = Simulation(scene, fps=FPS, resolution=resolution, backend="cpu")
-    heights, struck = [], {}
+    heights = []
+    struck = {}
     for frame in range(int(scene.duration * FPS)):
         simulation.advance_frame()
         heights.append(simulation.ripples["head"].height)
@@ -61,7 +68,12 @@ def make(folder: Path, resolution: int = 96) -> Path:
     with tempfile.TemporaryDirectory() as scratch:
         scenes = {"bone from a mesh": scene, "bone from voxels": from_scan(scene, Path(scratch))}
         found = {name: curves(each, resolution) for name, each in scenes.items()}
-    figure = sheet(13.0, 4.6, "The same ball on three places of a head", "height of the skin where it was struck")
+    figure = sheet(
+        13.0,
+        4.6,
+        "The same ball on three places of a head",
+        "height of the skin where it was struck",
+    )
     lowest = min(swing.min() for each in found.values() for _, swing in each.values())
     highest = max(swing.max() for each in found.values() for _, swing in each.values())
     for k, (ball, name) in enumerate(NAMES.items()):
@@ -69,12 +81,22 @@ def make(folder: Path, resolution: int = 96) -> Path:
         plain(axes, "time [s]", "height [mm]" if k == 0 else "")
         depths = [1e3 * each[ball][0] for each in found.values()]
         axes.set_title(
-            f"{name}: {depths[0]:.0f} mm over bone, {depths[1]:.0f} in voxels", fontsize=11, color=TEXT, loc="left"
+            f"{name}: {depths[0]:.0f} mm over bone, {depths[1]:.0f} in voxels",
+            fontsize=11,
+            color=TEXT,
+            loc="left",
         )
         for label, each in found.items():
             swing = each[ball][1]
             style = "-" if label == "bone from a mesh" else "--"
-            axes.plot(np.arange(len(swing)) / FPS, 1e3 * swing, style, color=COLORS[label], linewidth=1.5, label=label)
+            axes.plot(
+                np.arange(len(swing)) / FPS,
+                1e3 * swing,
+                style,
+                color=COLORS[label],
+                linewidth=1.5,
+                label=label,
+            )
         axes.axhline(0, color=FAINT, linewidth=0.6)
         axes.set_ylim(1.1e3 * lowest, 1.1e3 * highest)
         if k == 2:

@@ -5,7 +5,8 @@ import numpy as np
 from ripple_sim.solver import Atlas, Material, TexelMesh, WaveSolver, glue, texel_atlas
 from ripple_sim.solver.operator import decay_time, frequency
 
-STEPS, PERIODS = 120, 1.5
+STEPS = 120
+PERIODS = 1.5
 
 
 def flat_torus(n: int, side: float = 1.0) -> Atlas:
@@ -28,8 +29,11 @@ def swung(
     for _ in range(STEPS):
         waves.step(dt)
         x.append(float((waves.height * wave * atlas.areas).sum()))
-    # a damped swing obeys x_{n+1} = a x_n - b x_{n-1}, with a = 2 exp(-r dt) cos(w dt) and b = exp(-2 r dt)
-    before, now, after = np.array(x[:-2]), np.array(x[1:-1]), np.array(x[2:])
+    # a damped swing obeys x_{n+1} = a x_n - b x_{n-1}, with a = 2 exp(-r dt) cos(w dt) and b =
+    # exp(-2 r dt)
+    before = np.array(x[:-2])
+    now = np.array(x[1:-1])
+    after = np.array(x[2:])
     (a, b), *_ = np.linalg.lstsq(np.stack([now, -before], axis=1), after)
     return float(np.arccos(a / (2 * np.sqrt(b))) / dt), float(-np.log(b) / (2 * dt))
 

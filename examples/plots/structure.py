@@ -18,8 +18,8 @@ from imports import ROOT
 
 PAGE = ROOT / "docs" / "architecture.md"
 
-# A ball lies on a sphere. The modules are listed in the order in which the step first enters them. Kernels run as plain
-# Python, so that the trace sees their modules too.
+# A ball lies on a sphere. The modules are listed in the order in which the step first enters them.
+# Kernels run as plain Python, so that the trace sees their modules too.
 TRACE = """
 import json, sys
 import mujoco
@@ -51,7 +51,12 @@ def walk() -> list[str]:
     """The modules that a step with a contact runs, as paths in the source tree."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(
-        [sys.executable, "-c", TRACE], capture_output=True, text=True, check=True, env=environment, cwd=ROOT
+        [sys.executable, "-c", TRACE],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+        cwd=ROOT,
     )
     paths = json.loads(done.stdout.splitlines()[-1])
     roots = {(ROOT / folder).resolve(): folder for folder in ("solver", "ripple_sim")}
@@ -74,7 +79,8 @@ def walk_in_words(paths: Iterable[str]) -> str:
 
 def replaced(page: str, mark: str, text: str) -> str:
     """The page with a text between the marks of a name."""
-    start, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
+    start = f"<!-- {mark} -->"
+    end = f"<!-- end of {mark} -->"
     before, _, rest = page.partition(start)
     return f"{before}{start}\n{text}\n{end}{rest.partition(end)[2]}"
 

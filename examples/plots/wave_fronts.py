@@ -2,8 +2,9 @@
 
     python examples/plots/wave_fronts.py [MESH] [--resolution 96] [--up y|z]
 
-writes out/plots/wave_fronts.png. The dark lines are the measured fronts at equal times, the wide pale bands the circles
-of exact geodesic distance that they should run along; colour tells where a front is ahead or behind.
+writes out/plots/wave_fronts.png. The dark lines are the measured fronts at equal times, the wide
+pale bands the circles of exact geodesic distance that they should run along; colour tells where a
+front is ahead or behind.
 """
 
 import argparse
@@ -21,22 +22,34 @@ from ripple_sim.solver import Atlas, build_atlas, load_mesh
 from ripple_sim.solver.texels import sampling_matrix
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-from arrival import NEAREST, front_and_crest, geodesic_distance, ideal_width, plane_arrival, waves_of
+from arrival import (
+    NEAREST,
+    front_and_crest,
+    geodesic_distance,
+    ideal_width,
+    plane_arrival,
+    waves_of,
+)
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 VIEW = {"azimuth": 38.0, "elevation": 24.0}
 LIMIT = 0.25  # relative error at the ends of the colours
 CIRCLES = 12  # from the source to the farthest point
-BAND, LINE, INK = np.array([1.0, 0.82, 0.36]), 0.045, np.array([0.07, 0.09, 0.14])
+BAND = np.array([1.0, 0.82, 0.36])
+LINE = 0.045
+INK = np.array([0.07, 0.09, 0.14])
 
 
 class FrontPainter(AtlasPainter):
     """Paints the fronts: fields on the texels of the distance that they should have gone, and that they have gone."""
 
-    def __init__(self, atlas: Atlas, distance: np.ndarray, gone: np.ndarray, spacing: float, nearest: float) -> None:
+    def __init__(
+        self, atlas: Atlas, distance: np.ndarray, gone: np.ndarray, spacing: float, nearest: float
+    ) -> None:
         super().__init__(atlas, np.ones((*distance.shape, 3)))
         self._fields = np.stack([distance.ravel(), gone.ravel()], axis=1)
-        self._spacing, self._nearest = spacing, nearest
+        self._spacing = spacing
+        self._nearest = nearest
         self._topology = atlas.texels.topology
 
     def paint(self, chart: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
@@ -56,12 +69,15 @@ def fields(atlas: Atlas, source: int, operator: str) -> tuple[np.ndarray, np.nda
     """Exact geodesic distance of the texels from a vertex, and the distance that the wave's front had gone."""
     mesh = atlas.mesh
     exact = geodesic_distance(mesh, source)
-    # NaN on other parts of the mesh, where no front ever comes and none is expected: they are painted plain
+    # NaN on other parts of the mesh, where no front ever comes and none is expected: they are
+    # painted plain
     exact[~np.isfinite(exact)] = np.nan
     distance = (exact[mesh.F[atlas.triangles]] * atlas.barycentrics).sum(axis=-1)
     farthest = float(np.nanmax(distance))
     width = ideal_width(atlas)
-    probes = atlas.chart_map.coordinates(mesh, atlas.triangles.ravel(), atlas.positions.reshape(-1, 3))
+    probes = atlas.chart_map.coordinates(
+        mesh, atlas.triangles.ravel(), atlas.positions.reshape(-1, 3)
+    )
     front, _ = front_and_crest(*waves_of(atlas, mesh.V[source], probes, width, farthest, operator))
     # a front on the plane is a little behind its distance: read off where it would be by now
     grid = np.linspace(NEAREST - 1, farthest / width * 1.3, 400)
@@ -69,7 +85,9 @@ def fields(atlas: Atlas, source: int, operator: str) -> tuple[np.ndarray, np.nda
     return distance, np.where(np.isfinite(gone), gone, 0.0).reshape(distance.shape)
 
 
-def make(folder: Path, mesh: Path = MESH, resolution: int = 96, up: str = "z", size: int = 620) -> Path:
+def make(
+    folder: Path, mesh: Path = MESH, resolution: int = 96, up: str = "z", size: int = 620
+) -> Path:
     atlas = build_atlas(load_mesh(mesh), resolution)
     view = View(**VIEW, up=up)
     source = int(np.argmax(atlas.mesh.V @ (view.axes[2] + 0.9 * view.axes[1] + 0.2 * view.axes[0])))
@@ -77,7 +95,8 @@ def make(folder: Path, mesh: Path = MESH, resolution: int = 96, up: str = "z", s
         16.0,
         5.6,
         "Wave fronts and geodesic circles",
-        f"{mesh.stem}, {' x '.join(map(str, atlas.areas.shape))} texels; fronts at equal times (dark) over circles of "
+        f"{mesh.stem}, {' x '.join(map(str, atlas.areas.shape))} texels; fronts at equal times "
+        f"(dark) over circles of "
         "exact geodesic distance (yellow), from the black point",
     )
     nearest = NEAREST * ideal_width(atlas)
@@ -89,15 +108,32 @@ def make(folder: Path, mesh: Path = MESH, resolution: int = 96, up: str = "z", s
         axes.imshow(painter.mesh(view, size), interpolation="antialiased")
         axes.set_axis_off()
         error = np.abs(gone / distance - 1)[distance > nearest]
-        figure.text(left + 0.112, 0.085, NAMES[operator], fontsize=13, fontweight="bold", color=TEXT, ha="center")
         figure.text(
-            left + 0.112, 0.04, f"median error {100 * np.median(error):.2f} %", fontsize=10.5, color=FAINT, ha="center"
+            left + 0.112,
+            0.085,
+            NAMES[operator],
+            fontsize=13,
+            fontweight="bold",
+            color=TEXT,
+            ha="center",
+        )
+        figure.text(
+            left + 0.112,
+            0.04,
+            f"median error {100 * np.median(error):.2f} %",
+            fontsize=10.5,
+            color=FAINT,
+            ha="center",
         )
     bar = figure.add_axes((0.951, 0.2, 0.009, 0.52))
-    bar.imshow(np.linspace(1, 0, 256)[:, None], cmap=ListedColormap(color_table() / 255), aspect="auto")
+    bar.imshow(
+        np.linspace(1, 0, 256)[:, None], cmap=ListedColormap(color_table() / 255), aspect="auto"
+    )
     bar.set_xticks([])
     ends = f"{100 * LIMIT:g} %"
-    bar.set_yticks([0, 127.5, 255], [f"+{ends}", "0", f"\N{MINUS SIGN}{ends}"], fontsize=9.5, color=TEXT)
+    bar.set_yticks(
+        [0, 127.5, 255], [f"+{ends}", "0", f"\N{MINUS SIGN}{ends}"], fontsize=9.5, color=TEXT
+    )
     bar.yaxis.tick_right()
     bar.tick_params(length=0)
     bar.set_title("ahead", fontsize=9.5, color=FAINT)
@@ -108,7 +144,9 @@ def make(folder: Path, mesh: Path = MESH, resolution: int = 96, up: str = "z", s
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Wave fronts over a surface, and the circles they should follow.")
+    parser = argparse.ArgumentParser(
+        description="Wave fronts over a surface, and the circles they should follow."
+    )
     parser.add_argument("mesh", type=Path, nargs="?", default=MESH)
     parser.add_argument("--resolution", type=int, default=96)
     parser.add_argument("--up", choices=("y", "z"), help="axis of the mesh that points up")

@@ -1,6 +1,7 @@
 """Shipped meshes of a drum: a flat skin, and the wall that it is stretched over.
 
-`python examples/scene_meshes/drum.py` writes `scenes/meshes/drum_skin.obj` and `scenes/meshes/drum_shell.obj` again.
+`python examples/scene_meshes/drum.py` writes `scenes/meshes/drum_skin.obj` and
+`scenes/meshes/drum_shell.obj` again.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from ripple_sim.scenes.shapes import Array, Triangles, write_obj
 SKIN_FILE = Path(__file__).parents[2] / "scenes" / "meshes" / "drum_skin.obj"
 WALL_FILE = SKIN_FILE.with_name("drum_shell.obj")
 
-RADIUS, HEIGHT = 0.4, 0.32  # of the skin's rim, and where it lies [m]
+# of the skin's rim, and where it lies [m]
+RADIUS = 0.4
+HEIGHT = 0.32
 _HOOP = 0.016  # radius of the rod round the rim [m]
 
 
@@ -33,7 +36,8 @@ def skin(circles: int = 24) -> tuple[Array, Triangles]:
         points.append(RADIUS * circle / circles * np.stack([np.cos(angle), np.sin(angle)], axis=1))
     plane = np.concatenate(points)
     F = Delaunay(plane).simplices.astype(np.int64)
-    a, b = plane[F[:, 1]] - plane[F[:, 0]], plane[F[:, 2]] - plane[F[:, 0]]
+    a = plane[F[:, 1]] - plane[F[:, 0]]
+    b = plane[F[:, 2]] - plane[F[:, 0]]
     clockwise = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
     F[clockwise] = F[clockwise, ::-1]
     return np.column_stack([plane, np.full(len(plane), HEIGHT)]), F
@@ -50,12 +54,20 @@ def wall(segments: int = 72) -> tuple[Array, Triangles]:
     turn = 2 * np.pi * np.arange(segments) / segments
     radius, height = profile.T
     V = np.stack(
-        [np.outer(np.cos(turn), radius), np.outer(np.sin(turn), radius), np.tile(height, (segments, 1))], axis=-1
+        [
+            np.outer(np.cos(turn), radius),
+            np.outer(np.sin(turn), radius),
+            np.tile(height, (segments, 1)),
+        ],
+        axis=-1,
     )
     number = np.arange(segments * len(profile)).reshape(segments, len(profile))
-    after, above = np.roll(number, -1, axis=0), np.roll(number, -1, axis=1)
+    after = np.roll(number, -1, axis=0)
+    above = np.roll(number, -1, axis=1)
     both = np.roll(after, -1, axis=1)
-    F = np.stack([np.stack([number, after, both], axis=-1), np.stack([number, both, above], axis=-1)])
+    F = np.stack(
+        [np.stack([number, after, both], axis=-1), np.stack([number, both, above], axis=-1)]
+    )
     return V.reshape(-1, 3), F.reshape(-1, 3)
 
 

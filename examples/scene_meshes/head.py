@@ -2,9 +2,9 @@
 
     python examples/scene_meshes/head.py
 
-writes `face.obj` with texture coordinates, its colours `face.png`, the image `face_waves.png` that tells where waves
-run, and `skull.obj` to scenes/meshes again; `--volume FILE` writes the whole head as voxels instead, a .npy, as a
-scanner would see it.
+writes `face.obj` with texture coordinates, its colours `face.png`, the image `face_waves.png` that
+tells where waves run, and `skull.obj` to scenes/meshes again; `--volume FILE` writes the whole head
+as voxels instead, a .npy, as a scanner would see it.
 """
 
 from __future__ import annotations
@@ -34,26 +34,43 @@ from ripple_sim.solver.files import atomic_write
 
 FOLDER = Path(__file__).parents[2] / "scenes" / "meshes"
 
-_MIDDLE = np.array([0.0, 0.0, 0.52])  # texture coordinates are longitude and latitude about this point [m]
+# texture coordinates are longitude and latitude about this point [m]
+_MIDDLE = np.array([0.0, 0.0, 0.52])
 _HEIGHT = 512  # of the images [pixels]; they are twice as wide
 _FINER = 2  # they are painted so many times as fine, for smooth edges
 
-_EYE, _EYE_RADIUS = np.array([0.205, 0.108, 0.575]), 0.088
+_EYE = np.array([0.205, 0.108, 0.575])
+_EYE_RADIUS = 0.088
 _GAZE = np.array([0.955, -0.10, 0.12])  # of the eye at y > 0
-_IRIS, _PUPIL, _GLINT = 0.048, 0.026, 0.011  # radii [m]
+# radii [m]
+_IRIS = 0.048
+_PUPIL = 0.026
+_GLINT = 0.011
 
-_SKIN, _CHEEK, _LIP = (236, 190, 150), (232, 150, 124), (196, 92, 84)
-_WHITE, _BLUE, _BLACK = (250, 250, 246), (58, 128, 150), (24, 24, 30)
+_SKIN = (236, 190, 150)
+_CHEEK = (232, 150, 124)
+_LIP = (196, 92, 84)
+_WHITE = (250, 250, 246)
+_BLUE = (58, 128, 150)
+_BLACK = (24, 24, 30)
 
 FOOT = 0.13  # height at which the neck is cut off [m]
 # ears stand off the head towards the back
-_FLARED = np.array([[np.cos(0.45), np.sin(0.45), 0.0], [-np.sin(0.45), np.cos(0.45), 0.0], [0.0, 0.0, 1.0]])
+_FLARED = np.array(
+    [[np.cos(0.45), np.sin(0.45), 0.0], [-np.sin(0.45), np.cos(0.45), 0.0], [0.0, 0.0, 1.0]]
+)
 
-LOW, HIGH = np.array([-0.42, -0.42, 0.10]), np.array([0.45, 0.42, 0.95])  # a box round the head [m]
+# a box round the head [m]
+LOW = np.array([-0.42, -0.42, 0.10])
+HIGH = np.array([0.45, 0.42, 0.95])
 
-# What a scanner makes of air, soft tissue and bone [Hounsfield units], the thresholds between them, and its noise.
-AIR, TISSUE, BONE = -1000.0, 40.0, 1000.0
-SKIN_THRESHOLD, BONE_THRESHOLD = (AIR + TISSUE) / 2, (TISSUE + BONE) / 2
+# What a scanner makes of air, soft tissue and bone [Hounsfield units], the thresholds between them,
+# and its noise.
+AIR = -1000.0
+TISSUE = 40.0
+BONE = 1000.0
+SKIN_THRESHOLD = (AIR + TISSUE) / 2
+BONE_THRESHOLD = (TISSUE + BONE) / 2
 _NOISE = 25.0
 
 _LIPS = smooth_union(
@@ -99,7 +116,9 @@ def write_mesh(path: Path) -> None:
     lines += [f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in V]
     lines += [f"vt {u:.5g} {v:.5g}" for u, v in unique]
     corners = np.stack([F, index.reshape(F.shape)], axis=2) + 1
-    lines += ["f " + " ".join(f"{vertex}/{texture}" for vertex, texture in face) for face in corners]
+    lines += [
+        "f " + " ".join(f"{vertex}/{texture}" for vertex, texture in face) for face in corners
+    ]
     with atomic_write(path) as unfinished:
         unfinished.write_text("\n".join(lines) + "\n")
 
@@ -116,17 +135,23 @@ def write_images(colors: Path, waves: Path) -> None:
 def _coordinates(points: Array) -> Array:
     """Texture coordinates [..., 2] of points [..., 3]: longitude, with the face in the middle, and latitude."""
     x, y, z = np.moveaxis(points - _MIDDLE, -1, 0)
-    return np.stack([0.5 + np.arctan2(y, x) / (2 * np.pi), 0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi], axis=-1)
+    return np.stack(
+        [0.5 + np.arctan2(y, x) / (2 * np.pi), 0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi], axis=-1
+    )
 
 
 def _painted_points() -> Array:
     """Outermost points of the head that an image's pixels stand for, [height, width, 3], top row first."""
-    height, width = _FINER * _HEIGHT, 2 * _FINER * _HEIGHT
+    height = _FINER * _HEIGHT
+    width = 2 * _FINER * _HEIGHT
     latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
     longitude = 2 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
-    x, y, z = np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)
+    x = np.cos(latitude) * np.cos(longitude)
+    y = np.cos(latitude) * np.sin(longitude)
+    z = np.sin(latitude)
     ways = np.stack([x, y, np.broadcast_to(z, x.shape)], axis=-1)
-    solid, away = head_solid(), np.full((height, width), 0.5)
+    solid = head_solid()
+    away = np.full((height, width), 0.5)
     front = x > 0.5  # what is painted lies here
     for _ in range(30):  # from outside inwards; the distances are approximate, so in shorter steps
         away[front] -= 0.8 * solid(_MIDDLE + away[front][:, None] * ways[front])
@@ -173,7 +198,9 @@ def _skull_solid() -> Sdf:
     spine = rounded_cone((-0.05, 0.0, 0.36), (-0.05, 0.0, 0.23), 0.06, 0.07)
     nose = capsule((0.222, 0.0, 0.575), (0.245, 0.0, 0.545), 0.018)
     socket = sphere((0.205, 0.108, 0.575), 0.075)
-    solid = smooth_union(0.05, cranium, upper_jaw, chin, mirrored(branch), mirrored(cheekbone), spine)
+    solid = smooth_union(
+        0.05, cranium, upper_jaw, chin, mirrored(branch), mirrored(cheekbone), spine
+    )
     solid = smooth_intersection(0.02, solid, lambda points: -mirrored(socket)(points))
     return smooth_union(0.015, solid, nose)
 
@@ -205,7 +232,10 @@ def main() -> None:
     values, origin = head_volume(chosen.spacing)
     with atomic_write(chosen.volume) as unfinished, unfinished.open("wb") as file:
         np.save(file, values)
-    print(f"{chosen.volume}: spacing {chosen.spacing:g} m, origin {origin.tolist()} m, bone from {BONE_THRESHOLD:g} on")
+    print(
+        f"{chosen.volume}: spacing {chosen.spacing:g} m, origin {origin.tolist()} m, bone from "
+        f"{BONE_THRESHOLD:g} on"
+    )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,12 @@ from ripple_sim.scenes.shapes import Array
 
 TERRAIN_FILE = Path(__file__).parents[2] / "scenes" / "meshes" / "terrain.bin"
 
-_HILLS = ((-0.55, 0.45, 0.30, 1.0), (0.65, 0.55, 0.32, 0.8), (-0.75, -0.55, 0.28, 0.5), (0.60, -0.70, 0.26, 0.45))
+_HILLS = (
+    (-0.55, 0.45, 0.30, 1.0),
+    (0.65, 0.55, 0.32, 0.8),
+    (-0.75, -0.55, 0.28, 0.5),
+    (0.60, -0.70, 0.26, 0.45),
+)
 
 
 def terrain(size: int = 64) -> Array:

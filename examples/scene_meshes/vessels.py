@@ -1,6 +1,7 @@
 """Shipped target meshes that are no closed surface of genus 0: a teapot, a pretzel.
 
-`python examples/scene_meshes/vessels.py` writes `scenes/meshes/teapot.obj` and `scenes/meshes/pretzel.obj` again.
+`python examples/scene_meshes/vessels.py` writes `scenes/meshes/teapot.obj` and
+`scenes/meshes/pretzel.obj` again.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ TEAPOT_FILE = Path(__file__).parents[2] / "scenes" / "meshes" / "teapot.obj"
 PRETZEL_FILE = TEAPOT_FILE.with_name("pretzel.obj")
 
 _RIM = 0.42  # height of the teapot's opening [m]
-_TIP, _POUR = (0.53, 0.0, 0.365), (0.75, 0.0, 0.66)  # of the spout, and where it opens
+# of the spout, and where it opens
+_TIP = (0.53, 0.0, 0.365)
+_POUR = (0.75, 0.0, 0.66)
 
 
 def teapot(cell: float = 0.02) -> tuple[Array, Triangles]:
@@ -45,31 +48,61 @@ def teapot(cell: float = 0.02) -> tuple[Array, Triangles]:
     Returns
     -------
     V, F
-        Vertices [n, 3] float64 [m] and triangles [m, 3] int64, oriented outwards: two open parts, one with a handle.
+        Vertices [n, 3] float64 [m] and triangles [m, 3] int64, oriented outwards: two open parts,
+        one with a handle.
     """
     belly = smooth_intersection(
         0.04, ellipsoid((0.0, 0.0, 0.24), (0.34, 0.34, 0.235)), half_space((0.0, 0.0, -1.0), -0.035)
     )
     neck = rounded_cone((0.0, 0.0, 0.36), (0.0, 0.0, 0.56), 0.19, 0.17)
     spout = tube(
-        [(0.22, 0.0, 0.13), (0.36, 0.0, 0.17), (0.44, 0.0, 0.25), (0.51, 0.0, 0.34), (0.60, 0.0, 0.44)], 0.078, 0.043
+        [
+            (0.22, 0.0, 0.13),
+            (0.36, 0.0, 0.17),
+            (0.44, 0.0, 0.25),
+            (0.51, 0.0, 0.34),
+            (0.60, 0.0, 0.44),
+        ],
+        0.078,
+        0.043,
     )
     handle = tube(
-        [(-0.27, 0.0, 0.30), (-0.40, 0.0, 0.345), (-0.50, 0.0, 0.28), (-0.47, 0.0, 0.16), (-0.31, 0.0, 0.10)], 0.036
+        [
+            (-0.27, 0.0, 0.30),
+            (-0.40, 0.0, 0.345),
+            (-0.50, 0.0, 0.28),
+            (-0.47, 0.0, 0.16),
+            (-0.31, 0.0, 0.10),
+        ],
+        0.036,
     )
     pot = smooth_union(0.06, smooth_union(0.05, belly, neck), spout, handle)
     V, F = polygonise(pot, ((-0.56, -0.38, -0.03), (0.68, 0.38, 0.78)), cell)
     V, F = opened(pot, V, F, (0.0, 0.0, _RIM), (0.0, 0.0, 1.0), cell)
     V, F = opened(pot, V, F, _TIP, _POUR, cell)
-    lid = smooth_union(0.05, ellipsoid((0.0, 0.0, _RIM - 0.01), (0.265, 0.265, 0.08)), sphere((0.0, 0.0, 0.525), 0.04))
+    lid = smooth_union(
+        0.05,
+        ellipsoid((0.0, 0.0, _RIM - 0.01), (0.265, 0.265, 0.08)),
+        sphere((0.0, 0.0, 0.525), 0.04),
+    )
     lid_V, lid_F = polygonise(lid, ((-0.3, -0.3, 0.3), (0.3, 0.3, 0.6)), cell)
     lid_V, lid_F = opened(lid, lid_V, lid_F, (0.0, 0.0, _RIM + 0.004), (0.0, 0.0, -1.0), cell)
-    return np.concatenate([V, lid_V]) - [0.0, 0.0, V[:, 2].min()], np.concatenate([F, lid_F + len(V)])
+    return np.concatenate([V, lid_V]) - [0.0, 0.0, V[:, 2].min()], np.concatenate(
+        [F, lid_F + len(V)]
+    )
 
 
 def pretzel(cell: float = 0.02) -> tuple[Array, Triangles]:
     """Model a pretzel 1 m wide that lies on z = 0: a closed surface with three handles; cell as for `teapot`."""
-    course = [(0.13, -0.30), (0.07, -0.17), (-0.05, 0.01), (-0.20, 0.20), (-0.38, 0.17), (-0.45, -0.02), (-0.35, -0.22)]
+    course = [
+        (0.13, -0.30),
+        (0.07, -0.17),
+        (-0.05, 0.01),
+        (-0.20, 0.20),
+        (-0.38, 0.17),
+        (-0.45, -0.02),
+        (-0.35, -0.22),
+    ]
     course += [(-0.20, -0.315), (0.0, -0.345)]
     left, right = ([(side * x, y, 0.0) for x, y in course] for side in (1, -1))
     dough = smooth_union(0.03, tube(left, 0.052, 0.067), tube(right, 0.052, 0.067))
@@ -77,13 +110,18 @@ def pretzel(cell: float = 0.02) -> tuple[Array, Triangles]:
     return V - [0.0, 0.0, V[:, 2].min()], F
 
 
-def tube(course: ArrayLike, radius: float, last_radius: float | None = None, segments: int = 40) -> Sdf:
+def tube(
+    course: ArrayLike, radius: float, last_radius: float | None = None, segments: int = 40
+) -> Sdf:
     """Round tube along a smooth curve through points [k, 3] [m], whose radius [m] changes evenly to that at its end."""
     points = np.asarray(course, dtype=np.float64)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     curve = CubicSpline(along, points)(np.linspace(0.0, along[-1], segments + 1))
     radii = np.linspace(radius, radius if last_radius is None else last_radius, segments + 1)
-    cones = [rounded_cone(*ends) for ends in zip(curve[:-1], curve[1:], radii[:-1], radii[1:], strict=True)]
+    cones = [
+        rounded_cone(*ends)
+        for ends in zip(curve[:-1], curve[1:], radii[:-1], radii[1:], strict=True)
+    ]
     return lambda p: np.min([cone(p) for cone in cones], axis=0)
 
 
@@ -92,9 +130,11 @@ def opened(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Cut a triangulated surface sdf = 0 open: what lies beyond a plane through a point [m] along a normal is left out.
 
-    Vertices near the plane are moved onto its cut with the surface first, so that no slivers come about.
+    Vertices near the plane are moved onto its cut with the surface first, so that no slivers come
+    about.
     """
-    point, normal = np.asarray(point, dtype=np.float64), np.asarray(normal, dtype=np.float64)
+    point = np.asarray(point, dtype=np.float64)
+    normal = np.asarray(normal, dtype=np.float64)
     normal = normal / np.linalg.norm(normal)
     near = np.abs((V - point) @ normal) < 0.4 * cell
     V = V.copy()
@@ -115,12 +155,18 @@ def _clipped(V: Array, F: Triangles, beyond: Array) -> tuple[Array, Triangles]:
     """Part of a triangulation where a function, linear in its triangles and given at the vertices [n], is negative."""
     count = (beyond[F] > 0).sum(axis=1)
     crossing = F[(count > 0) & (beyond[F].min(axis=1) < 0)]
-    turn = np.where((beyond[crossing] > 0).sum(axis=1) == 1, beyond[crossing].argmax(1), beyond[crossing].argmin(1))
+    turn = np.where(
+        (beyond[crossing] > 0).sum(axis=1) == 1,
+        beyond[crossing].argmax(1),
+        beyond[crossing].argmin(1),
+    )
     a, b, c = np.take_along_axis(crossing, (turn[:, None] + np.arange(3)) % 3, axis=1).T
     ends = np.sort(np.stack([np.stack([a, b], axis=1), np.stack([a, c], axis=1)]), axis=2)
     edges, index = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     share = beyond[edges[:, 0]] / (beyond[edges[:, 0]] - beyond[edges[:, 1]])
-    cut = np.where(share == 0, edges[:, 0], np.where(share == 1, edges[:, 1], len(V) + np.arange(len(edges))))
+    cut = np.where(
+        share == 0, edges[:, 0], np.where(share == 1, edges[:, 1], len(V) + np.arange(len(edges)))
+    )
     to_b, to_c = cut[index.reshape(2, -1)]
     lone = beyond[a] < 0  # else a alone lies beyond
     kept = [
@@ -130,7 +176,9 @@ def _clipped(V: Array, F: Triangles, beyond: Array) -> tuple[Array, Triangles]:
         np.stack([to_b, c, to_c], axis=1)[~lone],
     ]
     triangles = np.concatenate(kept)
-    points = np.concatenate([V, V[edges[:, 0]] + share[:, None] * (V[edges[:, 1]] - V[edges[:, 0]])])
+    points = np.concatenate(
+        [V, V[edges[:, 0]] + share[:, None] * (V[edges[:, 1]] - V[edges[:, 0]])]
+    )
     distinct = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     used, triangles = np.unique(triangles[distinct], return_inverse=True)
     return points[used], triangles.reshape(-1, 3)

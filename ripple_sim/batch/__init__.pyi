@@ -1,7 +1,12 @@
 from .executors import DaskExecutor as DaskExecutor
 from .finished import pack as pack
 from .folder import BatchFolder as BatchFolder, keep_plan as keep_plan, stored as stored
-from .plan import Distribution as Distribution, Plan as Plan, parse_key as parse_key, read_plan as read_plan
+from .plan import (
+    Distribution as Distribution,
+    Plan as Plan,
+    parse_key as parse_key,
+    read_plan as read_plan,
+)
 from .report import load_batch as load_batch, parquet as parquet, status_text as status_text
 from .run import (
     Progress as Progress,

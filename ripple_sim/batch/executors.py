@@ -46,18 +46,23 @@ class DaskExecutor(Executor):
         try:
             from distributed import Client
         except ImportError as error:
-            raise BatchError("--dask needs Dask; install it with: pip install 'ripple-sim[dask]'") from error
+            raise BatchError(
+                "--dask needs Dask; install it with: pip install 'ripple-sim[dask]'"
+            ) from error
         try:
             self._client = Client(address, timeout=20, set_as_default=False)
         except (OSError, ValueError) as error:
             raise BatchError(
-                f"no Dask scheduler answers at {shown(address)} ({error}); valid is an address such as tcp://host:8786"
+                f"no Dask scheduler answers at {shown(address)} ({error}); valid is an address "
+                f"such as tcp://host:8786"
             ) from error
         self._address = address
         self._log = logging.getLogger("distributed.client")
-        self._silence = lambda record: False  # that the scheduler is gone is said once, by `refusal`
+        # that the scheduler is gone is said once, by `refusal`
+        self._silence = lambda record: False
         self._log.addFilter(self._silence)
-        self._places, self._counted = 0, -math.inf
+        self._places = 0
+        self._counted = -math.inf
         self._executor = self._client.get_executor(pure=False, retries=0)
 
     @property
@@ -83,7 +88,8 @@ class DaskExecutor(Executor):
         if self._client.status == "running":
             return None
         return BatchError(
-            f"the Dask scheduler at {self._address} is gone; finished scenes are kept: start it, and run the same "
+            f"the Dask scheduler at {self._address} is gone; finished scenes are kept: start it, "
+            f"and run the same "
             "command again to go on"
         )
 
@@ -112,8 +118,8 @@ def shares(cores: list[int], workers: int) -> list[list[int]]:
 class LocalExecutor(Executor):
     """Spawned processes, each with a core or more and an OpenGL context of its own.
 
-    One that dies fails what it was at, and is replaced; all of them end with this process, however it ends. At most
-    `places` tasks may be submitted at a time, one a worker.
+    One that dies fails what it was at, and is replaced; all of them end with this process, however
+    it ends. At most `places` tasks may be submitted at a time, one a worker.
     """
 
     def __init__(self, workers: int) -> None:
@@ -121,7 +127,8 @@ class LocalExecutor(Executor):
         self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._cores = shares(available_cores(), workers)
         self._user_line = user_line()
-        self._pools: dict[int, tuple[ProcessPoolExecutor, Future[int]]] = {}  # with the number of its process
+        # with the number of its process
+        self._pools: dict[int, tuple[ProcessPoolExecutor, Future[int]]] = {}
         for place in range(workers):
             self._free.put(place)
 
@@ -161,10 +168,12 @@ class LocalExecutor(Executor):
 def _begin(cores: list[int], line: tuple[str, int]) -> None:
     """Begin a worker: before anything heavy is imported, it gets its share of the cores; its warnings name a line."""
     work_for(line)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes: the parent ends this one
+    # Ctrl-C goes to all processes: the parent ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, cores)
-    os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe with threads may end the process; see docs/stability.md
+    # llvmpipe with threads may end the process; see docs/stability.md
+    os.environ.setdefault("LP_NUM_THREADS", "0")
     for variable in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, str(len(cores)))
     os.environ.setdefault("MUJOCO_GL", "disable")

@@ -30,8 +30,11 @@ from .folder import BatchFolder, members, times_of
 # An array `height_TARGET` a target, [frames, C, n, n] float32, in metres, a frame a chunk.
 HEIGHTS = "heights.zarr.zip"
 
-IMPULSES, POSITIONS, SENSORS = "impulses.csv", "qpos.npy", "sensors.npz"
-FACTS, TIMES = "scene.json", "times.json"
+IMPULSES = "impulses.csv"
+POSITIONS = "qpos.npy"
+SENSORS = "sensors.npz"
+FACTS = "scene.json"
+TIMES = "times.json"
 
 
 def facts_hash(facts: dict[str, Any]) -> str:
@@ -42,8 +45,12 @@ def facts_hash(facts: dict[str, Any]) -> str:
 class FinishedScene:
     """A scene of a batch: in a folder, or in a tar file, whose `members` it has by their names behind its number."""
 
-    def __init__(self, number: int, path: Path, members: dict[str, tarfile.TarInfo] | None = None) -> None:
-        self.number, self._path, self._members = number, path, members
+    def __init__(
+        self, number: int, path: Path, members: dict[str, tarfile.TarInfo] | None = None
+    ) -> None:
+        self.number = number
+        self._path = path
+        self._members = members
 
     def __repr__(self) -> str:
         return f"FinishedScene({self.number})"
@@ -52,7 +59,11 @@ class FinishedScene:
         """Names of its files; in a tar file with dots in place of slashes."""
         if self._members is not None:
             return sorted(self._members)
-        found = sorted(path.relative_to(self._path).as_posix() for path in self._path.rglob("*") if path.is_file())
+        found = sorted(
+            path.relative_to(self._path).as_posix()
+            for path in self._path.rglob("*")
+            if path.is_file()
+        )
         return [name for name in found if name != TIMES]
 
     def read(self, name: str) -> bytes:
@@ -77,24 +88,33 @@ class FinishedScene:
             raise
         except Exception as error:  # whatever a damaged file holds
             raise BatchError(
-                f"scene {self.number} in {self._path} is damaged: {error}; remove it, and run the batch again"
+                f"scene {self.number} in {self._path} is damaged: {error}; remove it, and run the "
+                f"batch again"
             ) from error
 
     def facts(self) -> dict[str, Any]:
         """What is known of it: seed, source, values drawn, counts, energies [J], files and their hashes."""
         with self._reported():
             found = msgspec.json.decode(self.read(FACTS), type=dict[str, Any])
-            if found["hash"] != facts_hash({name: value for name, value in found.items() if name != "hash"}):
+            if found["hash"] != facts_hash(
+                {name: value for name, value in found.items() if name != "hash"}
+            ):
                 raise ValueError(f"{FACTS} is not as it was written")
             return found
 
     def times(self) -> dict[str, Any]:
         """How long it took [s], and where it was made."""
         with self._reported():
-            kept = (self._path / TIMES if self._members is None else times_of(self._path)).read_bytes()
+            kept = (
+                self._path / TIMES if self._members is None else times_of(self._path)
+            ).read_bytes()
             found = msgspec.json.decode(kept, type=dict[str, Any])
             found = found if self._members is None else found[str(self.number)]
-            return {**found, "seconds": float(found["seconds"]), "cpu_seconds": float(found["cpu_seconds"])}
+            return {
+                **found,
+                "seconds": float(found["seconds"]),
+                "cpu_seconds": float(found["cpu_seconds"]),
+            }
 
     def positions(self) -> NDArray[np.float64]:
         """MuJoCo's generalised positions at every frame, [frames, nq]."""
@@ -110,7 +130,11 @@ class FinishedScene:
             with zipfile.ZipFile(io.BytesIO(self.read(HEIGHTS))) as file:
                 stored = {name: cpu.Buffer.from_bytes(file.read(name)) for name in file.namelist()}
             group = zarr.open_group(zarr.storage.MemoryStore(stored), mode="r", zarr_format=2)
-            return {str(array.attrs["target"]): array[...] for name, array in group.arrays() if name != "time"}
+            return {
+                str(array.attrs["target"]): array[...]
+                for name, array in group.arrays()
+                if name != "time"
+            }
 
     def impulses(self) -> NDArray:
         """The impulses, a structured array: frame, time, geom, other, x, y, z, impulse, chart, row, column, inner."""
@@ -127,10 +151,18 @@ class FinishedScene:
         BatchError
             If there are none, as with EXR frames.
         """
-        images = [name for name in self.names() if name.startswith("frames") and name.endswith(".png")]
-        video = next((name for name in self.names() if name.startswith("video.") and name.count(".") == 1), None)
+        images = [
+            name for name in self.names() if name.startswith("frames") and name.endswith(".png")
+        ]
+        video = next(
+            (name for name in self.names() if name.startswith("video.") and name.count(".") == 1),
+            None,
+        )
         if not images and video is None:
-            raise BatchError(f"scene {self.number} has no video and no PNG frames; it has {', '.join(self.names())}")
+            raise BatchError(
+                f"scene {self.number} has no video and no PNG frames; it has "
+                f"{', '.join(self.names())}"
+            )
         with self._reported():
             for name in images or ([video] if video and video.endswith((".gif", ".webp")) else []):
                 for frame in ImageSequence.Iterator(Image.open(io.BytesIO(self.read(name)))):
@@ -150,7 +182,9 @@ class FinishedScene:
         """
         names = [name for name in self.names() if "passes" in name and name.endswith(".npz")]
         if not names:
-            raise BatchError(f"scene {self.number} has no passes in .npz files; it has {', '.join(self.names())}")
+            raise BatchError(
+                f"scene {self.number} has no passes in .npz files; it has {', '.join(self.names())}"
+            )
         with self._reported():
             for name in names:
                 with np.load(io.BytesIO(self.read(name))) as arrays:
@@ -167,7 +201,8 @@ def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[
     """The scenes that are there, each once, but for those that are known."""
     loose = sorted(batch.loose())
     packed: set[int] = set()
-    for tar in batch.tar_files():  # looked at later than the folders, so that no scene is missed on its way into one
+    # looked at later than the folders, so that no scene is missed on its way into one
+    for tar in batch.tar_files():
         for scene in scenes_in_tar(tar):
             packed.add(scene.number)
             if scene.number not in known:
@@ -180,7 +215,8 @@ def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[
 def pack(batch: BatchFolder, first: int, end: int) -> None:
     """Move the finished scenes from `first` to before `end` into one tar file, beside those that are there already.
 
-    Killed at any time and called again, it loses and doubles nothing: folders go when the tar file is there.
+    Killed at any time and called again, it loses and doubles nothing: folders go when the tar file
+    is there.
     """
     with (batch.work / f"tar-{first:06d}").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process at a time
@@ -195,7 +231,10 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
         with atomic_write(times_of(tar)) as path:
             path.write_bytes(msgspec.json.encode(times))
         # it appears whole, and tells nothing of who wrote it and when
-        with atomic_write(tar) as path, tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as file:
+        with (
+            atomic_write(tar) as path,
+            tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as file,
+        ):
             for number, scene in scenes.items():
                 for name in scene.names():
                     # WebDataset takes what is before the first dot for the scene

@@ -1,9 +1,10 @@
 """The folder of a batch: where things stand in it, what is finished, and who works on what.
 
-`plan.json` is what the scenes are made by; `scenes/000012` is a finished scene, or a member of `tars/000000.tar`;
-`work/000012` is one that is being made, locked by whoever makes it; `failed/000012.json` and `.log` tell what went
-wrong. A scene is finished when its folder is renamed from `work` to `scenes`: nothing else has to be kept in step.
-Tar files are as WebDataset reads them: files of one scene one after another, named by its number.
+`plan.json` is what the scenes are made by; `scenes/000012` is a finished scene, or a member of
+`tars/000000.tar`; `work/000012` is one that is being made, locked by whoever makes it;
+`failed/000012.json` and `.log` tell what went wrong. A scene is finished when its folder is renamed
+from `work` to `scenes`: nothing else has to be kept in step. Tar files are as WebDataset reads
+them: files of one scene one after another, named by its number.
 """
 
 from __future__ import annotations
@@ -32,6 +33,11 @@ from .plan import Plan, check_plan
 
 NUMBER = re.compile(r"\d{6,}")
 
+# Until a scene is put aside: errors of its own, and deaths of its worker, which may have another
+# reason.
+ERRORS = 3
+DEATHS = 9
+
 
 def times_of(tar: Path) -> Path:
     """The file that tells who made the scenes of a tar file and how long each took, which is not in their bytes."""
@@ -47,12 +53,10 @@ def members(tar: Path) -> dict[int, dict[str, tarfile.TarInfo]]:
                 number, name = member.name.split(".", 1)
                 found.setdefault(int(number), {})[name] = member
     except (tarfile.TarError, EOFError, ValueError, OSError) as error:
-        raise BatchError(f"{tar} is damaged: {error}; remove it, and run the batch again") from error
+        raise BatchError(
+            f"{tar} is damaged: {error}; remove it, and run the batch again"
+        ) from error
     return found
-
-
-# Until a scene is put aside: errors of its own, and deaths of its worker, which may have another reason.
-ERRORS, DEATHS = 3, 9
 
 
 class Failure(msgspec.Struct):
@@ -78,16 +82,24 @@ class BatchFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.plan, self.scenes, self.tars = path / "plan.json", path / "scenes", path / "tars"
-        self.failed, self.thumbnails, self.work = path / "failed", path / "thumbnails", path / "work"
-        self.index, self.page = path / "index.parquet", path / "index.html"
+        self.plan = path / "plan.json"
+        self.scenes = path / "scenes"
+        self.tars = path / "tars"
+        self.failed = path / "failed"
+        self.thumbnails = path / "thumbnails"
+        self.work = path / "work"
+        self.index = path / "index.parquet"
+        self.page = path / "index.html"
 
     def make(self) -> None:
         """Make the folders; raises `BatchError` where a link lies, since it leads to what is not the batch's."""
         folders = (self.scenes, self.tars, self.failed, self.thumbnails, self.work)
         for path in (path for folder in (self.path, *folders) for path in _entries(folder)):
             if path.is_symlink():
-                raise BatchError(f"{path} is a link, which no batch makes; remove it and run the same command again")
+                raise BatchError(
+                    f"{path} is a link, which no batch makes; remove it and run the same command "
+                    f"again"
+                )
         for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
 
@@ -101,7 +113,8 @@ class BatchFolder:
 
     def finished(self) -> set[int]:
         """Numbers of the scenes that are there."""
-        return self.loose().union(*map(members, self.tar_files()))  # in this order: scenes move into tar files
+        # in this order: scenes move into tar files
+        return self.loose().union(*map(members, self.tar_files()))
 
     def loose(self) -> set[int]:
         """Numbers of the scenes that have a folder."""
@@ -111,7 +124,8 @@ class BatchFolder:
         """Whether a scene is there."""
         if self.scene(number).exists():
             return True
-        tars = [tar for tar in self.tar_files() if int(tar.stem) <= number]  # named by their first scene
+        # named by their first scene
+        tars = [tar for tar in self.tar_files() if int(tar.stem) <= number]
         return bool(tars) and number in members(tars[-1])
 
     def tar(self, first: int) -> Path:
@@ -120,13 +134,16 @@ class BatchFolder:
 
     def tar_files(self) -> list[Path]:
         """The tar files, in their order."""
-        return sorted(path for path in _entries(self.tars) if path.suffix == ".tar" and path.stem.isdecimal())
+        return sorted(
+            path for path in _entries(self.tars) if path.suffix == ".tar" and path.stem.isdecimal()
+        )
 
     @contextlib.contextmanager
     def claimed(self, number: int) -> Iterator[Path | None]:
         """Lock a scene against other processes; yields the folder to make it in, see `finish`.
 
-        None if another process makes it now, or it is finished. A process that dies leaves no lock behind.
+        None if another process makes it now, or it is finished. A process that dies leaves no lock
+        behind.
         """
         work = self.work / f"{number:06d}"
         work.mkdir(parents=True, exist_ok=True)
@@ -217,14 +234,20 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
     Raises `BatchError` naming what has changed.
     """
     if batch.plan.exists():
-        before, now = _flat(load_stored(batch.plan)), _flat(plan)
+        before = _flat(load_stored(batch.plan))
+        now = _flat(plan)
         # a larger batch begins like a smaller one
         keys = (before.keys() | now.keys()) - {"plan.count"}
         if changed := sorted(key for key in keys if before.get(key) != now.get(key)):
             key = changed[0]
-            more = f", and {len(changed) - 1} more ({', '.join(changed[1:4])})" if len(changed) > 1 else ""
+            more = (
+                f", and {len(changed) - 1} more ({', '.join(changed[1:4])})"
+                if len(changed) > 1
+                else ""
+            )
             raise BatchError(
-                f"{batch.path} holds a batch by another plan: {key} was {shown(before.get(key))} and is "
+                f"{batch.path} holds a batch by another plan: {key} was {shown(before.get(key))} "
+                f"and is "
                 f"{shown(now.get(key))}{more}; take it back, or name another folder"
             )
     elif batch.path.is_dir() and any(batch.path.iterdir()):
@@ -240,8 +263,15 @@ def load_stored(path: Path) -> StoredPlan:
         found = msgspec.json.decode(path.read_bytes(), type=StoredPlan)
         check_plan(found.plan)
         return found
-    except (OSError, RecursionError, ValueError, SceneError) as error:  # strings that are not UTF-8 are a ValueError
-        raise BatchError(f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is") from error
+    except (
+        OSError,
+        RecursionError,
+        ValueError,
+        SceneError,
+    ) as error:  # strings that are not UTF-8 are a ValueError
+        raise BatchError(
+            f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is"
+        ) from error
 
 
 def _flat(value: Any) -> dict[str, Any]:

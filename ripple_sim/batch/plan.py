@@ -35,6 +35,9 @@ KINDS = ("uniform", "log_uniform", "normal", "integers", "choice", "orientation"
 
 _MOST_DRAWS = 10_000  # until a normal one lies within its limits
 
+_STEP = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
+MOST_SCENES = 10_000_000
+
 
 class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """A random value: one of `uniform`, `log_uniform`, `normal`, `integers`, `choice`, `orientation`, `constant`."""
@@ -70,7 +73,9 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
         Floats are rounded to 12 digits, so that no processor's last bit counts.
         """
         if self.choice is not None:
-            share = None if self.weights is None else np.divide(self.weights, math.fsum(self.weights))
+            share = (
+                None if self.weights is None else np.divide(self.weights, math.fsum(self.weights))
+            )
             return self.choice[int(rng.choice(len(self.choice), p=share))]
         if self.constant is not None:
             return self.constant
@@ -78,7 +83,9 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
             turn = rng.standard_normal(4)
             return _plain(turn / math.sqrt(math.fsum(turn**2)))
         if self.integers is not None:
-            whole = rng.integers(self.integers[0], self.integers[1], size=self.length, endpoint=True)
+            whole = rng.integers(
+                self.integers[0], self.integers[1], size=self.length, endpoint=True
+            )
             return whole.tolist() if self.length else int(whole)
         if self.uniform is not None:
             return _plain(rng.uniform(*self.uniform, size=self.length))
@@ -93,29 +100,40 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
             if not np.any(outside):
                 return _plain(number)
             number = np.where(outside, rng.normal(mean, deviation, size=self.length), number)
-        raise SceneError(f"normal {self.normal} hardly ever lies within the limits {self.limits}; widen them")
+        raise SceneError(
+            f"normal {self.normal} hardly ever lies within the limits {self.limits}; widen them"
+        )
 
     def check(self, key: str) -> None:
         """Make sure that it names one kind, and that its numbers fit; raises `SceneError` with the key."""
         given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
         if len(given) != 1:
             raise SceneError(
-                f"plan: {key} is drawn from {' and '.join(given) or 'nothing'}; valid is one of {', '.join(KINDS)}"
+                f"plan: {key} is drawn from {' and '.join(given) or 'nothing'}; valid is one of "
+                f"{', '.join(KINDS)}"
             )
         kind = given[0]
-        for other, extra, fitting in (("weights", self.weights, "choice"), ("limits", self.limits, "normal")):
+        for other, extra, fitting in (
+            ("weights", self.weights, "choice"),
+            ("limits", self.limits, "normal"),
+        ):
             if extra is not None and kind != fitting:
                 raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
         if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
-            raise SceneError(f"plan: {key} has length {self.length}; valid is 1 or more, of numbers")
+            raise SceneError(
+                f"plan: {key} has length {self.length}; valid is 1 or more, of numbers"
+            )
         if problem := self._problem():
-            raise SceneError(f"plan: {key} is drawn from {kind} = {shown(getattr(self, kind))}; {problem}")
+            raise SceneError(
+                f"plan: {key} is drawn from {kind} = {shown(getattr(self, kind))}; {problem}"
+            )
 
     def _problem(self) -> str | None:
         """What is wrong with the numbers, as what is valid."""
         pair = self.uniform or self.log_uniform or self.integers or self.limits
         if pair is not None:
-            low, high = np.array(pair[0], float), np.array(pair[1], float)
+            low = np.array(pair[0], float)
+            high = np.array(pair[1], float)
             if low.shape not in ((), high.shape) and high.shape != ():
                 return "valid are two numbers, or two vectors of the same length"
             if not (np.isfinite(low).all() and np.isfinite(high).all() and np.all(low <= high)):
@@ -131,7 +149,9 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
                 return "valid is at least one value"
             weights = self.weights
             if weights is not None and not (
-                len(weights) == len(self.choice) and min(weights) >= 0 and 0 < sum(weights) < math.inf
+                len(weights) == len(self.choice)
+                and min(weights) >= 0
+                and 0 < sum(weights) < math.inf
             ):
                 return f"valid are {len(self.choice)} weights, none below 0"
         return None
@@ -144,9 +164,8 @@ def _plain(value: Any) -> Any:
     return float(f"{value:.12g}")
 
 
-_STEP = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
-
-# A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern with *; "" without.
+# A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern
+# with *; "" without.
 Step = tuple[str, str]
 
 
@@ -154,7 +173,8 @@ def parse_key(key: str) -> tuple[Step, ...]:
     """Read a key of a plan; raises `SceneError` if it is not names between dots."""
     if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", key):
         raise SceneError(
-            f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or a pattern in "
+            f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or a "
+            f"pattern in "
             "brackets, such as camera.azimuth, ripple[duck].material.speed or geom[ball*].size"
         )
     return tuple(re.findall(_STEP, key))
@@ -173,7 +193,9 @@ def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
     else:
         found = [number for number, name in enumerate(names) if fnmatchcase(name, chosen)]
     if not found:
-        listed = ", ".join(name or f"number {number}" for number, name in enumerate(names)) or "none"
+        listed = (
+            ", ".join(name or f"number {number}" for number, name in enumerate(names)) or "none"
+        )
         raise SceneError(f"plan: {where} has no {kind}[{chosen or '*'}]; there is {listed}")
     return found
 
@@ -220,12 +242,11 @@ def video_name(store: StoreEntry) -> str | None:
 
 def options_of(store: StoreEntry) -> VideoOptions:
     """How the scenes of a batch are rendered."""
-    shared = {field.name for field in dataclasses.fields(VideoOptions)} & set(StoreEntry.__struct_fields__)
+    shared = {field.name for field in dataclasses.fields(VideoOptions)} & set(
+        StoreEntry.__struct_fields__
+    )
     options = VideoOptions(**{name: getattr(store, name) for name in shared})
     return dataclasses.replace(options, frame_format="exr" if store.video == "exr" else "png")
-
-
-MOST_SCENES = 10_000_000
 
 
 class MeshesEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -246,7 +267,10 @@ class MeshesEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class PlanFile(msgspec.Struct, forbid_unknown_fields=True):
-    """The whole TOML file. Its scenes take turns: number 0 is the first, number 1 the second, and so on."""
+    """The whole TOML file.
+
+    Its scenes take turns: number 0 is the first, number 1 the second, and so on.
+    """
 
     count: int
     """How many scenes are made."""
@@ -297,7 +321,8 @@ def read_plan(path: str | Path) -> Plan:
     path = Path(path)
     if path.exists() and not path.is_file():
         raise SceneError(f"plan {str(path)!r} is not a regular file; give the path of a TOML file")
-    table, what = read_toml(path, "plan"), f"plan {str(path)!r}"
+    table = read_toml(path, "plan")
+    what = f"plan {str(path)!r}"
     check_keys(table, PlanFile, what)
     content = converted(table, PlanFile, what)
     plan = Plan(
@@ -325,13 +350,23 @@ def check_plan(plan: Plan) -> None:
         ("store.scenes_per_tar", store.scenes_per_tar, 1, MOST_SCENES),
     ):
         if not least <= value <= most:
-            raise SceneError(f"plan: {name} is {value}; valid is a whole number from {least} to {most}")
+            raise SceneError(
+                f"plan: {name} is {value}; valid is a whole number from {least} to {most}"
+            )
     if not plan.sources:
-        raise SceneError("plan: it names no scene; write scenes = ['duck'], or [meshes] with files = ['*.obj']")
+        raise SceneError(
+            "plan: it names no scene; write scenes = ['duck'], or [meshes] with files = ['*.obj']"
+        )
     if store.passes and store.video == "none":
-        raise SceneError("plan: store.passes need frames, and store.video is 'none'; name a video, or leave passes out")
+        raise SceneError(
+            "plan: store.passes need frames, and store.video is 'none'; name a video, or leave "
+            "passes out"
+        )
     if store.heights and importlib.util.find_spec("zarr") is None:
-        raise SceneError("plan: store.heights needs the package zarr; install it with: pip install 'ripple-sim[zarr]'")
+        raise SceneError(
+            "plan: store.heights needs the package zarr; install it with: pip install "
+            "'ripple-sim[zarr]'"
+        )
     with tempfile.TemporaryDirectory(prefix="ripple-sim-plan-") as folder:
         check_options(options_of(store), Path(folder) / (video_name(store) or "frames"))
     if plan.meshes is not None and isinstance(plan.meshes.bodies, Distribution):
@@ -347,7 +382,8 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
         path = folder / name
         if name not in shipped and not os.path.isfile(path):  # noqa: PTH113 - False for what can be no name, too
             raise SceneError(
-                f"plan: there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, or give the path of "
+                f"plan: there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, "
+                f"or give the path of "
                 "a TOML file, relative to the plan"
             )
         yield name if name in shipped else str(path.resolve())
@@ -360,7 +396,8 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
         found += [file for file in within if file.suffix[1:].lower() in trimesh.available_formats()]
         if not found:
             raise SceneError(
-                f"plan: no mesh fits {pattern!r}; valid is a file, a folder or a pattern, relative to the plan"
+                f"plan: no mesh fits {pattern!r}; valid is a file, a folder or a pattern, relative "
+                f"to the plan"
             )
         yield from map(str, found)
 
@@ -372,4 +409,11 @@ def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Di
         if isinstance(value, dict) and not set(value) & {*KINDS, "apply"}:
             yield from _distributions(value, key)
             continue
-        yield key, converted(value if isinstance(value, dict) else {"constant": value}, Distribution, f"plan: {key}")
+        yield (
+            key,
+            converted(
+                value if isinstance(value, dict) else {"constant": value},
+                Distribution,
+                f"plan: {key}",
+            ),
+        )

@@ -28,11 +28,27 @@ box-shadow:0 1px 3px #0003}}img{{width:100%;display:block;border-radius:3px}}.fa
 </style><h1>{name}</h1><p>{summary}</p><main>
 """
 
+_PLAIN = (
+    "number",
+    "seed",
+    "source",
+    "frames",
+    "fps",
+    "contacts",
+    "impulse",
+    "bytes",
+    "states",
+    "hash",
+)
+_LISTED = 5  # failures
+
 
 def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
     """Write `index.html`: a thumbnail a scene, with what was drawn for it, and what the whole took."""
     finished = [row for row in rows if row["status"] == "finished"]
-    frames, size, seconds = (sum(row[key] for row in finished) for key in ("frames", "bytes", "seconds"))
+    frames, size, seconds = (
+        sum(row[key] for row in finished) for key in ("frames", "bytes", "seconds")
+    )
     shown = f"; the first {_MOST} are shown" if len(rows) > _MOST else ""
     summary = (
         f"{len(finished)} scenes, {frames} frames, {size / 1e6:.1f} MB, {seconds:.0f} s of work; "
@@ -41,22 +57,28 @@ def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
     cards = "".join(_card(batch, row) for row in rows[:_MOST])
     name = html.escape(batch.path.name)
     with atomic_write(batch.page) as path:
-        path.write_text(_HEAD.format(name=name, summary=summary) + cards + "</main>\n", encoding="utf-8")
+        path.write_text(
+            _HEAD.format(name=name, summary=summary) + cards + "</main>\n", encoding="utf-8"
+        )
 
 
 def _card(batch: BatchFolder, row: dict[str, Any]) -> str:
     number = row["number"]
     if row["status"] != "finished":
-        return f'<a class="failed" href="failed/{number:06d}.log">{number}: {html.escape(str(row["error"]))}</a>\n'
+        return (
+            f'<a class="failed" href="failed/{number:06d}.log">{number}: '
+            f"{html.escape(str(row['error']))}</a>\n"
+        )
     title = html.escape("\n".join(f"{name}: {value}" for name, value in row.items()), quote=True)
     thumbnail = batch.thumbnail(number)
-    image = f'<img loading="lazy" src="thumbnails/{thumbnail.name}" alt="">' if thumbnail.exists() else ""
+    image = (
+        f'<img loading="lazy" src="thumbnails/{thumbnail.name}" alt="">'
+        if thumbnail.exists()
+        else ""
+    )
     link = f"scenes/{number:06d}/" if batch.scene(number).exists() else "tars/"
     text = f"{number}: {html.escape(row['source'])}, {row['impulse']:.3g} N s"
     return f'<a href="{link}" title="{title}">{image}{text}</a>\n'
-
-
-_PLAIN = ("number", "seed", "source", "frames", "fps", "contacts", "impulse", "bytes", "states", "hash")
 
 
 def parquet() -> Any:
@@ -84,15 +106,24 @@ def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
         except BatchError as error:  # or another process packs it, and will write the index too
             damaged[scene.number] = Failure(error=str(error))
     failed = {
-        number: {"number": number, "status": "failed", "attempts": failure.attempts, "error": failure.error}
+        number: {
+            "number": number,
+            "status": "failed",
+            "attempts": failure.attempts,
+            "error": failure.error,
+        }
         for number, failure in (batch.failures() | damaged).items()
     }
     listed = [each for _, each in sorted((failed | rows).items())]
     names = dict.fromkeys(["number", *(name for each in listed for name in each)])
     columns = {name: [each.get(name) for each in listed] for name in names}
     for name, values in columns.items():
-        kinds = {float if isinstance(value, int) and not isinstance(value, bool) else type(value) for value in values}
-        if len(kinds - {type(None)}) > 1 or dict in kinds:  # values of several kinds are kept as JSON
+        kinds = {
+            float if isinstance(value, int) and not isinstance(value, bool) else type(value)
+            for value in values
+        }
+        # values of several kinds are kept as JSON
+        if len(kinds - {type(None)}) > 1 or dict in kinds:
             columns[name] = [json.dumps(value) for value in values]
     with atomic_write(batch.index) as path:
         parquet().write_table(pyarrow.table(columns), path)
@@ -117,7 +148,8 @@ def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:
 class Batch(Sequence):
     """The scenes of a batch that were finished when it was loaded, in the order of their numbers.
 
-    It may be sent to other processes, such as a loader's workers; files are read when they are asked for.
+    It may be sent to other processes, such as a loader's workers; files are read when they are
+    asked for.
 
     Attributes
     ----------
@@ -157,9 +189,6 @@ def load_batch(path: str | Path) -> Batch:
     return Batch(path)
 
 
-_LISTED = 5  # failures
-
-
 def status_text(path: Path) -> str:
     """What is finished, what failed and why, and what is still to be made.
 
@@ -176,7 +205,10 @@ def status_text(path: Path) -> str:
         f"{count - len(finished) - len(aside)} to be made"
     ]
     lines += [
-        f"scene {number} failed {each.attempts} times: {each.error} ({batch.failed.name}/{number:06d}.log)"
+        (
+            f"scene {number} failed {each.attempts} times: {each.error} "
+            f"({batch.failed.name}/{number:06d}.log)"
+        )
         for number, each in sorted(failures.items())[:_LISTED]
     ]
     if len(failures) > _LISTED:

@@ -1,6 +1,7 @@
 """`run_batch`: makes the scenes of a plan that are not there yet, whoever works on them.
 
-A run gives out what is to be made, and notes what comes back. A trial makes one scene, and tells what all will take.
+A run gives out what is to be made, and notes what comes back. A trial makes one scene, and tells
+what all will take.
 """
 
 from __future__ import annotations
@@ -29,6 +30,12 @@ from .plan import Plan
 from .report import parquet, row, write_index
 from .variation import Variation
 from .worker import Outcome, make_scene
+
+_PATIENCE = 1.0  # between looks at scenes that another process makes [s]
+_INDEXED = 30.0  # between versions of the index while scenes are made [s]
+_REST = 20.0  # or so many times as long as the last one took to write
+_TRIED = 3  # scenes whose values are drawn before the batch begins
+_SHOWN = 3  # scenes whose values are told
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -76,32 +83,35 @@ class Progress:
     free: int = 0
 
 
-_PATIENCE = 1.0  # between looks at scenes that another process makes [s]
-_INDEXED = 30.0  # between versions of the index while scenes are made [s]
-_REST = 20.0  # or so many times as long as the last one took to write
-
-
 class BatchRun:
     """The scenes that one process has made, and those that it still has to."""
 
     def __init__(self, batch: BatchFolder, plan: Plan, options: RunOptions) -> None:
-        self.batch, self.options = batch, options
+        self.batch = batch
+        self.options = options
         self.rows: dict[int, dict[str, Any]] = {}  # of the index, by scene
-        self.failures, finished = batch.failures(), batch.finished()
+        self.failures = batch.failures()
+        finished = batch.finished()
         share = [number for number in range(plan.count) if in_shard(number, plan, options.shard)]
         self._share = set(share)
         aside = {number for number, failure in self.failures.items() if failure.aside}
         pending = [number for number in share if number not in finished and number not in aside]
         self.pending = deque(pending[: options.limit])
         self._tar_size = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 0
-        self._open = Counter(number // self._tar_size for number in pending) if self._tar_size else Counter()
-        self.progress = Progress(len(share), len(finished.intersection(share)), len(aside.intersection(share)))
+        self._open = (
+            Counter(number // self._tar_size for number in pending) if self._tar_size else Counter()
+        )
+        self.progress = Progress(
+            len(share), len(finished.intersection(share)), len(aside.intersection(share))
+        )
         self.full: str | None = None
         self._done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
         self._running: set[int] = set()
         self._later: list[int] = []  # what other processes are at
 
-    def work(self, executor: LocalExecutor | DaskExecutor, progress: Callable[[Progress], None] | None) -> None:
+    def work(
+        self, executor: LocalExecutor | DaskExecutor, progress: Callable[[Progress], None] | None
+    ) -> None:
         """Have all scenes made."""
         start = indexed = time.monotonic()
         pause = _INDEXED
@@ -116,11 +126,14 @@ class BatchRun:
                 try:
                     outcome = future.result()
                 except Exception as error:  # the worker died
-                    outcome = Outcome(number, "died", error=f"its worker died: {' '.join(str(error).split())}")
+                    outcome = Outcome(
+                        number, "died", error=f"its worker died: {' '.join(str(error).split())}"
+                    )
                 self._take(number, outcome)
             if not self.pending and not self._running and self._later and self.full is None:
                 time.sleep(_PATIENCE)
-                self.pending, self._later = deque(self._later), []
+                self.pending = deque(self._later)
+                self._later = []
             self.progress.seconds = time.monotonic() - start
             if progress is not None:
                 progress(self.progress)
@@ -135,7 +148,8 @@ class BatchRun:
         self.progress.free = shutil.disk_usage(self.batch.path).free
         if self.progress.free < self.options.keep_free and self.full is None:
             self.full = (
-                f"the disk has {self.progress.free / 1e9:.1f} GB left, less than the {self.options.keep_free / 1e9:g} "
+                f"the disk has {self.progress.free / 1e9:.1f} GB left, less than the "
+                f"{self.options.keep_free / 1e9:g} "
                 "GB to be kept free"
             )
         if self.full is not None:
@@ -153,7 +167,8 @@ class BatchRun:
         elif outcome.state == "full":
             self.full = f"the disk is full: {outcome.error}"
         elif outcome.state in ("failed", "died"):
-            before, died = self.failures.get(number, Failure()), outcome.state == "died"
+            before = self.failures.get(number, Failure())
+            died = outcome.state == "died"
             failure = Failure(before.errors + (not died), before.deaths + died, outcome.error)
             self.progress.failures += before.attempts == 0
             self.failures[number] = failure
@@ -188,12 +203,15 @@ class BatchRun:
 def work(folder: str, number: int) -> Outcome:
     """What a worker does: make a scene.
 
-    The first on each machine is made alone, for it compiles the kernels for all others; so is the first of each
-    source, which makes the atlases.
+    The first on each machine is made alone, for it compiles the kernels for all others; so is the
+    first of each source, which makes the atlases.
     """
     batch = BatchFolder(Path(folder))
     sources = load_stored(batch.plan).plan.sources
-    with first_alone(batch.work, "machine"), first_alone(batch.work, f"source-{number % len(sources)}"):
+    with (
+        first_alone(batch.work, "machine"),
+        first_alone(batch.work, f"source-{number % len(sources)}"),
+    ):
         return make_scene(folder, number)
 
 
@@ -201,9 +219,6 @@ def in_shard(number: int, plan: Plan, shard: tuple[int, int]) -> bool:
     """Whether a scene belongs to a part of the batch; scenes of a tar file stay together."""
     together = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 1
     return number // together % shard[1] == shard[0] - 1
-
-
-_TRIED = 3  # scenes whose values are drawn before the batch begins
 
 
 def run_batch(
@@ -230,7 +245,8 @@ def run_batch(
     Raises
     ------
     RippleError
-        If the plan is another than the folder's, a key of it fits nothing, or the disk is nearly full.
+        If the plan is another than the folder's, a key of it fits nothing, or the disk is nearly
+        full.
     """
     batch = BatchFolder(Path(output).absolute())
     if plan is None:
@@ -249,11 +265,17 @@ def run_batch(
         if options.dask is not None:
             executor = DaskExecutor(options.dask)
         else:
-            executor = LocalExecutor(min(options.workers or usual_workers(), max(1, len(run.pending))))
+            executor = LocalExecutor(
+                min(options.workers or usual_workers(), max(1, len(run.pending)))
+            )
         try:
             run.work(executor, progress)
         except BaseException as error:  # such as Ctrl-C: what is unfinished goes on next time
-            gone = executor.refusal() if isinstance(executor, DaskExecutor) and isinstance(error, Exception) else None
+            gone = (
+                executor.refusal()
+                if isinstance(executor, DaskExecutor) and isinstance(error, Exception)
+                else None
+            )
             executor.shutdown(wait=False, cancel_futures=True)
             if gone is not None:
                 raise gone from ConnectionError(str(error))
@@ -271,9 +293,6 @@ def run_batch(
     return run.progress
 
 
-_SHOWN = 3  # scenes whose values are told
-
-
 def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     """Make one scene in a temporary folder; tell the first ones' values, and the time and room that all will take.
 
@@ -284,12 +303,18 @@ def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     lines = []
     for number in range(min(_SHOWN, plan.count)):
         variation = Variation(plan, number)
-        values = ", ".join(f"{key} = {value}" for key, value in variation.load()[1].items()) or "nothing varies"
-        lines.append(f"scene {number} ({Path(variation.source).name}, seed {variation.seed}): {values}")
+        values = (
+            ", ".join(f"{key} = {value}" for key, value in variation.load()[1].items())
+            or "nothing varies"
+        )
+        lines.append(
+            f"scene {number} ({Path(variation.source).name}, seed {variation.seed}): {values}"
+        )
     with tempfile.TemporaryDirectory(prefix="ripple-sim-trial-") as name:
         batch = BatchFolder(Path(name))
         keep_plan(batch, stored(plan))
-        start, compiled = time.perf_counter(), sum(compile_times().values())
+        start = time.perf_counter()
+        compiled = sum(compile_times().values())
         outcome = make_scene(name, 0)
         if outcome.state != "made":
             raise BatchError(f"scene 0 cannot be made: {outcome.error}")
@@ -298,7 +323,8 @@ def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     count = workers or usual_workers()
     folder = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     lines.append(
-        f"{plan.count} scenes of {outcome.row['frames']} frames: {seconds:.1f} s and {size / 1e6:.2f} MB for one, "
+        f"{plan.count} scenes of {outcome.row['frames']} frames: {seconds:.1f} s and "
+        f"{size / 1e6:.2f} MB for one, "
         f"so about {plan.count * seconds / 3600:.2g} h of work (here by {count} workers, at best "
         f"{plan.count * seconds / 3600 / count:.2g} h) and {plan.count * size / 1e9:.2g} GB; "
         f"{shutil.disk_usage(folder).free / 1e9:.1f} GB are free"

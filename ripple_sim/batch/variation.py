@@ -28,8 +28,18 @@ Stream = Callable[[str], np.random.Generator]
 
 _NAMES = ("geom", "body", "actuator")  # what an entry of a list goes by
 
+# Elements of an MJCF by their tags, and where a specification lists them.
+ELEMENTS = {
+    "body": "bodies", "geom": "geoms", "joint": "joints", "site": "sites", "camera": "cameras", "light": "lights",
+    "material": "materials", "texture": "textures", "mesh": "meshes", "tendon": "tendons", "actuator": "actuators",
+}  # fmt: skip
+_GROUPS = ("option", "visual")
+_SEED_BITS = 29  # so that `ripple-sim render --seed` takes it: nine digits
 
-def vary_table(table: dict[str, Any], entries: Mapping[str, Distribution], stream: Stream) -> dict[str, Any]:
+
+def vary_table(
+    table: dict[str, Any], entries: Mapping[str, Distribution], stream: Stream
+) -> dict[str, Any]:
     """Draw values for the keys of a scene file's table and put them there.
 
     Returns
@@ -54,16 +64,20 @@ def vary_table(table: dict[str, Any], entries: Mapping[str, Distribution], strea
                     value = combined(np.asarray(old, float), value, distribution.apply).tolist()
                 except (TypeError, ValueError, OverflowError) as error:
                     raise SceneError(
-                        f"plan: {name} is {shown(old)} in the scene, which {shown(value)} cannot {distribution.apply}; "
+                        f"plan: {name} is {shown(old)} in the scene, which {shown(value)} cannot "
+                        f"{distribution.apply}; "
                         "write a number into the scene file, or set the value"
                     ) from error
             holder[place] = value
     return values
 
 
-def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterator[tuple[Any, Any, str]]:
+def _places(
+    table: dict[str, Any], steps: Sequence[Step], before: str
+) -> Iterator[tuple[Any, Any, str]]:
     """Where values stand: the table or list that holds each, the key or number there, and the whole key."""
-    (key, chosen), rest = steps[0], steps[1:]
+    (key, chosen) = steps[0]
+    rest = steps[1:]
     here = f"{before}.{key}" if before else key
     if not rest and not chosen:
         yield table, key, here
@@ -83,7 +97,9 @@ def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterat
     elif isinstance(inner, dict) and not chosen:
         yield from _places(inner, rest, here)
     else:
-        raise SceneError(f"plan: the scene has no {'.'.join([here, *(name for name, _ in rest)])} to vary")
+        raise SceneError(
+            f"plan: the scene has no {'.'.join([here, *(name for name, _ in rest)])} to vary"
+        )
 
 
 def combined(old: Any, value: Any, apply: str) -> Any:
@@ -91,15 +107,9 @@ def combined(old: Any, value: Any, apply: str) -> Any:
     return old + np.asarray(value, float) if apply == "add" else old * np.asarray(value, float)
 
 
-# Elements of an MJCF by their tags, and where a specification lists them.
-ELEMENTS = {
-    "body": "bodies", "geom": "geoms", "joint": "joints", "site": "sites", "camera": "cameras", "light": "lights",
-    "material": "materials", "texture": "textures", "mesh": "meshes", "tendon": "tendons", "actuator": "actuators",
-}  # fmt: skip
-_GROUPS = ("option", "visual")
-
-
-def vary_model(spec: mujoco.MjSpec, entries: Mapping[str, Distribution], stream: Stream) -> dict[str, Any]:
+def vary_model(
+    spec: mujoco.MjSpec, entries: Mapping[str, Distribution], stream: Stream
+) -> dict[str, Any]:
     """Draw values for attributes of a model's elements, such as `geom[ball].size`, and set them in place.
 
     Returns
@@ -132,7 +142,8 @@ def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int |
     kind, _ = first
     if not steps or kind not in (*ELEMENTS, *_GROUPS):
         raise SceneError(
-            f"plan: {key!r} is no attribute of a model; valid are an element and its attribute, such as "
+            f"plan: {key!r} is no attribute of a model; valid are an element and its attribute, "
+            f"such as "
             f"geom[ball].size, of {', '.join((*ELEMENTS, *_GROUPS))}"
         )
     if kind in _GROUPS:
@@ -146,7 +157,8 @@ def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int |
     index = int(chosen) if chosen.isdecimal() else None
     for element, name in found:
         for inner, _ in steps[:-1]:
-            element, name = _inner(element, inner, key), f"{name}.{inner}"
+            element = _inner(element, inner, key)
+            name = f"{name}.{inner}"
         _inner(element, attribute, key)
         yield element, attribute, index, f"{name}.{attribute}" + (f"[{chosen}]" if chosen else "")
 
@@ -162,9 +174,11 @@ def _assign(element: Any, attribute: str, index: int | None, value: Any, apply: 
     """Set an attribute; a vector takes as many numbers as are given, like an MJCF's."""
     old = getattr(element, attribute)
     if attribute == "mass" and apply == "multiply" and not np.isfinite(old):
-        attribute, old = "density", element.density
+        attribute = "density"
+        old = element.density
     if isinstance(old, np.ndarray):
-        new, given = old.copy(), np.atleast_1d(np.asarray(value, float))
+        new = old.copy()
+        given = np.atleast_1d(np.asarray(value, float))
         part: slice = np.s_[index : index + 1] if index is not None else np.s_[: len(given)]
         if apply == "multiply" and index is None and np.ndim(value) == 0:
             part = np.s_[:]
@@ -175,16 +189,16 @@ def _assign(element: Any, attribute: str, index: int | None, value: Any, apply: 
     elif isinstance(old, str):
         setattr(element, attribute, value)
     else:
-        setattr(element, attribute, type(old)(value if apply == "set" else combined(old, value, apply)))
-
-
-_SEED_BITS = 29  # so that `ripple-sim render --seed` takes it: nine digits
+        setattr(
+            element, attribute, type(old)(value if apply == "set" else combined(old, value, apply))
+        )
 
 
 class Variation:
     """The scene of a number, which is the same whoever makes it, and in whatever order.
 
-    Each key has a stream of random numbers of its own, so a key more in the plan leaves the values of the others.
+    Each key has a stream of random numbers of its own, so a key more in the plan leaves the values
+    of the others.
 
     Attributes
     ----------
@@ -193,14 +207,17 @@ class Variation:
     """
 
     def __init__(self, plan: Plan, number: int) -> None:
-        self.plan, self.number = plan, number
+        self.plan = plan
+        self.number = number
         self.source = plan.sources[number % len(plan.sources)]
         drawn = np.random.SeedSequence(plan.seed, spawn_key=(number,)).generate_state(1)[0]
         self.seed = int(drawn) >> (32 - _SEED_BITS)
 
     def stream(self, key: str) -> np.random.Generator:
         """The random numbers of a key."""
-        spawned = np.random.SeedSequence(self.plan.seed, spawn_key=(self.number, zlib.crc32(key.encode())))
+        spawned = np.random.SeedSequence(
+            self.plan.seed, spawn_key=(self.number, zlib.crc32(key.encode()))
+        )
         return np.random.Generator(np.random.PCG64(spawned))
 
     def load(self) -> tuple[Scene, dict[str, Any]]:
@@ -226,7 +243,9 @@ class Variation:
             if isinstance(bodies, Distribution):
                 bodies = bodies.draw(self.stream("bodies"))
                 if not isinstance(bodies, int):
-                    raise SceneError(f"plan: the number of bodies is {bodies!r}; draw it from integers")
+                    raise SceneError(
+                        f"plan: the number of bodies is {bodies!r}; draw it from integers"
+                    )
             values["bodies"] = bodies
             scene = drop_scene(
                 self.source,

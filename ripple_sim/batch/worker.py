@@ -44,6 +44,9 @@ from .variation import Variation
 
 _SIZE = 160  # its longer edge [pixels]
 
+# the time of every file in the zip file: the same heights, the same bytes
+_ALWAYS = (1980, 1, 1, 0, 0, 0)
+
 
 def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
     """Write a JPEG of the middle one of a scene's frames; where none are drawn, or as EXR, there is none."""
@@ -58,9 +61,6 @@ def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
             image.save(path, format="JPEG", quality=80)
 
 
-_ALWAYS = (1980, 1, 1, 0, 0, 0)  # the time of every file in the zip file: the same heights, the same bytes
-
-
 class FrameRecord:
     """Writes files into the folder of a scene, frame by frame; call it with the simulation at the time of each frame.
 
@@ -68,7 +68,9 @@ class FrameRecord:
     """
 
     def __init__(self, folder: Path, store: StoreEntry, frames: int, rate: float) -> None:
-        self._folder, self._store, self._frames = folder, store, frames
+        self._folder = folder
+        self._store = store
+        self._frames = frames
         self._heights = Store(folder / HEIGHTS.removesuffix(".zip"), {}) if store.heights else None
         if self._heights is not None:
             self._heights.fixed("time", ["time"], np.arange(frames) / rate, "s")
@@ -83,11 +85,14 @@ class FrameRecord:
 
     def __call__(self, simulation: Simulation) -> None:
         """Record a frame."""
-        data, ripples = simulation.data, simulation.ripples
+        data = simulation.data
+        ripples = simulation.ripples
         if self._store.positions:
             if self._positions is None:
                 shape = (self._frames, len(data.qpos))
-                self._positions = open_memmap(self._folder / POSITIONS, mode="w+", dtype=np.float64, shape=shape)
+                self._positions = open_memmap(
+                    self._folder / POSITIONS, mode="w+", dtype=np.float64, shape=shape
+                )
             self._positions[self.frame] = data.qpos
         self._digest.update(data.qpos.tobytes() + data.qvel.tobytes())
         for name in ripples:
@@ -95,7 +100,10 @@ class FrameRecord:
             if self._heights is not None:
                 suffix = re.sub(r"\W", "_", name)
                 if not self.frame:
-                    dimensions = ["time", *(f"{each}_{suffix}" for each in ("chart", "row", "column"))]
+                    dimensions = [
+                        "time",
+                        *(f"{each}_{suffix}" for each in ("chart", "row", "column")),
+                    ]
                     array = self._heights.grow(f"height_{suffix}", dimensions, height, "m", chunk=1)
                     array.attrs["target"] = name
                 self._heights.add(f"height_{suffix}", height)
@@ -119,7 +127,10 @@ class FrameRecord:
             folder = self._folder / HEIGHTS.removesuffix(".zip")
             with zipfile.ZipFile(self._folder / HEIGHTS, "w") as archive:
                 for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-                    archive.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix(), _ALWAYS), path.read_bytes())
+                    archive.writestr(
+                        zipfile.ZipInfo(path.relative_to(folder).as_posix(), _ALWAYS),
+                        path.read_bytes(),
+                    )
             shutil.rmtree(folder)
         if self._sensors:
             arrays = {name: sensor.samples for name, sensor in self._sensors.items()}
@@ -156,8 +167,8 @@ class Outcome(msgspec.Struct, frozen=True):
     Attributes
     ----------
     state : str
-        "made"; "there", finished by another process before; "busy", being made by one; "full", for lack of room on
-        the disk; "failed"; "died", its worker, without a word.
+        "made"; "there", finished by another process before; "busy", being made by one; "full", for
+        lack of room on the disk; "failed"; "died", its worker, without a word.
     times : dict
         How long it took [s]: `seconds` by the clock, `cpu_seconds` of the worker's threads.
     row : dict
@@ -177,17 +188,24 @@ class Outcome(msgspec.Struct, frozen=True):
 def make_scene(folder: str, number: int) -> Outcome:
     """Make a scene of the batch in a folder, unless it is there or another process makes it.
 
-    Its files are the same, byte for byte, whoever makes it and when, but for `times.json`, which tells these.
+    Its files are the same, byte for byte, whoever makes it and when, but for `times.json`, which
+    tells these.
     """
     batch = BatchFolder(Path(folder))
-    start, work = time.perf_counter(), time.process_time()
+    start = time.perf_counter()
+    work = time.process_time()
     with _one_at_a_time, batch.claimed(number) as place:
         if place is None:
             return Outcome(number, "there" if batch.is_finished(number) else "busy")
         try:
             facts = _make(load_stored(batch.plan).plan, number, place, batch)
-            times = {"seconds": time.perf_counter() - start, "cpu_seconds": time.process_time() - work}
-            _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
+            times = {
+                "seconds": time.perf_counter() - start,
+                "cpu_seconds": time.process_time() - work,
+            }
+            _write_json(
+                place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()}
+            )
         except Exception as error:  # of any kind: the batch goes on without this scene
             clear(place)
             reason: BaseException | None = error
@@ -195,7 +213,9 @@ def make_scene(folder: str, number: int) -> Outcome:
                 reason = reason.__cause__
             full = isinstance(reason, OSError) and reason.errno in (errno.ENOSPC, errno.EDQUOT)
             said = " ".join(str(error).split()) or type(error).__name__
-            return Outcome(number, "full" if full else "failed", error=said, log=traceback.format_exc())
+            return Outcome(
+                number, "full" if full else "failed", error=said, log=traceback.format_exc()
+            )
         batch.finish(number, place)
     return Outcome(number, "made", times, facts)
 

@@ -1,8 +1,9 @@
 """`FrameSource`: snapshots of a simulation rendered to frames, offscreen.
 
-Where the scene's camera stands at a time and what it is focused on, which surface is drawn of a target, the sensor that
-averages the finer pixels and the exposures of a frame in linear light, and passes: what a frame's pixels show, as
-numbers: distances, normals, geoms, positions, heights and motion.
+Where the scene's camera stands at a time and what it is focused on, which surface is drawn of a
+target, the sensor that averages the finer pixels and the exposures of a frame in linear light, and
+passes: what a frame's pixels show, as numbers: distances, normals, geoms, positions, heights and
+motion.
 """
 
 from __future__ import annotations
@@ -31,6 +32,17 @@ from ripple_sim.solver.kernel import Floats32, kernel
 from ripple_sim.solver.texels.chart_page import ChartPage
 
 from .snapshot import ShownWaves, Snapshot, exposures_of
+
+# Steps of the table from linear light to sRGB: enough that each of the 256 values has entries, the
+# darkest too.
+_FINE = 1 << 14
+_LINEAR = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
+_SRGB = np.rint(255 * linear_to_srgb(np.arange(_FINE + 1) / _FINE)).astype(np.uint8)
+
+# Resolution of the sphere that is drawn: the mesh of its atlas has a vertex a texel, more than
+# pictures need.
+_SPHERE = 32
+_NEAREST = 0.02  # least focal distance, in camera distances: the near plane
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,14 +83,16 @@ class Sighting:
     def flow_to(self, later: Sighting) -> NDArray[np.float32]:
         """How far each pixel's surface point moves in the frame [pixels], to the right and down, [height, width, 2].
 
-        The point rides on its geom, on a target that moves with its mesh, and on the waves, along the smooth normal. 0
-        where nothing is.
+        The point rides on its geom, on a target that moves with its mesh, and on the waves, along
+        the smooth normal. 0 where nothing is.
         """
-        image, seen = self.image, self.positions_seen
+        image = self.image
+        seen = self.positions_seen
         flow = np.zeros((*image.depth.shape, 2), np.float32)
         for geom in np.unique(image.geom[image.geom >= 0]):
             mask = image.geom == geom
-            rotation, points = self.rotations[geom], seen[mask]
+            rotation = self.rotations[geom]
+            points = seen[mask]
             local = (points - self.positions[geom]) @ rotation
             if geom in later.height_maps and (image.target[mask] >= 0).all():
                 height_map = later.height_maps[geom]
@@ -87,40 +101,44 @@ class Sighting:
                 heights = spline_heights(height_map, *spline_samples(*places, page.resolution))
                 direction = image.smooth_normal[mask] @ rotation
                 still = local - image.height[mask, None] * direction
-                mesh, V = self.meshes[geom], later.meshes[geom][0]
-                if not np.array_equal(mesh[0], V):  # the mesh has moved on, and takes points and directions along
+                mesh = self.meshes[geom]
+                V = later.meshes[geom][0]
+                # the mesh has moved on, and takes points and directions along
+                if not np.array_equal(mesh[0], V):
                     taken = MovingVertices(*mesh, still, direction, direction)(V)
                     still, direction = (each.astype(np.float64) for each in taken[:2])
                 local = still + heights[:, None] * direction
-            flow[mask] = later.pixels(local @ later.rotations[geom].T + later.positions[geom]) - self.pixels(points)
+            flow[mask] = later.pixels(
+                local @ later.rotations[geom].T + later.positions[geom]
+            ) - self.pixels(points)
         return flow
 
 
-def passes_of(sighting: Sighting, later: Sighting | None, names: tuple[str, ...]) -> dict[str, NDArray]:
+def passes_of(
+    sighting: Sighting, later: Sighting | None, names: tuple[str, ...]
+) -> dict[str, NDArray]:
     """The passes of a frame, by name; `later` is the next frame's sighting, without which nothing flows."""
     image = sighting.image
     makers = {
         "depth": lambda: np.where(image.depth > 0, image.depth, np.float32(np.inf)),
         "normal": lambda: image.normal,
         "segmentation": lambda: (image.geom + 1).astype(np.uint32),
-        "flow": lambda: np.zeros((*image.depth.shape, 2), np.float32) if later is None else sighting.flow_to(later),
+        "flow": lambda: (
+            np.zeros((*image.depth.shape, 2), np.float32)
+            if later is None
+            else sighting.flow_to(later)
+        ),
         "position": lambda: sighting.positions_seen.astype(np.float32),
         "height": lambda: image.height,
     }
     return {name: np.ascontiguousarray(makers[name]()) for name in names}
 
 
-# Steps of the table from linear light to sRGB: enough that each of the 256 values has entries, the darkest too.
-_FINE = 1 << 14
-_LINEAR = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
-_SRGB = np.rint(255 * linear_to_srgb(np.arange(_FINE + 1) / _FINE)).astype(np.uint8)
-
-
 class Sensor:
     """Averages images in linear light.
 
-    Images are uint8, in sRGB, with a fourth channel for their opacity, by which the colours are weighted; or float16,
-    in linear light, with colours already multiplied by their opacity.
+    Images are uint8, in sRGB, with a fourth channel for their opacity, by which the colours are
+    weighted; or float16, in linear light, with colours already multiplied by their opacity.
 
     Parameters
     ----------
@@ -131,7 +149,8 @@ class Sensor:
     """
 
     def __init__(self, factor: int = 1, exposures: int = 1) -> None:
-        self._factor, self._exposures = factor, exposures
+        self._factor = factor
+        self._exposures = exposures
         self._count = 0
         self._light = np.zeros((0, 0, 4), np.float32)  # sums: light times opacity, opacity
 
@@ -150,7 +169,8 @@ class Sensor:
         """
         if self._factor == self._exposures == 1:
             return image
-        factor, (height, width, channels) = self._factor, image.shape
+        factor = self._factor
+        (height, width, channels) = image.shape
         if self._count == 0:
             self._light = np.zeros((height // factor, width // factor, 4), np.float32)
         if image.dtype == np.uint8:
@@ -202,11 +222,9 @@ def _encode(light: Floats32, most: int, srgb: NDArray[np.uint8], frame: NDArray[
                 frame[row, column, 3] = int(opacity / most + 0.5)
 
 
-# Resolution of the sphere that is drawn: the mesh of its atlas has a vertex a texel, more than pictures need.
-_SPHERE = 32
-
-
-def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
+def surface_of(
+    waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None
+) -> Surface:
     """Surface to be drawn of a target."""
     atlas = drawn = waves.rest
     if isinstance(atlas, SphereAtlas) and atlas.resolution > _SPHERE:
@@ -223,15 +241,15 @@ def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] |
     )
 
 
-_NEAREST = 0.02  # least focal distance, in camera distances: the near plane
-
-
-def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float) -> Camera | FixedCamera:
+def viewpoint(
+    model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float
+) -> Camera | FixedCamera:
     """Camera of a scene at a time [s].
 
-    A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise MuJoCo's free camera,
-    aimed at the model's middle where the scene says nothing else. With `orbit` either circles by that many degrees a
-    second; with `track` the free camera moves along with a body's centre of mass, and the named one turns towards it.
+    A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise
+    MuJoCo's free camera, aimed at the model's middle where the scene says nothing else. With
+    `orbit` either circles by that many degrees a second; with `track` the free camera moves along
+    with a body's centre of mass, and the named one turns towards it.
     """
     tracked = None if entry.track is None else data.subtree_com[model.body(entry.track).id]
     if entry.name is not None:
@@ -241,7 +259,13 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
         if not entry.orbit:
             return fixed
         angle = np.radians(entry.orbit) * time  # around the vertical through its aim
-        turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        turn = np.array(
+            [
+                [np.cos(angle), -np.sin(angle), 0.0],
+                [np.sin(angle), np.cos(angle), 0.0],
+                [0.0, 0.0, 1.0],
+            ]
+        )
         focus = fixed.pose().focus
         position = focus + turn @ (fixed.position - focus)
         return dataclasses.replace(fixed, position=position, rotation=turn @ fixed.rotation)
@@ -257,7 +281,9 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
     )
 
 
-def focal_distance(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, pose: Pose) -> float:
+def focal_distance(
+    model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, pose: Pose
+) -> float:
     """Distance of the plane in focus from a scene's camera, along its axis [m]."""
     if entry.focus is None:
         return pose.distance
@@ -320,14 +346,17 @@ class FrameSource:
         linear: bool = False,
         annotate: Callable[[Surface], Surface] = lambda surface: surface,
     ) -> None:
-        self.width, self.height = width, height
+        self.width = width
+        self.height = height
         self._simulation = simulation
         _, self._lens_points = exposures_of(simulation.scene.camera)
         self._sensor = Sensor(supersample, len(self._lens_points))
         self._geoms = simulation.ripples.geom_ids
         self.shown = ShownWaves(simulation.ripples, height)
         surfaces = {
-            self._geoms[entry.geom]: annotate(surface_of(simulation.ripples[entry.geom], entry.look, entry.color))
+            self._geoms[entry.geom]: annotate(
+                surface_of(simulation.ripples[entry.geom], entry.look, entry.color)
+            )
             for entry in simulation.scene.targets
         }
         self.renderer = Renderer(
@@ -347,8 +376,12 @@ class FrameSource:
 
     def submit(self, snapshot: Snapshot) -> None:
         """Draw a snapshot without waiting for it: `fetch` returns it, after those submitted before."""
-        height_maps = {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}
-        pose, lens, sim = self.camera(snapshot).pose(), self._lens_points[snapshot.exposure], self._simulation
+        height_maps = {
+            self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()
+        }
+        pose = self.camera(snapshot).pose()
+        lens = self._lens_points[snapshot.exposure]
+        sim = self._simulation
         self.shown.look(snapshot.data, snapshot.heights, pose)
         if lens.any():
             focus = focal_distance(sim.model, snapshot.data, sim.scene.camera, pose)
@@ -361,18 +394,30 @@ class FrameSource:
 
     def sighting(self, snapshot: Snapshot) -> Sighting:
         """What the camera sees at a snapshot, through the middle of its lens."""
-        height_maps = {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}
+        height_maps = {
+            self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()
+        }
         camera = self.camera(snapshot)
-        image = self.renderer.surfaces(snapshot.data, height_maps, camera, (self.width, self.height))
-        read, meshes = {}, {}
+        image = self.renderer.surfaces(
+            snapshot.data, height_maps, camera, (self.width, self.height)
+        )
+        read = {}
+        meshes = {}
         for name, geom in self._geoms.items():
-            mesh, height_map = self._simulation.ripples[name].rest.mesh, height_maps[geom]
+            mesh = self._simulation.ripples[name].rest.mesh
+            height_map = height_maps[geom]
             read[geom] = np.asarray(height_map)
-            meshes[geom] = height_map.V if isinstance(height_map, MovedHeightMap) else mesh.V, mesh.F
-        data, model = snapshot.data, self._simulation.model
+            meshes[geom] = (
+                height_map.V if isinstance(height_map, MovedHeightMap) else mesh.V,
+                mesh.F,
+            )
+        data = snapshot.data
+        model = self._simulation.model
         more = first_skin(model) + model.nskin - model.ngeom  # what is soft is in the world
         positions = np.concatenate([data.geom_xpos, np.zeros((more, 3))])
-        rotations = np.concatenate([data.geom_xmat.reshape(-1, 3, 3), np.tile(np.eye(3), (more, 1, 1))])
+        rotations = np.concatenate(
+            [data.geom_xmat.reshape(-1, 3, 3), np.tile(np.eye(3), (more, 1, 1))]
+        )
         return Sighting(image, camera.pose(), positions, rotations, read, meshes)
 
     def camera(self, snapshot: Snapshot) -> Camera | FixedCamera:

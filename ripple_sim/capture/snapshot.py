@@ -1,8 +1,9 @@
 """Frozen copies of a running simulation's state, one for each exposure of a frame.
 
-`exposures_of` says at which times while the shutter is open, and through which points of the lens; `ShutterTimes` takes
-the simulation there, between its physics steps, and `drawn_heights` makes height maps, wherever a surface is.
-`ShownWaves` tells whether there is anything to be seen of the waves.
+`exposures_of` says at which times while the shutter is open, and through which points of the lens;
+`ShutterTimes` takes the simulation there, between its physics steps, and `drawn_heights` makes
+height maps, wherever a surface is. `ShownWaves` tells whether there is anything to be seen of the
+waves.
 """
 
 from __future__ import annotations
@@ -33,13 +34,18 @@ Heights = dict[str, Field]
 
 _ROUNDING = 9  # decimals of a physics step: what is a whole step but for round-off is one
 
+_SEEN = 5.0  # pixels of a height that catches the eye
+_GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
+_FULL_TURN = 360.0  # degrees of a rotary shutter: open from one frame to the next
+
 
 class ShutterTimes:
     """States of a simulation at given times of each frame.
 
-    Iterating over it advances the simulation through the times of the present frame. It takes the same physics steps
-    as without a shutter, so motion blur does not change the motion. Within a step, states are interpolated between its
-    ends: bodies move at constant velocity, as in MuJoCo's Euler and implicit integrators, and heights linearly.
+    Iterating over it advances the simulation through the times of the present frame. It takes the
+    same physics steps as without a shutter, so motion blur does not change the motion. Within a
+    step, states are interpolated between its ends: bodies move at constant velocity, as in MuJoCo's
+    Euler and implicit integrators, and heights linearly.
 
     Parameters
     ----------
@@ -51,7 +57,8 @@ class ShutterTimes:
         self._simulation = simulation
         # in physics steps
         self._places = np.round(times * simulation.steps_per_frame, _ROUNDING).tolist()
-        self._start, self._between = mujoco.MjData(simulation.model), mujoco.MjData(simulation.model)
+        self._start = mujoco.MjData(simulation.model)
+        self._between = mujoco.MjData(simulation.model)
 
     def __iter__(self) -> Iterator[tuple[mujoco.MjData, Heights]]:
         """Advance to one time after the other.
@@ -61,8 +68,8 @@ class ShutterTimes:
         data : mujoco.MjData
             State of the bodies, until the next iteration.
         heights : dict
-            By the geom's name [m], float32 [C, n, n], or on the GPU, see `WaveSolver.snapshot`. The same object as
-            before where no time has passed.
+            By the geom's name [m], float32 [C, n, n], or on the GPU, see `WaveSolver.snapshot`. The
+            same object as before where no time has passed.
         """
         simulation = self._simulation
         done = 0
@@ -71,7 +78,8 @@ class ShutterTimes:
             while done < place:
                 mujoco.mj_copyData(self._start, simulation.model, simulation.data)
                 simulation.step()
-                before, now = now, self._heights()
+                before = now
+                now = self._heights()
                 done += 1
             rest = done - place
             if rest == 0:
@@ -81,15 +89,18 @@ class ShutterTimes:
                 yield self._between, {name: _blend(now[name], before[name], rest) for name in now}
 
     def _heights(self) -> Heights:
-        return {name: self._simulation.ripples[name].snapshot() for name in self._simulation.ripples}
+        return {
+            name: self._simulation.ripples[name].snapshot() for name in self._simulation.ripples
+        }
 
     def _go_back(self, duration: float) -> None:
         """Set the bodies to where they were a duration [s] ago, within the last step.
 
-        After `mj_step` MuJoCo's poses are those at the step's beginning. So are these, and the motion that led to them
-        is the one of the step before.
+        After `mj_step` MuJoCo's poses are those at the step's beginning. So are these, and the
+        motion that led to them is the one of the step before.
         """
-        model, data = self._simulation.model, self._between
+        model = self._simulation.model
+        data = self._between
         mujoco.mj_copyData(data, model, self._start)
         data.time = self._simulation.data.time - duration
         mujoco.mj_integratePos(model, data.qpos, data.qvel, -duration)
@@ -105,7 +116,9 @@ def _blend(first: Field, second: Field, share: float) -> Field:
     return first + np.float32(share) * (second - first)
 
 
-def drawn_heights(ripples: Ripples, name: str, limit: bool) -> Callable[[Field, mujoco.MjData], AnyHeightMap]:
+def drawn_heights(
+    ripples: Ripples, name: str, limit: bool
+) -> Callable[[Field, mujoco.MjData], AnyHeightMap]:
     """What makes height maps of a target's heights [m], [C, n, n]; with the mesh's vertices, where these have moved.
 
     Parameters
@@ -119,30 +132,35 @@ def drawn_heights(ripples: Ripples, name: str, limit: bool) -> Callable[[Field, 
     gradients = functools.cache(lambda: MovedGradients(ripples[name].rest))
 
     def drawn(height: Field, data: mujoco.MjData) -> AnyHeightMap:
-        height_map, V = still(height), ripples.vertices(name, data)
-        return height_map if V is None else MovedHeightMap(gradients()(np.asarray(height_map), V), V)
+        height_map = still(height)
+        V = ripples.vertices(name, data)
+        return (
+            height_map if V is None else MovedHeightMap(gradients()(np.asarray(height_map), V), V)
+        )
 
     return drawn
-
-
-_SEEN = 5.0  # pixels of a height that catches the eye
 
 
 class ShownWaves:
     """Takes note of how high waves are in pictures of a height [pixels], and warns of those that no picture shows."""
 
     def __init__(self, ripples: Ripples, height: int) -> None:
-        self._ripples, self._height = ripples, height
-        # by target: of the highest wave so far in pixels, these, its height [m], and the width of a pixel there [m]
+        self._ripples = ripples
+        self._height = height
+        # by target: of the highest wave so far in pixels, these, its height [m], and the width of a
+        # pixel there [m]
         self._highest = dict.fromkeys(ripples, (0.0, 0.0, 1.0))
 
     def look(self, data: mujoco.MjData, heights: Heights, pose: Pose) -> None:
         """Take in a picture from a pose: the highest waves, in pixels of the nearest point that may be seen."""
         model = self._ripples.model
         for name, height in heights.items():
-            geom, distance = self._ripples.geom_ids[name], pose.distance
+            geom = self._ripples.geom_ids[name]
+            distance = pose.distance
             if geom < model.ngeom:  # what is soft has no place of its own
-                away = float(np.linalg.norm(data.geom_xpos[geom] - pose.position)) - float(model.geom_rbound[geom])
+                away = float(np.linalg.norm(data.geom_xpos[geom] - pose.position)) - float(
+                    model.geom_rbound[geom]
+                )
                 distance = max(away, 0.1 * distance)
             pixel = pose.pixel_height(distance, self._height)
             peak = height.peak if isinstance(height, DeviceField) else float(np.abs(height).max())
@@ -152,12 +170,16 @@ class ShownWaves:
         """Warn of targets whose waves were there, but never higher than a pixel, and say what would do."""
         for name, (pixels, peak, pixel) in self._highest.items():
             if 0 < pixels < 1:
-                density, factor = np.asarray(self._ripples[name].material.density), _SEEN / pixels
+                density = np.asarray(self._ripples[name].material.density)
+                factor = _SEEN / pixels
                 lower = "" if density.ndim else f", {float(density) / factor:.2g} kg/m^2,"
                 warn_caller(
-                    f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a pixel is {pixel:.2g} m"
-                    f" wide. A density {factor:.2g} times lower{lower} would show {_SEEN:g} pixels; so may "
-                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in Python'
+                    f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a "
+                    f"pixel is {pixel:.2g} m"
+                    f" wide. A density {factor:.2g} times lower{lower} would show {_SEEN:g} "
+                    f"pixels; so may "
+                    'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in '
+                    "Python"
                 )
 
     def warn_of_none(self) -> None:
@@ -165,13 +187,11 @@ class ShownWaves:
         for name, (pixels, _, _) in self._highest.items():
             if pixels == 0:
                 warn_caller(
-                    f"there was no wave on {name!r}: nothing touched it. Drop or throw a body on it, or poke it, in a "
-                    "scene file by [[drop]], [[throw]] or [[poke]]; or let a geom ripple that is touched"
+                    f"there was no wave on {name!r}: nothing touched it. Drop or throw a body on "
+                    f"it, or poke it, in a "
+                    "scene file by [[drop]], [[throw]] or [[poke]]; or let a geom ripple that is "
+                    "touched"
                 )
-
-
-_GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
-_FULL_TURN = 360.0  # degrees of a rotary shutter: open from one frame to the next
 
 
 def exposures_of(camera: CameraEntry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -188,8 +208,8 @@ def exposures_of(camera: CameraEntry) -> tuple[NDArray[np.float64], NDArray[np.f
     """
     count = camera.exposures if camera.shutter > 0 or camera.aperture > 0 else 1
     times = camera.shutter / _FULL_TURN * np.arange(count) / count
-    # the points in an order that visits all parts of the lens in any part of the time: from the middle outwards, moving
-    # bodies would begin sharp and end blurred
+    # the points in an order that visits all parts of the lens in any part of the time: from the
+    # middle outwards, moving bodies would begin sharp and end blurred
     order = np.argsort(np.argsort(np.arange(count) * _GOLDEN_RATIO % 1.0))
     return times, camera.aperture / 2 * disc_points(count)[order]
 
@@ -197,11 +217,12 @@ def exposures_of(camera: CameraEntry) -> tuple[NDArray[np.float64], NDArray[np.f
 def disc_points(count: int) -> NDArray[np.float64]:
     """Points spread evenly over the unit disc, float64 [count, 2], with their mean in its middle.
 
-    A spiral whose points follow one another under the golden angle (Vogel, "A better way to construct the sunflower
-    head", Mathematical Biosciences 44, 1979).
+    A spiral whose points follow one another under the golden angle (Vogel, "A better way to
+    construct the sunflower head", Mathematical Biosciences 44, 1979).
     """
     index = np.arange(count)
-    radius, angle = np.sqrt((index + 0.5) / count), 2 * np.pi * _GOLDEN_RATIO * index
+    radius = np.sqrt((index + 0.5) / count)
+    angle = 2 * np.pi * _GOLDEN_RATIO * index
     points = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return points - points.mean(axis=0)
 
@@ -219,8 +240,8 @@ class Snapshot:
     data : mujoco.MjData
         Copy of MuJoCo's state.
     heights, height_maps : dict
-        By the geom's name: height [m], float32 [C, n, n], and its height map (see `HeightMap`). Where the waves run on
-        a GPU both stay there, and `numpy.asarray` reads them back.
+        By the geom's name: height [m], float32 [C, n, n], and its height map (see `HeightMap`).
+        Where the waves run on a GPU both stay there, and `numpy.asarray` reads them back.
     impulses : list of Impulse
         Since the frame before, up to the frame's own time.
     """
@@ -264,10 +285,12 @@ def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterato
     for number in range(frames):
         if number:
             simulation.advance_frame()
-        impulses, shown = simulation.impulses, None
+        impulses = simulation.impulses
+        shown = None
         for exposure, (state, heights) in enumerate(shutter_times):
             if heights is not shown:
-                data, shown = next(states), heights
+                data = next(states)
+                shown = heights
                 mujoco.mj_copyData(data, simulation.model, state)
                 height_maps = {name: drawn[name](height, data) for name, height in heights.items()}
             yield Snapshot(number, exposure, data, heights, height_maps, impulses)

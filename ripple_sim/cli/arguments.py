@@ -14,18 +14,26 @@ from tyro.constructors import PrimitiveConstructorSpec
 from ripple_sim.solver.errors import shown
 
 # Written out, since the modules that have these names take seconds to import; a test compares them.
-UP_AXES, RIMS = ("y", "z"), ("free", "supported", "clamped", "fixed")
-LAYOUTS, BASELINES = ("auto", "cube", "patches"), ("paper", "uncorrected", "dynamic-paint")
+UP_AXES = ("y", "z")
+RIMS = ("free", "supported", "clamped", "fixed")
+LAYOUTS = ("auto", "cube", "patches")
+BASELINES = ("paper", "uncorrected", "dynamic-paint")
+
+_RIM_NAMES = f"{{{','.join(RIMS)}}}"
 
 
 def parse_size(word: str) -> tuple[int, int]:
     """Read width and height [pixels] from a word such as "1280x720"."""
     if (match := re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)) is None:
-        raise ValueError(f"{shown(word)} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720")
+        raise ValueError(
+            f"{shown(word)} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720"
+        )
     return int(match[1]), int(match[2])
 
 
-def _reader(read: Callable[[str], Any], right: Callable[[Any], bool], valid: str) -> Callable[[str], Any]:
+def _reader(
+    read: Callable[[str], Any], right: Callable[[Any], bool], valid: str
+) -> Callable[[str], Any]:
     """What reads a word to a value that is right; its message says what is valid."""
 
     def parse(word: str) -> Any:
@@ -55,12 +63,20 @@ def _one_of(names: tuple[str, ...]) -> Callable[[str], Any]:
 
 parse_count = _reader(_whole, lambda number: number >= 1, "a whole number, 1 or more")
 parse_seed = _reader(_whole, lambda number: True, "a whole number, 0 or more")
-parse_seconds = _reader(float, lambda seconds: 0 < seconds < math.inf, "a positive number of seconds")
+parse_seconds = _reader(
+    float, lambda seconds: 0 < seconds < math.inf, "a positive number of seconds"
+)
 parse_factor = _reader(float, lambda factor: 0 < factor < math.inf, "a positive number, such as 4")
-parse_angle = _reader(float, lambda angle: 0 <= angle <= 360, "an angle from 0 to 360 degrees, such as 180")
-parse_diameter = _reader(float, lambda metres: 0 <= metres < math.inf, "a number of metres, 0 or more, such as 0.02")
+parse_angle = _reader(
+    float, lambda angle: 0 <= angle <= 360, "an angle from 0 to 360 degrees, such as 180"
+)
+parse_diameter = _reader(
+    float, lambda metres: 0 <= metres < math.inf, "a number of metres, 0 or more, such as 0.02"
+)
 parse_supersample = _reader(_whole, lambda number: 1 <= number <= 4, "1, 2, 3 or 4")
-parse_shard = _reader(_part, lambda part: 1 <= part[0] <= part[1], "a part of how many, such as 1/4, 2/4, 3/4 or 4/4")
+parse_shard = _reader(
+    _part, lambda part: 1 <= part[0] <= part[1], "a part of how many, such as 1/4, 2/4, 3/4 or 4/4"
+)
 parse_axis, parse_layout, parse_rim = map(_one_of, (UP_AXES, LAYOUTS, RIMS))
 
 
@@ -84,7 +100,10 @@ def parse_material(word: str) -> tuple[str, dict[str, float]]:
     found = [re.fullmatch(r"(\w+) *= *(.+)", pair) for pair in pairs]
     with contextlib.suppress(ValueError, TypeError):
         return name, {match[1]: float(match[2]) for match in found}  # type: ignore[index]
-    raise ValueError(f"{shown(word)} is not valid; it must be a name, as steel-plate, or steel-plate,thickness=0.002")
+    raise ValueError(
+        f"{shown(word)} is not valid; it must be a name, as steel-plate, or "
+        f"steel-plate,thickness=0.002"
+    )
 
 
 def _one_word(
@@ -99,15 +118,27 @@ def _one_word(
     )
 
 
-Size = Annotated[tuple[int, int], _one_word(parse_size, "WIDTHxHEIGHT", lambda size: f"{size[0]}x{size[1]}")]
+Size = Annotated[
+    tuple[int, int], _one_word(parse_size, "WIDTHxHEIGHT", lambda size: f"{size[0]}x{size[1]}")
+]
 Count = Annotated[int, _one_word(parse_count, "N")]
 Seed = Annotated[int, _one_word(parse_seed, "N")]
-SceneSeed = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the scene's)")]
-FrameRate = Annotated[int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")]
-Duration = Annotated[float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")]
-Resolution = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")]
+SceneSeed = Annotated[
+    int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the scene's)")
+]
+FrameRate = Annotated[
+    int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")
+]
+Duration = Annotated[
+    float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")
+]
+Resolution = Annotated[
+    int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")
+]
 _names = _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ()))
-Overlay = Annotated[tuple[str, ...] | None, _names, arg(help_behavior_hint="(default: the scene's, or none)")]
+Overlay = Annotated[
+    tuple[str, ...] | None, _names, arg(help_behavior_hint="(default: the scene's, or none)")
+]
 Passes = Annotated[tuple[str, ...], _names, arg(help_behavior_hint="(optional)")]
 Baseline = Annotated[
     str | None,
@@ -116,24 +147,47 @@ Baseline = Annotated[
 ]
 Factor = Annotated[float, _one_word(parse_factor, "F")]
 Supersample = Annotated[int, _one_word(parse_supersample, "N")]
-Shutter = Annotated[float | None, _one_word(parse_angle, "DEGREES"), arg(help_behavior_hint="(default: the scene's)")]
-Aperture = Annotated[float | None, _one_word(parse_diameter, "M"), arg(help_behavior_hint="(default: the scene's)")]
+Shutter = Annotated[
+    float | None,
+    _one_word(parse_angle, "DEGREES"),
+    arg(help_behavior_hint="(default: the scene's)"),
+]
+Aperture = Annotated[
+    float | None, _one_word(parse_diameter, "M"), arg(help_behavior_hint="(default: the scene's)")
+]
 Focus = Annotated[
     float | str | None,
     _one_word(parse_focus, "M|NAME"),
     arg(help_behavior_hint="(default: the scene's, or what the camera looks at)"),
 ]
-Exposures = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's, or 32)")]
-Shard = Annotated[tuple[int, int] | None, _one_word(parse_shard, "I/N"), arg(help_behavior_hint="(default: all)")]
+Exposures = Annotated[
+    int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's, or 32)")
+]
+Shard = Annotated[
+    tuple[int, int] | None, _one_word(parse_shard, "I/N"), arg(help_behavior_hint="(default: all)")
+]
 Gigabytes = Annotated[float, _one_word(parse_factor, "GB")]
 Limit = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(optional)")]
-Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]
-UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]
+Device = Annotated[
+    int | None,
+    _one_word(parse_seed, "N"),
+    arg(help_behavior_hint="(default: the first that works)"),
+]
+UpAxis = Annotated[
+    str | None,
+    _one_word(parse_axis, "{y,z}"),
+    arg(help_behavior_hint="(default: z for STL, else y)"),
+]
 LayoutName = Annotated[str, _one_word(parse_layout, "{auto,cube,patches}")]
 SceneLayout = Annotated[
-    str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
+    str | None,
+    _one_word(parse_layout, "{auto,cube,patches}"),
+    arg(help_behavior_hint="(default: the scene's)"),
 ]
-_RIM_NAMES = f"{{{','.join(RIMS)}}}"
 RimName = Annotated[str, _one_word(parse_rim, _RIM_NAMES)]
-NamedMaterial = Annotated[tuple[str, dict[str, float]], _one_word(parse_material, "NAME[,PARAMETER=VALUE ...]")]
-Rim = Annotated[str | None, _one_word(parse_rim, _RIM_NAMES), arg(help_behavior_hint="(default: the scene's)")]
+NamedMaterial = Annotated[
+    tuple[str, dict[str, float]], _one_word(parse_material, "NAME[,PARAMETER=VALUE ...]")
+]
+Rim = Annotated[
+    str | None, _one_word(parse_rim, _RIM_NAMES), arg(help_behavior_hint="(default: the scene's)")
+]

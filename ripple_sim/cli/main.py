@@ -1,8 +1,8 @@
 """The `ripple-sim` program: reads the command line, runs a command, turns errors into one line and an exit status.
 
-A command is a class: its fields are the arguments, the docstrings the help, and `run` does the work. Heavy imports are
-inside `run`, so that `--help` and usage errors are answered at once.
-Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number after one.
+A command is a class: its fields are the arguments, the docstrings the help, and `run` does the
+work. Heavy imports are inside `run`, so that `--help` and usage errors are answered at once. Exit
+status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number after one.
 """
 
 from __future__ import annotations
@@ -32,12 +32,14 @@ from .reports import BatchCommand, BenchCommand, CacheCommand, InfoCommand, Mate
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
 from .surfaces import AtlasCommand, ModesCommand
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2
+DONE = 0
+FAILED = 1
+BAD_INPUT = 2
 
 _LONGEST = 800  # of a message [characters]
 
-# Address space [GB] that a small job takes, with its libraries, software OpenGL and kernels: with less, these end the
-# process, or blame something else.
+# Address space [GB] that a small job takes, with its libraries, software OpenGL and kernels: with
+# less, these end the process, or blame something else.
 _ADDRESS_SPACE = {
     InfoCommand: 1.3,
     AtlasCommand: 1.2,
@@ -49,6 +51,11 @@ _ADDRESS_SPACE = {
     BatchCommand: 2.4,
     ExportCommand: 3.0,
 }
+
+_DESCRIPTION = (
+    "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation. "
+    "--version tells which."
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -75,11 +82,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(command: Any) -> int:
     """Run a command and return the exit status."""
-    need, most = _ADDRESS_SPACE.get(type(command), 0), resource.getrlimit(resource.RLIMIT_AS)[0]
+    need = _ADDRESS_SPACE.get(type(command), 0)
+    most = resource.getrlimit(resource.RLIMIT_AS)[0]
     if resource.RLIM_INFINITY != most < 1e9 * need:
-        text = f"this needs {need} GB of address space, but the limit (ulimit -v) is {most / 1e9:.2f} GB; allow more"
+        text = (
+            f"this needs {need} GB of address space, but the limit (ulimit -v) is "
+            f"{most / 1e9:.2f} GB; allow more"
+        )
         return _fail(text, FAILED)
-    os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
+    # MuJoCo's own renderer would take the OpenGL context away
+    os.environ.setdefault("MUJOCO_GL", "disable")
     log = logging.getLogger("ripple_sim")
     if not log.handlers:
         log.addHandler(_Log())
@@ -101,11 +113,19 @@ def _run(command: Any) -> int:
         return _fail(error, FAILED)
     except RippleError as error:
         cause = error.__cause__
-        failed = isinstance(cause, ConnectionError) or (isinstance(cause, OSError) and cause.errno in OF_THE_DISK)
+        failed = isinstance(cause, ConnectionError) or (
+            isinstance(cause, OSError) and cause.errno in OF_THE_DISK
+        )
         return _fail(error, FAILED if failed else BAD_INPUT)
     except MemoryError as error:
         return _fail(
-            f"not enough memory{f': {error}' if str(error) else ''}; ask for a lower resolution or size", FAILED
+            (
+                f"not enough memory{f': {error}' if str(error) else ''}; ask for a lower "
+                f"resolution "
+                f"or "
+                f"size"
+            ),
+            FAILED,
         )
     except KeyboardInterrupt as ending:
         return _fail("interrupted", INTERRUPTED, ending)
@@ -137,7 +157,9 @@ def _say(message: str) -> None:
     text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
     try:
         print(f"ripple-sim: {text}", file=sys.stderr, flush=True)
-    except OSError:  # standard error is full, or a closed pipe: nothing more goes there, not even at exit
+    except (
+        OSError
+    ):  # standard error is full, or a closed pipe: nothing more goes there, not even at exit
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
 
 
@@ -162,7 +184,8 @@ def _open_standard_streams() -> None:
 
 def completion(
     shell: Annotated[
-        Positional[Literal["bash", "zsh"]], arg(metavar="SHELL", help="Shell to complete in: bash or zsh.")
+        Positional[Literal["bash", "zsh"]],
+        arg(metavar="SHELL", help="Shell to complete in: bash or zsh."),
     ],
 ) -> None:
     """Print a shell completion script. To use it: source <(ripple-sim completion bash)."""
@@ -184,10 +207,6 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "completion": completion,
 }
 
-_DESCRIPTION = (
-    "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation. --version tells which."
-)
-
 
 def parse(argv: Sequence[str]) -> Any:
     """Return the command to run, or None if the help, the version or a completion script was printed instead.
@@ -200,7 +219,10 @@ def parse(argv: Sequence[str]) -> Any:
     if argv and not argv[0].startswith("-") and argv[0] not in COMMANDS:
         near = _nearest(argv[0], COMMANDS)
         names = ", ".join(COMMANDS)
-        raise RippleError(f"there is no command {shown(argv[0])}{near}; commands are {names}; see ripple-sim --help")
+        raise RippleError(
+            f"there is no command {shown(argv[0])}{near}; commands are {names}; see ripple-sim "
+            f"--help"
+        )
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
@@ -214,12 +236,15 @@ def parse(argv: Sequence[str]) -> Any:
     except SystemExit as ending:
         if not ending.code:
             return None
-    # tyro's complaint is a title, a rule, what is wrong, a rule, and hints; it is framed where stdout is UTF-8. What is
-    # between the first two rules counts, without the help texts (indented by 8).
+    # tyro's complaint is a title, a rule, what is wrong, a rule, and hints; it is framed where
+    # stdout is UTF-8. What is between the first two rules counts, without the help texts (indented
+    # by 8).
     text = re.sub(r"\x1b\[[0-9;]*m", "", complaint.getvalue())
     parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
     part = parts[1] if len(parts) > 1 else text
-    said = " ".join(line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)).strip()
+    said = " ".join(
+        line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)
+    ).strip()
     command = f" {argv[0]}" if argv else ""
     unknown = re.match(r"Unrecognized options: (--[\w-]+)", said)
     near = _nearest(unknown[1], _options_of(argv[0])) if unknown and argv else ""

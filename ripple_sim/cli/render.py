@@ -1,7 +1,7 @@
 """Commands that show a scene or write it to a file: `render`, `drop`, `export` and `view`.
 
-On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log gets lines where
-the job takes long.
+On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a
+log gets lines where the job takes long.
 """
 
 from __future__ import annotations
@@ -15,7 +15,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.text import Text
 from tyro.conf import Positional, arg
 
@@ -33,8 +41,21 @@ if TYPE_CHECKING:
 # A job that is over within this time [s] prints no progress into a pipe or a log.
 _SILENT_TIME = 10.0
 
+# What the kernels of a package do, in a user's words; the longest name that fits counts.
+_STAGES = {
+    "ripple_sim.solver.layouts.sphere_map": "the sphere map",
+    "ripple_sim.solver.layouts.patches": "the charts",
+    "ripple_sim.solver": "the atlas",
+    "ripple_sim.solver.operator": "the wave operator",
+    "ripple_sim.solver.backends": "the wave step",
+    "ripple_sim.solver.waves": "loads and height maps",
+    "ripple_sim.coupling": "the contacts",
+    "ripple_sim.render": "the renderer",
+}
 
-# Fields, defaults and help of commands are those of the options; what is not here is read as its type says.
+
+# Fields, defaults and help of commands are those of the options; what is not here is read as its
+# type says.
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _SceneCommand(SceneOptions):
     size: arguments.Size = SceneOptions.size
@@ -43,7 +64,9 @@ class _SceneCommand(SceneOptions):
     resolution: arguments.Resolution = SceneOptions.resolution
     layout: arguments.SceneLayout = SceneOptions.layout
     rim: arguments.Rim = SceneOptions.rim
-    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
+    camera: Annotated[
+        str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")
+    ] = None
     """Camera of the MJCF."""
 
     def seen(self, scene: Scene) -> Scene:
@@ -75,7 +98,9 @@ class ExportCommand(_SceneCommand, ExportOptions):
         from ripple_sim.scene.drop import find_scene, is_scene
 
         is_scene(self.scene)
-        options = ExportOptions(**{each.name: getattr(self, each.name) for each in dataclasses.fields(ExportOptions)})
+        options = ExportOptions(
+            **{each.name: getattr(self, each.name) for each in dataclasses.fields(ExportOptions)}
+        )
         check_options(options)  # before anything that takes time
         check_export(self.output, options.overwrite)
 
@@ -91,21 +116,9 @@ class ExportCommand(_SceneCommand, ExportOptions):
         size = summary.output.stat().st_size if summary.output.is_file() else 0
         print(
             f"{summary.output}: {summary.frames} frames{f', {size / 1e6:.1f} MB' if size else ''}\n"
-            f"stages    simulation {summary.simulate_seconds:.1f} s, writing {summary.write_seconds:.1f} s"
+            f"stages    simulation {summary.simulate_seconds:.1f} s, writing "
+            f"{summary.write_seconds:.1f} s"
         )
-
-
-# What the kernels of a package do, in a user's words; the longest name that fits counts.
-_STAGES = {
-    "ripple_sim.solver.layouts.sphere_map": "the sphere map",
-    "ripple_sim.solver.layouts.patches": "the charts",
-    "ripple_sim.solver": "the atlas",
-    "ripple_sim.solver.operator": "the wave operator",
-    "ripple_sim.solver.backends": "the wave step",
-    "ripple_sim.solver.waves": "loads and height maps",
-    "ripple_sim.coupling": "the contacts",
-    "ripple_sim.render": "the renderer",
-}
 
 
 class _Rate(ProgressColumn):
@@ -115,7 +128,9 @@ class _Rate(ProgressColumn):
         from ripple_sim.solver.kernel import compile_times, compiling
 
         if (module := compiling()) is None:
-            return Text(f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed")
+            return Text(
+                f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed"
+            )
         stage = _stage(module)
         seconds = sum(time for each, time in compile_times().items() if _stage(each) == stage)
         return Text(f"compiling {stage} (once): {seconds:.0f} s")
@@ -137,7 +152,11 @@ def _progress_lines() -> Callable[[int, int], None]:
         tenths = 10 * done // total if total else 0
         if tenths > told and time.monotonic() - start > _SILENT_TIME:
             told = tenths
-            print(f"ripple-sim: {10 * tenths} % done, {done} of {total} frames", file=sys.stderr, flush=True)
+            print(
+                f"ripple-sim: {10 * tenths} % done, {done} of {total} frames",
+                file=sys.stderr,
+                flush=True,
+            )
 
     return report
 
@@ -146,13 +165,19 @@ def _progress_lines() -> Callable[[int, int], None]:
 def frame_progress(title: str, total: int | None = None) -> Iterator[Callable[[int, int], None]]:
     """Show how far a job is on stderr while the block runs; yields a function of the frames done and of all frames.
 
-    A terminal gets a title, and below it frames done of a total, rate and remaining time. A pipe or a log gets a line
-    at each tenth of a job that takes long.
+    A terminal gets a title, and below it frames done of a total, rate and remaining time. A pipe or
+    a log gets a line at each tenth of a job that takes long.
     """
     if not sys.stderr.isatty():
         yield _progress_lines()
         return
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("frames"), _Rate(), TimeRemainingColumn())
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("frames"),
+        _Rate(),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         progress.console.print(title, markup=False, highlight=False)
         task = progress.add_task("", total=total)
@@ -181,7 +206,9 @@ class _VideoCommand(_SceneCommand, VideoOptions):
 
     def options(self) -> VideoOptions:
         """Options that the user chose."""
-        return VideoOptions(**{field.name: getattr(self, field.name) for field in dataclasses.fields(VideoOptions)})
+        return VideoOptions(
+            **{field.name: getattr(self, field.name) for field in dataclasses.fields(VideoOptions)}
+        )
 
     def check_input(self) -> None:
         """Make sure that what is to be rendered exists."""
@@ -212,13 +239,22 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         title = f"renderer {shared_context().renderer}, waves {options.backend}"
         with frame_progress(title, frame_count(options)) as progress:
             summary = render_video(scene, self.output, options, progress=progress)
-        resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
-        compiling = f"compiling (once) {summary.compile_seconds:.1f} s, " if summary.compile_seconds >= 0.05 else ""
+        resumed = (
+            f", the first {summary.resumed_at} of them rendered before"
+            if summary.resumed_at
+            else ""
+        )
+        compiling = (
+            f"compiling (once) {summary.compile_seconds:.1f} s, "
+            if summary.compile_seconds >= 0.05
+            else ""
+        )
         print(
             f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
             f"renderer  {summary.renderer}\n"
             f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
-            f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+            f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics "
+            f"{summary.physics_seconds:.1f} s, "
             f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
             f"encoding {summary.encode_seconds:.1f} s"
         )
@@ -233,9 +269,14 @@ class _VideoCommand(_SceneCommand, VideoOptions):
         scene = self.seen(self.load())
         frames = frame_count(settled(self.options(), scene, self.output))
         with frame_progress(f"renderer Cycles, {self.samples} samples", frames) as progress:
-            summary = render_cycles(scene, self.output, self.options(), samples=self.samples, progress=progress)
+            summary = render_cycles(
+                scene, self.output, self.options(), samples=self.samples, progress=progress
+            )
         print(f"{summary.output}: {summary.frames} frames")
-        print(f"stages    simulation and export {summary.simulate_seconds:.1f} s, Cycles {summary.write_seconds:.1f} s")
+        print(
+            f"stages    simulation and export {summary.simulate_seconds:.1f} s, Cycles "
+            f"{summary.write_seconds:.1f} s"
+        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -307,9 +348,10 @@ class DropCommand(_VideoCommand):
 class ViewCommand:
     """Open a scene or a mesh in an interactive window.
 
-    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N: next frame. R: reset.
-    T: throw a ball at the pointer. O: next operator (fem, uncorrected, paper). C: heatmap on or off. S: screenshot.
-    V: start or stop a recording. H: list of keys. Q: quit. Sliders set the poke's impulse and the material.
+    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N:
+    next frame. R: reset. T: throw a ball at the pointer. O: next operator (fem, uncorrected,
+    paper). C: heatmap on or off. S: screenshot. V: start or stop a recording. H: list of keys. Q:
+    quit. Sliders set the poke's impulse and the material.
     """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
@@ -346,11 +388,14 @@ class ViewCommand:
         from ripple_sim.viewer.opening import display_problem
         from ripple_sim.viewer.window import benchmark, check_display, run
 
-        # refuse what cannot work before anything that takes time: first what is asked for, then what this machine lacks
+        # refuse what cannot work before anything that takes time: first what is asked for, then
+        # what this machine lacks
         is_scene(self.scene)
         check_size(*self.size)
         if not self.folder.is_dir():
-            raise VideoError(f"there is no folder {str(self.folder)!r} for screenshots and videos; make it first")
+            raise VideoError(
+                f"there is no folder {str(self.folder)!r} for screenshots and videos; make it first"
+            )
         if self.benchmark:
             print(benchmark(self._window(off_screen=display_problem() is not None)))
         elif self.web:
@@ -368,7 +413,12 @@ class ViewCommand:
         from ripple_sim.viewer.window import Window
 
         scene = open_scene(
-            self.scene, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair, wrap=self.wrap
+            self.scene,
+            bodies=self.bodies,
+            seed=self.seed,
+            up=self.up,
+            repair=self.repair,
+            wrap=self.wrap,
         )
         session = Session(scene, resolution=self.resolution)
         return Window(session, size=self.size, off_screen=off_screen, folder=self.folder)

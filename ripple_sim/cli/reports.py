@@ -24,12 +24,18 @@ from .arguments import Gigabytes, Limit, Shard
 if TYPE_CHECKING:
     from ripple_sim.batch.run import Progress
 
+# Of the wave whose speed and decay are told [m].
+_WAVELENGTH = 0.05
+_BETWEEN = 60.0  # lines in a log [s]
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BenchCommand:
     """Measure the wave solver: speed beside the bound of memory, cost of the coupling, accuracy against theory."""
 
-    meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")] = ()
+    meshes: Annotated[
+        Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")
+    ] = ()
     """Meshes of which to time the atlas and the wave step, in addition to the duck."""
     json: bool = False
     """Print JSON."""
@@ -38,7 +44,9 @@ class BenchCommand:
         """Measure and print; the stages are announced on stderr."""
         from ripple_sim.bench import as_text, measure
 
-        report = measure(list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr))
+        report = measure(
+            list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr)
+        )
         print(json_format.dumps(report, indent=2) if self.json else as_text(report))
 
 
@@ -53,7 +61,8 @@ class CacheCommand:
         """Clear the cache if asked to, and print what is in it."""
         from ripple_sim.solver.cache import cache_folder, cache_limit, cached_files, removed
 
-        limit, files = cache_limit(), cached_files()
+        limit = cache_limit()
+        files = cached_files()
         if self.clear:
             freed = sum(size * removed(path) for path, size in files.items())
             print(f"removed {len(files)} files, {freed / 1e6:.0f} MB")
@@ -77,10 +86,6 @@ class InfoCommand:
         print(json_format.dumps(info, indent=2) if self.json else as_text(info))
 
 
-# Of the wave whose speed and decay are told [m].
-_WAVELENGTH = 0.05
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MaterialsCommand:
     """List the real materials by name, with speed and decay of a wave of 5 cm, sources, and where they hold."""
@@ -94,7 +99,8 @@ class MaterialsCommand:
         from ripple_sim.solver.operator.material import decay_time, phase_speed
         from ripple_sim.solver.operator.presets import PRESETS
 
-        q, table = 2 * math.pi / _WAVELENGTH, {}
+        q = 2 * math.pi / _WAVELENGTH
+        table = {}
         for name, preset in PRESETS.items():
             material = Material.preset(name)
             facts = {"speed [m/s]": phase_speed(material, q), "decay [s]": decay_time(material, q)}
@@ -104,11 +110,16 @@ class MaterialsCommand:
             return
         width = max(map(len, table))
         for name, row in table.items():
-            print(f"{name:{width}}  {row['speed [m/s]']:.3g} m/s, falls to 1/e in {row['decay [s]']:.3g} s")
+            print(
+                f"{name:{width}}  {row['speed [m/s]']:.3g} m/s, falls to 1/e in "
+                f"{row['decay [s]']:.3g} s"
+            )
             parameters = ", ".join(f"{key} {value:g}" for key, value in row["parameters"].items())
             print(f"{'':{width}}  {row['law']}: {parameters}")
             print(f"{'':{width}}  holds: {row['valid']}")
-            print(f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}")
+            print(
+                f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}"
+            )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -117,7 +128,9 @@ class BatchCommand:
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN|DIR")]
     """The plan (TOML), or the folder of a batch to go on with."""
-    output: Annotated[Path | None, arg(aliases=["-o"], metavar="DIR", help_behavior_hint="(needed with a plan)")] = None
+    output: Annotated[
+        Path | None, arg(aliases=["-o"], metavar="DIR", help_behavior_hint="(needed with a plan)")
+    ] = None
     """Folder of the batch. Run again, it makes what is not there yet."""
     workers: Limit = None
     """Processes that make scenes; by default one for every two cores, at least two."""
@@ -171,9 +184,6 @@ class BatchCommand:
             print(status_text(folder))
 
 
-_BETWEEN = 60.0  # lines in a log [s]
-
-
 def progress_text(progress: Progress) -> str:
     """Frames, rate, time left, failures, room taken and left on the disk, in a line."""
     left = progress.scenes - progress.finished - progress.aside
@@ -183,14 +193,22 @@ def progress_text(progress: Progress) -> str:
         parts += [f"{3600 * rate:.0f} scenes/h", f"{duration_text(left / rate)} left"]
     if progress.failures or progress.aside:
         parts.append(f"{progress.failures} failed, {progress.aside} put aside")
-    return ", ".join([*parts, f"{progress.bytes / 1e9:.2f} GB written", f"{progress.free / 1e9:.1f} GB free"])
+    return ", ".join(
+        [*parts, f"{progress.bytes / 1e9:.2f} GB written", f"{progress.free / 1e9:.1f} GB free"]
+    )
 
 
 def duration_text(seconds: float) -> str:
     """A time in seconds, minutes and hours."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+    return (
+        f"{hours} h {minutes:02d} min"
+        if hours
+        else f"{minutes} min {rest:02d} s"
+        if minutes
+        else f"{rest} s"
+    )
 
 
 @contextlib.contextmanager
@@ -204,7 +222,11 @@ def batch_progress() -> Iterator[Callable[[Progress], None]]:
             if time.monotonic() - told >= _BETWEEN:
                 told = time.monotonic()
                 done = progress.finished + progress.aside
-                print(f"{done} of {progress.scenes} scenes, {progress_text(progress)}", file=sys.stderr, flush=True)
+                print(
+                    f"{done} of {progress.scenes} scenes, {progress_text(progress)}",
+                    file=sys.stderr,
+                    flush=True,
+                )
 
         yield log
         return
@@ -212,5 +234,8 @@ def batch_progress() -> Iterator[Callable[[Progress], None]]:
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task("", total=None)
         yield lambda now: bars.update(
-            task, total=now.scenes, completed=now.finished + now.aside, description=progress_text(now)
+            task,
+            total=now.scenes,
+            completed=now.finished + now.aside,
+            description=progress_text(now),
         )

@@ -1,12 +1,13 @@
 """Ctrl-C, SIGTERM and SIGHUP: one line, status 128 + the signal's number, and what is unfinished is cleaned up.
 
-Before a command begins there is nothing to clean up, and the process ends at once. Later the signal becomes an
-exception. Where that would do harm a timer tries again until it is over: within calls of moderngl's or LLVM's it would
-end in a segmentation fault; VTK swallows exceptions of what it calls back, or exits by itself; zarr's threads would go
-on to write into a folder that is being removed; a package may take it for an import error; Python swallows it in a
-finalizer; and a video that is being opened has nobody yet who would clean it up.
-A second signal ends the process at once; what is left is then as whole as after a kill. One that comes after the
-command, while the interpreter shuts down, changes nothing.
+Before a command begins there is nothing to clean up, and the process ends at once. Later the signal
+becomes an exception. Where that would do harm a timer tries again until it is over: within calls of
+moderngl's or LLVM's it would end in a segmentation fault; VTK swallows exceptions of what it calls
+back, or exits by itself; zarr's threads would go on to write into a folder that is being removed; a
+package may take it for an import error; Python swallows it in a finalizer; and a video that is
+being opened has nobody yet who would clean it up. A second signal ends the process at once; what is
+left is then as whole as after a kill. One that comes after the command, while the interpreter shuts
+down, changes nothing.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ def end_in_good_order() -> None:
 def finish_undisturbed() -> None:
     """Ignore the signals from here on: the command is done, and its status stands.
 
-    While the interpreter shuts down it would give them back to the system, which ends the process without a word.
+    While the interpreter shuts down it would give them back to the system, which ends the process
+    without a word.
     """
     _handle(signal.SIG_IGN)
 
@@ -75,7 +77,8 @@ def _end(number: int, frame: FrameType | None) -> None:
 def _raise(number: int, frame: FrameType | None) -> None:
     while frame is not None:  # from the innermost of the functions that are running
         name = f"{frame.f_globals.get('__name__', '')}.{frame.f_code.co_qualname}"
-        if frame.f_code.co_name == "__del__" or name.startswith(_NEVER_IN):  # an exception does harm: try again
+        # an exception does harm: try again
+        if frame.f_code.co_name == "__del__" or name.startswith(_NEVER_IN):
             signal.signal(signal.SIGALRM, lambda _, then: _raise(number, then))
             signal.setitimer(signal.ITIMER_REAL, _RETRY)
             return

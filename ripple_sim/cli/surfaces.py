@@ -1,6 +1,7 @@
 """Commands on a mesh: `atlas`, which reports what its charts are like, and `modes`, how it rings.
 
-The report of an atlas tells of the mesh, what was done to it, the quality of the atlas, and the time of each stage.
+The report of an atlas tells of the mesh, what was done to it, the quality of the atlas, and the
+time of each stage.
 """
 
 from __future__ import annotations
@@ -21,6 +22,24 @@ from .arguments import Count, LayoutName, NamedMaterial, RimName, UpAxis
 if TYPE_CHECKING:
     from ripple_sim.solver import Atlas, Modes
 
+# By figure of `Atlas.quality`: what it is called in the text, and its unit.
+_FIGURES = {
+    "solid_angle": ("solid angle of the map", "sr"),
+    "flipped": ("folded triangles", ""),
+    "q001": ("stretch, 0.1 % of the area", ""),
+    "q01": ("stretch, 1 %", ""),
+    "q50": ("stretch, median", ""),
+    "q99": ("stretch, 99 %", ""),
+    "q999": ("stretch, 99.9 %", ""),
+    "starved": ("area starved (stretch over 4)", ""),
+    "edge_min": ("shortest texel edge", "m"),
+    "edge_max": ("longest texel edge", "m"),
+    "folded": ("folded texels", ""),
+    "coverage": ("texel area / mesh area", ""),
+    "spanned": ("area between texels / mesh area", ""),
+    "timestep": ("time step / even grid's", ""),
+}
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class AtlasCommand:
@@ -28,7 +47,9 @@ class AtlasCommand:
 
     mesh: Annotated[Positional[Path], arg(metavar="MESH")]
     """Mesh file (OBJ, OFF, PLY, STL, GLB ...)."""
-    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE", help_behavior_hint="(optional)")] = None
+    output: Annotated[
+        Path | None, arg(aliases=["-o"], metavar="FILE", help_behavior_hint="(optional)")
+    ] = None
     """Save the atlas to this file (NPZ)."""
     resolution: Count = 128
     """Texels along the edge of a cube's chart, N: about 6 N^2 in all, in every layout."""
@@ -69,7 +90,9 @@ class AtlasCommand:
         start = time.perf_counter()
         mesh = load_mesh(self.mesh, repair=self.repair, wrap=self.wrap)
         loaded = time.perf_counter()
-        atlas = build_atlas(mesh, resolution=self.resolution, method=self.method, layout=self.layout)
+        atlas = build_atlas(
+            mesh, resolution=self.resolution, method=self.method, layout=self.layout
+        )
         seconds = {"load": loaded - start, **atlas.timings}
         thickness = None
         if inside is not None:
@@ -96,7 +119,9 @@ class AtlasCommand:
             _check_other(path, self.mesh, "the mesh")
             _check_other(path, self.inside, "what is inside")
         if self.inside is None and (self.threshold is not None or self.spacing is not None):
-            raise AtlasError("--threshold and --spacing belong to the volume that --inside names; name one")
+            raise AtlasError(
+                "--threshold and --spacing belong to the volume that --inside names; name one"
+            )
         if self.output is not None:
             check_atlas_place(self.output, self.overwrite)
         if self.plot is not None:
@@ -108,9 +133,13 @@ class AtlasCommand:
         from ripple_sim.figures.atlas_plot import plot_atlas, plot_thickness
         from ripple_sim.scene.drop import usual_up
 
-        mesh, up = atlas.mesh, self.up or usual_up(self.mesh)
+        mesh = atlas.mesh
+        up = self.up or usual_up(self.mesh)
         method = self.method if atlas.layout == "cube" else None
-        subtitle = f"{len(mesh.V):,} vertices, {len(mesh.F):,} triangles; {charts_text(atlas.texels.shape, method)}"
+        subtitle = (
+            f"{len(mesh.V):,} vertices, {len(mesh.F):,} triangles; "
+            f"{charts_text(atlas.texels.shape, method)}"
+        )
         if thickness is None:
             plot_atlas(atlas, path, title=self.mesh.stem, subtitle=subtitle, up=up)
         else:
@@ -126,39 +155,28 @@ def _check_other(path: Path, read: Path | None, what: str) -> None:
         raise AtlasError(f"cannot write {path}: it is {what} itself; name another file")
 
 
-# By figure of `Atlas.quality`: what it is called in the text, and its unit.
-_FIGURES = {
-    "solid_angle": ("solid angle of the map", "sr"),
-    "flipped": ("folded triangles", ""),
-    "q001": ("stretch, 0.1 % of the area", ""),
-    "q01": ("stretch, 1 %", ""),
-    "q50": ("stretch, median", ""),
-    "q99": ("stretch, 99 %", ""),
-    "q999": ("stretch, 99.9 %", ""),
-    "starved": ("area starved (stretch over 4)", ""),
-    "edge_min": ("shortest texel edge", "m"),
-    "edge_max": ("longest texel edge", "m"),
-    "folded": ("folded texels", ""),
-    "coverage": ("texel area / mesh area", ""),
-    "spanned": ("area between texels / mesh area", ""),
-    "timestep": ("time step / even grid's", ""),
-}
-
-
 def atlas_report(
-    path: Path, atlas: Atlas, method: str, seconds: dict[str, float], thickness: NDArray[np.float64] | None = None
+    path: Path,
+    atlas: Atlas,
+    method: str,
+    seconds: dict[str, float],
+    thickness: NDArray[np.float64] | None = None,
 ) -> dict[str, Any]:
     """Figures of an atlas, as JSON can hold them.
 
-    They are of the mesh in the file at a path (`size` of the bounding box [m], `area` [m^2], `volume` [m^3], `notes` on
-    what was done to it and why it got its layout), of its charts (C, n, n), the `method` of the cube's sphere map,
-    `quality` (see `Atlas.quality`), quantiles of the `thickness` [m] of a layer, and wall time of each stage [s].
+    They are of the mesh in the file at a path (`size` of the bounding box [m], `area` [m^2],
+    `volume` [m^3], `notes` on what was done to it and why it got its layout), of its charts (C, n,
+    n), the `method` of the cube's sphere map, `quality` (see `Atlas.quality`), quantiles of the
+    `thickness` [m] of a layer, and wall time of each stage [s].
     """
     mesh = atlas.mesh
     known: dict[str, Any] = {}
     if thickness is not None:
-        names, shares = ("least", "q01", "median", "q99", "greatest"), (0, 0.01, 0.5, 0.99, 1)
-        known = {"thickness": dict(zip(names, np.quantile(thickness, shares).tolist(), strict=True))}
+        names = ("least", "q01", "median", "q99", "greatest")
+        shares = (0, 0.01, 0.5, 0.99, 1)
+        known = {
+            "thickness": dict(zip(names, np.quantile(thickness, shares).tolist(), strict=True))
+        }
     return {
         "mesh": str(path),
         "vertices": len(mesh.V),
@@ -179,7 +197,10 @@ def atlas_report(
 
 def charts_text(shape: Sequence[int], method: str | None) -> str:
     """Number and size of charts of a shape (C, n, n), and the sphere map that the cube layout has, as text."""
-    return f"{' x '.join(map(str, shape))} texels, {'patches' if method is None else f'{method} sphere map'}"
+    return (
+        f"{' x '.join(map(str, shape))} texels, "
+        f"{'patches' if method is None else f'{method} sphere map'}"
+    )
 
 
 def report_text(report: dict[str, Any]) -> str:
@@ -195,8 +216,14 @@ def report_text(report: dict[str, Any]) -> str:
             (_FIGURES[name][0], f"{value:.6g} {_FIGURES[name][1]}".rstrip())
             for name, value in report["quality"].items()
         ),
-        *((f"thickness, {name}", f"{metres:.6g} m") for name, metres in report.get("thickness", {}).items()),
-        *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),
+        *(
+            (f"thickness, {name}", f"{metres:.6g} m")
+            for name, metres in report.get("thickness", {}).items()
+        ),
+        *(
+            (f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s")
+            for stage, seconds in report["seconds"].items()
+        ),
     ]
     width = max(len(name) for name, _ in rows)
     return "\n".join([report["mesh"], *(f"{name:<{width}}  {value}" for name, value in rows)])
@@ -259,7 +286,9 @@ class ModesCommand:
             return
         print("mode  frequency [Hz]   ratio  falls to 1/e in [s]")
         for number, mode in enumerate(report, 1):
-            ratio, last = ("-" if mode[key] is None else f"{mode[key]:.4g}" for key in ("ratio", "decay_time"))
+            ratio, last = (
+                "-" if mode[key] is None else f"{mode[key]:.4g}" for key in ("ratio", "decay_time")
+            )
             print(f"{number:4}  {mode['frequency']:14.5g}  {ratio:>6}  {last}")
 
     def _plot(self, path: Path, atlas: Atlas, found: Modes) -> None:

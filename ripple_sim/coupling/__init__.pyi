@@ -22,21 +22,34 @@ from .geoms import (
     geom_name as geom_name,
     target_name as target_name,
 )
-from .load import ContactLoads as ContactLoads, StepContacts as StepContacts, TargetLoad as TargetLoad
+from .load import (
+    ContactLoads as ContactLoads,
+    StepContacts as StepContacts,
+    TargetLoad as TargetLoad,
+)
 from .model import (
     CoupledModel as CoupledModel,
     FlexContacts as FlexContacts,
     find_flex_colliders as find_flex_colliders,
     flex_thickness as flex_thickness,
 )
-from .own_model import check_targets as check_targets, own_data as own_data, own_model as own_model, posed as posed
+from .own_model import (
+    check_targets as check_targets,
+    own_data as own_data,
+    own_model as own_model,
+    posed as posed,
+)
 from .patches import (
     MAX_CORNERS as MAX_CORNERS,
     Footprints as Footprints,
     corners as corners,
     load_points as load_points,
 )
-from .rest_filter import NO_FORCES as NO_FORCES, RestFilter as RestFilter, TexelForces as TexelForces
+from .rest_filter import (
+    NO_FORCES as NO_FORCES,
+    RestFilter as RestFilter,
+    TexelForces as TexelForces,
+)
 from .ripples import Impulse as Impulse, Ripples as Ripples
 from .soft import (
     HighPass as HighPass,

@@ -1,7 +1,7 @@
 """`make_collidable`: let a mesh geom collide as its true surface.
 
-A convex collider stands for a geom by convex parts of its mesh, which CoACD finds and the user's cache keeps; a flex
-collider by a rigid flex of triangles.
+A convex collider stands for a geom by convex parts of its mesh, which CoACD finds and the user's
+cache keeps; a flex collider by a rigid flex of triangles.
 """
 
 from __future__ import annotations
@@ -31,41 +31,73 @@ from .target_warnings import GAP_TOLERANCE
 _GEOM = mujoco.mjtGeom
 ROUTES = ("auto", "sdf", "flex", "convex", "hull")
 
-# Starting points of MuJoCo's search for contacts with a signed distance. Fewer miss contacts; its default of 40 takes
-# five times as long.
+# Starting points of MuJoCo's search for contacts with a signed distance. Fewer miss contacts; its
+# default of 40 takes five times as long.
 SDF_INITPOINTS = 10
-# MuJoCo makes room for as many contacts of a pair, but finds up to 50 where the other geom is a mesh.
+# MuJoCo makes room for as many contacts of a pair, but finds up to 50 where the other geom is a
+# mesh.
 _MESH_INITPOINTS = 50
+
+# CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface.
+# With a third of its usual iterations it finds as good cuts in half the time.
+_DECOMPOSITION = {"threshold": 0.05, "mcts_iterations": 60, "seed": 0}
+
+# What a geom's stand-ins collide like.
+_SETTINGS = ("contype", "conaffinity", "condim", "priority", "solmix", "gap")
+_LISTS = ("friction", "solref", "solimp")
+
+# MuJoCo's viewers and ours do not show this group.
+_HIDDEN = 3
+
+# Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
+_THICKNESSES = (0.05, 0.04, 0.03, 0.02)
+
+# Thickness of a sheet over its size, on either side.
+_SHEET = 0.01
+
+# Vertices at sharp corners move by this many thicknesses at most; those of a cube need 1.73.
+_SHARPEST = 2.0
+
+# Weight of the isotropic term over that of the triangles' planes: it settles the directions that
+# they leave open.
+_ROUNDING = 1e-3
+
+# Vertices move by this share of the local thickness at most, so that opposite sides of a thin part
+# stay apart.
+_DEEPEST = 0.45
 
 
 def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujoco.MjsGeom:
     """Let a mesh geom collide as its true surface.
 
-    Primitive geoms do so by themselves and are left as they are. For them and for hulls MuJoCo's speculative contacts
-    are enabled where the version has them (from 4 on): fast geoms are then stopped in time. SDF geoms have none.
+    Primitive geoms do so by themselves and are left as they are. For them and for hulls MuJoCo's
+    speculative contacts are enabled where the version has them (from 4 on): fast geoms are then
+    stopped in time. SDF geoms have none.
 
     Parameters
     ----------
     spec : mujoco.MjSpec
-        Changed in place, before it is compiled. A route taken earlier is undone, but not by one that fails.
+        Changed in place, before it is compiled. A route taken earlier is undone, but not by one
+        that fails.
     geom : str
-        Name of a geom, or "body/index" of an unnamed one, which gets that name. One that collides with nothing gets a
-        contype and a conaffinity of 1; other geoms of its body go on colliding.
+        Name of a geom, or "body/index" of an unnamed one, which gets that name. One that collides
+        with nothing gets a contype and a conaffinity of 1; other geoms of its body go on colliding.
     route : str
-        "auto": "sdf" for a closed mesh, "flex" for an open one.
-        "sdf": as a signed distance, which MuJoCo computes when it compiles the model. For moving targets too, and right
-        for geoms of all shapes. Only planes meet the mesh's convex hull, and height fields nothing at all.
-        "flex": through a rigid flex of its triangles, with the geom's name and on its body; the geom itself keeps its
-        looks and mass. Planes and height fields meet it too, and an open mesh is met from both sides. A step costs by
-        the triangles, that of a signed distance by the bodies: on ten thousand triangles ten balls take a third of its
-        time, and one takes twice as long. Right for spheres, capsules and ellipsoids, and for cylinders and meshes that
-        sink in by less than 0.7 of the flex's thickness (2 to 5 % of the mesh's size). Boxes may be thrown aside, and
-        SDF geoms sink in; a warning names both. See `add_flex_collider`.
-        "convex": as the convex parts of its mesh, geoms of their own without mass, which CoACD finds in some ten
-        seconds and which are then kept in the user's cache (needs the package coacd). The most robust: boxes stack on
-        it, and all geoms meet it. Bodies are held up to 2.5 % of the mesh's size off the surface. For closed meshes.
-        See `add_convex_collider`.
-        "hull": as its convex hull, MuJoCo's way for mesh geoms: fast, and right for convex meshes only.
+        "auto": "sdf" for a closed mesh, "flex" for an open one. "sdf": as a signed distance, which
+        MuJoCo computes when it compiles the model. For moving targets too, and right for geoms of
+        all shapes. Only planes meet the mesh's convex hull, and height fields nothing at all.
+        "flex": through a rigid flex of its triangles, with the geom's name and on its body; the
+        geom itself keeps its looks and mass. Planes and height fields meet it too, and an open mesh
+        is met from both sides. A step costs by the triangles, that of a signed distance by the
+        bodies: on ten thousand triangles ten balls take a third of its time, and one takes twice as
+        long. Right for spheres, capsules and ellipsoids, and for cylinders and meshes that sink in
+        by less than 0.7 of the flex's thickness (2 to 5 % of the mesh's size). Boxes may be thrown
+        aside, and SDF geoms sink in; a warning names both. See `add_flex_collider`. "convex": as
+        the convex parts of its mesh, geoms of their own without mass, which CoACD finds in some ten
+        seconds and which are then kept in the user's cache (needs the package coacd). The most
+        robust: boxes stack on it, and all geoms meet it. Bodies are held up to 2.5 % of the mesh's
+        size off the surface. For closed meshes. See `add_convex_collider`. "hull": as its convex
+        hull, MuJoCo's way for mesh geoms: fast, and right for convex meshes only.
 
     Returns
     -------
@@ -75,19 +107,24 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     Raises
     ------
     SceneError
-        For an unknown route or geom, a specification from which no collider can be made, or a package that is missing.
+        For an unknown route or geom, a specification from which no collider can be made, or a
+        package that is missing.
     MeshError
         If the mesh cannot be used.
     """
     if route not in ROUTES:
-        raise SceneError(f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}")
+        raise SceneError(
+            f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}"
+        )
     found = _find(spec, geom)
     if found.meshname and route == "auto":
         model = _compiled(spec, found)
         route = "sdf" if target_mesh(model, model.geom(found.name).id).closed else "flex"
     # what can fail comes first: then nothing has been changed
     core = flex_core(mesh_on_body(spec, found)) if found.meshname and route == "flex" else None
-    parts = convex_parts(mesh_on_body(spec, found)) if found.meshname and route == "convex" else None
+    parts = (
+        convex_parts(mesh_on_body(spec, found)) if found.meshname and route == "convex" else None
+    )
     if not found.meshname or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
     if found.meshname:
@@ -96,8 +133,16 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     if not (found.contype or found.conaffinity):
         found.contype = found.conaffinity = 1
     if found.meshname and route == "sdf":
-        others = (each for each in spec.geoms if each.name != found.name and (each.contype or each.conaffinity))
-        choose, count = (max, _MESH_INITPOINTS) if any(each.meshname for each in others) else (min, SDF_INITPOINTS)
+        others = (
+            each
+            for each in spec.geoms
+            if each.name != found.name and (each.contype or each.conaffinity)
+        )
+        choose, count = (
+            (max, _MESH_INITPOINTS)
+            if any(each.meshname for each in others)
+            else (min, SDF_INITPOINTS)
+        )
         spec.option.sdf_initpoints = choose(spec.option.sdf_initpoints, count)
     if core is not None:
         add_flex_collider(spec, found, core)
@@ -118,26 +163,26 @@ def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
         found.name = found.name or key
         return found
     names = ", ".join(repr(each.name) for each in spec.geoms if each.name)
-    raise SceneError(f"the specification has no geom {key!r}; its named geoms are {names or 'none'}")
+    raise SceneError(
+        f"the specification has no geom {key!r}; its named geoms are {names or 'none'}"
+    )
 
 
-# Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the surface [m].
+# Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the
+# surface [m].
 FlexCore = tuple[NDArray[np.float64], NDArray[np.int64], float]
-
-# CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface. With a third of its
-# usual iterations it finds as good cuts in half the time.
-_DECOMPOSITION = {"threshold": 0.05, "mcts_iterations": 60, "seed": 0}
 
 
 def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     """Vertices of the convex parts of a mesh [m], each [n, 3]; the same for the same mesh.
 
-    Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity and tree search".
-    Raises `SceneError` if the mesh is open, or the package coacd is missing.
+    Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity
+    and tree search". Raises `SceneError` if the mesh is open, or the package coacd is missing.
     """
     if not mesh.closed:
         raise SceneError(
-            f"the {mesh.name} is open and encloses no volume that has convex parts; valid routes for it are 'flex' "
+            f"the {mesh.name} is open and encloses no volume that has convex parts; valid routes "
+            f"for it are 'flex' "
             "and 'hull'"
         )
     try:
@@ -155,28 +200,31 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     import coacd
 
     coacd.set_log_level("error")
-    parts = [np.array(V, dtype=np.float64) for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)]
+    parts = [
+        np.array(V, dtype=np.float64)
+        for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)
+    ]
     # a folder that cannot be written costs the next call its time, nothing else
-    with contextlib.suppress(OSError), atomic_write(path) as unfinished, unfinished.open("wb") as file:
+    with (
+        contextlib.suppress(OSError),
+        atomic_write(path) as unfinished,
+        unfinished.open("wb") as file,
+    ):
         write_arrays(file, {str(i): part for i, part in enumerate(parts)})
     make_room(path)
     return parts
 
 
-# What a geom's stand-ins collide like.
-_SETTINGS = ("contype", "conaffinity", "condim", "priority", "solmix", "gap")
-_LISTS = ("friction", "solref", "solimp")
-
-
 def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
     """A geom's mesh in the frame of its body, as MuJoCo compiles it.
 
-    Raises `SceneError` if the specification does not compile as it is, or would lose geoms that do not collide, and
-    `MeshError` if the mesh has no triangle with an area.
+    Raises `SceneError` if the specification does not compile as it is, or would lose geoms that do
+    not collide, and `MeshError` if the mesh has no triangle with an area.
     """
     if spec.compiler.discardvisual:
         raise SceneError(
-            f"geom {geom.name!r} cannot have others collide for it: with discardvisual the compiler would discard it; "
+            f"geom {geom.name!r} cannot have others collide for it: with discardvisual the "
+            f"compiler would discard it; "
             "set spec.compiler.discardvisual = False"
         )
     model = _compiled(spec, geom)
@@ -190,21 +238,22 @@ def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
     # a signed distance would take long, and a flat mesh has no convex hull
     trial.compiler.discardvisual = False
     own = trial.geom(geom.name)
-    own.type, own.contype, own.conaffinity = mujoco.mjtGeom.mjGEOM_MESH, 0, 0
+    own.type = mujoco.mjtGeom.mjGEOM_MESH
+    own.contype = 0
+    own.conaffinity = 0
     try:
         return trial.compile()
     except ValueError as error:
         raise SceneError(
-            f"the colliders of geom {geom.name!r} are made from its compiled mesh, but the specification does not "
+            f"the colliders of geom {geom.name!r} are made from its compiled mesh, but the "
+            f"specification does not "
             f"compile: {error}"
         ) from error
 
 
-# MuJoCo's viewers and ours do not show this group.
-_HIDDEN = 3
-
-
-def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequence[NDArray[np.float64]]) -> None:
+def add_convex_collider(
+    spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequence[NDArray[np.float64]]
+) -> None:
     """Let a mesh geom collide through geoms of its convex parts, on its body, and no longer by itself.
 
     They have its contact settings and no mass: mass and looks stay with the geom.
@@ -220,7 +269,9 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
     for i, V in enumerate(parts):
         name = part_name(geom.name, i)
         # a thin part may have too little volume for MuJoCo to take an inertia from it
-        spec.add_mesh(name=name, uservert=V.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        spec.add_mesh(
+            name=name, uservert=V.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        )
         geom.parent.add_geom(
             name=name,
             type=_GEOM.mjGEOM_MESH,
@@ -234,29 +285,18 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequen
     geom.contype = geom.conaffinity = 0
 
 
-# Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
-_THICKNESSES = (0.05, 0.04, 0.03, 0.02)
-# Thickness of a sheet over its size, on either side.
-_SHEET = 0.01
-# Vertices at sharp corners move by this many thicknesses at most; those of a cube need 1.73.
-_SHARPEST = 2.0
-# Weight of the isotropic term over that of the triangles' planes: it settles the directions that they leave open.
-_ROUNDING = 1e-3
-# Vertices move by this share of the local thickness at most, so that opposite sides of a thin part stay apart.
-_DEEPEST = 0.45
-
-
 def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore) -> None:
     """Let a mesh geom collide through a rigid flex of its triangles, of the same name, and no longer by itself.
 
-    MuJoCo's contacts with a triangle are right as long as nothing penetrates it: they push along the shortest line
-    between the two. A geom that has penetrated is pushed out through the nearest side, which is sideways for a flat
-    geom with a triangle under its rim. So the triangles lie inside the surface, and a contact margin of the same
-    thickness holds other geoms off: they meet the true surface. Sharp edges become rounded and thin parts thicker; the
-    flex is as thick as possible (2 to 5 % of the mesh's size) without putting either off by more than 2 %.
+    MuJoCo's contacts with a triangle are right as long as nothing penetrates it: they push along
+    the shortest line between the two. A geom that has penetrated is pushed out through the nearest
+    side, which is sideways for a flat geom with a triangle under its rim. So the triangles lie
+    inside the surface, and a contact margin of the same thickness holds other geoms off: they meet
+    the true surface. Sharp edges become rounded and thin parts thicker; the flex is as thick as
+    possible (2 to 5 % of the mesh's size) without putting either off by more than 2 %.
 
-    An open mesh is a sheet that can be hit from both sides: the triangles are its own, and the margin, 1 % of its size,
-    holds geoms off either side.
+    An open mesh is a sheet that can be hit from both sides: the triangles are its own, and the
+    margin, 1 % of its size, holds geoms off either side.
 
     Parameters
     ----------
@@ -266,7 +306,8 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore)
     core : FlexCore
         See `flex_core`.
     """
-    (V, F, thickness), body = core, geom.parent
+    (V, F, thickness) = core
+    body = geom.parent
     body.name = body.name or f"body of {geom.name}"
     spec.add_flex(
         name=geom.name,
@@ -287,11 +328,15 @@ def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     """Remove the flex and the convex colliders of a geom, if it has any, and let it collide by itself again."""
     flex = spec.flex(geom.name)
     if flex is not None and set(flex.vertbody) == {geom.parent.name}:
-        geom.contype, geom.conaffinity = flex.contype, flex.conaffinity
+        geom.contype = flex.contype
+        geom.conaffinity = flex.conaffinity
         spec.delete(flex)
     i = 0
-    while (part := spec.geom(part_name(geom.name, i))) is not None and part.parent.name == geom.parent.name:
-        geom.contype, geom.conaffinity = part.contype, part.conaffinity
+    while (
+        part := spec.geom(part_name(geom.name, i))
+    ) is not None and part.parent.name == geom.parent.name:
+        geom.contype = part.contype
+        geom.conaffinity = part.conaffinity
         spec.delete(part)
         spec.delete(spec.mesh(part_name(geom.name, i)))
         i += 1
@@ -306,7 +351,10 @@ def flex_core(mesh: Mesh) -> FlexCore:
     for share in _THICKNESSES:
         thickness = share * size
         core = inset(mesh, thickness)
-        if np.abs(ClosestPoints(core, mesh.F).distances(points) - thickness).max() <= GAP_TOLERANCE * size:
+        if (
+            np.abs(ClosestPoints(core, mesh.F).distances(points) - thickness).max()
+            <= GAP_TOLERANCE * size
+        ):
             break
     return core, mesh.F, thickness
 
@@ -314,16 +362,21 @@ def flex_core(mesh: Mesh) -> FlexCore:
 def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     """Vertices [m], [n, 3], moved inwards until the planes of their triangles lie deeper by `depth` [m].
 
-    Where more than three planes meet, the remaining squared distances, weighted by the corners' angles, are least.
-    Parts too thin for that keep a tenth of their thickness.
+    Where more than three planes meet, the remaining squared distances, weighted by the corners'
+    angles, are least. Parts too thin for that keep a tenth of their thickness.
     """
-    V, F = mesh.V, mesh.F
+    V = mesh.V
+    F = mesh.F
     corners = V[F]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    squares, sums, weights = np.zeros((len(V), 3, 3)), np.zeros((len(V), 3)), np.zeros(len(V))
+    squares = np.zeros((len(V), 3, 3))
+    sums = np.zeros((len(V), 3))
+    weights = np.zeros(len(V))
     for k, angle in enumerate(corner_angles(V, F).T):
-        np.add.at(squares, F[:, k], angle[:, None, None] * normals[:, :, None] * normals[:, None, :])
+        np.add.at(
+            squares, F[:, k], angle[:, None, None] * normals[:, :, None] * normals[:, None, :]
+        )
         np.add.at(sums, F[:, k], angle[:, None] * normals)
         np.add.at(weights, F[:, k], angle)
     squares += _ROUNDING * weights[:, None, None] * np.eye(3)
@@ -332,4 +385,7 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     outward /= length[:, None]
     # to the other side of the mesh, infinite where there is none
     thickness = 1e-3 * depth + RayScene(V, F).cast(V - 1e-3 * depth * outward, -outward)[1]
-    return V - np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * thickness)[:, None] * outward
+    return (
+        V
+        - np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * thickness)[:, None] * outward
+    )

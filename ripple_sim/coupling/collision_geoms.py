@@ -24,18 +24,21 @@ def named_collision_geoms(
     Raises
     ------
     SceneError
-        For a geom that does not exist, on a body that moves by itself, or that ripples itself; and for contacts of a
-        geom that does not ripple.
+        For a geom that does not exist, on a body that moves by itself, or that ripples itself; and
+        for contacts of a geom that does not ripple.
     """
     if not isinstance(contacts, Mapping):
-        raise SceneError(f"contacts is {contacts!r}; valid is a mapping of rippling geoms to lists of geoms")
+        raise SceneError(
+            f"contacts is {contacts!r}; valid is a mapping of rippling geoms to lists of geoms"
+        )
     rippling = {find_any(model, name): name for name in targets}
     found = {}
     for name, keys in by_name(model, contacts, "contacts").items():
         target = find_any(model, name)
         if is_soft(model, target):
             raise SceneError(
-                f"contacts names {name!r}, a flex or a skin, for which no geoms can be chosen: a flex takes the "
+                f"contacts names {name!r}, a flex or a skin, for which no geoms can be chosen: a "
+                f"flex takes the "
                 "contacts of its own vertices, a skin those of the bodies of its bones"
             )
         if target not in rippling:
@@ -47,30 +50,37 @@ def named_collision_geoms(
             raise SceneError(f"contacts of geom {name!r} is {keys!r}; valid is a list of geoms")
         found[target] = tuple(dict.fromkeys(find_geom(model, key) for key in keys))
         for geom in found[target]:
-            other, weld = geom_name(model, geom), model.body_weldid[model.geom_bodyid]
+            other = geom_name(model, geom)
+            weld = model.body_weldid[model.geom_bodyid]
             if weld[geom] != weld[target]:
                 theirs, own = (model.body(model.geom_bodyid[each]).name for each in (geom, target))
                 raise SceneError(
-                    f"contacts of geom {name!r} names geom {other!r} on body {theirs!r}, which moves by itself; valid "
+                    f"contacts of geom {name!r} names geom {other!r} on body {theirs!r}, which "
+                    f"moves by itself; valid "
                     f"are geoms of body {own!r} and of those welded to it"
                 )
             if geom != target and geom in rippling:
                 raise SceneError(
-                    f"contacts of geom {name!r} names geom {other!r}, which ripples itself and keeps its contacts; "
+                    f"contacts of geom {name!r} names geom {other!r}, which ripples itself and "
+                    f"keeps its contacts; "
                     "take it out of one of the two"
                 )
     return found
 
 
 def find_collision_geoms(
-    model: mujoco.MjModel, collides: NDArray[np.bool_], targets: Iterable[int], named: Mapping[int, Sequence[int]]
+    model: mujoco.MjModel,
+    collides: NDArray[np.bool_],
+    targets: Iterable[int],
+    named: Mapping[int, Sequence[int]],
 ) -> dict[int, tuple[int, ...]]:
     """Geoms whose contacts load each target, by the target's geom id.
 
-    Those that a target names, and itself where it collides. A target that does neither takes the geoms of its body that
-    collide, but for planes, height fields, those that ripple themselves, and those that others name. Where there are
-    none, or in the world, it takes those of bodies welded to its own; in the world, whose geoms need not belong
-    together, only those whose middle lies in the box around the target.
+    Those that a target names, and itself where it collides. A target that does neither takes the
+    geoms of its body that collide, but for planes, height fields, those that ripple themselves, and
+    those that others name. Where there are none, or in the world, it takes those of bodies welded
+    to its own; in the world, whose geoms need not belong together, only those whose middle lies in
+    the box around the target.
 
     Parameters
     ----------
@@ -82,7 +92,8 @@ def find_collision_geoms(
     named : mapping
         Of some targets' ids to the ids that they name.
     """
-    targets, weld = list(targets), model.body_weldid[model.geom_bodyid]
+    targets = list(targets)
+    weld = model.body_weldid[model.geom_bodyid]
     free = collides & ~np.isin(model.geom_type, ENDLESS)
     free[[*targets, *(geom for geoms in named.values() for geom in geoms)]] = False
     found = {}
@@ -98,7 +109,8 @@ def find_collision_geoms(
             if not weld[target]:
                 data = mujoco.MjData(model)
                 mujoco.mj_kinematics(model, data)
-                rotation, box = data.geom_xmat.reshape(-1, 3, 3), model.geom_aabb
+                rotation = data.geom_xmat.reshape(-1, 3, 3)
+                box = model.geom_aabb
                 middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
                 away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
                 kin &= (np.abs(away) <= box[target, 3:]).all(axis=1)

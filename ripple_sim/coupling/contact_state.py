@@ -80,7 +80,8 @@ CONTACT_STATE = np.dtype(
             ("level", np.float64),  # its force, averaged over chatter [N]
             ("deficit", np.float64),  # impulse that the surface has yet to receive [N s]
             ("prepaid", np.float64),  # impulse that the surface has received in advance [N s]
-            ("memory", np.float64),  # averaging time of the means, short where something changes [s]
+            # averaging time of the means, short where something changes [s]
+            ("memory", np.float64),
             ("mean_force", np.float64),  # [N]
             ("place", np.float64, 3),  # where it is [m]
             ("mean_place", np.float64, 3),  # [m]
@@ -110,7 +111,9 @@ def turn(state: ContactState, side: float) -> None:
 
 
 @kernel(no_cpython_wrapper=True)
-def touch(state: ContactState, force: float, point: Floats, place_radius: float, dt: float) -> float:
+def touch(
+    state: ContactState, force: float, point: Floats, place_radius: float, dt: float
+) -> float:
     """Advance a contact by a step in which it touches; return the force on the surface [N].
 
     Parameters

@@ -1,8 +1,9 @@
 """Easing: the surface of a material that the model chose bears what is far heavier than what it is to show.
 
-A robot's torso can be hit by a ball and bear the whole robot, whose impulses differ by a factor of a thousand. Waves
-are proportional to impulses, so that no density shows the one and bears the other. Where the user gives no density,
-the model chooses one that shows the lightest body, and `Easing` limits the forces of the others.
+A robot's torso can be hit by a ball and bear the whole robot, whose impulses differ by a factor of
+a thousand. Waves are proportional to impulses, so that no density shows the one and bears the
+other. Where the user gives no density, the model chooses one that shows the lightest body, and
+`Easing` limits the forces of the others.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ class EasingLaw(NamedTuple):
     rate : float
         Of the smoothing, an exponential one; that of the surface's own swing [1/s].
     thickness : float
-        Half the target's thickness where this holds [m]; where it is thinner the most is less by as much.
+        Half the target's thickness where this holds [m]; where it is thinner the most is less by as
+        much.
     """
 
     most: float
@@ -44,12 +46,19 @@ class EasingLaw(NamedTuple):
 
     @classmethod
     def of(
-        cls, share: float, thickness: float, *, radius: float, density: float, speed: float, stiffness: float
+        cls,
+        share: float,
+        thickness: float,
+        *,
+        radius: float,
+        density: float,
+        speed: float,
+        stiffness: float,
     ) -> EasingLaw:
         """The law by which a surface is dented by a share of half its thickness at most, by a hit or a weight at rest.
 
-        A hit J that is short beside the surface's swing of rate w counts as a force J w. Arguments are as for
-        `density_under`.
+        A hit J that is short beside the surface's swing of rate w counts as a force J w. Arguments
+        are as for `density_under`.
         """
         unit = depth_under(1.0, radius=radius, density=density, speed=speed, stiffness=stiffness)
         return cls(share * thickness / unit, math.sqrt(stiffness), thickness)
@@ -58,8 +67,8 @@ class EasingLaw(NamedTuple):
 class Easing:
     """Which share of each body's force a target takes up, step by step.
 
-    Each body's smoothed force stays below the law's most: all of a light hit is taken up, and of a harder one as much
-    as of one that just reaches the most.
+    Each body's smoothed force stays below the law's most: all of a light hit is taken up, and of a
+    harder one as much as of one that just reaches the most.
 
     Parameters
     ----------
@@ -125,7 +134,9 @@ def easing_warning(name: str, easing: Easing) -> str | None:
     if easing.least_share >= _TOLD:
         return None
     return (
-        f"geom {name!r} shows hits of the lightest body that can touch it, and takes up {easing.least_share:.2g} of "
-        "the force of a heavier one, which would dent it too deep (`last_impulses` has all of it). For waves in "
+        f"geom {name!r} shows hits of the lightest body that can touch it, and takes up "
+        f"{easing.least_share:.2g} of "
+        "the force of a heavier one, which would dent it too deep (`last_impulses` has all of it). "
+        "For waves in "
         "proportion to every impulse, give the material a density"
     )

@@ -66,9 +66,14 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
     if isinstance(key, str) and key in names:
         return names.index(key)
     more = f" and {model.ngeom - _LISTED} more" if model.ngeom > _LISTED else ""
-    soft = f"; its flexes and skins are {', '.join(map(repr, soft_names(model)))}" if soft_names(model) else ""
+    soft = (
+        f"; its flexes and skins are {', '.join(map(repr, soft_names(model)))}"
+        if soft_names(model)
+        else ""
+    )
     raise SceneError(
-        f"the model has no geom {key!r}; its geoms are {', '.join(map(repr, names[:_LISTED])) or 'none'}{more}{soft}: "
+        f"the model has no geom {key!r}; its geoms are "
+        f"{', '.join(map(repr, names[:_LISTED])) or 'none'}{more}{soft}: "
         'give a name, "body/index", or an id'
     )
 
@@ -86,7 +91,10 @@ def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
     geom = find_any(model, key)
     if not is_soft(model, geom) and int(model.geom_type[geom]) not in TARGET_TYPES:
         kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-        raise SceneError(f"geom {key!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}")
+        raise SceneError(
+            f"geom {key!r} is a {kind}, which cannot ripple; valid are "
+            f"{', '.join(TARGET_TYPES.values())}"
+        )
     return geom
 
 
@@ -101,7 +109,9 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
     for key, value in values.items():
         name = target_name(model, find_any(model, key))
         if name in found:
-            raise SceneError(f"{what} has two entries for geom {name!r}, one of them as {key!r}; valid is one")
+            raise SceneError(
+                f"{what} has two entries for geom {name!r}, one of them as {key!r}; valid is one"
+            )
         found[name] = value
     return found
 

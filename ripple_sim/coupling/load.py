@@ -1,7 +1,8 @@
 """From the contacts of a physics step to the loads on the texels of all targets.
 
-What the contacts did is kept, from which the user's records of impulses are made when they are asked for.
-Bodies that MuJoCo lets sleep have no contacts in its data; they still press on what they lie on.
+What the contacts did is kept, from which the user's records of impulses are made when they are
+asked for. Bodies that MuJoCo lets sleep have no contacts in its data; they still press on what they
+lie on.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ _SLOW_STEPS = 10
 class SleepingContacts:
     """Holds the contacts of bodies that sleep on a target that sleeps too or is static.
 
-    A sleeping body's contacts stay where they were, with their mean force over the steps before it fell asleep, until
-    one of the two wakes.
+    A sleeping body's contacts stay where they were, with their mean force over the steps before it
+    fell asleep, until one of the two wakes.
     """
 
     def __init__(self, coupled: CoupledModel) -> None:
@@ -48,14 +49,22 @@ class SleepingContacts:
 
     def add(self, data: mujoco.MjData, contacts: Mapping[int, Contacts]) -> dict[int, Contacts]:
         """Contacts of each target, by geom id, with those of sleeping bodies."""
-        present = {(t, other): pair for t, each in contacts.items() for other, pair in each.split(each.others).items()}
+        present = {
+            (t, other): pair
+            for t, each in contacts.items()
+            for other, pair in each.split(each.others).items()
+        }
         found = dict(contacts)
         for key, (pair, sums) in list(self._pairs.items()):
             if key in present:
                 continue
             if self._coupled.are_still(data, key):
-                mean = pair._replace(forces=pair.forces * (sum(sums) / len(sums) / pair.forces.sum()))
-                found[key[0]] = Contacts.together([found[key[0]], mean]) if key[0] in found else mean
+                mean = pair._replace(
+                    forces=pair.forces * (sum(sums) / len(sums) / pair.forces.sum())
+                )
+                found[key[0]] = (
+                    Contacts.together([found[key[0]], mean]) if key[0] in found else mean
+                )
             else:
                 sums.append(0.0)
                 if not any(sums):
@@ -80,8 +89,8 @@ class Impulse:
     point : float64 [3]
         Force-weighted contact point on the target's true surface, in the world [m].
     impulse : float
-        Sum of normal force times time step [N s]; it pushes inwards, or is negative where something sticks and pulls.
-        Through a flex collider, of the whole force along the surface's normal.
+        Sum of normal force times time step [N s]; it pushes inwards, or is negative where something
+        sticks and pulls. Through a flex collider, of the whole force along the surface's normal.
     texel : tuple of int
         Chart, row and column of the texel nearest to the point.
     inner : bool
@@ -105,7 +114,14 @@ class Impulse:
 
     def _values(self) -> tuple[object, ...]:
         """All fields, with the point as a tuple, since NumPy compares arrays entry by entry."""
-        return self.geom, self.other, tuple(self.point.tolist()), self.impulse, self.texel, self.inner
+        return (
+            self.geom,
+            self.other,
+            tuple(self.point.tolist()),
+            self.impulse,
+            self.texel,
+            self.inner,
+        )
 
 
 class StepContacts(NamedTuple):
@@ -122,7 +138,8 @@ class StepContacts(NamedTuple):
     starts : int64 [p]
         The first contact of each collider that touches.
     places : float64 [p, 3]
-        Surface points nearest to the force-weighted middles of their contacts, in the target's frame [m].
+        Surface points nearest to the force-weighted middles of their contacts, in the target's
+        frame [m].
     texels : int64 [p]
         Flat indices of the texels nearest to these.
     forces : float64 [p]
@@ -143,7 +160,9 @@ class StepContacts(NamedTuple):
     inner: Bools
     on_texels: TexelForces
 
-    def impulses(self, names: Sequence[str], owners: Ints, atlas: Atlas, timestep: float) -> Iterator[Impulse]:
+    def impulses(
+        self, names: Sequence[str], owners: Ints, atlas: Atlas, timestep: float
+    ) -> Iterator[Impulse]:
         """One record for each geom or flex that touches; for each place of one that touches in several.
 
         Parameters
@@ -155,28 +174,45 @@ class StepContacts(NamedTuple):
         timestep : float
             How long the forces were held [s].
         """
-        geom, others = names[owners[self.target]], owners[self.on_texels.geoms]
-        places, forces, texels, inner = self.places, self.forces, self.texels, self.inner
-        # the last ids are those of a flex's vertices, which touch for themselves and are told of together
+        geom = names[owners[self.target]]
+        others = owners[self.on_texels.geoms]
+        places = self.places
+        forces = self.forces
+        texels = self.texels
+        inner = self.inner
+        # the last ids are those of a flex's vertices, which touch for themselves and are told of
+        # together
         if others[-1] != self.on_texels.geoms[-1]:
             first = first_rows(others)
             weighted = np.add.reduceat(forces[:, None] * places, first)
-            forces, others, inner = np.add.reduceat(forces, first), others[first], inner[first]
+            forces = np.add.reduceat(forces, first)
+            others = others[first]
+            inner = inner[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
         # what touches in several places, and not in their middle, as what is wedged does
-        elif (apart := ((places - self.on_texels.middles) ** 2).sum(axis=1) > self.on_texels.place_radii**2).any():
+        elif (
+            apart := ((places - self.on_texels.middles) ** 2).sum(axis=1)
+            > self.on_texels.place_radii**2
+        ).any():
             ends = np.append(self.starts[1:], len(self.contacts.forces))
             points = (self.contacts.points - self.position) @ self.rotation
             rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
-            whose, middles, forces = corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
+            whose, middles, forces = corners(
+                rows, points, self.contacts.forces, 2 * self.on_texels.place_radii
+            )
             kept = np.concatenate([(~apart).nonzero()[0], apart[whose].nonzero()[0] + len(apart)])
             whose = np.concatenate([np.arange(len(apart)), whose])[kept]
             forces = np.concatenate([self.forces, forces])[kept]
             places, texels = atlas.nearest(np.concatenate([places, middles])[kept])
-            others, inner = others[whose], inner[whose]
+            others = others[whose]
+            inner = inner[whose]
         points = self.position + places @ self.rotation.T
-        at = zip(*(each.tolist() for each in np.unravel_index(texels, atlas.areas.shape)), strict=True)
-        told = zip(others.tolist(), points, (forces * timestep).tolist(), at, inner.tolist(), strict=True)
+        at = zip(
+            *(each.tolist() for each in np.unravel_index(texels, atlas.areas.shape)), strict=True
+        )
+        told = zip(
+            others.tolist(), points, (forces * timestep).tolist(), at, inner.tolist(), strict=True
+        )
         for other, point, impulse, texel, behind in told:
             yield Impulse(geom, names[other], point, impulse, texel, behind)
 
@@ -214,14 +250,17 @@ class TargetLoad:
     ) -> None:
         self._hits = hits
         self._easing = easing
-        self._target, self._radii, self._convex = target, np.minimum(radii, radii[target]), convex
+        self._target = target
+        self._radii = np.minimum(radii, radii[target])
+        self._convex = convex
         self._is_open = not waves.atlas.mesh.closed
         self._filter = RestFilter(len(radii), waves.atlas.areas.size, time_constant)
         self.set_waves(waves)
 
     def set_waves(self, waves: WaveSolver) -> None:
         """Go on with new waves on the same atlas; impulses that are yet to be given stay."""
-        self._waves, self._atlas = waves, waves.atlas
+        self._waves = waves
+        self._atlas = waves.atlas
         self._footprints = Footprints(waves.atlas, waves.operator.movable.reshape(-1))
         self._filter.forget_places()
 
@@ -252,17 +291,27 @@ class TargetLoad:
         if self._waves.atlas is not self._atlas:  # the surface has moved
             self._atlas = self._waves.atlas
             self._footprints.follow(self._atlas)
-        starts, (position, rotation) = first_rows(contacts.others), pose
-        geoms, points = contacts.others[starts], (contacts.points - position) @ rotation
+        starts = first_rows(contacts.others)
+        (position, rotation) = pose
+        geoms = contacts.others[starts]
+        points = (contacts.points - position) @ rotation
         forces = np.add.reduceat(contacts.forces, starts)
         middles = np.add.reduceat(contacts.forces[:, None] * points, starts) / forces[:, None]
         places, at = self._atlas.nearest_places(middles)
         inner = np.zeros(len(starts), dtype=np.bool_)
         if self._is_open:  # which may be touched from inside
-            pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
+            pushes = (
+                np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts)
+                @ rotation
+            )
             inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
         patches, points, parts, radii = load_points(
-            points, contacts.forces, starts, self._radii[geoms], self._convex[geoms], self._atlas.closest_places
+            points,
+            contacts.forces,
+            starts,
+            self._radii[geoms],
+            self._convex[geoms],
+            self._atlas.closest_places,
         )
         under = self._footprints.under(geoms[patches], points, radii, self._filter.active)
         # what touches from inside pushes outwards
@@ -275,9 +324,16 @@ class TargetLoad:
         first = np.searchsorted(patches, np.arange(len(geoms) + 1))
         begins = np.array([0, *itertools.accumulate(counts)])[first]
         on_texels = TexelForces(
-            geoms, middles, radii[first[:-1]] / 2, begins, texels, shares * np.repeat(pushes, counts)
+            geoms,
+            middles,
+            radii[first[:-1]] / 2,
+            begins,
+            texels,
+            shares * np.repeat(pushes, counts),
         )
-        done = StepContacts(self._target, *pose, contacts, starts, places, at, forces, inner, on_texels)
+        done = StepContacts(
+            self._target, *pose, contacts, starts, places, at, forces, inner, on_texels
+        )
         self._filter.set_timestep(timestep)
         if self._hits is not None and data is not None:
             for row in self._filter.arrived(geoms, elapsed):
@@ -323,7 +379,9 @@ class ContactLoads:
         hits: Mapping[int, Hits] | None = None,
         easings: Mapping[int, Easing] | None = None,
     ) -> None:
-        self._coupled, self._waves, self._hits = coupled, waves, hits or {}
+        self._coupled = coupled
+        self._waves = waves
+        self._hits = hits or {}
         self._easings = dict(easings or {})
         self._contacts = ContactReader(coupled, {geom: each.atlas for geom, each in waves.items()})
         self.clear()
@@ -331,9 +389,12 @@ class ContactLoads:
     def clear(self) -> None:
         """Forget all contacts."""
         self._sleeping: SleepingContacts | None = None
-        coupled, self._targets = self._coupled, dict[int, TargetLoad]()
+        coupled = self._coupled
+        self._targets = dict[int, TargetLoad]()
         for geom, waves in self._waves.items():
-            surface, hits, constant = coupled.soft.get(geom), self._hits.get(geom), DEFAULT_TIME_CONSTANT
+            surface = coupled.soft.get(geom)
+            hits = self._hits.get(geom)
+            constant = DEFAULT_TIME_CONSTANT
             if surface is None:
                 constant = float(coupled.solref[geom, 0])
             elif surface.flex >= 0:
@@ -343,7 +404,9 @@ class ContactLoads:
             # a flex has a contact at each of its vertices: nothing touches between them
             convex = coupled.convex & (surface is None)
             easing = self._easings.get(geom)
-            self._targets[geom] = TargetLoad(waves, geom, coupled.footprint_radii, convex, constant, hits, easing)
+            self._targets[geom] = TargetLoad(
+                waves, geom, coupled.footprint_radii, convex, constant, hits, easing
+            )
             if hits is not None:
                 hits.clear()
             if easing is not None:
@@ -376,14 +439,17 @@ class ContactLoads:
         if self._coupled.model.opt.enableflags & SLEEP:
             if self._sleeping is None:
                 # bodies that sleep already never touched before our eyes
-                self._sleeping, resting = SleepingContacts(self._coupled), at_rest(self._coupled.model, data)
+                self._sleeping = SleepingContacts(self._coupled)
+                resting = at_rest(self._coupled.model, data)
                 if resting is not None:
                     self._sleeping.add(data, self._contacts.read(resting))
             contacts = self._sleeping.add(data, contacts)
         for geom, target in self._targets.items():
             if geom in contacts:
                 pose = target_pose(data, geom)
-                loads[geom], done = target.touched(contacts[geom], pose, self._timestep, elapsed, data)
+                loads[geom], done = target.touched(
+                    contacts[geom], pose, self._timestep, elapsed, data
+                )
                 self.since_skip.append(done)
             else:
                 loads[geom] = target.given(elapsed)
@@ -393,10 +459,13 @@ class ContactLoads:
     def impulses(self) -> list[Impulse]:
         """The impulses given since `skip`, one record for each pair and step, or for each place of what is wedged."""
         if self._impulses is None:
-            names, owners = self._coupled.names, self._coupled.owners
+            names = self._coupled.names
+            owners = self._coupled.owners
             self._impulses = [
                 impulse
                 for done in self.since_skip
-                for impulse in done.impulses(names, owners, self._waves[done.target].atlas, self._timestep)
+                for impulse in done.impulses(
+                    names, owners, self._waves[done.target].atlas, self._timestep
+                )
             ]
         return self._impulses

@@ -1,8 +1,9 @@
 """`CoupledModel`: what a MuJoCo model says about what collides, computed once and shared by all steps.
 
-Which geoms and flexes MuJoCo lets touch each other, and what collides in place of a mesh geom: geoms of its convex
-parts (convex colliders), or a rigid flex of its triangles (flex collider). Of a soft flex each vertex touches for
-itself. The contacts of flex colliders are loads by the sum of their whole forces, in place of that of normal ones.
+Which geoms and flexes MuJoCo lets touch each other, and what collides in place of a mesh geom:
+geoms of its convex parts (convex colliders), or a rigid flex of its triangles (flex collider). Of a
+soft flex each vertex touches for itself. The contacts of flex colliders are loads by the sum of
+their whole forces, in place of that of normal ones.
 """
 
 from __future__ import annotations
@@ -26,6 +27,22 @@ SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
 
 _VISIBLE = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF))
 
+_NOT_CONVEX = (int(mujoco.mjtGeom.mjGEOM_SDF), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
+
+# Footprint radius of a contact over the touching geom's smallest half-extent: about the patch of a
+# ball that is sunk in by an eighth of its radius.
+_FOOTPRINT = 0.5
+
+# Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push
+# sideways: geoms that hit an edge or a corner push at down to 0.5.
+_SIDEWAYS = 0.1
+
+# Share of the forces on a target that may be pushes sideways; old ones count less with each step.
+_UNEXPLAINED = 0.01
+_MEMORY = 0.99
+_TINY = np.finfo(np.float64).tiny
+
 
 def part_name(geom: str, index: int) -> str:
     """Name of a convex part of a geom: of its collider, and of that one's mesh."""
@@ -41,8 +58,16 @@ def find_convex_colliders(model: mujoco.MjModel) -> dict[int, list[int]]:
     for part in np.flatnonzero(model.geom_type == _VISIBLE[0]).tolist():
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, part) or ""
         whole, mark, number = name.rpartition("#")
-        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, whole) if mark and number.isdecimal() else -1
-        if geom < 0 or model.geom_type[geom] not in _VISIBLE or model.geom_bodyid[geom] != model.geom_bodyid[part]:
+        geom = (
+            mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, whole)
+            if mark and number.isdecimal()
+            else -1
+        )
+        if (
+            geom < 0
+            or model.geom_type[geom] not in _VISIBLE
+            or model.geom_bodyid[geom] != model.geom_bodyid[part]
+        ):
             continue
         if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
             found.setdefault(geom, []).append(part)
@@ -67,23 +92,15 @@ def flex_thickness(model: mujoco.MjModel, flex: int) -> float:
     return float(model.flex_margin[flex] + model.flex_radius[flex])
 
 
-_NOT_CONVEX = (int(mujoco.mjtGeom.mjGEOM_SDF), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-
-_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
-
-# Footprint radius of a contact over the touching geom's smallest half-extent: about the patch of a ball that is sunk in
-# by an eighth of its radius.
-_FOOTPRINT = 0.5
-
-
 class CoupledModel:
     """The geoms of a MuJoCo model as the coupling sees them.
 
-    A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are the geom's. It may
-    collide through its convex parts, which then touch as that geom. Of any other flex each vertex is a collider.
-    Collider ids are those of the geoms, and after them one for each vertex, each flex and each skin; there are c of
-    them. A flex or a skin that ripples touches as a whole, with the last ones, see `find_soft`. A target may have
-    collision geoms, whose contacts load it; see `find_collision_geoms`.
+    A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are
+    the geom's. It may collide through its convex parts, which then touch as that geom. Of any other
+    flex each vertex is a collider. Collider ids are those of the geoms, and after them one for each
+    vertex, each flex and each skin; there are c of them. A flex or a skin that ripples touches as a
+    whole, with the last ones, see `find_soft`. A target may have collision geoms, whose contacts
+    load it; see `find_collision_geoms`.
 
     Parameters
     ----------
@@ -99,7 +116,8 @@ class CoupledModel:
     names : list of str
         Of all geoms, see `geom_name`, and then of all flexes and skins.
     owners : int64 [c]
-        What a collider is part of, by its place among the names: a geom itself, or the flex of a vertex.
+        What a collider is part of, by its place among the names: a geom itself, or the flex of a
+        vertex.
     bodies : int64 [c]
         The body of each collider, -1 for vertices between several.
     flex_colliders : dict of int to int
@@ -109,7 +127,8 @@ class CoupledModel:
     has_flex : bool [c]
         Whether a geom collides through a flex.
     extents : float64 [c]
-        Smallest half-extents [m]; infinite for planes and height fields, the spacing of a flex's vertices for them.
+        Smallest half-extents [m]; infinite for planes and height fields, the spacing of a flex's
+        vertices for them.
     collider_extents : float64 [ngeom]
         Of the geoms alone, with the thickness of its flex where a geom has one [m].
     solref : float64 [ngeom, 2]
@@ -123,39 +142,56 @@ class CoupledModel:
     of_geom : int64 [ngeom]
         Collider id of each geom: its own, or of what it collides for.
     of_flex : int64 [nflex + 1]
-        Geom that a flex collides for, or itself where it is a target; -1 for none, and after the last flex.
+        Geom that a flex collides for, or itself where it is a target; -1 for none, and after the
+        last flex.
     """
 
     def __init__(
-        self, model: mujoco.MjModel, targets: Iterable[int] = (), named: Mapping[int, Sequence[int]] | None = None
+        self,
+        model: mujoco.MjModel,
+        targets: Iterable[int] = (),
+        named: Mapping[int, Sequence[int]] | None = None,
     ) -> None:
         self.model = model
-        geoms, softs = range(model.ngeom), model.nflex + model.nskin
+        geoms = range(model.ngeom)
+        softs = model.nflex + model.nskin
         self.names = [geom_name(model, geom) for geom in geoms] + soft_names(model)
         vertex_flexes = np.repeat(np.arange(model.nflex), model.flex_vertnum)
         whole = model.ngeom + np.arange(softs)
         self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes, whole]).astype(np.int64)
-        self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid, np.full(softs, -1)]).astype(np.int64)
+        self.bodies = np.concatenate(
+            [model.geom_bodyid, model.flex_vertbodyid, np.full(softs, -1)]
+        ).astype(np.int64)
         self.flex_colliders = find_flex_colliders(model)
         self.convex_colliders = find_convex_colliders(model)
         self.has_flex = np.zeros(len(self.owners), dtype=np.bool_)
         self.has_flex[list(self.flex_colliders)] = True
-        extents = np.where(np.isin(model.geom_type, ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
-        self.collider_extents, self.solref = extents.copy(), model.geom_solref.copy()
+        extents = np.where(
+            np.isin(model.geom_type, ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1)
+        )
+        self.collider_extents = extents.copy()
+        self.solref = model.geom_solref.copy()
         # the masks of what collides: the geom, its flex, or its convex colliders
-        contype, conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()
+        contype = model.geom_contype.copy()
+        conaffinity = model.geom_conaffinity.copy()
         for geom, flex in self.flex_colliders.items():
-            self.collider_extents[geom], self.solref[geom] = flex_thickness(model, flex), model.flex_solref[flex]
-            contype[geom], conaffinity[geom] = model.flex_contype[flex], model.flex_conaffinity[flex]
+            self.collider_extents[geom] = flex_thickness(model, flex)
+            self.solref[geom] = model.flex_solref[flex]
+            contype[geom] = model.flex_contype[flex]
+            conaffinity[geom] = model.flex_conaffinity[flex]
         for geom, parts in self.convex_colliders.items():
-            contype[geom], conaffinity[geom] = model.geom_contype[parts[0]], model.geom_conaffinity[parts[0]]
+            contype[geom] = model.geom_contype[parts[0]]
+            conaffinity[geom] = model.geom_conaffinity[parts[0]]
             contype[parts] = conaffinity[parts] = 0
-        self._contype, self._conaffinity = contype, conaffinity
+        self._contype = contype
+        self._conaffinity = conaffinity
         self._collides = (contype | conaffinity).astype(np.bool_)
         self._collides |= np.isin(np.arange(model.ngeom), [model.pair_geom1, model.pair_geom2])
         self._soft_flexes = np.setdiff1d(np.arange(model.nflex), list(self.flex_colliders.values()))
         edges = zip(model.flex_edgeadr, model.flex_edgenum, strict=True)
-        lengths = [model.flexedge_length0[i : i + count].mean() if count else 0.0 for i, count in edges]
+        lengths = [
+            model.flexedge_length0[i : i + count].mean() if count else 0.0 for i, count in edges
+        ]
         spacing = np.array(lengths)[vertex_flexes]
         endless = np.full(softs, np.inf)
         self.extents = np.concatenate([extents, spacing, endless])
@@ -167,11 +203,17 @@ class CoupledModel:
         self.soft = {each: SoftSurface(model, each) for each in targets if is_soft(model, each)}
         for target, surface in self.soft.items():
             # the mean distance between vertices side by side: no contact is known more closely
-            V, F = surface.mesh.V, surface.mesh.F
-            self.footprint_radii[target] = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean()
+            V = surface.mesh.V
+            F = surface.mesh.F
+            self.footprint_radii[target] = np.linalg.norm(
+                V[F] - V[np.roll(F, 1, axis=1)], axis=2
+            ).mean()
         geoms_alone = [each for each in targets if each not in self.soft]
-        self._collision_geoms = find_collision_geoms(model, self._collides, geoms_alone, named or {})
-        self.of_geom, self.of_flex = np.arange(model.ngeom), np.full(model.nflex + 1, -1)
+        self._collision_geoms = find_collision_geoms(
+            model, self._collides, geoms_alone, named or {}
+        )
+        self.of_geom = np.arange(model.ngeom)
+        self.of_flex = np.full(model.nflex + 1, -1)
         for geom, parts in self.convex_colliders.items():
             self.of_geom[parts] = geom
         for geom, flex in self.flex_colliders.items():
@@ -195,8 +237,11 @@ class CoupledModel:
 
         They are on bodies that are not welded to that of this geom.
         """
-        model, types, affinities = self.model, self._contype, self._conaffinity
-        found, pairs = np.zeros(model.ngeom, dtype=np.bool_), (model.pair_geom1, model.pair_geom2)
+        model = self.model
+        types = self._contype
+        affinities = self._conaffinity
+        found = np.zeros(model.ngeom, dtype=np.bool_)
+        pairs = (model.pair_geom1, model.pair_geom2)
         for each in self.collision_geoms(geom):
             found |= (types[each] & affinities | types & affinities[each]) != 0
             for one, two in (pairs, pairs[::-1]):
@@ -206,13 +251,20 @@ class CoupledModel:
     def out_of_touch(self, geom: int) -> bool:
         """Whether there are geoms or flexes that collide, but none that meets those that collide for this geom."""
         meets = self.can_collide(geom).any() or len(self.soft_flexes(geom))
-        return not meets and bool(len(self._soft_flexes) or (self._collides & self._apart(geom)).any())
+        return not meets and bool(
+            len(self._soft_flexes) or (self._collides & self._apart(geom)).any()
+        )
 
     def soft_flexes(self, geom: int) -> NDArray[np.int64]:
         """Flexes other than flex colliders that MuJoCo collides with those that collide for this geom."""
-        model, soft, of = self.model, self._soft_flexes, list(self.collision_geoms(geom))
-        types, affinities = model.flex_contype[soft, None], model.flex_conaffinity[soft, None]
-        return soft[((self._contype[of] & affinities | types & self._conaffinity[of]) != 0).any(axis=1)]
+        model = self.model
+        soft = self._soft_flexes
+        of = list(self.collision_geoms(geom))
+        types = model.flex_contype[soft, None]
+        affinities = model.flex_conaffinity[soft, None]
+        return soft[
+            ((self._contype[of] & affinities | types & self._conaffinity[of]) != 0).any(axis=1)
+        ]
 
     def _apart(self, geom: int) -> NDArray[np.bool_]:
         """Geoms, [ngeom], on bodies not welded to that of this one."""
@@ -220,22 +272,14 @@ class CoupledModel:
         return np.asarray(weld != weld[geom])
 
 
-# Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: geoms that
-# hit an edge or a corner push at down to 0.5.
-_SIDEWAYS = 0.1
-
-# Share of the forces on a target that may be pushes sideways; old ones count less with each step.
-_UNEXPLAINED, _MEMORY = 0.01, 0.99
-_TINY = np.finfo(np.float64).tiny
-
-
 class FlexContacts:
     """Contacts with flex colliders.
 
-    Where the rim of a flat geom crosses a triangle, MuJoCo pushes sideways, and the friction of such contacts pushes
-    along the normal. These forces cancel in pairs, but their amounts do not: they add up to many times the momentum
-    exchanged. So the load of a pair is the sum of its whole forces along its mean normal. Contacts that push sideways
-    count neither for that normal nor for the place of the load.
+    Where the rim of a flat geom crosses a triangle, MuJoCo pushes sideways, and the friction of
+    such contacts pushes along the normal. These forces cancel in pairs, but their amounts do not:
+    they add up to many times the momentum exchanged. So the load of a pair is the sum of its whole
+    forces along its mean normal. Contacts that push sideways count neither for that normal nor for
+    the place of the load.
 
     Parameters
     ----------
@@ -250,15 +294,24 @@ class FlexContacts:
     """
 
     def __init__(self, coupled: CoupledModel, meshes: Mapping[int, Mesh]) -> None:
-        model, flexes, ids = coupled.model, coupled.flex_colliders, len(coupled.owners)
+        model = coupled.model
+        flexes = coupled.flex_colliders
+        ids = len(coupled.owners)
         self.is_target, self._is_sheet = np.zeros((2, ids), dtype=np.bool_)
-        self._extents, self._names = coupled.extents, coupled.names
-        # outward unit normals of all triangles, in the frames of the geoms, and the row of a target's first one
-        self._normals, self._first = np.zeros((model.nflexelem, 3)), np.full(ids, -1)
+        self._extents = coupled.extents
+        self._names = coupled.names
+        # outward unit normals of all triangles, in the frames of the geoms, and the row of a
+        # target's first one
+        self._normals = np.zeros((model.nflexelem, 3))
+        self._first = np.full(ids, -1)
         for geom in flexes.keys() & meshes.keys():
-            flex, mesh = flexes[geom], meshes[geom]
-            first, begin, count = model.flex_elemadr[flex], model.flex_elemdataadr[flex], model.flex_elemnum[flex]
-            F, V = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3), mesh.V
+            flex = flexes[geom]
+            mesh = meshes[geom]
+            first = model.flex_elemadr[flex]
+            begin = model.flex_elemdataadr[flex]
+            count = model.flex_elemnum[flex]
+            F = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3)
+            V = mesh.V
             if not np.array_equal(F, mesh.F):
                 # a flex not made by `make_collidable`
                 own = model.flex_vert[model.flex_vertadr[flex] :][: model.flex_vertnum[flex]]
@@ -267,14 +320,29 @@ class FlexContacts:
             normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             # they point outwards where the volume that they enclose is positive
             outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0])) if mesh.closed else 1.0
-            normals = outward * normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+            normals = (
+                outward
+                * normals
+                / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+            )
             self._normals[first : first + count] = normals
-            self._first[geom], self.is_target[geom], self._is_sheet[geom] = first, True, not mesh.closed
-        # amounts of the sums of forces [N], and the part of them that neither a normal force nor friction explains
-        self._amounts, self._warned = np.zeros((ids, 2)), set[int]()
+            self._first[geom] = first
+            self.is_target[geom] = True
+            self._is_sheet[geom] = not mesh.closed
+        # amounts of the sums of forces [N], and the part of them that neither a normal force nor
+        # friction explains
+        self._amounts = np.zeros((ids, 2))
+        self._warned = set[int]()
 
     def loads(
-        self, data: mujoco.MjData, contacts: Ints, sides: Ints, targets: Ints, others: Ints, starts: Ints, along: Floats
+        self,
+        data: mujoco.MjData,
+        contacts: Ints,
+        sides: Ints,
+        targets: Ints,
+        others: Ints,
+        starts: Ints,
+        along: Floats,
     ) -> tuple[Bools, Floats, Floats, Floats]:
         """Contacts that share the sum of the whole forces of their pair; pairs whose sum does not push are left out.
 
@@ -294,24 +362,35 @@ class FlexContacts:
         points, forces, normals
             Of those that are kept; see `Contacts`.
         """
-        each, counts = data.contact, np.diff(np.append(starts, len(contacts)))
-        frames, sign = each.frame[contacts].reshape(-1, 3, 3), np.where(sides == 1, 1.0, -1.0)[:, None]
+        each = data.contact
+        counts = np.diff(np.append(starts, len(contacts)))
+        frames = each.frame[contacts].reshape(-1, 3, 3)
+        sign = np.where(sides == 1, 1.0, -1.0)[:, None]
         outward = -sign * frames[:, 0]
-        rotations, elements = data.geom_xmat[targets].reshape(-1, 3, 3), each.elem[contacts, sides]
+        rotations = data.geom_xmat[targets].reshape(-1, 3, 3)
+        elements = each.elem[contacts, sides]
         normals = np.einsum("kij,kj->ki", rotations, self._normals[self._first[targets] + elements])
         # a plane touches vertices, which are no element, and its own normal is right
         normals = np.where(elements[:, None] >= 0, normals, outward)
         straight = np.einsum("ij,ij->i", outward, normals)
         behind = self._is_sheet[targets] & (straight < 0)
-        normals[behind], straight[behind] = -normals[behind], -straight[behind]
+        normals[behind] = -normals[behind]
+        straight[behind] = -straight[behind]
         kept = (along[:, 0] > 0) & (straight > _SIDEWAYS)
         pushes = np.where(kept, along[:, 0], 0.0)
         whole = np.add.reduceat(sign * np.einsum("ki,kij->kj", along, frames), starts)
         mean = np.add.reduceat(pushes[:, None] * outward, starts)
         length = np.linalg.norm(mean, axis=1)
-        force = np.where(length > 0, -np.einsum("ij,ij->i", whole, mean) / np.where(length > 0, length, 1.0), 0.0)
+        force = np.where(
+            length > 0, -np.einsum("ij,ij->i", whole, mean) / np.where(length > 0, length, 1.0), 0.0
+        )
         friction = np.where(each.dim[contacts] > 1, each.friction[contacts, :2].max(axis=1), 0.0)
-        self._judge(targets[starts], force, np.linalg.norm(whole, axis=1), np.maximum.reduceat(friction, starts))
+        self._judge(
+            targets[starts],
+            force,
+            np.linalg.norm(whole, axis=1),
+            np.maximum.reduceat(friction, starts),
+        )
         kept &= np.repeat(force > 0, counts)
         weights = np.where(kept, pushes * straight**2, 0.0)
         sums = np.add.reduceat(weights, starts)
@@ -338,13 +417,18 @@ class FlexContacts:
         unexplained = amount - np.where(force > 0, np.hypot(force, across), 0.0)
         self._amounts *= _MEMORY
         np.add.at(self._amounts, targets, np.column_stack([amount, unexplained]))
-        for target in np.flatnonzero(self._amounts[:, 1] > _UNEXPLAINED * self._amounts[:, 0]).tolist():
+        for target in np.flatnonzero(
+            self._amounts[:, 1] > _UNEXPLAINED * self._amounts[:, 0]
+        ).tolist():
             if target in self._warned:
                 continue
             self._warned.add(target)
-            name, share = self._names[target], self._amounts[target, 1] / self._amounts[target, 0]
+            name = self._names[target]
+            share = self._amounts[target, 1] / self._amounts[target, 0]
             warn_caller(
-                f"the impulses on geom {name!r} are wrong by about {share:.1%}: MuJoCo pushes sideways what touches "
-                "its flex, where a geom has sunk in or edges and corners meet; use a shorter time step, no override of "
+                f"the impulses on geom {name!r} are wrong by about {share:.1%}: MuJoCo pushes "
+                f"sideways what touches "
+                "its flex, where a geom has sunk in or edges and corners meet; use a shorter time "
+                "step, no override of "
                 f'contact margins, or make_collidable(spec, {name!r}, "sdf")'
             )

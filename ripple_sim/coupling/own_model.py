@@ -19,8 +19,8 @@ from .geoms import target_name
 _SIZES = ("nq", "nv", "nu", "nbody", "ngeom")
 
 
-# Beginnings of the names of the arrays that say what is where and of what shape, and of those that say how it moves and
-# collides; and endings of those that only say how it looks.
+# Beginnings of the names of the arrays that say what is where and of what shape, and of those that
+# say how it moves and collides; and endings of those that only say how it looks.
 _SHAPES = (
     "body_parentid", "geom_type", "geom_size", "geom_bodyid", "geom_dataid", "geom_pos", "geom_quat", "mesh_vert",
     "mesh_face", "flex_vert", "flex_elem", "skin_vert", "skin_face",
@@ -44,46 +44,68 @@ _LONGEST_STEP = 1.0
 def own_model(model: Any) -> mujoco.MjModel:
     """MuJoCo's model itself, also of dm_control's wrapper.
 
-    Raises `SceneError` if it is something else, or has a time step, a place, a size, a mass or a gravity out of range.
+    Raises `SceneError` if it is something else, or has a time step, a place, a size, a mass or a
+    gravity out of range.
     """
     found = getattr(model, "ptr", model)
     if not isinstance(found, mujoco.MjModel):
-        raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's")
+        raise SceneError(
+            f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's"
+        )
     if not 0 < found.opt.timestep <= _LONGEST_STEP:
         raise SceneError(
-            f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 and up to "
+            f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 "
+            f"and up to "
             f"{_LONGEST_STEP:g}, such as 0.002 (<option timestep=...>)"
         )
-    for name in ("opt.gravity", "opt.wind", "body_pos", "body_quat", "body_mass", "geom_pos", "geom_size", "qpos0"):
+    for name in (
+        "opt.gravity",
+        "opt.wind",
+        "body_pos",
+        "body_quat",
+        "body_mass",
+        "geom_pos",
+        "geom_size",
+        "qpos0",
+    ):
         values = operator.attrgetter(name)(found)
         wrong = values[~(np.abs(values) <= mujoco.mjMAXVAL)]  # NaN, too
         if len(wrong):
-            raise SceneError(f"the model's {name} holds {wrong[0]:g}; valid are numbers up to {mujoco.mjMAXVAL:g}")
+            raise SceneError(
+                f"the model's {name} holds {wrong[0]:g}; valid are numbers up to "
+                f"{mujoco.mjMAXVAL:g}"
+            )
     return found
 
 
 def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco.MjData:
     """MuJoCo's data itself, also of dm_control's wrapper.
 
-    Its model is `model`, whatever was changed there since, or a copy in which bodies move and collide alike. Where it
-    is only `drawn`, they need not: shapes and places have to do. Raises `SceneError` if it is something else, or
-    belongs to another model.
+    Its model is `model`, whatever was changed there since, or a copy in which bodies move and
+    collide alike. Where it is only `drawn`, they need not: shapes and places have to do. Raises
+    `SceneError` if it is something else, or belongs to another model.
     """
     found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
     if not isinstance(found, mujoco.MjData):
-        raise SceneError(f"data is {type(data).__name__}; valid is a mujoco.MjData, or dm_control's")
+        raise SceneError(
+            f"data is {type(data).__name__}; valid is a mujoco.MjData, or dm_control's"
+        )
     other = found.model
     if other is model or other in _copies.get(model, ()):
         return found
     kinds = _SHAPES if drawn else _DYNAMICS
     if found.signature and model.signature:
-        differing = "signature" if found.signature != model.signature else _differing(model, other, kinds)
+        differing = (
+            "signature" if found.signature != model.signature else _differing(model, other, kinds)
+        )
     else:  # MuJoCo drops signatures in pickling, and gives the data a model of its own: then sizes have to do
         differing = "sizes" if _sizes(other) != _sizes(model) else None
     if differing:
         raise SceneError(
-            f"data belongs to another model ({_sizes(other)}) than that of the ripples ({_sizes(model)}), of another "
-            f"{differing}: give step the data of the latter, mujoco.MjData(model), or make new Ripples for the former"
+            f"data belongs to another model ({_sizes(other)}) than that of the ripples "
+            f"({_sizes(model)}), of another "
+            f"{differing}: give step the data of the latter, mujoco.MjData(model), or make new "
+            f"Ripples for the former"
         )
     if not drawn:
         _copies.setdefault(model, WeakSet()).add(other)
@@ -98,11 +120,14 @@ def check_targets(model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping
     if model is other:
         return
     differing = _differing(model, other, _SHAPES)
-    if differing is None and any(target_name(model, geom) != name for name, geom in targets.items()):
+    if differing is None and any(
+        target_name(model, geom) != name for name, geom in targets.items()
+    ):
         differing = "names of geoms"
     if differing:
         raise SceneError(
-            f"the ripples belong to another model ({_sizes(other)}) than the one to be drawn ({_sizes(model)}), of "
+            f"the ripples belong to another model ({_sizes(other)}) than the one to be drawn "
+            f"({_sizes(model)}), of "
             f"another {differing}: draw ripples.model, or make new Ripples for the latter"
         )
 
@@ -120,7 +145,10 @@ def posed(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
 def _differing(model: mujoco.MjModel, other: mujoco.MjModel, kinds: tuple[str, ...]) -> str | None:
     """Name of the first array in which two models differ, of those whose names begin so."""
     names = (name for name in dir(model) if name.startswith(kinds) and not name.endswith(_LOOKS))
-    return next((name for name in names if not np.array_equal(getattr(model, name), getattr(other, name))), None)
+    return next(
+        (name for name in names if not np.array_equal(getattr(model, name), getattr(other, name))),
+        None,
+    )
 
 
 def _sizes(model: mujoco.MjModel) -> str:

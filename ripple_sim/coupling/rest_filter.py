@@ -53,7 +53,12 @@ class TexelForces(NamedTuple):
 
 
 NO_FORCES = TexelForces(
-    np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0)
+    np.zeros(0, np.int64),
+    np.zeros((0, 3)),
+    np.zeros(0),
+    np.zeros(1, np.int64),
+    np.zeros(0, np.int64),
+    np.zeros(0),
 )
 
 
@@ -69,8 +74,8 @@ class _Shares(NamedTuple):
     latest : float64 [k]
         Shares in this step, or 0; later the forces on the texels [N].
     slots : int64 [C n n]
-        Where a texel of the present geom stands in the arrays above, or -1. It is -1 everywhere before
-        and after a step, so that a step costs no more on a larger grid.
+        Where a texel of the present geom stands in the arrays above, or -1. It is -1 everywhere
+        before and after a step, so that a step costs no more on a larger grid.
     """
 
     texels: Ints
@@ -90,7 +95,9 @@ class RestFilter:
         Of contacts [s].
     """
 
-    def __init__(self, geoms: int, texels: int, time_constant: float = DEFAULT_TIME_CONSTANT) -> None:
+    def __init__(
+        self, geoms: int, texels: int, time_constant: float = DEFAULT_TIME_CONSTANT
+    ) -> None:
         self._time_constant = time_constant
         self._time_scale = 1.0  # real time over that of `contact_state`
         self._states = np.zeros(geoms, CONTACT_STATE)
@@ -120,7 +127,9 @@ class RestFilter:
         """Which rows of geoms that touch over a time [s] did not before."""
         scaled_dt = dt / self._time_scale
         states = list(self._states[geoms])
-        return [row for row, state in enumerate(states) if not state.active or is_gone(state, scaled_dt)]
+        return [
+            row for row, state in enumerate(states) if not state.active or is_gone(state, scaled_dt)
+        ]
 
     def prepay(self, geom: int, impulse: float) -> None:
         """Note an impulse [N s], positive inwards, that the surface received before a geom gives it."""
@@ -148,7 +157,12 @@ class RestFilter:
 
 @kernel
 def _filter(
-    states: np.ndarray, texels: Ints, mean_shares: Floats, present: TexelForces, dt: float, out: _Shares
+    states: np.ndarray,
+    texels: Ints,
+    mean_shares: Floats,
+    present: TexelForces,
+    dt: float,
+    out: _Shares,
 ) -> tuple[int, bool]:
     """Fill in the texels under all geoms; return their number, and whether all geoms are gone.
 
@@ -206,7 +220,9 @@ def _filter(
 
 
 @kernel(no_cpython_wrapper=True)
-def _fade(state: ContactState, texels: Ints, mean_shares: Floats, left: float, out: _Shares, end: int) -> int:
+def _fade(
+    state: ContactState, texels: Ints, mean_shares: Floats, left: float, out: _Shares, end: int
+) -> int:
     """Enter the earlier mean shares of a geom from `end` on, scaled to the sum `left`; return the new end."""
     whole = 0.0
     for i in range(state.first, state.last):

@@ -55,43 +55,47 @@ _FAR = 0.1
 class Ripples:
     """Ripples on geoms of a MuJoCo model, driven by its contact forces.
 
-    Call `step(data)` after each `mujoco.mj_step(model, data)`, or `mj_step(data)` instead of both. From now on MuJoCo's
-    warnings are given as `RippleWarning`, unless `mujoco.set_mju_user_warning` was told otherwise.
+    Call `step(data)` after each `mujoco.mj_step(model, data)`, or `mj_step(data)` instead of both.
+    From now on MuJoCo's warnings are given as `RippleWarning`, unless `mujoco.set_mju_user_warning`
+    was told otherwise.
 
     Parameters
     ----------
     model : mujoco.MjModel
         Or dm_control's wrapper of one; likewise the data of each step.
     materials : mapping
-        Geom to its `Material`, or to a `Target`, which also says how the waves of this geom are solved. A geom is given
-        by its name, an unnamed one by "body/index" (index among the geoms of its body), or by its id. Geoms of type
-        mesh, sdf, hfield, sphere, ellipsoid, capsule, cylinder and box can ripple, and flexes and skins, by their
-        names.
-        MuJoCo collides a mesh geom as its convex hull. A geom of type="sdf" collides as the true surface, and so does a
-        mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
-        `make_collidable`. Impulses are exact with every integrator but RK4. Of a material without a density, this and
-        the speed, damping and stiffness that it does not give are chosen by the model, see `suited_material`; they
-        stand in `ripples[geom].material`, and forces of bodies too heavy for it are eased, see `Easing`.
+        Geom to its `Material`, or to a `Target`, which also says how the waves of this geom are
+        solved. A geom is given by its name, an unnamed one by "body/index" (index among the geoms
+        of its body), or by its id. Geoms of type mesh, sdf, hfield, sphere, ellipsoid, capsule,
+        cylinder and box can ripple, and flexes and skins, by their names. MuJoCo collides a mesh
+        geom as its convex hull. A geom of type="sdf" collides as the true surface, and so does a
+        mesh geom with a rigid flex of the same name on the same body, which collides in its place;
+        see `make_collidable`. Impulses are exact with every integrator but RK4. Of a material
+        without a density, this and the speed, damping and stiffness that it does not give are
+        chosen by the model, see `suited_material`; they stand in `ripples[geom].material`, and
+        forces of bodies too heavy for it are eased, see `Easing`.
     resolution : int, optional
-        Texels along an edge of the atlas's charts. None: 32 to 256, by what touches the target and by the time step,
-        see `suited_resolution`. This argument and the following ones hold for all targets whose `Target` leaves them
-        open. Mappings of values by geom still work, and are deprecated.
+        Texels along an edge of the atlas's charts. None: 32 to 256, by what touches the target and
+        by the time step, see `suited_resolution`. This argument and the following ones hold for all
+        targets whose `Target` leaves them open. Mappings of values by geom still work, and are
+        deprecated.
     layout : str
         How surfaces get their charts: "auto", "cube" or "patches"; see `build_atlas`.
     rim : str or callable
-        "free", "supported", "clamped" or "fixed" rims of open surfaces, or a function of their points in the geom's
-        frame; see `WaveSolver`.
+        "free", "supported", "clamped" or "fixed" rims of open surfaces, or a function of their
+        points in the geom's frame; see `WaveSolver`.
     two_way : bool
-        Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
-        Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects
-        `data.qvel` and `data.qpos`; `xfrc_applied` and the other applied forces in `data` are yours alone. The
-        integrator RK4 is refused. See "Two-way coupling" in how-it-works.md.
+        Let surfaces give way to the bodies that touch them, and push back on those within reach of
+        them while risen. Each `step` finds the contact forces of the latest physics step anew, with
+        the motion of both, and corrects `data.qvel` and `data.qpos`; `xfrc_applied` and the other
+        applied forces in `data` are yours alone. The integrator RK4 is refused. See "Two-way
+        coupling" in how-it-works.md.
     contacts : mapping, optional
         Geom to the geoms that collide for it. Deprecated: use `Target(contacts=...)`.
     high_pass : bool
-        Whether a flex keeps to itself the coarse motion that contacts give it: its waves
-        then get what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in the flex
-        and in its waves, which take theirs from nothing.
+        Whether a flex keeps to itself the coarse motion that contacts give it: its waves then get
+        what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in
+        the flex and in its waves, which take theirs from nothing.
     pulse : str
         How long a hit takes: "contact", as MuJoCo's soft contact holds it, some
         milliseconds, or "hertz", as two elastic bodies touch, with the same impulse; see `Hits`.
@@ -107,7 +111,8 @@ class Ripples:
     Raises
     ------
     SceneError
-        For an unknown geom or one that cannot ripple, a geom without a material or resolution, or invalid contacts.
+        For an unknown geom or one that cannot ripple, a geom without a material or resolution, or
+        invalid contacts.
     RippleError
         If a geom's mesh does not suit the layout, or a wave parameter is invalid.
     """
@@ -144,7 +149,8 @@ class Ripples:
         # what pushes back, and pulses of hits, need all of a force
         can_ease = not two_way and all(target.pulse == "contact" for target in targets.values())
         self._surfaces, self._easings = rippling_surfaces(self.model, targets, options, can_ease)
-        # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here
+        # by geom id; shared with all who load or read the waves, and see new ones as soon as they
+        # are in here
         self._waves = {surface.geom: surface.waves for surface in self._surfaces.values()}
         adopt_warnings()
         self._contacts = named_collision_geoms(self.model, self, contacts_of(targets, contacts))
@@ -152,32 +158,39 @@ class Ripples:
         self._fine = {name: bool(target.high_pass) for name, target in targets.items()}
         self._has_two_way = two_way
         coupled = self._couple(None)
-        self._check_tunnelling = TunnellingCheck(coupled, [geom for geom in self._waves if geom not in coupled.soft])
+        self._check_tunnelling = TunnellingCheck(
+            coupled, [geom for geom in self._waves if geom not in coupled.soft]
+        )
         for geom, waves in self._waves.items():
             if geom not in coupled.soft:
                 for message in collision_warnings(coupled, geom, waves.atlas):
                     warn_caller(message)
         if two_way and self._moduli:
             raise SceneError(
-                "with two_way the surface itself says how long a hit takes; take two_way=False, or pulse='contact'"
+                "with two_way the surface itself says how long a hit takes; take two_way=False, or "
+                "pulse='contact'"
             )
         if two_way and coupled.soft:
             raise SceneError(
-                "flexes and skins cannot push back: their waves have the masses that their nodes and bones have "
+                "flexes and skins cannot push back: their waves have the masses that their nodes "
+                "and bones have "
                 "already; take two_way=False, or geoms as targets alone"
             )
         if two_way:
             require_suited_options(self.model)
         if self._waves and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
             warn_caller(
-                "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
-                'impulses are off by some per cent; use integrator="implicitfast", or a short time step'
+                "the integrator RK4 averages four contact forces in each step, of which MuJoCo "
+                "keeps only the last: "
+                'impulses are off by some per cent; use integrator="implicitfast", or a short time '
+                "step"
             )
         for name, target in targets.items():
             if not target.limit:
                 self.allow_any_height(name)
         self._scratch = mujoco.MjData(self.model)
-        self._clock, self._solved = StepClock(), SolvedForces(self.model)
+        self._clock = StepClock()
+        self._solved = SolvedForces(self.model)
         self._warned: set[str] = set()
 
     def __getitem__(self, name: GeomKey) -> WaveSolver:
@@ -208,12 +221,18 @@ class Ripples:
         names = [field.name for field in dataclasses.fields(Material)]
         for given in coefficients:
             if given not in names:
-                raise SolverError(f"a material has no coefficient {given!r}; valid are {', '.join(names)}")
-        self._change(name, material=dataclasses.replace(self._surface(name).material, **coefficients))
+                raise SolverError(
+                    f"a material has no coefficient {given!r}; valid are {', '.join(names)}"
+                )
+        self._change(
+            name, material=dataclasses.replace(self._surface(name).material, **coefficients)
+        )
         if "density" in coefficients:
             self._take_up_all(self._surface(name).geom)
 
-    def poke(self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0) -> Footprint:
+    def poke(
+        self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0
+    ) -> Footprint:
         """Give a geom's surface an impulse at once, as `[[poke]]` in a scene file does.
 
         Parameters
@@ -221,8 +240,8 @@ class Ripples:
         name : str or int
             Geom.
         point : [3]
-            In the frame of the geom's body, as places in an MJCF are [m]; the nearest surface point is taken, with a
-            warning where that is far.
+            In the frame of the geom's body, as places in an MJCF are [m]; the nearest surface point
+            is taken, with a warning where that is far.
         impulse : float
             [N s]; positive presses inwards.
         radius : float
@@ -240,12 +259,15 @@ class Ripples:
         SolverError
             If the impulse, the point or the radius is not finite, or the radius negative.
         """
-        waves, place = self._surface(name).waves, self.to_geom(name, point)
+        waves = self._surface(name).waves
+        place = self.to_geom(name, point)
         where = waves.add_impulse(place, impulse, radius)
-        off, size = float(np.linalg.norm(place - where.point)), float(np.ptp(waves.atlas.mesh.V, axis=0).max())
+        off = float(np.linalg.norm(place - where.point))
+        size = float(np.ptp(waves.atlas.mesh.V, axis=0).max())
         if off > _FAR * size:
             warn_caller(
-                f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its size); the nearest point "
+                f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its "
+                f"size); the nearest point "
                 f"is poked. Points are in the frame of the geom's body [m]"
             )
         return where
@@ -286,7 +308,9 @@ class Ripples:
         try:
             held = np.asarray(region, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise SolverError(f"region is {region!r}; valid are numbers from 0 to 1, one for each texel") from error
+            raise SolverError(
+                f"region is {region!r}; valid are numbers from 0 to 1, one for each texel"
+            ) from error
         if before is not None and held.shape == before.shape:
             held = np.maximum(held, before)
         self._change(name, held=held)
@@ -302,8 +326,8 @@ class Ripples:
     def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes.
 
-        The points of `poke` and `make_rigid` are in the body's frame; those of an atlas, and of the waves of one geom,
-        `ripples[name]`, in the geom's.
+        The points of `poke` and `make_rigid` are in the body's frame; those of an atlas, and of the
+        waves of one geom, `ripples[name]`, in the geom's.
         """
         geom = self._surface(name).geom
         if is_soft(self.model, geom):  # it is in the world
@@ -315,21 +339,22 @@ class Ripples:
     def last_impulses(self) -> list[Impulse]:
         """The impulses given to the surfaces in the latest call of `step` or `mj_step`, or within `following`.
 
-        One record for each pair of geoms and each physics step; of a geom that is wedged between parts of the surface
-        one for each place where it touches.
+        One record for each pair of geoms and each physics step; of a geom that is wedged between
+        parts of the surface one for each place where it touches.
         """
         return self._loads.impulses
 
     def step(self, data: mujoco.MjData) -> None:
         """Apply the contact forces of the latest physics step to the surfaces, and advance the waves to `data.time`.
 
-        The forces and poses in `data` after `mj_step` are those at the beginning of that step, over which MuJoCo holds
-        the forces: each contact gives normal force times time step. Of several steps since the last call only the
-        latest gives its impulses, and a warning says so; see `mj_step`. If time stands still, nothing happens.
+        The forces and poses in `data` after `mj_step` are those at the beginning of that step, over
+        which MuJoCo holds the forces: each contact gives normal force times time step. Of several
+        steps since the last call only the latest gives its impulses, and a warning says so; see
+        `mj_step`. If time stands still, nothing happens.
 
-        If the simulation was reset (`mj_resetData`, a keyframe, MuJoCo's automatic reset of a simulation that diverges,
-        or a time that went back), the waves are reset too, and of the steps since then only the latest counts, as at
-        the first call.
+        If the simulation was reset (`mj_resetData`, a keyframe, MuJoCo's automatic reset of a
+        simulation that diverges, or a time that went back), the waves are reset too, and of the
+        steps since then only the latest counts, as at the first call.
 
         Raises
         ------
@@ -367,8 +392,8 @@ class Ripples:
     def following(self, data: mujoco.MjData) -> Iterator[None]:
         """Follow the physics steps that other code takes, such as an environment's `step`: a context manager.
 
-        Within the context each `mujoco.mj_step` or `mujoco.mj_step2` on this data is followed by a `step`, whoever
-        calls it, and however many steps are taken at once.
+        Within the context each `mujoco.mj_step` or `mujoco.mj_step2` on this data is followed by a
+        `step`, whoever calls it, and however many steps are taken at once.
 
         Raises
         ------
@@ -384,7 +409,8 @@ class Ripples:
     def energy(self, data: mujoco.MjData) -> Energy:
         """Kinetic and potential energy of the bodies, energy of the waves, and their total [J].
 
-        With `two_way` contacts do not raise the total, within the bounds given in how-it-works.md; actuators may.
+        With `two_way` contacts do not raise the total, within the bounds given in how-it-works.md;
+        actuators may.
 
         Raises
         ------
@@ -397,7 +423,8 @@ class Ripples:
     def vertices(self, name: GeomKey, data: mujoco.MjData) -> NDArray[np.float64] | None:
         """Where the vertices of a target's mesh are [m], [n, 3]: of a flex or a skin by `data`, in the world.
 
-        Of a geom that was moved by `ripples[name].move` in its own frame; None where nothing has moved them.
+        Of a geom that was moved by `ripples[name].move` in its own frame; None where nothing has
+        moved them.
         """
         target = self._surface(name)
         soft = self._soft.get(target.geom)
@@ -453,12 +480,14 @@ class Ripples:
     def follow_shapes(self) -> None:
         """Lay new atlases on the targets whose surfaces a program has changed in the model; their waves begin flat.
 
-        That is their geom's size, the data of a height field or the vertices of a mesh. Each step does so by itself.
+        That is their geom's size, the data of a height field or the vertices of a mesh. Each step
+        does so by itself.
 
         Raises
         ------
         SceneError
-            If a region of such a target is held still, its material is given texel by texel, or sensors listen to it.
+            If a region of such a target is held still, its material is given texel by texel, or
+            sensors listen to it.
         MeshError
             If the new surface does not suit the layout.
         """
@@ -467,7 +496,8 @@ class Ripples:
             names = ", ".join(map(repr, changed))
             self._warn_once(
                 f"shapes {names}",
-                f"the surface of {names} was changed in the model: it gets a new atlas, and its waves begin flat; set "
+                f"the surface of {names} was changed in the model: it gets a new atlas, and its "
+                f"waves begin flat; set "
                 "surfaces before Ripples is made where that takes too long",
             )
 
@@ -486,7 +516,9 @@ class Ripples:
         }
         hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in self._moduli.items()}
         bodies = bodies_of(coupled)
-        self._eased = {geom: Easing(law, bodies, self._waves[geom].rest) for geom, law in self._easings.items()}
+        self._eased = {
+            geom: Easing(law, bodies, self._waves[geom].rest) for geom, law in self._easings.items()
+        }
         self._loads = ContactLoads(coupled, self._waves, hits, self._eased)
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         for geom in rigid:
@@ -502,7 +534,8 @@ class Ripples:
             target = self._surfaces.get(target_name(self.model, find_any(self.model, name)))
         if target is None:
             raise SceneError(
-                f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._surfaces))}"
+                f"geom {name!r} does not ripple; the rippling geoms are "
+                f"{', '.join(map(repr, self._surfaces))}"
             )
         return target
 
@@ -515,7 +548,8 @@ class Ripples:
         ]
         for name in changed:
             target = self._surfaces[name].on_its_surface(self.model)
-            self._surfaces[name], self._waves[target.geom] = target, target.waves
+            self._surfaces[name] = target
+            self._waves[target.geom] = target.waves
         return changed
 
     def _change(self, name: GeomKey, **changes: Any) -> None:

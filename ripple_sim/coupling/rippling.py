@@ -57,7 +57,8 @@ class RipplingSurface:
 
         Raises `SceneError` if something belongs to single texels of the old atlas.
         """
-        name, old = target_name(model, self.geom), self.waves
+        name = target_name(model, self.geom)
+        old = self.waves
         bound = [
             ("a region of it is held still", self.held is not None),
             ("its material is given texel by texel", _is_mapped(self.material)),
@@ -66,7 +67,8 @@ class RipplingSurface:
         for what, so in bound:
             if so:
                 raise SceneError(
-                    f"the surface of {name!r} was changed in the model, and {what}, which belongs to the old one: make "
+                    f"the surface of {name!r} was changed in the model, and {what}, which belongs "
+                    f"to the old one: make "
                     "new Ripples for the model as it is now"
                 )
         atlas = target_atlas(model, self.geom, old.rest.resolution, self.layout)
@@ -77,7 +79,8 @@ class RipplingSurface:
     def rebuilt(self, **changes: Any) -> RipplingSurface:
         """The same with a new solver in the state of the old one, after a change of its material, options or `held`."""
         changed = dataclasses.replace(self, **changes)
-        old, material = self.waves, changed.material
+        old = self.waves
+        material = changed.material
         if changed.held is not None:
             material = hold(old.rest, material, changed.held)
         new = WaveSolver(old.rest, material, **changed.options)
@@ -98,19 +101,23 @@ def _is_mapped(material: Material) -> bool:
 def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
     """Where a site is in the frame of a target [m], [3]: of a geom on the same body, or welded to it.
 
-    In that of a flex or a skin, the world, it is where it stands in `qpos0`. Raises `SceneError` for an unknown site,
-    or one on a body that moves against the geom's.
+    In that of a flex or a skin, the world, it is where it stands in `qpos0`. Raises `SceneError`
+    for an unknown site, or one on a body that moves against the geom's.
     """
     site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
     if site < 0:
         sites = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SITE, i) for i in range(model.nsite))
-        raise SceneError(f"the model has no site {name!r}; its sites are {', '.join(filter(None, sites)) or 'none'}")
+        raise SceneError(
+            f"the model has no site {name!r}; its sites are "
+            f"{', '.join(filter(None, sites)) or 'none'}"
+        )
     data = mujoco.MjData(model)
     bodies = [] if is_soft(model, geom) else [model.site_bodyid[site], model.geom_bodyid[geom]]
     if len({int(model.body_weldid[body]) for body in bodies}) > 1:
         names = " and ".join(repr(model.body(body).name) for body in bodies)
         raise SceneError(
-            f"site {name!r} and the geom it measures are on bodies {names}, which move; put it on the geom's"
+            f"site {name!r} and the geom it measures are on bodies {names}, which move; put it on "
+            f"the geom's"
         )
     mujoco.mj_kinematics(model, data)
     position, rotation = target_pose(data, geom)
@@ -130,7 +137,8 @@ def rippling_surfaces(
     options : mapping
         Keyword arguments of `WaveSolver` that are common to all.
     can_ease : bool
-        Whether a target whose density is chosen may take up less than all of a heavy body's forces, see `Easing`.
+        Whether a target whose density is chosen may take up less than all of a heavy body's forces,
+        see `Easing`.
     """
     materials = {name: target.material for name, target in targets.items()}
     resolutions = {name: target.resolution for name, target in targets.items()}
@@ -141,8 +149,12 @@ def rippling_surfaces(
         layout = target.layout or "auto"
         own_options = {**options, "rim": target.rim, "conserve_volume": target.conserve_volume}
         material = suited.materials[name]
-        waves = WaveSolver(target_atlas(model, geom, suited.resolutions[name], layout), material, **own_options)
+        waves = WaveSolver(
+            target_atlas(model, geom, suited.resolutions[name], layout), material, **own_options
+        )
         waves.listeners.find_points = functools.partial(site_on, model, geom)
         shape = WatchedShape(model, geom)
-        surfaces[name] = RipplingSurface(geom, material, own_options, waves, layout=layout, shape=shape)
+        surfaces[name] = RipplingSurface(
+            geom, material, own_options, waves, layout=layout, shape=shape
+        )
     return surfaces, {find_target(model, name): law for name, law in suited.easings.items()}

@@ -1,7 +1,7 @@
 """MuJoCo's sleep: what sleeps where, and what wakes it.
 
-MuJoCo stops the bodies of an island that were slow for some steps, and leaves out their contacts. It does not know
-that a rippling surface below them may move.
+MuJoCo stops the bodies of an island that were slow for some steps, and leaves out their contacts.
+It does not know that a rippling surface below them may move.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 # Velocity that wakes a sleeping tree and moves nothing [m/s or rad/s]: MuJoCo wakes what has any.
 _NUDGE = 1e-200
 
-# Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their forces are those of
-# statics, however deep the bodies lie in each other.
-_NO_SPRING, _RIGID = (1e6, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
+# Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their
+# forces are those of statics, however deep the bodies lie in each other.
+_NO_SPRING = (1e6, 1.0)
+_RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 # Geoms that are apart by this share of the smaller one's size are meant to touch.
 _NEAR = 1e-3
 
@@ -42,7 +43,8 @@ def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData | None:
     mujoco.mj_getState(model, data, state, _STATE)
     resting = mujoco.MjData(still)
     mujoco.mj_setState(still, resting, state, _STATE)
-    resting.qvel[:], resting.qacc_warmstart[:] = 0.0, 0.0
+    resting.qvel[:] = 0.0
+    resting.qacc_warmstart[:] = 0.0
     mujoco.mj_forward(still, resting)
     return resting
 

@@ -1,7 +1,8 @@
 """Soft targets: flexes and skins, whose surfaces move in the world.
 
-Their ids come after those of geoms and of the vertices of flexes; see `CoupledModel`. A `SoftSurface` is the mesh and
-where it is. A `HighPass` leaves a flex its coarse motion: its waves get what it cannot follow.
+Their ids come after those of geoms and of the vertices of flexes; see `CoupledModel`. A
+`SoftSurface` is the mesh and where it is. A `HighPass` leaves a flex its coarse motion: its waves
+get what it cannot follow.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from scipy.spatial import cKDTree
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Load, Mesh, WaveSolver
+
+# Share of a mass that is added to each coarse motion's own: some are next to the same.
+_LEAST = 1e-9
 
 
 def first_flex(model: mujoco.MjModel) -> int:
@@ -32,7 +36,9 @@ def is_soft(model: mujoco.MjModel, target: int) -> bool:
     return target >= model.ngeom
 
 
-def target_pose(data: mujoco.MjData, target: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def target_pose(
+    data: mujoco.MjData, target: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Position [3] [m] and rotation [3, 3] of a target's frame in the world, copies; what is soft is in the world."""
     if is_soft(data.model, target):
         return np.zeros(3), np.eye(3)
@@ -43,7 +49,10 @@ def find_soft(model: mujoco.MjModel, name: object) -> int:
     """Target id of the flex or skin of a name, -1 if there is none."""
     if not isinstance(name, str) or not name:
         return -1
-    for kind, first in ((mujoco.mjtObj.mjOBJ_FLEX, first_flex(model)), (mujoco.mjtObj.mjOBJ_SKIN, first_skin(model))):
+    for kind, first in (
+        (mujoco.mjtObj.mjOBJ_FLEX, first_flex(model)),
+        (mujoco.mjtObj.mjOBJ_SKIN, first_skin(model)),
+    ):
         number = mujoco.mj_name2id(model, kind, name)
         if number >= 0:
             return first + int(number)
@@ -57,7 +66,8 @@ def soft_name(model: mujoco.MjModel, target: int) -> str:
 
 def soft_names(model: mujoco.MjModel) -> list[str]:
     """Names of all flexes, then of all skins; without one "flex <id>", "skin <id>"."""
-    flex, skin = mujoco.mjtObj.mjOBJ_FLEX, mujoco.mjtObj.mjOBJ_SKIN
+    flex = mujoco.mjtObj.mjOBJ_FLEX
+    skin = mujoco.mjtObj.mjOBJ_SKIN
     flexes = [mujoco.mj_id2name(model, flex, i) or f"flex {i}" for i in range(model.nflex)]
     return flexes + [mujoco.mj_id2name(model, skin, i) or f"skin {i}" for i in range(model.nskin)]
 
@@ -82,18 +92,25 @@ class SoftSurface:
     """
 
     def __init__(self, model: mujoco.MjModel, target: int) -> None:
-        self._model, self.flex, self._skin = model, -1, -1
+        self._model = model
+        self.flex = -1
+        self._skin = -1
         if target < first_skin(model):
             flex = self.flex = target - first_flex(model)
             if model.flex_dim[flex] == 1:
                 raise SceneError(
-                    f"flex {soft_name(model, target)!r} is a cable, which cannot ripple; valid are surfaces and solids "
+                    f"flex {soft_name(model, target)!r} is a cable, which cannot ripple; valid are "
+                    f"surfaces and solids "
                     "(dim 2 and 3)"
                 )
             # the triangles themselves, or those of the outside of tetrahedra
-            F, first, count = model.flex_elem, model.flex_elemdataadr[flex], model.flex_elemnum[flex]
+            F = model.flex_elem
+            first = model.flex_elemdataadr[flex]
+            count = model.flex_elemnum[flex]
             if model.flex_dim[flex] == 3:
-                F, first, count = model.flex_shell, model.flex_shelldataadr[flex], model.flex_shellnum[flex]
+                F = model.flex_shell
+                first = model.flex_shelldataadr[flex]
+                count = model.flex_shellnum[flex]
             F = F[first : first + 3 * count].reshape(-1, 3)
         else:
             self._skin = target - first_skin(model)
@@ -110,8 +127,14 @@ class SoftSurface:
         # the mesh has merged vertices that lie at one place
         distance, self._vertices = cKDTree(every).query(self.mesh.V)
         if distance.max() > 1e-6 * np.ptp(every, axis=0).max():
-            raise SceneError(f"the surface of {soft_name(model, target)!r} is not that of its vertices")
-        self.geoms = [] if self._skin < 0 else np.flatnonzero(np.isin(model.geom_bodyid, self.bodies)).tolist()
+            raise SceneError(
+                f"the surface of {soft_name(model, target)!r} is not that of its vertices"
+            )
+        self.geoms = (
+            []
+            if self._skin < 0
+            else np.flatnonzero(np.isin(model.geom_bodyid, self.bodies)).tolist()
+        )
 
     def vertices(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Where the vertices of the mesh are in the world [m], [n, 3]."""
@@ -123,10 +146,12 @@ class SoftSurface:
         model = self._model
         if self._skin >= 0:
             return np.unique(model.skin_bonebodyid[self._bones]).astype(np.int64)
-        first, count = model.flex_vertadr[self.flex], model.flex_vertnum[self.flex]
+        first = model.flex_vertadr[self.flex]
+        count = model.flex_vertnum[self.flex]
         bodies = model.flex_vertbodyid[first : first + count]
         if model.flex_interp[self.flex]:
-            node, nodes = model.flex_nodeadr[self.flex], model.flex_nodenum[self.flex]
+            node = model.flex_nodeadr[self.flex]
+            nodes = model.flex_nodenum[self.flex]
             bodies = model.flex_nodebodyid[node : node + nodes]
         return np.unique(bodies[bodies >= 0]).astype(np.int64)
 
@@ -139,10 +164,16 @@ class SoftSurface:
         model = self._model
         if self._skin < 0:
             first = model.flex_vertadr[self.flex]
-            return np.array(data.flexvert_xpos[first : first + model.flex_vertnum[self.flex]], dtype=np.float64)
-        first, count = model.skin_vertadr[self._skin], model.skin_vertnum[self._skin]
+            return np.array(
+                data.flexvert_xpos[first : first + model.flex_vertnum[self.flex]], dtype=np.float64
+            )
+        first = model.skin_vertadr[self._skin]
+        count = model.skin_vertnum[self._skin]
         V = model.skin_vert[first : first + count].astype(np.float64)
-        moved, rotation, turn, back = np.zeros_like(V), np.zeros(9), np.zeros(4), np.zeros(4)
+        moved = np.zeros_like(V)
+        rotation = np.zeros(9)
+        turn = np.zeros(4)
+        back = np.zeros(4)
         for bone in range(self._bones.start, self._bones.stop):
             body = model.skin_bonebodyid[bone]
             mujoco.mju_negQuat(back, model.skin_bonebindquat[bone].astype(np.float64))
@@ -150,21 +181,20 @@ class SoftSurface:
             mujoco.mju_quat2Mat(rotation, turn)
             begin = model.skin_bonevertadr[bone]
             which = slice(begin, begin + model.skin_bonevertnum[bone])
-            vertices, weights = model.skin_bonevertid[which], model.skin_bonevertweight[which, None]
-            placed = (V[vertices] - model.skin_bonebindpos[bone]) @ rotation.reshape(3, 3).T + data.xpos[body]
+            vertices = model.skin_bonevertid[which]
+            weights = model.skin_bonevertweight[which, None]
+            placed = (V[vertices] - model.skin_bonebindpos[bone]) @ rotation.reshape(
+                3, 3
+            ).T + data.xpos[body]
             np.add.at(moved, vertices, weights * placed)
         return moved
-
-
-# Share of a mass that is added to each coarse motion's own: some are next to the same.
-_LEAST = 1e-9
 
 
 class HighPass:
     """Takes out of a load what would set the surface in a motion that its flex makes itself.
 
-    The forces that are left do no work on any coarse velocity: M B u is taken off, with M the texels' masses, the
-    columns of B the coarse motions along the normals, and B' M B u = B' f.
+    The forces that are left do no work on any coarse velocity: M B u is taken off, with M the
+    texels' masses, the columns of B the coarse motions along the normals, and B' M B u = B' f.
 
     Parameters
     ----------
@@ -185,20 +215,26 @@ class HighPass:
         if not len(load.texels):
             return load
         forces = np.bincount(load.texels, load.forces, len(self._mass)).astype(np.float64)
-        # sparse products, and einsum, stay off the threads of BLAS, which wait for one another on a busy machine
+        # sparse products, and einsum, stay off the threads of BLAS, which wait for one another on a
+        # busy machine
         coarse = self._solve(_times(self._basis.T, forces))
         return Load(np.arange(len(forces)), forces - self._mass * _times(self._basis, coarse))
 
 
-def _times(matrix: csr_array | NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.einsum("ij,j->i", matrix, vector) if isinstance(matrix, np.ndarray) else matrix @ vector
+def _times(
+    matrix: csr_array | NDArray[np.float64], vector: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return (
+        np.einsum("ij,j->i", matrix, vector) if isinstance(matrix, np.ndarray) else matrix @ vector
+    )
 
 
 def coarse_motions(waves: WaveSolver, surface: SoftSurface) -> csr_array | NDArray[np.float64]:
     """Motions of the texels along their normals that a flex makes itself, [T, k].
 
-    Of a flex with its own vertices as degrees of freedom: each of these moves along the normal, and heights between
-    them are linear. Of one that is interpolated between 8 or 27 nodes: all polynomials of that degree along each axis.
+    Of a flex with its own vertices as degrees of freedom: each of these moves along the normal, and
+    heights between them are linear. Of one that is interpolated between 8 or 27 nodes: all
+    polynomials of that degree along each axis.
     """
     atlas = waves.rest
     texels = np.arange(atlas.areas.size)

@@ -1,8 +1,8 @@
 """A simulation as it is stepped by whoever owns its loop.
 
-`StepClock` follows its time and its resets, `followed` the steps that other code takes, and `SolvedForces` finds data
-whose contact forces are solved. MuJoCo's own warnings and errors become ours: divergence, `adopt_warnings` and
-`physics_errors`.
+`StepClock` follows its time and its resets, `followed` the steps that other code takes, and
+`SolvedForces` finds data whose contact forces are solved. MuJoCo's own warnings and errors become
+ours: divergence, `adopt_warnings` and `physics_errors`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,52 @@ _FWDINV = int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 # nothing that is computed depends on the marks, so they may differ from run to run
 _random = random.SystemRandom()
 _ROUND_OFF = 1e-6  # of times, in time steps
+
+IN_TURN_WARNING = (
+    "`Ripples.step` was given two MjData in turn, as of two simulations: its waves belong to one, "
+    "and begin anew each "
+    "time the other one comes; make one Ripples for each MjData, Ripples(model, materials)"
+)
+_NO_CONTACTS = {
+    "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
+}
+_BROKEN = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+_FINISH_A_STEP = ("mj_step", "mj_step2")
+
+# MuJoCo's mark of a contact that the constraint solver takes.
+_HAS_ROWS = 0
+
+# Forces found from accelerations are those of the step if their sums on the bodies are, up to this
+# share.
+_RESTORED = 1e-3
+
+# The order of a loop's calls shows as soon as something moves: so many steps are looked at then,
+# later one in so many.
+_FIRST = 5
+_EVERY = 20
+
+# Movement within a step, in radians or metres, that shows in the poses whatever their scale.
+_MOVES = 1e-8
+UNSOLVED_WARNING = (
+    "`Ripples.step` was called between `mj_step1` and `mj_step2`, before MuJoCo had solved for the "
+    "contact forces: "
+    "they are solved for with the controls as they are, and may differ from those of the coming "
+    "`mj_step2`; call "
+    "`step` between `mj_step2` and `mj_step1`, or take steps within `with ripples.following(data):`"
+)
+LOST_WARNING = (
+    "the contact forces of the latest physics step were gone when `Ripples.step` was called: "
+    "`mj_collision`, called "
+    "after `mj_step`, throws them away; those of the coming step are taken in their place, so that "
+    "hits begin too "
+    "late; call `step` right after `mj_step`, or take steps with `ripples.mj_step(data)`"
+)
 
 
 class Passed(NamedTuple):
@@ -53,19 +99,21 @@ class Passed(NamedTuple):
 class StepClock:
     """Follows the simulation's time from look to look.
 
-    The simulation began anew if its time went back, or if MuJoCo's data lost a mark. Then, as at the first look, only
-    the latest step counts: what came before belongs to no wave. At time 0 there was no step yet.
+    The simulation began anew if its time went back, or if MuJoCo's data lost a mark. Then, as at
+    the first look, only the latest step counts: what came before belongs to no wave. At time 0
+    there was no step yet.
 
-    Time alone does not tell: a reset after one step, and one more step, and it is the same time again; or steps that
-    nobody saw after a reset bring the time to where it was, or beyond; or a keyframe sets it to any value. The mark is
-    a negative number in `data.solver_fwdinv[0]`: a step leaves it alone, `copy` keeps it, and `mj_resetData`, a
-    keyframe and the automatic reset of a simulation that diverges all wipe it out. MuJoCo's own values there are not
-    negative, and written only where the flag `fwdinv` is enabled: then no mark is made, and of resets that time does
-    not tell only those round a divergence are seen, by MuJoCo's warning of it.
+    Time alone does not tell: a reset after one step, and one more step, and it is the same time
+    again; or steps that nobody saw after a reset bring the time to where it was, or beyond; or a
+    keyframe sets it to any value. The mark is a negative number in `data.solver_fwdinv[0]`: a step
+    leaves it alone, `copy` keeps it, and `mj_resetData`, a keyframe and the automatic reset of a
+    simulation that diverges all wipe it out. MuJoCo's own values there are not negative, and
+    written only where the flag `fwdinv` is enabled: then no mark is made, and of resets that time
+    does not tell only those round a divergence are seen, by MuJoCo's warning of it.
 
-    A clock follows one simulation, in whichever data that is copied to. Data of two simulations in turn shows as data
-    that was looked at before the last look's, carries a mark, so that nobody has reset it, and does not go on from
-    where the last one was.
+    A clock follows one simulation, in whichever data that is copied to. Data of two simulations in
+    turn shows as data that was looked at before the last look's, carries a mark, so that nobody has
+    reset it, and does not go on from where the last one was.
     """
 
     def __init__(self) -> None:
@@ -90,14 +138,17 @@ class StepClock:
 
     def look(self, model: mujoco.MjModel, data: mujoco.MjData) -> Passed:
         """What happened since the last look."""
-        time, timestep = float(data.time), float(model.opt.timestep)
-        before, longest = self._time, max(timestep, self._timestep)
+        time = float(data.time)
+        timestep = float(model.opt.timestep)
+        before = self._time
+        longest = max(timestep, self._timestep)
         reset = before is not None and time < before
         was_reset_by_user = True
         if not model.opt.enableflags & _FWDINV:
             found = float(data.solver_fwdinv[0])
             was_reset_by_user = not found < 0
-            if not found < 0:  # a mark is made where there is none, and one that others made is taken over
+            # a mark is made where there is none, and one that others made is taken over
+            if not found < 0:
                 found = data.solver_fwdinv[0] = -1.0 - _random.random()
             reset = reset or self._mark not in (None, found)
             self._mark = found
@@ -108,7 +159,8 @@ class StepClock:
             self._diverged = diverged
         goes_on = before is not None and not reset and time > before
         in_turn = self._is_back_at(data) and not was_reset_by_user and not goes_on
-        self._time, self._timestep = time, timestep
+        self._time = time
+        self._timestep = timestep
         if before is None or reset:
             return Passed(timestep if time else 0.0, reset=reset, in_turn=in_turn)
         if in_turn:
@@ -118,7 +170,9 @@ class StepClock:
         if abs(elapsed - timestep) < _ROUND_OFF * timestep:
             return Passed(timestep)
         steps = round(elapsed / timestep)
-        elapsed = steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
+        elapsed = (
+            steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
+        )
         return Passed(elapsed, max(round(elapsed / longest) - 1, 0))
 
     def _is_back_at(self, data: mujoco.MjData) -> bool:
@@ -130,13 +184,6 @@ class StepClock:
         return is_back
 
 
-IN_TURN_WARNING = (
-    "`Ripples.step` was given two MjData in turn, as of two simulations: its waves belong to one, and begin anew each "
-    "time the other one comes; make one Ripples for each MjData, Ripples(model, materials)"
-)
-_NO_CONTACTS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT}
-
-
 def disabled_warning(model: mujoco.MjModel) -> str | None:
     """What to warn of where the model's flags let no contact have a force, else None."""
     disabled = [name for name, flag in _NO_CONTACTS.items() if model.opt.disableflags & flag]
@@ -145,7 +192,8 @@ def disabled_warning(model: mujoco.MjModel) -> str | None:
     flags = " ".join(f'{name}="disable"' for name in disabled)
     constants = " | ".join(f"mujoco.mjtDisableBit.{_NO_CONTACTS[name].name}" for name in disabled)
     return (
-        f"nothing will ripple by contacts: the model has <flag {flags}/>, with which MuJoCo finds no contact forces; "
+        f"nothing will ripple by contacts: the model has <flag {flags}/>, with which MuJoCo finds "
+        f"no contact forces; "
         f"remove it from the MJCF's <option>, or call model.opt.disableflags &= ~int({constants})"
     )
 
@@ -155,21 +203,20 @@ def missed_warning(missed: int) -> str | None:
     if not missed:
         return None
     return (
-        f"{missed + 1} physics steps were taken between two calls of `Ripples.step`, of which only the latest gives "
+        f"{missed + 1} physics steps were taken between two calls of `Ripples.step`, of which only "
+        f"the latest gives "
         f"its impulses: MuJoCo no longer has the contact forces of the other {missed}; call "
-        f"`ripples.mj_step(data, nstep={missed + 1})` in place of `mujoco.mj_step`, or, around code that steps by "
+        f"`ripples.mj_step(data, nstep={missed + 1})` in place of `mujoco.mj_step`, or, around "
+        f"code that steps by "
         "itself, `with ripples.following(data):`"
     )
-
-
-_BROKEN = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
 def divergence(data: mujoco.MjData) -> str | None:
     """Name of MuJoCo's warning of a position, velocity or acceleration that is not finite or huge, else None.
 
-    Where its automatic reset is not disabled, MuJoCo has then gone back to the initial state, and keeps the warning.
+    Where its automatic reset is not disabled, MuJoCo has then gone back to the initial state, and
+    keeps the warning.
     """
     return next((warning.name for warning in _BROKEN if data.warning[warning].number), None)
 
@@ -188,8 +235,6 @@ def divergence_warning(model: mujoco.MjModel, data: mujoco.MjData) -> str | None
     return f"the simulation diverged ({broken}): {then}; {advice}"
 
 
-_FINISH_A_STEP = ("mj_step", "mj_step2")
-
 _lock = threading.Lock()
 # By the id of the data; who follows keeps the data alive.
 _followers: dict[int, list[Callable[[], None]]] = {}
@@ -200,10 +245,10 @@ _mujoco_functions: dict[str, Callable[..., None]] = {}
 def followed(data: mujoco.MjData, after_step: Callable[[], None]) -> Iterator[None]:
     """Call a function after each physics step that anybody takes on this data within the context.
 
-    While somebody follows, `mujoco.mj_step` and `mujoco.mj_step2` are replaced by functions that do the same and then
-    call the followers of their data. MuJoCo has no callback after a step; this is the one place that all code passes,
-    whatever framework it belongs to, but for code that bound the functions to names of its own (`from mujoco import
-    mj_step`).
+    While somebody follows, `mujoco.mj_step` and `mujoco.mj_step2` are replaced by functions that do
+    the same and then call the followers of their data. MuJoCo has no callback after a step; this is
+    the one place that all code passes, whatever framework it belongs to, but for code that bound
+    the functions to names of its own (`from mujoco import mj_step`).
     """
     with _lock:
         if not _followers:
@@ -247,8 +292,8 @@ def _count(nstep: int = 1) -> int:
 def adopt_warnings() -> None:
     """Have MuJoCo's warnings given as `RippleWarning`, from now on, each once.
 
-    Of itself it writes them to standard error and to MUJOCO_LOG.TXT in the current folder. A handler that the user has
-    given to `mujoco.set_mju_user_warning` stays.
+    Of itself it writes them to standard error and to MUJOCO_LOG.TXT in the current folder. A
+    handler that the user has given to `mujoco.set_mju_user_warning` stays.
     """
     if mujoco.get_mju_user_warning() in (None, _tell):
         _said.clear()
@@ -277,37 +322,21 @@ def physics_errors() -> Iterator[None]:
         yield
     except mujoco.FatalError as error:
         reason = " ".join(str(error).split())
-        advice = '; enlarge <size memory="..."/> in the MJCF' if "memory" in reason or "stack" in reason else ""
+        advice = (
+            '; enlarge <size memory="..."/> in the MJCF'
+            if "memory" in reason or "stack" in reason
+            else ""
+        )
         raise SimulationError(f"MuJoCo cannot go on: {reason}{advice}") from error
-
-
-# MuJoCo's mark of a contact that the constraint solver takes.
-_HAS_ROWS = 0
-# Forces found from accelerations are those of the step if their sums on the bodies are, up to this share.
-_RESTORED = 1e-3
-# The order of a loop's calls shows as soon as something moves: so many steps are looked at then, later one in so many.
-_FIRST, _EVERY = 5, 20
-# Movement within a step, in radians or metres, that shows in the poses whatever their scale.
-_MOVES = 1e-8
-
-UNSOLVED_WARNING = (
-    "`Ripples.step` was called between `mj_step1` and `mj_step2`, before MuJoCo had solved for the contact forces: "
-    "they are solved for with the controls as they are, and may differ from those of the coming `mj_step2`; call "
-    "`step` between `mj_step2` and `mj_step1`, or take steps within `with ripples.following(data):`"
-)
-LOST_WARNING = (
-    "the contact forces of the latest physics step were gone when `Ripples.step` was called: `mj_collision`, called "
-    "after `mj_step`, throws them away; those of the coming step are taken in their place, so that hits begin too "
-    "late; call `step` right after `mj_step`, or take steps with `ripples.mj_step(data)`"
-)
 
 
 class SolvedForces:
     """Finds data whose contact forces belong to its contacts.
 
-    After `mj_step`, or `mj_step1` and `mj_step2`, poses, contacts and their forces are those at the beginning of the
-    step. But a loop that ends with `mj_step1` has moved on to the poses and contacts of the next step, and the forces
-    beside them mean nothing until `mj_step2`. After `mj_collision` there are contacts, but no forces.
+    After `mj_step`, or `mj_step1` and `mj_step2`, poses, contacts and their forces are those at the
+    beginning of the step. But a loop that ends with `mj_step1` has moved on to the poses and
+    contacts of the next step, and the forces beside them mean nothing until `mj_step2`. After
+    `mj_collision` there are contacts, but no forces.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -320,9 +349,10 @@ class SolvedForces:
     def of(self, data: mujoco.MjData) -> tuple[mujoco.MjData, str | None]:
         """Data with solved forces, and what to warn of where they are those of the coming step.
 
-        That is `data` itself, or, from the first time on that `data` has moved on to the next step, a copy of it,
-        completed as `mj_step2` will do with the controls as they are. Forces that are solved already, as after
-        `mj_forward`, come out the same. Where forces are lost, the copy has them as they were, if they can be found.
+        That is `data` itself, or, from the first time on that `data` has moved on to the next step,
+        a copy of it, completed as `mj_step2` will do with the controls as they are. Forces that are
+        solved already, as after `mj_forward`, come out the same. Where forces are lost, the copy
+        has them as they were, if they can be found.
         """
         model = self._model
         # no row of the constraint solver, but contacts that should have rows
@@ -344,10 +374,13 @@ class SolvedForces:
         mujoco.mj_fwdConstraint(model, self._completed)
         if lost:
             return self._completed, LOST_WARNING
-        # whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f; the sums may be in another order
+        # whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f; the sums may be
+        # in another order
         force = np.zeros(model.nv)
         mujoco.mj_mulJacTVec(model, data, force, data.efc_force)
-        return self._completed, None if _agree(force, data.qfrc_constraint, 1e-9) else UNSOLVED_WARNING
+        return self._completed, None if _agree(
+            force, data.qfrc_constraint, 1e-9
+        ) else UNSOLVED_WARNING
 
     def _moved_on(self, data: mujoco.MjData) -> bool:
         """Whether the poses are already those that follow from the positions."""
@@ -359,7 +392,9 @@ class SolvedForces:
             return False
         self._steps += self._steps < _FIRST
         poses = self._poses
-        poses.qpos, poses.mocap_pos, poses.mocap_quat = data.qpos, data.mocap_pos, data.mocap_quat
+        poses.qpos = data.qpos
+        poses.mocap_pos = data.mocap_pos
+        poses.mocap_quat = data.mocap_quat
         mujoco.mj_kinematics(self._model, poses)
         return np.array_equal(poses.xpos, data.xpos) and np.array_equal(poses.xquat, data.xquat)
 
@@ -382,4 +417,6 @@ def _restore_forces(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
 
 
 def _agree(force: NDArray[np.float64], expected: NDArray[np.float64], tolerance: float) -> bool:
-    return float(np.abs(force - expected).max()) <= tolerance * (1.0 + float(np.abs(expected).max()))
+    return float(np.abs(force - expected).max()) <= tolerance * (
+        1.0 + float(np.abs(expected).max())
+    )

@@ -1,7 +1,7 @@
 """What suits a target where the user does not say: the material's coefficients, and the resolution.
 
-Materials are chosen by the bodies that can touch the target, by how far they fall, and by the time step; resolutions
-are fine enough for what touches it and coarse enough for the time step.
+Materials are chosen by the bodies that can touch the target, by how far they fall, and by the time
+step; resolutions are fine enough for what touches it and coarse enough for the time step.
 """
 
 from __future__ import annotations
@@ -34,18 +34,24 @@ from .soft import SoftSurface, is_soft
 from .target_mesh import target_mesh
 
 # Waves cross the target in the first time and fall to a tenth in the second [s].
-_CROSSING, _DECAY = 0.25, 1.5
+_CROSSING = 0.25
+_DECAY = 1.5
 
-# MuJoCo's default, in place of that of a geom without a mass: those of the world have none [kg/m^3].
+# MuJoCo's default, in place of that of a geom without a mass: those of the world have none
+# [kg/m^3].
 _DENSITY = 1000.0
 
-# By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is warned of. The
-# estimates are half of what a hard, short hit does, and many times what the slow push of a limb does.
-_HIT, _REST = 0.085, 0.05
+# By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is
+# warned of. The estimates are half of what a hard, short hit does, and many times what the slow
+# push of a limb does.
+_HIT = 0.085
+_REST = 0.05
 
-# The same where forces are eased: the lightest body leaves a ring that is seen, and none dents the target deeper.
-# It sinks in by the second share at rest.
-_SHOWN, _SUNK, _EASED = 0.17, 0.1, 0.12
+# The same where forces are eased: the lightest body leaves a ring that is seen, and none dents the
+# target deeper. It sinks in by the second share at rest.
+_SHOWN = 0.17
+_SUNK = 0.1
+_EASED = 0.12
 
 # The least density over that for the heaviest body: what is lighter still is a speck.
 _SPECK = 1e-6
@@ -56,9 +62,37 @@ _PULSE = 0.4
 # Wave number of the longest wave on a ball, times its size: sqrt(8).
 _LONGEST = 8**0.5
 
-# Of the stiffness alone, sqrt(k) times the time step at most: a swing takes twelve steps or more. What swings faster
-# is not resolved, and takes up energy from contacts that last a step.
+# Of the stiffness alone, sqrt(k) times the time step at most: a swing takes twelve steps or more.
+# What swings faster is not resolved, and takes up energy from contacts that last a step.
 _STIFFEST = 0.5
+
+# Of a typical hit: its dent over the target's size, and at most over half its usual thickness.
+_DENT = 0.05
+_THIN = 0.5
+LEAST = 32
+USUAL = 96
+MOST = 256
+_STEP = 16
+
+# A footprint's radius is to hold so many texels, and a physics step is to take at most so many
+# substeps.
+_TEXELS = 4.0
+_SUBSTEPS = 4.0
+
+# Stable time step over the time that a wave takes from texel to texel, on meshes with limbs (0.29
+# to 0.65 on the meshes tried), by which the operator's largest eigenvalue is (2 c / (0.35 d))^2 at
+# a mean spacing d.
+_STABLE = 0.35
+
+# Rings of a body so many times as light as what the surface is to bear are not seen.
+_HEAVY = 100.0
+_SOFT = 64  # resolution of flexes and skins
+
+# A mesh of so many triangles that is no sphere in shape (whose Euler characteristic is 2) gets this
+# resolution at most: laying charts on it takes three to ten times as long at 96.
+_MANY_TRIANGLES = 10_000
+_INTRICATE = 48
+_SPHERE = 2
 
 
 class Extent(NamedTuple):
@@ -98,19 +132,24 @@ def suited_material(
 ) -> SuitedMaterial:
     """The material with what it leaves to the model chosen; what is given stays, all of it where the density is.
 
-    - speed: waves cross the target in a quarter of a second, or as fast as a body is that has fallen from a height of
+    - speed: waves cross the target in a quarter of a second, or as fast as a body is that has
+      fallen from a height of
       the target's size, which is faster on targets smaller than 1 m;
     - damping: they fall to a tenth in 1.5 s;
-    - stiffness: (16 c / size)^2, so that dents are narrow and rings run from them; but no more than (0.5 / dt)^2, which
+    - stiffness: (16 c / size)^2, so that dents are narrow and rings run from them; but no more than
+      (0.5 / dt)^2, which
       the time step dt resolves;
-    - density: a fall of the heaviest body that can touch the target leaves a dent of less than a quarter of the
-      target's radius, and at rest that body sinks by a twentieth at most: rings of some hundredth of the size. The fall
-      is from a height of the target's size, or from where bodies are above the target, or it above them, in the model
-      as it begins. Where nothing can touch it, it is the mass of the target's body over the area of the target; of a
-      geom without a mass, 1000 kg/m^3 times its volume over its area.
+    - density: a fall of the heaviest body that can touch the target leaves a dent of less than a
+      quarter of the
+      target's radius, and at rest that body sinks by a twentieth at most: rings of some hundredth
+      of the size. The fall is from a height of the target's size, or from where bodies are above
+      the target, or it above them, in the model as it begins. Where nothing can touch it, it is the
+      mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3
+      times its volume over its area.
 
-    Where `can_ease`, the density is for the lightest body that can touch the target and is not joined to it, whose ring
-    is then seen, and forces are taken up as far as they dent the target by a fifth of its radius, see `Easing`.
+    Where `can_ease`, the density is for the lightest body that can touch the target and is not
+    joined to it, whose ring is then seen, and forces are taken up as far as they dent the target by
+    a fifth of its radius, see `Easing`.
 
     Parameters
     ----------
@@ -135,7 +174,14 @@ def suited_material(
     if lightest is not None:
         footprint = lightest.footprint
         shown = _density_for(
-            coupled, geom, extent, lightest, speed, stiffness, dent=_SHOWN * extent.radius, sink=_SUNK * extent.radius
+            coupled,
+            geom,
+            extent,
+            lightest,
+            speed,
+            stiffness,
+            dent=_SHOWN * extent.radius,
+            sink=_SUNK * extent.radius,
         )
         density = min(density, max(shown, _SPECK * density))
     easing = EasingLaw.of(
@@ -152,23 +198,29 @@ def suited_material(
 def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
     """Density with which a target bears what may lie on it and hit it, as `suited_material` has it [kg/m^2].
 
-    The least speed and stiffness of the material count. Bending b resists all waves as a speed q sqrt(b) would, or
-    more, with q the wave number of the longest. What yields is to stay elastic. Over deep fluid it is not known: 0.
+    The least speed and stiffness of the material count. Bending b resists all waves as a speed q
+    sqrt(b) would, or more, with q the wave number of the longest. What yields is to stay elastic.
+    Over deep fluid it is not known: 0.
     """
     if material.deep:
         return 0.0
     speed, bending, stiffness, limit = (
-        float(np.min(getattr(material, name))) for name in ("speed", "bending", "stiffness", "yield_height")
+        float(np.min(getattr(material, name)))
+        for name in ("speed", "bending", "stiffness", "yield_height")
     )
     speed = float(np.hypot(speed, _LONGEST / extent.size * bending**0.5))
     return min(_density_under(coupled, geom, extent, speed, stiffness, limit), 1e12)
 
 
-def _speed_and_stiffness(model: mujoco.MjModel, extent: Extent, material: Material) -> tuple[float, float]:
+def _speed_and_stiffness(
+    model: mujoco.MjModel, extent: Extent, material: Material
+) -> tuple[float, float]:
     """Those of the material, its highest and its least, or else suited ones."""
     speed = _speed(model, extent) if "speed" in material.unset else float(np.max(material.speed))
     if "stiffness" in material.unset:  # dents are narrow, but no more than the time step resolves
-        return speed, float(min(narrow_stiffness(extent.size, speed), (_STIFFEST / model.opt.timestep) ** 2, 1e12))
+        return speed, float(
+            min(narrow_stiffness(extent.size, speed), (_STIFFEST / model.opt.timestep) ** 2, 1e12)
+        )
     return speed, float(np.min(material.stiffness))
 
 
@@ -184,7 +236,12 @@ def _filled_in(material: Material, speed: float, stiffness: float, density: floa
 
 
 def _density_under(
-    coupled: CoupledModel, geom: int, extent: Extent, speed: float, stiffness: float, limit: float = np.inf
+    coupled: CoupledModel,
+    geom: int,
+    extent: Extent,
+    speed: float,
+    stiffness: float,
+    limit: float = np.inf,
 ) -> float:
     """The least with which a target bears a weight at rest and a hit; 0 where there is nothing to bear.
 
@@ -195,7 +252,16 @@ def _density_under(
     fall = _fall(model, max(extent.size, _height(coupled, geom)))
     hit = Hit(mass, _resting(coupled, geom), footprint, fall)
     dent = min(_HIT * extent.radius, limit)
-    return _density_for(coupled, geom, extent, hit, speed, stiffness, dent=dent, sink=min(_REST * extent.radius, limit))
+    return _density_for(
+        coupled,
+        geom,
+        extent,
+        hit,
+        speed,
+        stiffness,
+        dent=dent,
+        sink=min(_REST * extent.radius, limit),
+    )
 
 
 class Hit(NamedTuple):
@@ -235,9 +301,15 @@ def _density_for(
     model = coupled.model
     weight = hit.weight * float(np.linalg.norm(model.opt.gravity))
     impulse = BOUNCE * hit.mass * hit.speed
-    duration = max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep)
+    duration = max(
+        _PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep
+    )
     stiffness = _stiffness_of_the_whole(extent, speed, stiffness)
-    of = {"radius": max(hit.footprint, FOOTPRINT * extent.size), "speed": speed, "stiffness": stiffness}
+    of = {
+        "radius": max(hit.footprint, FOOTPRINT * extent.size),
+        "speed": speed,
+        "stiffness": stiffness,
+    }
     return max(
         density_under(weight, sink, **of),
         density_after(impulse, dent, duration=duration, **of),
@@ -252,8 +324,9 @@ def _stiffness_of_the_whole(extent: Extent, speed: float, stiffness: float) -> f
 def lightest_hit(coupled: CoupledModel, geom: int, extent: Extent) -> Hit | None:
     """Hit of the lightest body that can touch a target, of those that it is not joined to; None if there are none.
 
-    It falls from the target's size, or from where it is above the target as the model begins, up to twice the size:
-    higher, bodies wait to be dropped. What is fixed to the world counts where the target moves.
+    It falls from the target's size, or from where it is above the target as the model begins, up to
+    twice the size: higher, bodies wait to be dropped. What is fixed to the world counts where the
+    target moves.
     """
     model = coupled.model
     reduced = _reduced_masses(coupled, geom)
@@ -288,7 +361,8 @@ def _fall(model: mujoco.MjModel, height: float) -> float:
 
 def _height(coupled: CoupledModel, geom: int) -> float:
     """From how high bodies fall on a target at the model's beginning, or it on them [m]."""
-    model, data = coupled.model, mujoco.MjData(coupled.model)
+    model = coupled.model
+    data = mujoco.MjData(coupled.model)
     mujoco.mj_kinematics(model, data)
     up = -model.opt.gravity / max(float(np.linalg.norm(model.opt.gravity)), 1e-300)
     above = (data.geom_xpos - data.geom_xpos[geom]) @ up
@@ -301,7 +375,9 @@ def _height(coupled: CoupledModel, geom: int) -> float:
 def _resting(coupled: CoupledModel, geom: int) -> float:
     """Mass of the heaviest body that can lie on a target, or that lies on it with others below [kg]."""
     model = coupled.model
-    masses = np.where(_moves(model), model.body_subtreemass[model.body_rootid][model.geom_bodyid], 0.0)
+    masses = np.where(
+        _moves(model), model.body_subtreemass[model.body_rootid][model.geom_bodyid], 0.0
+    )
     touching = coupled.can_collide(geom)
     return float(max(masses[touching].max(), masses[geom])) if touching.any() else 0.0
 
@@ -314,8 +390,8 @@ def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
 def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
     """Mass that the heaviest body that can touch a target brings with it [kg], and its footprint radius [m].
 
-    Of two bodies that both move it is the reduced mass, and a body stands for all that it is joined to. Where nothing
-    moves, the mass is 0.
+    Of two bodies that both move it is the reduced mass, and a body stands for all that it is joined
+    to. Where nothing moves, the mass is 0.
     """
     reduced = _reduced_masses(coupled, geom)
     return float(reduced.max()), float(coupled.footprint_radii[[geom, int(reduced.argmax())]].min())
@@ -325,7 +401,9 @@ def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
     """Reduced mass of each geom's body and a target's [kg]; 0 where they cannot touch, or neither moves."""
     model = coupled.model
     masses = model.body_subtreemass[model.body_rootid]
-    inverse = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)[model.geom_bodyid]
+    inverse = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)[
+        model.geom_bodyid
+    ]
     total = np.where(coupled.can_collide(geom), inverse + inverse[geom], 0.0)
     return np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)
 
@@ -333,22 +411,28 @@ def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
 def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
     """What `Material.suited` asks for, of a target in its model: size, hit, radius and amplitude.
 
-    The hit is that of the body of median mass that can touch it, after a fall from the target's size, or from where
-    bodies are above it as the model begins, up to twice the size: higher, they wait to be dropped. The dent is a
-    twentieth of the size, or less on what is thin. Raises `SceneError` if nothing that moves can touch the target, or
-    it is soft.
+    The hit is that of the body of median mass that can touch it, after a fall from the target's
+    size, or from where bodies are above it as the model begins, up to twice the size: higher, they
+    wait to be dropped. The dent is a twentieth of the size, or less on what is thin. Raises
+    `SceneError` if nothing that moves can touch the target, or it is soft.
     """
     geom = find_target(model, name)
-    needs = f'the preset "suited" of {name!r} needs a size [m] and a hit [kg, m/s], as size = 1.0, hit = [0.5, 4.4]'
+    needs = (
+        f'the preset "suited" of {name!r} needs a size [m] and a hit [kg, m/s], as size = '
+        f"1.0, "
+        f"hit = [0.5, 4.4]"
+    )
     if is_soft(model, geom):
         raise SceneError(f"{needs}: what may hit a flex or a skin is not known")
     coupled = CoupledModel(model, [geom])
-    extent, reduced = Extent.of(target_mesh(model, geom)), _reduced_masses(coupled, geom)
+    extent = Extent.of(target_mesh(model, geom))
+    reduced = _reduced_masses(coupled, geom)
     touching = np.flatnonzero(reduced)
     if not len(touching):
         raise SceneError(f"{needs}: nothing that moves can touch it in the model")
     middle = int(touching[np.argsort(reduced[touching])[len(touching) // 2]])
-    mass, footprint = float(reduced[middle]), float(coupled.footprint_radii[[geom, middle]].min())
+    mass = float(reduced[middle])
+    footprint = float(coupled.footprint_radii[[geom, middle]].min())
     fall = _fall(model, min(max(extent.size, _height(coupled, geom)), 2 * extent.size))
     return {
         "size": extent.size,
@@ -358,50 +442,29 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
     }
 
 
-# Of a typical hit: its dent over the target's size, and at most over half its usual thickness.
-_DENT, _THIN = 0.05, 0.5
-
-LEAST, USUAL, MOST = 32, 96, 256
-_STEP = 16
-
-# A footprint's radius is to hold so many texels, and a physics step is to take at most so many substeps.
-_TEXELS, _SUBSTEPS = 4.0, 4.0
-
-# Stable time step over the time that a wave takes from texel to texel, on meshes with limbs (0.29 to 0.65 on the meshes
-# tried), by which the operator's largest eigenvalue is (2 c / (0.35 d))^2 at a mean spacing d.
-_STABLE = 0.35
-
-
 def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> int:
     """Texels along a chart's side, a multiple of 16 from 32 to 256.
 
-    From 96 on, as many as put four texels into the footprint of what touches the target; but no more than can be
-    stepped in four substeps to a physics step, as far as that can be told before the atlas is there.
+    From 96 on, as many as put four texels into the footprint of what touches the target; but no
+    more than can be stepped in four substeps to a physics step, as far as that can be told before
+    the atlas is there.
     """
     spacing = np.sqrt(extent.area / 6)  # times resolution
     _, footprint = heaviest(coupled, geom)
     resolved = _TEXELS * spacing / footprint if 0 < footprint < np.inf else 0.0
     n = int(np.clip(_STEP * np.ceil(resolved / _STEP), USUAL, MOST))
     speed, bending, viscosity, stiffness = (
-        float(np.max(getattr(material, name))) for name in ("speed", "bending", "viscosity", "stiffness")
+        float(np.max(getattr(material, name)))
+        for name in ("speed", "bending", "viscosity", "stiffness")
     )
     while n > LEAST:
         eigenvalue = (2 / (_STABLE * (spacing / n))) ** 2
-        wave, viscous = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness, viscosity * eigenvalue
+        wave = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness
+        viscous = viscosity * eigenvalue
         if coupled.model.opt.timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4 <= _SUBSTEPS:
             break
         n -= _STEP
     return n
-
-
-# Rings of a body so many times as light as what the surface is to bear are not seen.
-_HEAVY = 100.0
-
-_SOFT = 64  # resolution of flexes and skins
-
-# A mesh of so many triangles that is no sphere in shape (whose Euler characteristic is 2) gets this resolution at most:
-# laying charts on it takes three to ten times as long at 96.
-_MANY_TRIANGLES, _INTRICATE, _SPHERE = 10_000, 48, 2
 
 
 class SuitedTargets(NamedTuple):
@@ -423,7 +486,8 @@ def suited_targets(
 
     Raises `MeshError` if a target's mesh cannot ripple.
     """
-    suited, texels = dict(materials), {name: n for name, n in resolutions.items() if n is not None}
+    suited = dict(materials)
+    texels = {name: n for name, n in resolutions.items() if n is not None}
     easings: dict[str, EasingLaw] = {}
     geoms = {name: find_target(model, name) for name in materials}
     for name, target in list(geoms.items()):
@@ -443,7 +507,9 @@ def suited_targets(
     for name in left:
         mesh = target_mesh(model, geoms[name])
         extent = Extent.of(mesh)
-        found_material = suited_material(coupled, geoms[name], extent, materials[name], can_ease=can_ease)
+        found_material = suited_material(
+            coupled, geoms[name], extent, materials[name], can_ease=can_ease
+        )
         suited[name] = found_material.material
         if found_material.easing is not None:
             easings[name] = found_material.easing
@@ -457,7 +523,9 @@ def suited_targets(
 
 def _is_intricate(mesh: Mesh) -> bool:
     """Whether charts take long on a mesh: a robot's cover of many triangles, with holes, handles or loose parts."""
-    is_plain = mesh.closed and mesh.component_count == 1 and len(mesh.V) - len(mesh.F) / 2 == _SPHERE
+    is_plain = (
+        mesh.closed and mesh.component_count == 1 and len(mesh.V) - len(mesh.F) / 2 == _SPHERE
+    )
     return len(mesh.F) > _MANY_TRIANGLES and not is_plain
 
 
@@ -468,7 +536,9 @@ def _warn_of_unseen(coupled: CoupledModel, name: str, geom: int, extent: Extent)
     light = float(reduced[reduced > 0].min(initial=np.inf))
     if heavy > _HEAVY * light:
         warn_caller(
-            f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as {light:.2g} "
-            f"kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) is suited "
+            f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
+            f"{light:.2g} "
+            f"kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) "
+            f"is suited "
             "to them"
         )

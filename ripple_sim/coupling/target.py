@@ -25,8 +25,8 @@ _MAY_BE_MISSING = ("modulus",)
 class Target:
     """A geom, flex or skin that ripples: its material, and how its waves are solved.
 
-    `Ripples(model, {"egg": Target(material, resolution=96)})` takes it beside a bare `Material`. What is None is as the
-    keyword argument of the same name says for all targets.
+    `Ripples(model, {"egg": Target(material, resolution=96)})` takes it beside a bare `Material`.
+    What is None is as the keyword argument of the same name says for all targets.
 
     Attributes
     ----------
@@ -45,10 +45,10 @@ class Target:
     modulus : float, optional
         For "hertz": E* of the two materials [Pa].
     contacts : sequence of str or int, optional
-        The geoms that collide for this one, on its body or on bodies welded to it, where it is only visible. A target
-        that neither collides nor names geoms takes the contacts of all geoms of its body that collide and do not
-        ripple. A contact loads the surface where this is nearest and faces it; of several targets that share a geom,
-        the nearest.
+        The geoms that collide for this one, on its body or on bodies welded to it, where it is only
+        visible. A target that neither collides nor names geoms takes the contacts of all geoms of
+        its body that collide and do not ripple. A contact loads the surface where this is nearest
+        and faces it; of several targets that share a geom, the nearest.
     limit : bool
         Whether to warn of waves that are too high or too steep for the object.
     conserve_volume : bool, optional
@@ -80,20 +80,26 @@ def named_targets(
     given : mapping
         Geom to its `Material` or `Target`.
     common : mapping
-        Field of `Target` to a value for all targets, or, which is deprecated, to a mapping of values by geom.
+        Field of `Target` to a value for all targets, or, which is deprecated, to a mapping of
+        values by geom.
 
     Raises
     ------
     SceneError
-        For an unknown geom, one that cannot ripple, one that is given twice or that a mapping leaves out, and for a
-        value that is neither a `Material` nor a `Target`.
+        For an unknown geom, one that cannot ripple, one that is given twice or that a mapping
+        leaves out, and for a value that is neither a `Material` nor a `Target`.
     """
     if not isinstance(given, Mapping):
-        raise SceneError(f"materials is {type(given).__name__}; valid is a mapping of geom names to Material or Target")
+        raise SceneError(
+            f"materials is {type(given).__name__}; valid is a mapping of geom names to Material or "
+            f"Target"
+        )
     for key, value in given.items():
         find_target(model, key)
         if not isinstance(value, (Material, Target)):
-            raise SceneError(f"material of geom {key!r} is {shown(value)}; valid is a Material or a Target")
+            raise SceneError(
+                f"material of geom {key!r} is {shown(value)}; valid is a Material or a Target"
+            )
     targets = {
         name: value if isinstance(value, Target) else Target(value)
         for name, value in by_name(model, given, "materials").items()
@@ -113,12 +119,17 @@ def _value_for_each(
     """The value of a field for each target; a mapping may leave out those for which the field has no meaning."""
     if not isinstance(value, Mapping):
         return dict.fromkeys(targets, value)
-    deprecated(f"{field} as a mapping by geom", f"Target(material, {field}=...) for each geom", _MAPPINGS_GO)
+    deprecated(
+        f"{field} as a mapping by geom",
+        f"Target(material, {field}=...) for each geom",
+        _MAPPINGS_GO,
+    )
     values = by_name(model, value, field)
     missing = [name for name in targets if name not in values]
     if missing and field not in _MAY_BE_MISSING:
         raise SceneError(
-            f"{field} has no entry for geom {missing[0]!r}; it has {', '.join(map(repr, values)) or 'none'}: "
+            f"{field} has no entry for geom {missing[0]!r}; it has "
+            f"{', '.join(map(repr, values)) or 'none'}: "
             f"give every rippling geom one, or one {field} for all"
         )
     return values
@@ -129,8 +140,14 @@ def contacts_of(targets: Mapping[str, Target], given: Any) -> ByGeom[Sequence[Ge
     if given is None:
         given = {}
     elif isinstance(given, Mapping):
-        deprecated("contacts as an argument", "Target(material, contacts=[...]) for each geom", _MAPPINGS_GO)
+        deprecated(
+            "contacts as an argument",
+            "Target(material, contacts=[...]) for each geom",
+            _MAPPINGS_GO,
+        )
     else:
         return given  # refused where it is read
-    named = {name: target.contacts for name, target in targets.items() if target.contacts is not None}
+    named = {
+        name: target.contacts for name, target in targets.items() if target.contacts is not None
+    }
     return {**given, **named}

@@ -19,32 +19,47 @@ from ripple_sim.solver.mesh.clean import counted
 from .geoms import TARGET_TYPES, geom_name
 from .soft import SoftSurface, is_soft
 
-
-def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices [m], [n, 3], on the top of a height field in the frame of its geom, and triangles, [m, 3], facing up.
-
-    The cells are cut along the diagonal along which MuJoCo cuts them into prisms (`mjc_ConvexHField`).
-    """
-    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
-    first, size = int(model.hfield_adr[field]), model.hfield_size[field]
-    x, y = np.meshgrid(np.linspace(-size[0], size[0], columns), np.linspace(-size[1], size[1], rows))
-    z = size[2] * model.hfield_data[first : first + rows * columns].astype(np.float64)
-    number = np.arange(rows * columns).reshape(rows, columns)
-    south_west, south_east = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
-    north_west, north_east = number[1:, :-1].ravel(), number[1:, 1:].ravel()
-    F = [np.stack([south_west, south_east, north_east], axis=1), np.stack([south_west, north_east, north_west], axis=1)]
-    return np.stack([x.ravel(), y.ravel(), z], axis=1), np.concatenate(F)
-
-
 # Longest edge of a triangle over the size of the primitive.
 _LONGEST_EDGE = 1 / 24
 _CYLINDER_SIDES = 96
+_MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB
 
 
-def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def height_field_triangles(
+    model: mujoco.MjModel, field: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices [m], [n, 3], on the top of a height field in the frame of its geom, and triangles, [m, 3], facing up.
+
+    The cells are cut along the diagonal along which MuJoCo cuts them into prisms
+    (`mjc_ConvexHField`).
+    """
+    rows = int(model.hfield_nrow[field])
+    columns = int(model.hfield_ncol[field])
+    first = int(model.hfield_adr[field])
+    size = model.hfield_size[field]
+    x, y = np.meshgrid(
+        np.linspace(-size[0], size[0], columns), np.linspace(-size[1], size[1], rows)
+    )
+    z = size[2] * model.hfield_data[first : first + rows * columns].astype(np.float64)
+    number = np.arange(rows * columns).reshape(rows, columns)
+    south_west = number[:-1, :-1].ravel()
+    south_east = number[:-1, 1:].ravel()
+    north_west = number[1:, :-1].ravel()
+    north_east = number[1:, 1:].ravel()
+    F = [
+        np.stack([south_west, south_east, north_east], axis=1),
+        np.stack([south_west, north_east, north_west], axis=1),
+    ]
+    return np.stack([x.ravel(), y.ravel(), z], axis=1), np.concatenate(F)
+
+
+def primitive_triangles(
+    kind: str, size: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices [m], [n, 3], on a primitive geom of a MuJoCo size, [3], and triangles, [m, 3]."""
     if kind == "sphere":
-        kind, size = "ellipsoid", np.full(3, size[0])
+        kind = "ellipsoid"
+        size = np.full(3, size[0])
     # trimesh merges vertices within a fixed distance: triangles are made at a size of about 1
     scale = 2.0 ** np.floor(np.log2(size.max()))
     size = size / scale
@@ -55,7 +70,9 @@ def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[n
         solid = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=(48, 48))
         solid.apply_translation([0, 0, -solid.bounds.mean(axis=0)[2]])
     elif kind == "cylinder":
-        solid = trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=_CYLINDER_SIDES)
+        solid = trimesh.creation.cylinder(
+            radius=size[0], height=2 * size[1], sections=_CYLINDER_SIDES
+        )
     else:
         solid = trimesh.creation.box(extents=2 * size)
     longest = float(np.max(solid.extents)) * _LONGEST_EDGE
@@ -74,8 +91,6 @@ def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[n
     return scale * V, F
 
 
-_MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB
-
 _atlases: ResultCache[Atlas] = ResultCache(4, lambda atlas: atlas.areas.size <= _MOST_TEXELS)
 
 
@@ -93,7 +108,9 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
         return build_atlas(SoftSurface(model, geom).mesh, resolution, layout=layout)
     if TARGET_TYPES[int(model.geom_type[geom])] == "sphere" and layout != "patches":
         radius = float(model.geom_size[geom, 0])
-        return _atlases.get(f"sphere {radius!r} {resolution}", lambda: sphere_atlas(radius, resolution))
+        return _atlases.get(
+            f"sphere {radius!r} {resolution}", lambda: sphere_atlas(radius, resolution)
+        )
     V, F, uv, name = _surface(model, geom)
     key = content_key(f"{resolution} {layout}", [V, F, np.zeros(0) if uv is None else uv])
 
@@ -103,8 +120,10 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
             return build_atlas(mesh, resolution, layout=layout, sphere=shipped_sphere_map(mesh))
         except AtlasError as error:
             raise AtlasError(
-                f"{name}, in {counted(mesh.component_count, 'part')}, gets no charts: {error}; let the geom that "
-                "collides for it ripple, or give it a mesh that is wrapped: load_mesh(file, wrap=True)"
+                f"{name}, in {counted(mesh.component_count, 'part')}, gets no charts: {error}; let "
+                f"the geom that "
+                "collides for it ripple, or give it a mesh that is wrapped: load_mesh(file, "
+                "wrap=True)"
             ) from error
 
     return _atlases.get(key, build)
@@ -132,11 +151,13 @@ def mesh_arrays(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]:
     """Vertices [m], [n, 3], and triangles, [m, 3], of a mesh asset, and its own texture coordinates, if it has any.
 
-    These are those of the triangles' corners, [m, 3, 2]; v is counted from the upper edge of the image.
+    These are those of the triangles' corners, [m, 3, 2]; v is counted from the upper edge of the
+    image.
     """
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
     V = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(np.float64)
-    first, uv = model.mesh_texcoordadr[mesh], None
+    first = model.mesh_texcoordadr[mesh]
+    uv = None
     if first >= 0:
         uv = model.mesh_texcoord[first + model.mesh_facetexcoord[faces]].astype(np.float64)
     return V, model.mesh_face[faces].astype(np.int64), uv

@@ -1,7 +1,7 @@
 """Warnings of targets that nothing can touch, that collide off the surface that ripples, or whose waves are too high.
 
-Waves too high or too steep for the object that carries them are reported once a target, with what would do: heights are
-compared with the local radius, slopes with 1.
+Waves too high or too steep for the object that carries them are reported once a target, with what
+would do: heights are compared with the local radius, slopes with 1.
 """
 
 from __future__ import annotations
@@ -30,11 +30,47 @@ _GEOM = mujoco.mjtGeom
 # Points of the rippling surface at which its distance is taken.
 _POINTS = 1500
 
+# A collision surface off the true one by this share of the target's size shows: bodies stop in
+# mid-air. The coarse tolerance is for geoms that were made to collide in place of a finer one.
+GAP_TOLERANCE = 0.02
+COARSE_TOLERANCE = 0.1
+
+# The height allowed over the local radius.
+HIGH = 0.25
+
+# Of the surface, what is counted as the thinnest part is beyond this share.
+_THINNEST = 0.99
+_ROWS = 4
+
+# Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard
+# body is steep, but small.
+_STEEP_AREA = 0.01
+
+# The crests of all steps, and the slopes of one, are looked at once in so many steps. They are read
+# back from a GPU for that, which lets it run dry.
+_EVERY = {"cpu": 16, "gl": 128}
+
+# A wave that is too high is followed for so many looks, or until it falls again, so that the advice
+# is based on its crest.
+_FOLLOWED = 4
+
+# The density that is advised is this much more than the least for what was seen, and for a wave of
+# this share of its height that has spread to where the object is thinnest.
+_MARGIN = 2.0
+_SPREAD = 0.3
+
+# What a material is printed with; the others change no wave.
+_PRINTED = tuple(
+    each for each in dataclasses.fields(Material) if isinstance(each.default, float | bool)
+)
+
 
 def hull_gap(atlas: Atlas) -> float:
     """Greatest distance from the convex hull of a mesh to its surface [m], on points 1/24 of its size apart."""
     hull = trimesh.Trimesh(atlas.mesh.V, atlas.mesh.F, process=False).convex_hull
-    points, _ = trimesh.remesh.subdivide_to_size(hull.vertices, hull.faces, max_edge=float(hull.extents.max()) / 24)
+    points, _ = trimesh.remesh.subdivide_to_size(
+        hull.vertices, hull.faces, max_edge=float(hull.extents.max()) / 24
+    )
     closest, _ = atlas.project(points)
     return float(np.linalg.norm(points - closest, axis=1).max())
 
@@ -42,8 +78,8 @@ def hull_gap(atlas: Atlas) -> float:
 def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Iterable[int]) -> float:
     """How deep bodies sink into a target's surface before they meet the geoms that collide for it [m].
 
-    Or how far above the surface they are held, where that is more: over half of it, since a part of it may well lie
-    inside a geom that collides for the target's neighbour too.
+    Or how far above the surface they are held, where that is more: over half of it, since a part of
+    it may well lie inside a geom that collides for the target's neighbour too.
 
     Parameters
     ----------
@@ -53,14 +89,18 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
     atlas : Atlas
         Of the target.
     geoms : iterable of int
-        Ids of geoms on its body or on bodies welded to it. Planes and height fields have no surface to be off from.
+        Ids of geoms on its body or on bodies welded to it. Planes and height fields have no surface
+        to be off from.
     """
-    model, data = coupled.model, mujoco.MjData(coupled.model)
+    model = coupled.model
+    data = mujoco.MjData(coupled.model)
     mujoco.mj_kinematics(model, data)
     points = atlas.positions.reshape(-1, 3)
     points = points[:: -(-len(points) // _POINTS)]
     points = data.geom_xpos[target] + points @ data.geom_xmat[target].reshape(3, 3).T
-    solids = [geom for geom in geoms if TARGET_TYPES.get(int(model.geom_type[geom]), "hfield") != "hfield"]
+    solids = [
+        geom for geom in geoms if TARGET_TYPES.get(int(model.geom_type[geom]), "hfield") != "hfield"
+    ]
     if not solids:
         return 0.0
     outside = np.full(len(points), np.inf)
@@ -72,20 +112,18 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
             V, F = primitive_triangles(kind, model.geom_size[geom])
         if kind == "mesh" and not coupled.has_flex[geom]:
             hull = trimesh.convex.convex_hull(V)
-            V, F = np.array(hull.vertices), np.array(hull.faces)
+            V = np.array(hull.vertices)
+            F = np.array(hull.faces)
         local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
         outside = np.minimum(outside, igl.signed_distance(local, V, F)[0])
     return float(max(outside.max(), -np.median(outside)))
 
 
-# A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air. The coarse
-# tolerance is for geoms that were made to collide in place of a finer one.
-GAP_TOLERANCE, COARSE_TOLERANCE = 0.02, 0.1
-
-
 def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
     """What to warn of where nothing touches a target, it collides off its surface, or contacts tell no forces."""
-    model, name, size = coupled.model, coupled.names[geom], float(np.ptp(atlas.mesh.V, axis=0).max())
+    model = coupled.model
+    name = coupled.names[geom]
+    size = float(np.ptp(atlas.mesh.V, axis=0).max())
     solids = coupled.collision_geoms(geom)
     if coupled.out_of_touch(geom):
         yield _touch_warning(coupled, geom)
@@ -95,85 +133,122 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
         if gap > COARSE_TOLERANCE * size:
             names = ", ".join(repr(coupled.names[each]) for each in colliders)
             yield (
-                f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface "
-                f"that ripples: contacts load it where it is nearest to them; name other geoms in Target(contacts=...) "
+                f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its "
+                f"size) off the surface "
+                f"that ripples: contacts load it where it is nearest to them; name other geoms in "
+                f"Target(contacts=...) "
                 f"or call make_collidable(spec, {name!r})"
             )
     elif coupled.has_flex[geom]:
         yield from _flex_warning(coupled, geom)
-    elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+    elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and (
+        model.geom_contype[geom] or model.geom_conaffinity[geom]
+    ):
         gap = hull_gap(atlas)
         if gap > GAP_TOLERANCE * size:
             yield (
-                f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the "
-                f'surface that ripples; give it type="sdf" in the MJCF, or call make_collidable(spec, {name!r})'
+                f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} "
+                f"of its size) off the "
+                f'surface that ripples; give it type="sdf" in the MJCF, or call '
+                f"make_collidable(spec, {name!r})"
             )
     elif model.geom_type[geom] == _GEOM.mjGEOM_SDF:
         hills = np.flatnonzero(coupled.can_collide(geom) & (model.geom_type == _GEOM.mjGEOM_HFIELD))
         if len(hills):
             names = ", ".join(repr(coupled.names[other]) for other in hills)
             yield (
-                f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): call "
-                f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so that they do not meet'
+                f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): "
+                f"call "
+                f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so '
+                f"that they do not meet"
             )
-    passive = getattr(model, "flex_passive", np.zeros(model.nflex))  # not in MuJoCo's older versions
+    # not in MuJoCo's older versions
+    passive = getattr(model, "flex_passive", np.zeros(model.nflex))
     for flex in coupled.soft_flexes(geom).tolist():
         if passive[flex]:
             yield (
-                f"MuJoCo tells no forces of the passive contacts of flex {coupled.names[model.ngeom + flex]!r}, under "
+                f"MuJoCo tells no forces of the passive contacts of flex "
+                f"{coupled.names[model.ngeom + flex]!r}, under "
                 f'which geom {name!r} will not ripple; set passive="false" in the flex\'s <contact>'
             )
 
 
 def _touch_warning(coupled: CoupledModel, geom: int) -> str:
     """Warning of a target that nothing can touch."""
-    model, name, colliders = coupled.model, coupled.names[geom], coupled.collision_geoms(geom)
+    model = coupled.model
+    name = coupled.names[geom]
+    colliders = coupled.collision_geoms(geom)
     if not colliders:
         return (
-            f"nothing can touch geom {name!r}: it does not collide (contype and conaffinity are 0), nor does another "
-            f"geom of its body; name the geoms that collide for it, Target(contacts=[...]), or give it a contype"
+            f"nothing can touch geom {name!r}: it does not collide (contype and conaffinity are "
+            f"0), nor does another "
+            f"geom of its body; name the geoms that collide for it, Target(contacts=[...]), or "
+            f"give it a contype"
         )
     masks = ", ".join(
-        f"{coupled.names[each]!r} has contype {model.geom_contype[each]} and conaffinity {model.geom_conaffinity[each]}"
+        (
+            f"{coupled.names[each]!r} has contype {model.geom_contype[each]} and conaffinity "
+            f"{model.geom_conaffinity[each]}"
+        )
         for each in colliders
     )
-    return f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not welded to its own"
+    return (
+        f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not "
+        f"welded to its own"
+    )
 
 
 def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
     """Warning of geoms that a flex collider meets badly, or not at all."""
-    model, name, meets = coupled.model, coupled.names[geom], coupled.can_collide(geom)
+    model = coupled.model
+    name = coupled.names[geom]
+    meets = coupled.can_collide(geom)
     thickness = flex_thickness(model, coupled.flex_colliders[geom])
-    boxes, distances = model.geom_type == _GEOM.mjGEOM_BOX, model.geom_type == _GEOM.mjGEOM_SDF
+    boxes = model.geom_type == _GEOM.mjGEOM_BOX
+    distances = model.geom_type == _GEOM.mjGEOM_SDF
     # MuJoCo lets bodies pass through one another that are joined, or excluded by name
-    body, weld = int(model.geom_bodyid[geom]), model.body_weldid
+    body = int(model.geom_bodyid[geom])
+    weld = model.body_weldid
     above = weld[model.body_parentid[weld]]
-    joined = (weld != weld[body]) & (weld != 0) & ((above == weld[body]) | (above[body] == weld)) & bool(weld[body])
+    joined = (
+        (weld != weld[body])
+        & (weld != 0)
+        & ((above == weld[body]) | (above[body] == weld))
+        & bool(weld[body])
+    )
     joined &= not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
     excluded = np.column_stack([model.exclude_signature >> 16, model.exclude_signature & 0xFFFF])
     joined[excluded[(excluded == body).any(axis=1)]] = True
     apart = joined[model.geom_bodyid] & (model.geom_bodyid != body)
     reasons = (
-        (boxes, "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped meshes"),
+        (
+            boxes,
+            (
+                "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not "
+                "box-shaped meshes"
+            ),
+        ),
         (distances, f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out"),
-        (apart, "MuJoCo finds no contacts of a flex with bodies that are joined to its own or excluded ({})"),
+        (
+            apart,
+            (
+                "MuJoCo finds no contacts of a flex with bodies that are joined to its own or "
+                "excluded "
+                "({})"
+            ),
+        ),
     )
-    named = [([repr(coupled.names[i]) for i in np.flatnonzero(which & meets)], why) for which, why in reasons]
+    named = [
+        ([repr(coupled.names[i]) for i in np.flatnonzero(which & meets)], why)
+        for which, why in reasons
+    ]
     found = [why.format(", ".join(names)) for names, why in named if names]
     if found:
         yield (
-            f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), '
+            f"geom {name!r} collides through a flex: {'; '.join(found)}; call "
+            f'make_collidable(spec, {name!r}, "sdf"), '
             "or choose contype and conaffinity so that they do not meet"
         )
-
-
-# The height allowed over the local radius.
-HIGH = 0.25
-
-# Of the surface, what is counted as the thinnest part is beyond this share.
-_THINNEST = 0.99
-
-_ROWS = 4
 
 
 def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
@@ -182,8 +257,8 @@ def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
     Returns
     -------
     fields : float32 [4, C, n, n]
-        1 over the greatest height allowed [1/m]; 1 over the distance to the next texel in the next row and column
-        [1/m], 0 beyond the chart; share of the surface's area.
+        1 over the greatest height allowed [1/m]; 1 over the distance to the next texel in the next
+        row and column [1/m], 0 beyond the chart; share of the surface's area.
     per_thinnest : float
         1 over the greatest height allowed where the object is thinnest [1/m].
     calm : float
@@ -205,31 +280,13 @@ def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
 
 def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
     """Share of the surface that is steeper than 1, seen on every fourth row."""
-    here, below, beside = np.s_[:, :-1:_ROWS, :-1], np.s_[:, 1::_ROWS, :-1], np.s_[:, :-1:_ROWS, 1:]
+    here = np.s_[:, :-1:_ROWS, :-1]
+    below = np.s_[:, 1::_ROWS, :-1]
+    beside = np.s_[:, :-1:_ROWS, 1:]
     down = (height[below] - height[here]) * per_row[here]
     right = (height[beside] - height[here]) * per_column[here]
     seen = share[here].astype(np.float64)
     return float(seen[down**2 + right**2 > 1].sum() / seen.sum())
-
-
-# Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard body is steep, but
-# small.
-_STEEP_AREA = 0.01
-
-# The crests of all steps, and the slopes of one, are looked at once in so many steps. They are read back from a GPU for
-# that, which lets it run dry.
-_EVERY = {"cpu": 16, "gl": 128}
-
-# A wave that is too high is followed for so many looks, or until it falls again, so that the advice is based on its
-# crest.
-_FOLLOWED = 4
-
-# The density that is advised is this much more than the least for what was seen, and for a wave of this share of its
-# height that has spread to where the object is thinnest.
-_MARGIN, _SPREAD = 2.0, 0.3
-
-# What a material is printed with; the others change no wave.
-_PRINTED = tuple(each for each in dataclasses.fields(Material) if isinstance(each.default, float | bool))
 
 
 class AmplitudeCheck:
@@ -280,7 +337,11 @@ class AmplitudeCheck:
     def _warn(self, geom: int) -> None:
         watch = self._watched.pop(geom)
         warn_caller(
-            f"the waves on geom {self._coupled.names[geom]!r} are {watch.what}; pictures show them limited. "
+            (
+                f"the waves on geom {self._coupled.names[geom]!r} are {watch.what}; pictures show "
+                f"them "
+                f"limited. "
+            )
             + self._advice(geom, watch.waves, _MARGIN * watch.needed)
         )
 
@@ -300,7 +361,9 @@ class AmplitudeCheck:
             for each in _PRINTED
             if given[each.name] != each.default or each.name == "density"
         ]
-        python, toml = (", ".join(f"{name}{sign}{value}" for name, value in pairs) for sign in ("=", " = "))
+        python, toml = (
+            ", ".join(f"{name}{sign}{value}" for name, value in pairs) for sign in ("=", " = ")
+        )
         return f"This would do: Material({python}), in a scene file material = {{{toml}}}"
 
 
@@ -323,7 +386,9 @@ class _WatchedTarget:
         # lower waves are right anywhere, or too small to matter
         self._calm = 1e-3 * float(np.ptp(waves.rest.mesh.V, axis=0).max())
         self._scales: tuple[Floats32, float] | None = None
-        self.excess, self.needed, self.what = 0.0, 0.0, ""
+        self.excess = 0.0
+        self.needed = 0.0
+        self.what = ""
         self._looks = 0
 
     def look(self) -> bool:
@@ -346,20 +411,29 @@ class _WatchedTarget:
         texel = int(over.argmax())
         high = float(over[texel])
         steep_share = steep_area(height, per_row, per_column, share)
-        excess, what = high, ""
+        excess = high
+        what = ""
         if steep_share > _STEEP_AREA:
             down = np.diff(height, axis=1, append=0) * per_row
             slope = np.hypot(down, np.diff(height, axis=2, append=0) * per_column).ravel()
             order = np.argsort(-slope)
             # the slope that this share of the surface exceeds
-            steep = float(slope[order[np.searchsorted(np.cumsum(share.ravel()[order]), _STEEP_AREA)]])
-            excess, what = max(excess, steep), f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
+            steep = float(
+                slope[order[np.searchsorted(np.cumsum(share.ravel()[order]), _STEEP_AREA)]]
+            )
+            excess = max(excess, steep)
+            what = f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
         if excess > max(self.excess, 1.0):
             if high == excess:
-                where = ", ".join(f"{x:.3g}" for x in self.waves.rest.positions.reshape(-1, 3)[texel])
+                where = ", ".join(
+                    f"{x:.3g}" for x in self.waves.rest.positions.reshape(-1, 3)[texel]
+                )
                 radius = 1 / (HIGH * float(per_limit.reshape(-1)[texel]))
                 here = float(crests.reshape(-1)[texel])
-                what = f"too high: {here:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
+                what = (
+                    f"too high: {here:.2g} m at ({where}) m, where the object's radius is "
+                    f"{radius:.2g} m"
+                )
             self.what = what
         self.excess = max(self.excess, excess)
         spread = _SPREAD * float(crests.max()) * per_thinnest

@@ -14,8 +14,8 @@ from .model import SPECULATIVE, CoupledModel
 _SAFE = 0.85
 
 
-# Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
-# at 1.4, not yet at 1.2.
+# Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push
+# from all sides: seen at 1.4, not yet at 1.2.
 _SAFE_IN_SDF = 1.2
 
 
@@ -46,18 +46,19 @@ PAIR = np.dtype(
 class TunnellingCheck:
     """Compares how deep geoms will sink into the targets with how thick both are.
 
-    A geom that arrives at speed v sinks in by about v dt before MuJoCo sees the contact, and then by v t_stop before
-    the contact's spring has stopped it: t_stop = tau zeta exp(-zeta) for a `solref` of time constant tau and damping
-    ratio zeta (a critically damped spring at zeta = 1). Past the sum of the two geoms' smallest half-extents it comes
-    out on the other side or stays inside; the first that did so were seen at 0.9 of that sum. A geom that is inside an
-    SDF geom by more than its own half-extent is pushed from all sides: the normal forces then add up to many times the
-    momentum exchanged. A warning names the pair that is worst, and comes again only where another is twice as bad:
-    a humanoid that falls has dozens of pairs, and one advice serves them all. MuJoCo's speculative contacts, where the
-    version has them and they are enabled, stop geoms in time, but not at SDF geoms or flexes: then only those are
-    checked.
+    A geom that arrives at speed v sinks in by about v dt before MuJoCo sees the contact, and then
+    by v t_stop before the contact's spring has stopped it: t_stop = tau zeta exp(-zeta) for a
+    `solref` of time constant tau and damping ratio zeta (a critically damped spring at zeta = 1).
+    Past the sum of the two geoms' smallest half-extents it comes out on the other side or stays
+    inside; the first that did so were seen at 0.9 of that sum. A geom that is inside an SDF geom by
+    more than its own half-extent is pushed from all sides: the normal forces then add up to many
+    times the momentum exchanged. A warning names the pair that is worst, and comes again only where
+    another is twice as bad: a humanoid that falls has dozens of pairs, and one advice serves them
+    all. MuJoCo's speculative contacts, where the version has them and they are enabled, stop geoms
+    in time, but not at SDF geoms or flexes: then only those are checked.
 
-    A flex collider holds geoms off by its thickness, which counts in place of the half-extent of its geom. Cylinders
-    that sink in by 0.7 of the thickness begin to be thrown aside.
+    A flex collider holds geoms off by its thickness, which counts in place of the half-extent of
+    its geom. Cylinders that sink in by 0.7 of the thickness begin to be thrown aside.
 
     Parameters
     ----------
@@ -67,9 +68,11 @@ class TunnellingCheck:
     """
 
     def __init__(self, coupled: CoupledModel, targets: list[int]) -> None:
-        self._model, self._names = coupled.model, coupled.names
+        self._model = coupled.model
+        self._names = coupled.names
         self._pairs = _watched_pairs(coupled, targets)
-        self._told = np.inf  # within how long the pair of the last warning would have had to stop [s]
+        # within how long the pair of the last warning would have had to stop [s]
+        self._told = np.inf
         self._steps = 0
 
     def __call__(self, data: mujoco.MjData) -> None:
@@ -82,8 +85,11 @@ class TunnellingCheck:
         if not times.min(initial=np.inf) < self._told / _WORSE:
             return
         worst = int(times.argmin())
-        self._told, speed = float(times[worst]), float(speeds[worst])
-        model, names, timestep = self._model, self._names, self._model.opt.timestep
+        self._told = float(times[worst])
+        speed = float(speeds[worst])
+        model = self._model
+        names = self._names
+        timestep = self._model.opt.timestep
         target, other, limit, _, stopping_time = self._pairs[rows[worst]].item()
         body = model.body(int(model.geom_bodyid[other])).name or names[other]
         needed = limit / speed - stopping_time
@@ -96,34 +102,53 @@ class TunnellingCheck:
         else:
             advice = f'use a solref of "{np.e * (limit / speed - timestep):.2g} 1" or less for both'
         warn_caller(
-            f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through it, get stuck or "
+            f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through "
+            f"it, get stuck or "
             f"give a wrong impulse: with a time step of {timestep:.2g} s it sinks in by "
             f"{speed * (timestep + stopping_time):.2g} m, of which {limit:.2g} m are safe; {advice}"
         )
 
 
-def too_fast(pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> tuple[Ints, Floats]:
+def too_fast(
+    pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, steps: int
+) -> tuple[Ints, Floats]:
     """Rows of the pairs, `PAIR`, that may touch within some steps and sink in beyond their limits, and speeds [m/s]."""
-    body, target, other, timestep = model.geom_bodyid, pairs["target"], pairs["other"], model.opt.timestep
+    body = model.geom_bodyid
+    target = pairs["target"]
+    other = pairs["other"]
+    timestep = model.opt.timestep
     # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
     from_root = data.geom_xpos - data.subtree_com[model.body_rootid[body]]
     velocities = data.cvel[body, 3:] + np.cross(data.cvel[body, :3], from_root)
-    away, relative = data.geom_xpos[other] - data.geom_xpos[target], velocities[other] - velocities[target]
-    distances, speeds = np.linalg.norm(away, axis=1), np.linalg.norm(relative, axis=1)
+    away = data.geom_xpos[other] - data.geom_xpos[target]
+    relative = velocities[other] - velocities[target]
+    distances = np.linalg.norm(away, axis=1)
+    speeds = np.linalg.norm(relative, axis=1)
     near = distances < pairs["range"] + (1 + steps) * speeds * timestep
     approaching = np.einsum("ij,ij->i", away, relative) < 0
-    rows = np.flatnonzero(near & approaching & (speeds * (timestep + pairs["stopping_time"]) > pairs["limit"]))
+    rows = np.flatnonzero(
+        near & approaching & (speeds * (timestep + pairs["stopping_time"]) > pairs["limit"])
+    )
     return rows, speeds[rows]
 
 
 def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
     """Pairs of a geom that collides for a target and another geom, which may tunnel, `PAIR` [p]."""
-    model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex[: coupled.model.ngeom]
-    sdf, cylinder = (model.geom_type == kind for kind in (mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_CYLINDER))
-    unchecked = sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
+    model = coupled.model
+    extents = coupled.collider_extents
+    flex = coupled.has_flex[: coupled.model.ngeom]
+    sdf, cylinder = (
+        model.geom_type == kind
+        for kind in (mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_CYLINDER)
+    )
+    unchecked = (
+        sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
+    )
     pairs = [
         (target, other)
-        for target in dict.fromkeys(geom for each in targets for geom in coupled.collision_geoms(each))
+        for target in dict.fromkeys(
+            geom for each in targets for geom in coupled.collision_geoms(each)
+        )
         for other in np.flatnonzero(coupled.can_collide(target)).tolist()
         if np.isfinite(extents[other]) and (unchecked[target] or unchecked[other])
     ]
@@ -135,7 +160,8 @@ def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void
         limit = np.minimum(limit, safe)
     reach = model.geom_rbound[target] + model.geom_rbound[other]
     solref = (coupled.solref[target] + coupled.solref[other]) / 2
-    # negative pairs are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio = damping / (2 omega)
+    # negative pairs are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio =
+    # damping / (2 omega)
     direct = solref[:, 0] <= 0
     omega = np.sqrt(np.where(direct, np.maximum(-solref[:, 0], 1e-12), 1.0))
     constant = np.maximum(solref[:, 0], 2 * model.opt.timestep)

@@ -1,7 +1,7 @@
 """Arrays of a model that its user may write to at any time, looked at before each frame or step.
 
-A look at a large array costs no more than one at a small one: samples of all of it are compared, and one stretch after
-another whole.
+A look at a large array costs no more than one at a small one: samples of all of it are compared,
+and one stretch after another whole.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from .soft import is_soft
 
 _WHOLE = 1 << 20  # bytes that are compared whole at each look: some 0.05 ms
-_STRETCH = 1 << 18  # bytes of a larger array that are compared at each look, one stretch after another
+# bytes of a larger array that are compared at each look, one stretch after another
+_STRETCH = 1 << 18
 _SAMPLES = 4096  # of a larger array that are compared at each look
 
 
@@ -35,13 +36,15 @@ class WatchedArray:
 
     def changed(self, array: NDArray) -> bool:
         """Whether something else is there than was taken: of a large array whatever this look comes across."""
-        now, taken = _bytes_of(array), self._taken
+        now = _bytes_of(array)
+        taken = self._taken
         if len(now) <= _WHOLE:
             return not np.array_equal(now, taken)
         stretch = slice(self._next, self._next + _STRETCH)
         self._next = stretch.stop if stretch.stop < len(now) else 0
         return not (
-            np.array_equal(now[stretch], taken[stretch]) and np.array_equal(now[:: self._step], taken[:: self._step])
+            np.array_equal(now[stretch], taken[stretch])
+            and np.array_equal(now[:: self._step], taken[:: self._step])
         )
 
     def differs(self, array: NDArray, start: int, count: int) -> bool:
@@ -66,7 +69,10 @@ class WatchedShape:
 
     def changed(self, model: mujoco.MjModel) -> bool:
         """Whether the surface is another one than at the beginning."""
-        return any(watched.changed(array) for watched, array in zip(self._watched, self._arrays(model), strict=True))
+        return any(
+            watched.changed(array)
+            for watched, array in zip(self._watched, self._arrays(model), strict=True)
+        )
 
     def _arrays(self, model: mujoco.MjModel) -> list[NDArray]:
         geom = self._geom
@@ -75,10 +81,12 @@ class WatchedShape:
         asset = int(model.geom_dataid[geom])
         match int(model.geom_type[geom]):
             case mujoco.mjtGeom.mjGEOM_HFIELD:
-                first, count = int(model.hfield_adr[asset]), int(model.hfield_nrow[asset] * model.hfield_ncol[asset])
+                first = int(model.hfield_adr[asset])
+                count = int(model.hfield_nrow[asset] * model.hfield_ncol[asset])
                 return [model.hfield_data[first : first + count], model.hfield_size[asset]]
             case mujoco.mjtGeom.mjGEOM_MESH | mujoco.mjtGeom.mjGEOM_SDF:
-                first, count = int(model.mesh_vertadr[asset]), int(model.mesh_vertnum[asset])
+                first = int(model.mesh_vertadr[asset])
+                count = int(model.mesh_vertnum[asset])
                 return [model.mesh_vert[first : first + count]]
             case _:
                 return [model.geom_size[geom]]

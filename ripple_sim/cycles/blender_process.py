@@ -1,7 +1,7 @@
 """Renders a stage with Cycles, frame by frame: `python blender_process.py SETTINGS.json`, in a process of its own.
 
-Blender is under the GPL, which is why nothing of ripple-sim is imported here and only files and lines pass between the
-two. Each frame becomes NUMBER.npy, linear, and then the line "frame NUMBER".
+Blender is under the GPL, which is why nothing of ripple-sim is imported here and only files and
+lines pass between the two. Each frame becomes NUMBER.npy, linear, and then the line "frame NUMBER".
 """
 
 import json
@@ -20,14 +20,18 @@ def main(settings):
     """Render all frames."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.usd_import(
-        filepath=settings["stage"], set_frame_range=True, property_import_mode="USER", create_world_material=False
+        filepath=settings["stage"],
+        set_frame_range=True,
+        property_import_mode="USER",
+        create_world_material=False,
     )
     scene = bpy.context.scene
     scene.camera = next(each for each in scene.objects if each.type == "CAMERA")
     set_rendering(scene, settings)
     box_axes = set_world(scene, settings)
     for lamp in (each for each in scene.objects if each.type == "LIGHT"):
-        lamp.data.energy = lamp.data["power"]  # the importer makes lamps four times as strong, and suns twice as wide
+        # the importer makes lamps four times as strong, and suns twice as wide
+        lamp.data.energy = lamp.data["power"]
         if lamp.data.type == "SUN":
             lamp.data.angle = lamp.data["angle"]
     for material in bpy.data.materials:
@@ -47,7 +51,8 @@ def main(settings):
 def set_rendering(scene, settings):
     """Engine, size, shutter and file format."""
     scene.render.engine = "CYCLES"
-    scene.cycles.samples, scene.cycles.use_denoising = settings["samples"], True
+    scene.cycles.samples = settings["samples"]
+    scene.cycles.use_denoising = True
     scene.cycles.seed = 0
     scene.render.resolution_x, scene.render.resolution_y = settings["size"]
     scene.render.resolution_percentage = 100
@@ -78,18 +83,26 @@ def save(scene, folder, number):
 def set_world(scene, settings):
     """The sky and the soft boxes: as the camera sees them, as they are reflected, and as they light the rest.
 
-    Return the nodes that take the axes of each box. Where directions are chosen for light alone, Cycles does not know
-    what kind of ray will meet the sky: surfaces choose them.
+    Return the nodes that take the axes of each box. Where directions are chosen for light alone,
+    Cycles does not know what kind of ray will meet the sky: surfaces choose them.
     """
     scene.world = bpy.data.worlds.new("sky")
     scene.world.use_nodes = True
     scene.world.cycles.sampling_method = "NONE"
     tree = scene.world.node_tree
-    nodes, links = tree.nodes, tree.links
+    nodes = tree.nodes
+    links = tree.links
     nodes.clear()
-    rays, direction, parts = (nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "TexCoord", "SeparateXYZ"))
+    rays, direction, parts = (
+        nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "TexCoord", "SeparateXYZ")
+    )
     links.new(direction.outputs["Generated"], parts.inputs[0])
-    seen = mixed(tree, smooth_step(tree, parts.outputs["Z"], -0.1, 0.8), settings["horizon"], settings["zenith"])
+    seen = mixed(
+        tree,
+        smooth_step(tree, parts.outputs["Z"], -0.1, 0.8),
+        settings["horizon"],
+        settings["zenith"],
+    )
     boxes, axes = soft_boxes(tree, settings["boxes"])
     diffuse = vectors(tree, "SCALE", boxes, settings["boxes_diffuse"])
     diffuse = vectors(tree, "ADD", settings["sky"], diffuse)
@@ -98,7 +111,8 @@ def set_world(scene, settings):
     color = mixed(tree, rays.outputs["Is Glossy Ray"], diffuse, glossy)
     for kind in ("Is Camera Ray", "Is Transmission Ray"):
         color = mixed(tree, rays.outputs[kind], color, seen)
-    background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+    background = nodes.new("ShaderNodeBackground")
+    output = nodes.new("ShaderNodeOutputWorld")
     links.new(color, background.inputs["Color"])
     links.new(background.outputs[0], output.inputs["Surface"])
     return axes
@@ -107,7 +121,8 @@ def set_world(scene, settings):
 def soft_boxes(tree, boxes):
     """Radiance of the boxes, far away, and for each the nodes that take its axes: to it, across, up."""
     direction = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
-    total, axes = [0.0, 0.0, 0.0], []
+    total = [0.0, 0.0, 0.0]
+    axes = []
     for box in boxes:
         shares = [vectors(tree, "DOT_PRODUCT", direction, [0.0, 0.0, 0.0]) for _ in range(3)]
         inside = maths(tree, "GREATER_THAN", shares[0], 0.0)
@@ -124,7 +139,8 @@ def smooth_step(tree, value, low, high):
     """From 0 at `low` to 1 at `high`."""
     step = tree.nodes.new("ShaderNodeMapRange")
     step.interpolation_type = "SMOOTHSTEP"
-    step.inputs["From Min"].default_value, step.inputs["From Max"].default_value = low, high
+    step.inputs["From Min"].default_value = low
+    step.inputs["From Max"].default_value = high
     tree.links.new(value, step.inputs["Value"])
     return step.outputs["Result"]
 
@@ -167,7 +183,9 @@ def set_input(tree, socket, value):
 
 def set_look(material, depth):
     """What UsdPreviewSurface has no word for."""
-    shader = next((node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"), None)
+    shader = next(
+        (node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"), None
+    )
     if shader is None or "translucency" not in material:
         return
     color = shader.inputs["Base Color"].default_value
@@ -186,7 +204,8 @@ def axes_of(camera, box):
     right = Vector((right.x, right.y, 0)).normalized()
     up = Vector((0, 0, 1))
     forward = up.cross(right)
-    turn, rise = math.radians(box["azimuth"]), math.radians(box["elevation"])
+    turn = math.radians(box["azimuth"])
+    rise = math.radians(box["elevation"])
     way = (forward * math.cos(turn) - right * math.sin(turn)) * math.cos(rise) + up * math.sin(rise)
     across = up.cross(way).normalized()
     return way, across, way.cross(across)
@@ -200,17 +219,20 @@ def fading_floor(settings):
         return None
     material = floor.data.materials[0] = floor.data.materials[0].copy()
     tree = material.node_tree
-    nodes, links = tree.nodes, tree.links
+    nodes = tree.nodes
+    links = tree.links
     output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
     surface = output.inputs["Surface"].links[0].from_socket
     for name in ("Specular IOR Level", "Coat Weight"):  # ours is matte
         surface.node.inputs[name].default_value = 0.0
-    place, apart = nodes.new("ShaderNodeNewGeometry"), nodes.new("ShaderNodeVectorMath")
+    place = nodes.new("ShaderNodeNewGeometry")
+    apart = nodes.new("ShaderNodeVectorMath")
     apart.operation = "DISTANCE"
     links.new(place.outputs["Position"], apart.inputs[0])
     near, far = (each * settings["distance"] for each in settings["fade"])
     share = smooth_step(tree, apart.outputs["Value"], near, far)
-    glow, mix = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeMixShader")
+    glow = nodes.new("ShaderNodeEmission")
+    mix = nodes.new("ShaderNodeMixShader")
     glow.inputs["Color"].default_value = (*settings["horizon"], 1.0)
     links.new(share, mix.inputs[0])
     links.new(surface, mix.inputs[1])

@@ -1,7 +1,7 @@
 """`render_cycles`: a scene simulated, written as USD, and rendered by Cycles in a process of Blender's own.
 
-Beside the stage Blender is told frames, sky, soft boxes, and the floor that fades into the sky. The linear radiance
-that it gives back gets the colours of a frame as the renderer's.
+Beside the stage Blender is told frames, sky, soft boxes, and the floor that fades into the sky. The
+linear radiance that it gives back gets the colours of a frame as the renderer's.
 """
 
 from __future__ import annotations
@@ -33,7 +33,14 @@ from ripple_sim.export.source import Source
 from ripple_sim.export.visuals import mean_color
 from ripple_sim.render.passes.shadows import find_floor
 from ripple_sim.render.tone_mapping import tone_mapped
-from ripple_sim.render.visuals.lights import BESIDE_LIGHTS, FADE, SOFT_BOX_LIGHTS, STUDIO_FADE, lighting_of, sky_colors
+from ripple_sim.render.visuals.lights import (
+    BESIDE_LIGHTS,
+    FADE,
+    SOFT_BOX_LIGHTS,
+    STUDIO_FADE,
+    lighting_of,
+    sky_colors,
+)
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.scene.scene import Scene, with_exposure
@@ -47,9 +54,17 @@ PYTHON = "RIPPLE_SIM_BPY_PYTHON"
 OLDEST = (5, 0)  # bpy before it has other names for what the importer of USD is told
 _LAST = 300  # characters of what a process said last
 _ADVICE = (
-    "on Python 3.13 install it with: pip install 'ripple-sim[cycles]'; otherwise give it an environment of its own "
-    f"(python3.11 -m venv blender; blender/bin/pip install 'bpy>=5.0') and set {PYTHON}=blender/bin/python"
+    "on Python 3.13 install it with: pip install 'ripple-sim[cycles]'; otherwise give it an "
+    "environment of its own "
+    f"(python3.11 -m venv blender; blender/bin/pip install 'bpy>=5.0') and set "
+    f"{PYTHON}=blender/bin/python"
 )
+
+# what the renderer's soft boxes give to diffuse surfaces, over what lights of their size and
+# radiance would
+_DIFFUSE_SHARE = 0.13 * np.pi / 4
+SAMPLES = 64
+_OURS_ALONE = ("sound", "compare", "overlay", "passes", "resume", "transparent")
 
 
 def python_with_bpy() -> str:
@@ -60,7 +75,9 @@ def python_with_bpy() -> str:
     named = os.environ.get(PYTHON)
     if named:
         if not os.access(named, os.X_OK):
-            raise VideoError(f"{PYTHON} is {named!r}, which cannot be run; name a Python that has bpy")
+            raise VideoError(
+                f"{PYTHON} is {named!r}, which cannot be run; name a Python that has bpy"
+            )
     elif importlib.util.find_spec("bpy") is None:
         raise VideoError(f"the renderer cycles needs bpy, which is not installed; {_ADVICE}")
     python = named or sys.executable
@@ -74,7 +91,9 @@ def python_with_bpy() -> str:
 @functools.cache  # asking takes most of a second
 def _version_of_bpy(python: str) -> tuple[int, ...]:
     code = "import bpy; print(*bpy.app.version)"
-    asked = subprocess.run([python, "-c", code], capture_output=True, text=True, errors="replace", check=False)
+    asked = subprocess.run(
+        [python, "-c", code], capture_output=True, text=True, errors="replace", check=False
+    )
     last = (asked.stdout if asked.returncode == 0 else asked.stderr).strip().splitlines()[-1:]
     try:
         return tuple(map(int, last[0].split()))
@@ -83,7 +102,9 @@ def _version_of_bpy(python: str) -> tuple[int, ...]:
         raise VideoError(f"{python} cannot import bpy: {reason}; {_ADVICE}") from None
 
 
-def frames_of_cycles(python: str, settings: dict[str, Any], folder: Path) -> Iterator[NDArray[np.float32]]:
+def frames_of_cycles(
+    python: str, settings: dict[str, Any], folder: Path
+) -> Iterator[NDArray[np.float32]]:
     """Linear frames [height, width, 3], in their order, from a process of Blender's own.
 
     Parameters
@@ -100,13 +121,19 @@ def frames_of_cycles(python: str, settings: dict[str, Any], folder: Path) -> Ite
     VideoError
         If the process ends before the last frame.
     """
-    told, errors = folder / "settings.json", folder / "blender.log"
+    told = folder / "settings.json"
+    errors = folder / "blender.log"
     told.write_text(json.dumps({**settings, "folder": str(folder)}), encoding="utf-8")
-    place = {**os.environ, "TMPDIR": str(folder)}  # Blender leaves folders behind where temporary files go
+    # Blender leaves folders behind where temporary files go
+    place = {**os.environ, "TMPDIR": str(folder)}
     with (
-        importlib.resources.as_file(importlib.resources.files(__package__).joinpath("blender_process.py")) as path,
+        importlib.resources.as_file(
+            importlib.resources.files(__package__).joinpath("blender_process.py")
+        ) as path,
         errors.open("wb") as log,
-        subprocess.Popen([python, str(path), str(told)], stdout=subprocess.PIPE, stderr=log, env=place) as process,
+        subprocess.Popen(
+            [python, str(path), str(told)], stdout=subprocess.PIPE, stderr=log, env=place
+        ) as process,
     ):
         try:
             for number in range(settings["frames"]):
@@ -131,16 +158,14 @@ def _wait_for(number: int, process: subprocess.Popen, errors: Path) -> None:
     raise VideoError(f"Blender ended before frame {number} with status {process.wait()}: {reason}")
 
 
-# what the renderer's soft boxes give to diffuse surfaces, over what lights of their size and radiance would
-_DIFFUSE_SHARE = 0.13 * np.pi / 4
-
-
 def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
-    model, pose = source.model, source.pose(data)
+    model = source.model
+    pose = source.pose(data)
     if not pose.has_square_pixels(source.size[0] / source.size[1]):
         warn_caller(
-            "Cycles shows the camera with square pixels, which it has not; ripple-sim render without --renderer cycles "
+            "Cycles shows the camera with square pixels, which it has not; ripple-sim render "
+            "without --renderer cycles "
             "shows it as it is"
         )
     lighting = lighting_of(model, data, pose, source.lighting)
@@ -165,14 +190,15 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         "boxes_reflected": strength,
         "boxes_diffuse": _DIFFUSE_SHARE * strength if studio else 0.0,
         "boxes": [
-            {"azimuth": azimuth, "elevation": elevation, "half": [width, height], "radiance": list(radiance)}
+            {
+                "azimuth": azimuth,
+                "elevation": elevation,
+                "half": [width, height],
+                "radiance": list(radiance),
+            }
             for azimuth, elevation, width, height, radiance in SOFT_BOX_LIGHTS
         ],
     }
-
-
-SAMPLES = 64
-_OURS_ALONE = ("sound", "compare", "overlay", "passes", "resume", "transparent")
 
 
 def render_cycles(
@@ -202,19 +228,26 @@ def render_cycles(
     Raises
     ------
     RippleError
-        Before anything is simulated if bpy or usd-core is missing, an option is one of ours alone, or the output or
-        the scene is invalid; later if Blender fails or the video cannot be written.
+        Before anything is simulated if bpy or usd-core is missing, an option is one of ours alone,
+        or the output or the scene is invalid; later if Blender fails or the video cannot be
+        written.
     """
     adopt_warnings()
     output = Path(output)
     python = check_cycles(options, output, samples)
     options = settled(dataclasses.replace(options, overlay=()), scene, output)
     scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
-    frames, start = frame_count(options), time.perf_counter()
-    with open_video(output, options) as writer, tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
+    frames = frame_count(options)
+    start = time.perf_counter()
+    with (
+        open_video(output, options) as writer,
+        tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder,
+    ):
         stage = Path(folder) / "stage.usdc"
         simulation = Simulation.of(scene, options)
-        exported_as = ExportOptions(fps=options.fps or 1, slow_motion=options.slow_motion, size=options.size)
+        exported_as = ExportOptions(
+            fps=options.fps or 1, slow_motion=options.slow_motion, size=options.size
+        )
         source = scene_source(scene, simulation, exported_as)
         settings = blender_settings(source, simulation.data)
         with Exporter.of(source, stage) as exporter:
@@ -225,7 +258,11 @@ def render_cycles(
         exported = time.perf_counter()
         told = {**settings, "stage": str(stage), "frames": frames, "samples": samples}
         for frame in frames_of_cycles(python, told, Path(folder)):
-            coded = frame.astype(np.float16) if options.linear else np.rint(255 * tone_mapped(frame)).astype(np.uint8)
+            coded = (
+                frame.astype(np.float16)
+                if options.linear
+                else np.rint(255 * tone_mapped(frame)).astype(np.uint8)
+            )
             writer.write(coded)
             if progress is not None:
                 progress(writer.frames, frames)
@@ -239,9 +276,13 @@ def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) ->
     """
     for name in _OURS_ALONE:
         if getattr(options, name):
-            raise VideoError(f"the renderer cycles has no --{name}; leave it out, or render with --renderer gl")
+            raise VideoError(
+                f"the renderer cycles has no --{name}; leave it out, or render with --renderer gl"
+            )
     if not isinstance(samples, int) or not 1 <= samples <= 65536:
-        raise VideoError(f"there shall be {samples!r} samples; valid is a whole number from 1 to 65536")
+        raise VideoError(
+            f"there shall be {samples!r} samples; valid is a whole number from 1 to 65536"
+        )
     check_options(options, output)
     try:
         ending_of(Path("stage.usdc"))

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from .replace import MARK
 
-THREADS = 2  # fixed, since x264's output depends on it; small, since the renderer needs the processor too
+# fixed, since x264's output depends on it; small, since the renderer needs the processor too
+THREADS = 2
 SOUND_RATE = 48_000  # samples a second
 _AUDIO = {"mp4": "aac", "webm": "libopus"}  # by the container; 192 kbit/s
 _BLOCK = 960  # samples that are encoded together, 20 ms
@@ -38,7 +39,8 @@ class Codec:
     Attributes
     ----------
     container, name, pixel_format : str
-        FFmpeg's names. A YUV pixel format is converted with, and tagged as, ITU-R BT.709 of limited range.
+        FFmpeg's names. A YUV pixel format is converted with, and tagged as, ITU-R BT.709 of limited
+        range.
     options : dict
         Passed to the codec.
     """
@@ -49,11 +51,16 @@ class Codec:
     options: dict[str, str] = dataclasses.field(default_factory=dict)
 
 
-# What browsers play. mbtree reads beyond its arrays where a row is not a multiple of 8 macroblocks: the same frames
-# would then give another file every time.
-H264 = Codec("mp4", "libx264", "yuv420p", {"crf": "17", "preset": "veryfast", "x264-params": "mbtree=0"})
+# What browsers play. mbtree reads beyond its arrays where a row is not a multiple of 8 macroblocks:
+# the same frames would then give another file every time.
+H264 = Codec(
+    "mp4", "libx264", "yuv420p", {"crf": "17", "preset": "veryfast", "x264-params": "mbtree=0"}
+)
 VP9 = Codec(
-    "webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "5", "row-mt": "1"}
+    "webm",
+    "libvpx-vp9",
+    "yuv420p",
+    {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "5", "row-mt": "1"},
 )
 LOSSLESS = Codec("matroska", "libx264rgb", "rgb24", {"qp": "0", "preset": "ultrafast"})
 GIF = Codec("gif", "gif", "pal8")
@@ -68,13 +75,19 @@ class Clip:
         self._time_base = Fraction(1, stream.fps)
         self._frames = 0
         self._container = open_container(path, codec.container)
-        self._stream = self._container.add_stream(codec.name, rate=stream.fps, options=codec.options)
-        self._stream.width, self._stream.height, self._stream.pix_fmt = stream.width, stream.height, codec.pixel_format
+        self._stream = self._container.add_stream(
+            codec.name, rate=stream.fps, options=codec.options
+        )
+        self._stream.width = stream.width
+        self._stream.height = stream.height
+        self._stream.pix_fmt = codec.pixel_format
         context = self._stream.codec_context
         context.thread_count = THREADS
         if self._yuv:
-            context.color_primaries, context.color_trc = ColorPrimaries.BT709, ColorTrc.BT709
-            context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
+            context.color_primaries = ColorPrimaries.BT709
+            context.color_trc = ColorTrc.BT709
+            context.colorspace = Colorspace.ITU709
+            context.color_range = ColorRange.MPEG
 
     def write(self, frame: NDArray[np.uint8]) -> None:
         """Encode one frame, uint8 [height, width, 3]."""
@@ -83,8 +96,11 @@ class Clip:
     def encode(self, image: av.VideoFrame) -> None:
         """Encode one frame of FFmpeg's."""
         if self._yuv:
-            image = image.reformat(format=self._yuv, dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG)
-        image.pts, image.time_base = self._frames, self._time_base
+            image = image.reformat(
+                format=self._yuv, dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG
+            )
+        image.pts = self._frames
+        image.time_base = self._time_base
         self._frames += 1
         self._container.mux(self._stream.encode(image))
 
@@ -102,8 +118,8 @@ class Clip:
 
 def open_container(path: Path, container: str) -> Any:
     """Open a file for writing; the same content gives the same bytes."""
-    # bitexact: no random identifiers in Matroska and WebM. faststart: an MP4's index goes in front, so that playback
-    # starts before the file is loaded.
+    # bitexact: no random identifiers in Matroska and WebM. faststart: an MP4's index goes in front,
+    # so that playback starts before the file is loaded.
     options = {"fflags": "+bitexact", **({"movflags": "+faststart"} if container == "mp4" else {})}
     opened = av.open(str(path), "w", format=container, options=options)
     opened.metadata["comment"] = MARK
@@ -114,15 +130,23 @@ class _Track:
     """The sound of a file, encoded as far as its pictures are there."""
 
     def __init__(self, container: Any, name: str, sound: NDArray) -> None:
-        self._container, self._sound, self._done = container, sound.astype(np.float32), 0
-        self._stream = container.add_stream(_AUDIO[name], rate=SOUND_RATE, layout="mono", bit_rate=192_000)
+        self._container = container
+        self._sound = sound.astype(np.float32)
+        self._done = 0
+        self._stream = container.add_stream(
+            _AUDIO[name], rate=SOUND_RATE, layout="mono", bit_rate=192_000
+        )
 
     def encode(self, time: float) -> None:
         """Encode all up to a time [s]."""
         while self._done < min(time * SOUND_RATE, len(self._sound)):
             block = self._sound[None, self._done : self._done + _BLOCK]
-            frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(block), format="fltp", layout="mono")
-            frame.sample_rate, frame.pts, frame.time_base = SOUND_RATE, self._done, Fraction(1, SOUND_RATE)
+            frame = av.AudioFrame.from_ndarray(
+                np.ascontiguousarray(block), format="fltp", layout="mono"
+            )
+            frame.sample_rate = SOUND_RATE
+            frame.pts = self._done
+            frame.time_base = Fraction(1, SOUND_RATE)
             self._container.mux(self._stream.encode(frame))
             self._done += _BLOCK
 
@@ -133,7 +157,11 @@ class _Track:
 
 
 def join_clips(
-    clips: Sequence[tuple[Path, int]], path: Path, container: str, fps: int, sound: NDArray | None = None
+    clips: Sequence[tuple[Path, int]],
+    path: Path,
+    container: str,
+    fps: int,
+    sound: NDArray | None = None,
 ) -> None:
     """Concatenate clips into one file, and add the sound, if any.
 
@@ -165,8 +193,11 @@ def join_clips(
                     # exact frame numbers, whatever the container's time base
                     tick = packet.time_base
                     decoded = packet.pts if packet.dts is None else packet.dts
-                    packet.pts, packet.dts = (first + round(time * tick * fps) for time in (packet.pts, decoded))
-                    packet.time_base, packet.duration = Fraction(1, fps), 1
+                    packet.pts, packet.dts = (
+                        first + round(time * tick * fps) for time in (packet.pts, decoded)
+                    )
+                    packet.time_base = Fraction(1, fps)
+                    packet.duration = 1
                     packet.stream = target
                     output.mux_one(packet)
                     if track is not None:

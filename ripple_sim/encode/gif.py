@@ -1,7 +1,7 @@
 """Animated GIFs, whose memory does not grow with their length.
 
-A GIF has one palette for the whole animation, which depends on every frame. So the frames are first stored
-losslessly, and then read twice: to choose the colours, and to draw with them.
+A GIF has one palette for the whole animation, which depends on every frame. So the frames are first
+stored losslessly, and then read twice: to choose the colours, and to draw with them.
 """
 
 from __future__ import annotations
@@ -26,12 +26,15 @@ _PALETTE_USE = "dither=bayer:bayer_scale=4:diff_mode=rectangle"
 def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> None:
     """Make an endlessly looping GIF of clips, given with the number of each one's first frame."""
     graph = Graph()
-    frames, sink = _source(graph, stream), graph.add("buffersink")
+    frames = _source(graph, stream)
+    sink = graph.add("buffersink")
     graph.link_nodes(frames, graph.add("palettegen"), sink).configure()
     (palette,) = _filtered(_images(clips, stream.fps), frames, sink)
     graph = Graph()
-    frames, colours = _source(graph, stream), graph.add_buffer(palette, time_base=Fraction(1, stream.fps))
-    draw, sink = graph.add("paletteuse", _PALETTE_USE), graph.add("buffersink")
+    frames = _source(graph, stream)
+    colours = graph.add_buffer(palette, time_base=Fraction(1, stream.fps))
+    draw = graph.add("paletteuse", _PALETTE_USE)
+    sink = graph.add("buffersink")
     frames.link_to(draw, 0, 0)
     colours.link_to(draw, 0, 1)
     draw.link_to(sink)
@@ -46,8 +49,12 @@ def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> N
 
 
 def _source(graph: Graph, stream: Stream) -> Any:
-    width, height, form = stream.width, stream.height, av.VideoFormat("rgb24")
-    return graph.add_buffer(width=width, height=height, format=form, time_base=Fraction(1, stream.fps))
+    width = stream.width
+    height = stream.height
+    form = av.VideoFormat("rgb24")
+    return graph.add_buffer(
+        width=width, height=height, format=form, time_base=Fraction(1, stream.fps)
+    )
 
 
 def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFrame]:
@@ -55,7 +62,8 @@ def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFra
         with av.open(str(clip)) as container:
             for number, image in enumerate(container.decode(video=0)):
                 image = image.reformat(format="rgb24")
-                image.pts, image.time_base = first + number, Fraction(1, fps)
+                image.pts = first + number
+                image.time_base = Fraction(1, fps)
                 yield image
 
 
@@ -63,6 +71,7 @@ def _filtered(images: Iterable[av.VideoFrame], source: Any, sink: Any) -> Iterat
     """What comes out of a graph's sink, taken at once, while images go in at its source."""
     for image in itertools.chain(images, [None]):
         source.push(image)
-        with contextlib.suppress(av.BlockingIOError, av.EOFError):  # until it wants the next image, or is done
+        # until it wants the next image, or is done
+        with contextlib.suppress(av.BlockingIOError, av.EOFError):
             while True:
                 yield sink.pull()

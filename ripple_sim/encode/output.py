@@ -25,9 +25,26 @@ from .gif import join_gif
 from .replace import MARK, is_plain, made_here, png_mark
 from .webp import join_webp
 
-FRAMES_IN_CLIP = 48  # as many may be lost when a render is killed; each clip begins with a key frame
+# as many may be lost when a render is killed; each clip begins with a key frame
+FRAMES_IN_CLIP = 48
 
 Segments = Sequence[tuple[Path, int]]
+
+MIN_SIZE = 16
+MAX_SIZE = 8192
+MAX_FPS = 240
+_H264_BLOCKS = 139_264
+
+# browsers slow a GIF down to 10 frames per second if a frame lasts less than 0.02 s
+MAX_GIF_FPS = 50
+ENDINGS = (".mp4", ".webm", ".gif", ".webp")
+FRAME_FORMATS = ("png", "exr")
+_FRAME_PATTERN = re.compile(rf"frame_\d{{5,}}\.({'|'.join(FRAME_FORMATS)})")
+_SUBSAMPLED = (".mp4", ".webm")
+_WITH_OPACITY = (".webp", *FRAME_FORMATS)
+_VALID = (
+    f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of PNG or EXR frames"
+)
 
 
 def _still(write: Callable[[NDArray], None]) -> SimpleNamespace:
@@ -55,10 +72,11 @@ class Format:
     length : int
         Frames in a segment; the last one may have fewer.
     join : callable or None
-        Makes the video of all segments, given with the number of each one's first frame. None: their folder is the
-        video.
+        Makes the video of all segments, given with the number of each one's first frame. None:
+        their folder is the video.
     linear : bool
-        Whether frames are linear light, float16, colours multiplied by opacity; otherwise sRGB, uint8, not multiplied.
+        Whether frames are linear light, float16, colours multiplied by opacity; otherwise sRGB,
+        uint8, not multiplied.
     """
 
     suffix: str
@@ -68,12 +86,19 @@ class Format:
     linear: bool = False
 
 
-def _of_clips(suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream], None] | None = None) -> Format:
+def _of_clips(
+    suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream], None] | None = None
+) -> Format:
     return Format(
         suffix=suffix,
         start=lambda path, stream: Clip(path, codec, stream),
         length=FRAMES_IN_CLIP,
-        join=join or (lambda clips, path, stream: join_clips(clips, path, codec.container, stream.fps, stream.sound)),
+        join=join
+        or (
+            lambda clips, path, stream: join_clips(
+                clips, path, codec.container, stream.fps, stream.sound
+            )
+        ),
     )
 
 
@@ -84,39 +109,35 @@ FORMATS = {
     ".gif": _of_clips(".mkv", LOSSLESS, join_gif),
     ".webp": Format(
         suffix=".webp",
-        start=lambda path, stream: _by_pillow(path, format="WEBP", quality=88, method=3, xmp=MARK.encode()),
+        start=lambda path, stream: _by_pillow(
+            path, format="WEBP", quality=88, method=3, xmp=MARK.encode()
+        ),
         join=lambda stills, path, stream: join_webp([still for still, _ in stills], path, stream),
     ),
     "png": Format(
-        suffix=".png", start=lambda path, stream: _by_pillow(path, format="PNG", compress_level=3, pnginfo=png_mark())
+        suffix=".png",
+        start=lambda path, stream: _by_pillow(
+            path, format="PNG", compress_level=3, pnginfo=png_mark()
+        ),
     ),
     "exr": Format(
-        suffix=".exr", start=lambda path, stream: _still(lambda frame: write_exr(path, frame, stream.fps)), linear=True
+        suffix=".exr",
+        start=lambda path, stream: _still(lambda frame: write_exr(path, frame, stream.fps)),
+        linear=True,
     ),
 }
-
-
-MIN_SIZE, MAX_SIZE = 16, 8192
-MAX_FPS = 240
-_H264_BLOCKS = 139_264
-MAX_GIF_FPS = 50  # browsers slow a GIF down to 10 frames per second if a frame lasts less than 0.02 s
-
-ENDINGS = (".mp4", ".webm", ".gif", ".webp")
-FRAME_FORMATS = ("png", "exr")
-_FRAME_PATTERN = re.compile(rf"frame_\d{{5,}}\.({'|'.join(FRAME_FORMATS)})")
-_SUBSAMPLED = (".mp4", ".webm")
-_WITH_OPACITY = (".webp", *FRAME_FORMATS)
-_VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of PNG or EXR frames"
 
 
 def video_format(path: Path, frame_format: str = "png") -> str:
     """Format of an output path: one of `ENDINGS`, or for a folder the format of its frames.
 
-    Raises `VideoError` if the path is not a file name, has any other ending and is not a folder, or the frame format is
-    unknown.
+    Raises `VideoError` if the path is not a file name, has any other ending and is not a folder, or
+    the frame format is unknown.
     """
     if frame_format not in FRAME_FORMATS:
-        raise VideoError(f"frame format is {frame_format!r}; valid is {' or '.join(map(repr, FRAME_FORMATS))}")
+        raise VideoError(
+            f"frame format is {frame_format!r}; valid is {' or '.join(map(repr, FRAME_FORMATS))}"
+        )
     name = path.name
     if name in ("", "..") or name.lower() in ENDINGS:
         raise VideoError(f"output is {str(path)!r}, which is not a file name; {_VALID}")
@@ -149,10 +170,10 @@ def check_output(
     Raises
     ------
     VideoError
-        If the ending is unknown, the size or rate is out of range, the size is odd in a format of halved colour
-        resolution, the format supports no transparency or no overlays, EXR frames are not for a folder, there can be
-        no such name, or something that was not made here stands in the output's place. With `overwrite` such a file
-        or frames are no obstacle.
+        If the ending is unknown, the size or rate is out of range, the size is odd in a format of
+        halved colour resolution, the format supports no transparency or no overlays, EXR frames are
+        not for a folder, there can be no such name, or something that was not made here stands in
+        the output's place. With `overwrite` such a file or frames are no obstacle.
     EncodingError
         If the output cannot be written.
     """
@@ -160,12 +181,16 @@ def check_output(
     try:
         form = video_format(path, frame_format)
         if frame_format != "png" and form != frame_format:
-            raise VideoError(f"cannot write {frame_format.upper()} frames to {path}: name a folder, without an ending")
+            raise VideoError(
+                f"cannot write {frame_format.upper()} frames to {path}: name a folder, without an "
+                f"ending"
+            )
         if form == "exr":
             check_exr()
             if overlaid:
                 raise VideoError(
-                    "EXR frames are linear light, without overlays and comparisons; leave these out (--overlay '', and "
+                    "EXR frames are linear light, without overlays and comparisons; leave these "
+                    "out (--overlay '', and "
                     "no --compare), or write PNG frames"
                 )
         if transparent and form not in _WITH_OPACITY:
@@ -173,8 +198,10 @@ def check_output(
         check_size(width, height)
         if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
             raise VideoError(
-                f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at {_H264_BLOCKS} "
-                "blocks of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp or a folder of frames"
+                f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at "
+                f"{_H264_BLOCKS} "
+                "blocks of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp "
+                "or a folder of frames"
             )
         if form in _SUBSAMPLED and (width % 2 or height % 2):
             raise VideoError(
@@ -184,11 +211,15 @@ def check_output(
         highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
         if not isinstance(fps, int) or not 1 <= fps <= highest:
             what = "a GIF's frame rate" if form == ".gif" else "frame rate"
-            raise VideoError(f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second")
+            raise VideoError(
+                f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second"
+            )
         _check_place(path, form, overwrite)
     except OSError as error:
         kind = VideoError if error.errno in NO_NAME else EncodingError
-        raise kind(f"cannot write {path}: {error.strerror}; name a file in a folder you can write to") from error
+        raise kind(
+            f"cannot write {path}: {error.strerror}; name a file in a folder you can write to"
+        ) from error
 
 
 def check_size(width: int, height: int) -> None:
@@ -197,7 +228,10 @@ def check_size(width: int, height: int) -> None:
     Raises `VideoError` if a side is shorter than `MIN_SIZE` or longer than `MAX_SIZE`.
     """
     if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
-        raise VideoError(f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each side")
+        raise VideoError(
+            f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each "
+            f"side"
+        )
 
 
 def check_replaceable(path: Path, overwrite: bool) -> None:
@@ -206,20 +240,30 @@ def check_replaceable(path: Path, overwrite: bool) -> None:
     Raises
     ------
     VideoError
-        If it is, or holds, anything else; with `overwrite` anything but a file or files with the names of frames.
+        If it is, or holds, anything else; with `overwrite` anything but a file or files with the
+        names of frames.
     """
     if path.is_file():
         if not (overwrite or made_here(path)):
             raise VideoError(
-                f"cannot write {path}: it exists and was not {MARK}; name another file, or add --overwrite"
+                f"cannot write {path}: it exists and was not {MARK}; name another file, or add "
+                f"--overwrite"
             )
         return
-    strangers = [each.name for each in path.iterdir() if not (is_plain(each) and _FRAME_PATTERN.fullmatch(each.name))]
+    strangers = [
+        each.name
+        for each in path.iterdir()
+        if not (is_plain(each) and _FRAME_PATTERN.fullmatch(each.name))
+    ]
     if strangers:
-        raise VideoError(f"cannot write frames to {path}: it holds other files ({min(strangers)}); name a new folder")
+        raise VideoError(
+            f"cannot write frames to {path}: it holds other files ({min(strangers)}); name a new "
+            f"folder"
+        )
     if not overwrite and (others := [each.name for each in path.iterdir() if not made_here(each)]):
         raise VideoError(
-            f"cannot write frames to {path}: it holds frames that were not {MARK} ({min(others)}); name a new folder, "
+            f"cannot write frames to {path}: it holds frames that were not {MARK} ({min(others)}); "
+            f"name a new folder, "
             "or add --overwrite"
         )
 
@@ -230,12 +274,19 @@ def _check_place(path: Path, form: str, overwrite: bool) -> None:
         if is_file:
             raise VideoError(f"cannot write {path}: it is a folder; name a file")
         if path.is_symlink():  # which no finished folder can replace
-            raise VideoError(f"cannot write frames to {path}: it is a link; name the folder {final_path(path)}")
+            raise VideoError(
+                f"cannot write frames to {path}: it is a link; name the folder {final_path(path)}"
+            )
         check_replaceable(path, overwrite)
     elif path.exists():
         if not (is_file and path.is_file()):
-            raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
+            raise VideoError(
+                f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}"
+            )
         check_replaceable(final_path(path), overwrite)
-    # A link is written through. Permission bits do not tell the truth for root or on a read-only disk; a file does.
-    with tempfile.TemporaryFile(dir=next(each for each in final_path(path).parents if each.exists())):
+    # A link is written through. Permission bits do not tell the truth for root or on a read-only
+    # disk; a file does.
+    with tempfile.TemporaryFile(
+        dir=next(each for each in final_path(path).parents if each.exists())
+    ):
         pass

@@ -1,8 +1,8 @@
 """The folder of an unfinished video: complete segments only, from which a killed render continues.
 
-`clip.mp4.part` stands beside `clip.mp4` until that is complete. It holds `frames/`, the segments (a clip of some frames
-that plays, or an image per frame), `settings.json`, what the video is rendered with, and `states.txt`, fingerprints of
-the simulation against which a resumed render is checked.
+`clip.mp4.part` stands beside `clip.mp4` until that is complete. It holds `frames/`, the segments (a
+clip of some frames that plays, or an image per frame), `settings.json`, what the video is rendered
+with, and `states.txt`, fingerprints of the simulation against which a resumed render is checked.
 """
 
 from __future__ import annotations
@@ -20,11 +20,15 @@ from ripple_sim.errors import VideoError
 from .output import check_replaceable
 from .replace import MARK, is_plain, made_here, move, read_object
 
-SETTINGS, STATES = "settings.json", "states.txt"
-_FRAMES, _WHOLE = "frames", "whole"
-_STATE = re.compile(r"([0-9]{1,9}) ([0-9a-f]+);")  # the semicolon is missing where a killed process cut the line off
+SETTINGS = "settings.json"
+STATES = "states.txt"
+_FRAMES = "frames"
+_WHOLE = "whole"
+# the semicolon is missing where a killed process cut the line off
+_STATE = re.compile(r"([0-9]{1,9}) ([0-9a-f]+);")
 _SEGMENT = re.compile(r"frames?_(\d+)(?:-(\d+))?")
-Settings = Mapping[str, str | int | float]  # what decides the content of a file, by the names in messages
+# what decides the content of a file, by the names in messages
+Settings = Mapping[str, str | int | float]
 
 
 class Part:
@@ -48,7 +52,8 @@ class Part:
     Raises
     ------
     VideoError
-        If another process is writing this video, the folder holds anything else, or the settings there are others.
+        If another process is writing this video, the folder holds anything else, or the settings
+        there are others.
     OSError
         If the folder cannot be written.
 
@@ -63,17 +68,31 @@ class Part:
     """
 
     def __init__(
-        self, video: Path, suffix: str, length: int, settings: Settings, *, resume: bool, overwrite: bool
+        self,
+        video: Path,
+        suffix: str,
+        length: int,
+        settings: Settings,
+        *,
+        resume: bool,
+        overwrite: bool,
     ) -> None:
-        self.video, self._overwrite = video, overwrite
+        self.video = video
+        self._overwrite = overwrite
         self.folder = video.with_name(video.name + ".part")
-        self._suffix, self._length = suffix, length
+        self._suffix = suffix
+        self._length = length
         self._segments = self.folder / _FRAMES
-        self.unfinished, self.whole = self._segments / f".unfinished{suffix}", self.folder / _WHOLE
+        self.unfinished = self._segments / f".unfinished{suffix}"
+        self.whole = self.folder / _WHOLE
         if self.folder.is_symlink():
-            raise VideoError(f"cannot write {video}: its folder {self.folder.name} is a link; move it away")
+            raise VideoError(
+                f"cannot write {video}: its folder {self.folder.name} is a link; move it away"
+            )
         if self.folder.exists() and not self.folder.is_dir():
-            raise VideoError(f"cannot write {video}: {self.folder.name} beside it is no folder; move it away")
+            raise VideoError(
+                f"cannot write {video}: {self.folder.name} beside it is no folder; move it away"
+            )
         self.folder.mkdir(parents=True, exist_ok=True)
         self._lock = os.open(self.folder, os.O_RDONLY | os.O_NOFOLLOW)
         try:
@@ -83,17 +102,21 @@ class Part:
                 self._compare({MARK: True, **settings})
                 self._drop_unfinished()
             else:
-                (self.folder / SETTINGS).unlink(missing_ok=True)  # first: without it nothing is continued
+                # first: without it nothing is continued
+                (self.folder / SETTINGS).unlink(missing_ok=True)
                 for entry in self.folder.iterdir():
                     shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
                 self._segments.mkdir()
                 unfinished = self.folder / f".{SETTINGS}"
                 unfinished.write_text(json.dumps({MARK: True, **settings}, indent=1))
-                move(unfinished, self.folder / SETTINGS)  # last: while it is missing there is nothing to continue
+                # last: while it is missing there is nothing to continue
+                move(unfinished, self.folder / SETTINGS)
             states = self.folder / STATES
             lines = states.read_text(errors="replace").splitlines() if states.exists() else []
             # fingerprints of the simulation that were recorded, by frame
-            self._states = {int(line[1]): line[2] for line in map(_STATE.fullmatch, lines) if line is not None}
+            self._states = {
+                int(line[1]): line[2] for line in map(_STATE.fullmatch, lines) if line is not None
+            }
         except BaseException:
             os.close(self._lock)
             raise
@@ -101,14 +124,19 @@ class Part:
         self.frames = 0
         for path in sorted(self._segments.iterdir(), key=lambda path: (len(path.name), path.name)):
             numbers = _SEGMENT.fullmatch(path.stem)
-            if numbers is not None and int(numbers[1]) == self.frames:  # what comes after a gap is made again
+            # what comes after a gap is made again
+            if numbers is not None and int(numbers[1]) == self.frames:
                 self.segments.append((path, self.frames))
                 self.frames = int(numbers[2] or numbers[1]) + 1
 
     def store(self, frames: int) -> None:
         """Add the unfinished segment, of that many frames, to the complete ones."""
         first = self.frames
-        name = f"frame_{first:05d}" if self._length == 1 else f"frames_{first:05d}-{first + frames - 1:05d}"
+        name = (
+            f"frame_{first:05d}"
+            if self._length == 1
+            else f"frames_{first:05d}-{first + frames - 1:05d}"
+        )
         path = self._segments / (name + self._suffix)
         move(self.unfinished, path)
         self.segments.append((path, first))
@@ -122,10 +150,12 @@ class Part:
         if frame not in self._states:
             self._states[frame] = digest
             with (self.folder / STATES).open("a") as file:
-                file.write(f"\n{frame} {digest};\n")  # on a line of its own even if the last one was cut off
+                # on a line of its own even if the last one was cut off
+                file.write(f"\n{frame} {digest};\n")
         elif self._states[frame] != digest:
             raise VideoError(
-                f"cannot resume {self.video}: at frame {frame} the simulation is not in the state it was in before; a "
+                f"cannot resume {self.video}: at frame {frame} the simulation is not in the state "
+                f"it was in before; a "
                 "hook, a library or the processor has changed: leave --resume out to start again"
             )
 
@@ -162,12 +192,15 @@ class Part:
 
     def _compare(self, settings: Settings) -> None:
         """Raise `VideoError` naming the first setting in which the interrupted video differs."""
-        old, new = json.loads((self.folder / SETTINGS).read_text()), json.loads(json.dumps(settings))
+        old = json.loads((self.folder / SETTINGS).read_text())
+        new = json.loads(json.dumps(settings))
         for name in sorted({*old, *new}):
-            before, now = old.get(name), new.get(name)
+            before = old.get(name)
+            now = new.get(name)
             if before != now:
                 raise VideoError(
-                    f"cannot resume {self.video}: {name} was {before} and now is {now}; restore it, or leave --resume "
+                    f"cannot resume {self.video}: {name} was {before} and now is {now}; restore "
+                    f"it, or leave --resume "
                     "out to start again"
                 )
 
@@ -176,11 +209,13 @@ class Part:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise VideoError(
-                f"another process is writing {self.video}; wait until it is done, or name another file"
+                f"another process is writing {self.video}; wait until it is done, or name another "
+                f"file"
             ) from error
         if strangers := sorted(self._strangers()):
             raise VideoError(
-                f"cannot write {self.video}: its folder {self.folder.name} holds other files ({strangers[0]}); "
+                f"cannot write {self.video}: its folder {self.folder.name} holds other files "
+                f"({strangers[0]}); "
                 "move it away, or name another file"
             )
 
@@ -191,7 +226,9 @@ class Part:
             own = is_plain(entry) and entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE)
             if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():
                 for each in entry.iterdir():
-                    segment = _SEGMENT.fullmatch(each.stem) is not None and (ours or made_here(each))
+                    segment = _SEGMENT.fullmatch(each.stem) is not None and (
+                        ours or made_here(each)
+                    )
                     if not (is_plain(each) and (segment or each.name.startswith(".unfinished."))):
                         yield f"{_FRAMES}/{each.name}"
             elif not own or (entry.name == SETTINGS and not ours):

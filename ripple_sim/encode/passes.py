@@ -29,7 +29,8 @@ _CONTENTS = "segmentation.json"
 _NAME = re.compile(rf"passes_\d{{5,}}\.({'|'.join(PASS_FORMATS)})|{re.escape(_CONTENTS)}")
 
 
-_CHANNELS = {"normal": "XYZ", "position": "XYZ", "flow": "XY"}  # of an EXR; one channel has the pass's own name
+# of an EXR; one channel has the pass's own name
+_CHANNELS = {"normal": "XYZ", "position": "XYZ", "flow": "XY"}
 
 
 class PassFiles:
@@ -55,9 +56,17 @@ class PassFiles:
     """
 
     def __init__(
-        self, video: Path, form: str, geoms: Mapping[int, str], frames: int = 0, overwrite: bool = False
+        self,
+        video: Path,
+        form: str,
+        geoms: Mapping[int, str],
+        frames: int = 0,
+        overwrite: bool = False,
     ) -> None:
-        self._video, self._form, self._geoms, self._overwrite = video, form, geoms, overwrite
+        self._video = video
+        self._form = form
+        self._geoms = geoms
+        self._overwrite = overwrite
         self.folder = passes_folder(video)
         self.complete = 0
         while self.complete < frames and self._path(self.complete).exists():
@@ -66,13 +75,15 @@ class PassFiles:
     def begin(self) -> None:
         """Remove the passes of an earlier run, and say whose come now: before the first frame that has passes.
 
-        Raises `VideoError` if the folder has become another's since `check_passes`, and `EncodingError` if it cannot
-        be written.
+        Raises `VideoError` if the folder has become another's since `check_passes`, and
+        `EncodingError` if it cannot be written.
         """
         _check_folder(self._video, self._overwrite)  # again: to set up a scene takes long
         kept = {self._path(frame) for frame in range(self.complete)}
         owner = {"software": MARK, "video": final_path(self._video).name}
-        text = json.dumps({**owner, "geoms": {str(k): name for k, name in self._geoms.items()}}, indent=1)
+        text = json.dumps(
+            {**owner, "geoms": {str(k): name for k, name in self._geoms.items()}}, indent=1
+        )
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             for each in {*self.folder.iterdir()} - kept:
@@ -114,13 +125,15 @@ def passes_folder(video: Path) -> Path:
 def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: bool) -> None:
     """Make sure that passes can be written beside a video.
 
-    Raises `VideoError` if there is no such pass or format, OpenEXR is missing, or the folder holds the passes of
-    another video or anything that was not made here.
+    Raises `VideoError` if there is no such pass or format, OpenEXR is missing, or the folder holds
+    the passes of another video or anything that was not made here.
     """
     if unknown := [name for name in passes if name not in PASSES]:
         raise VideoError(f"there is no pass {unknown[0]!r}; valid are {', '.join(PASSES)}")
     if form not in PASS_FORMATS:
-        raise VideoError(f"pass format is {form!r}; valid is {' or '.join(map(repr, PASS_FORMATS))}")
+        raise VideoError(
+            f"pass format is {form!r}; valid is {' or '.join(map(repr, PASS_FORMATS))}"
+        )
     if form == "exr":
         check_exr()
     _check_folder(video, overwrite)
@@ -132,13 +145,17 @@ def _check_folder(video: Path, overwrite: bool) -> None:
 
     def own(file: Path) -> bool:
         unfinished = file.name.startswith(".")  # a kill left it, perhaps without its mark
-        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (unfinished or overwrite or made_here(file))
+        return _NAME.fullmatch(file.name.lstrip(".")) is not None and (
+            unfinished or overwrite or made_here(file)
+        )
 
     check_folder(VideoError, "passes", folder, own)
-    owner = read_object(folder / _CONTENTS).get("video")  # None: the folder does not say whose it is
+    # None: the folder does not say whose it is
+    owner = read_object(folder / _CONTENTS).get("video")
     if owner not in (None, final_path(video).name) and not overwrite:
         raise VideoError(
-            f"cannot write passes to {folder}: they are those of {owner}; name another output, or add --overwrite"
+            f"cannot write passes to {folder}: they are those of {owner}; name another output, or "
+            f"add --overwrite"
         )
 
 

@@ -13,8 +13,11 @@ from PIL.PngImagePlugin import PngInfo
 
 MARK = "made by ripple-sim"
 
-# Where the mark is in a file [bytes]. An MP4 has it behind its index, which grows with the length of the video.
-_HEAD, _INDEX, _TAIL = 1 << 16, 1 << 24, 1 << 10
+# Where the mark is in a file [bytes]. An MP4 has it behind its index, which grows with the length
+# of the video.
+_HEAD = 1 << 16
+_INDEX = 1 << 24
+_TAIL = 1 << 10
 
 
 def made_here(path: Path) -> bool:
@@ -39,7 +42,11 @@ def read_object(path: Path) -> dict[str, Any]:
     """What a JSON file says; nothing where it is missing, damaged, no plain file or no object."""
     try:
         found = json.loads(path.read_text()) if path.is_file() else None
-    except (OSError, ValueError, RecursionError):  # the last one of brackets in brackets without end
+    except (
+        OSError,
+        ValueError,
+        RecursionError,
+    ):  # the last one of brackets in brackets without end
         return {}
     return found if isinstance(found, dict) else {}
 
@@ -59,13 +66,18 @@ def mark_gif(path: Path) -> None:
         file.write(b"\x21\xfe" + bytes([len(text)]) + text + b"\x00\x3b")
 
 
-def check_folder(kind: type[Exception], what: str, folder: Path, own: Callable[[Path], object]) -> None:
+def check_folder(
+    kind: type[Exception], what: str, folder: Path, own: Callable[[Path], object]
+) -> None:
     """Raise an error of a kind if a folder, to which `what` is to be written, holds anything but files of our own."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise kind(f"cannot write {what} to {folder}: it is not a folder; name another output")
     for each in folder.iterdir() if folder.is_dir() else ():
         if not (is_plain(each) and own(each)):
-            raise kind(f"cannot write {what} to {folder}: it holds other files ({each.name}); name another output")
+            raise kind(
+                f"cannot write {what} to {folder}: it holds other files ({each.name}); name "
+                f"another output"
+            )
 
 
 def sync(path: Path) -> None:

@@ -1,7 +1,8 @@
 """Animated WebPs, assembled from still ones.
 
-The container is RIFF, see "WebP Container Specification" by Google: VP8X (size and flags), ANIM (background, loops),
-an ANMF chunk for each frame with the chunks of a still image, and XMP with the mark of this program.
+The container is RIFF, see "WebP Container Specification" by Google: VP8X (size and flags), ANIM
+(background, loops), an ANMF chunk for each frame with the chunks of a still image, and XMP with the
+mark of this program.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from pathlib import Path
 from .clip import Stream
 from .replace import MARK
 
-_ANIMATION, _METADATA, _OPACITY = 0x02, 0x04, 0x10
+_ANIMATION = 0x02
+_METADATA = 0x04
+_OPACITY = 0x10
 
 
 _DO_NOT_BLEND = 0x02
@@ -24,7 +27,8 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
     flags = _ANIMATION | _METADATA
     canvas = b"".join((side - 1).to_bytes(3, "little") for side in (stream.width, stream.height))
     with path.open("wb") as file:
-        file.write(bytes(12 + 8 + 10))  # RIFF and VP8X, which come last: they hold the size and the flags
+        # RIFF and VP8X, which come last: they hold the size and the flags
+        file.write(bytes(12 + 8 + 10))
         file.write(riff_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
         for number, still in enumerate(stills):
             # whole milliseconds, without accumulating the rounding error
@@ -32,7 +36,9 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
             image = _image_chunks(still.read_bytes())
             if image.startswith(b"ALPH") or (image.startswith(b"VP8L") and image[12] & 0x10):
                 flags |= _OPACITY
-            header = bytes(6) + canvas + (end - begin).to_bytes(3, "little") + bytes([_DO_NOT_BLEND])
+            header = (
+                bytes(6) + canvas + (end - begin).to_bytes(3, "little") + bytes([_DO_NOT_BLEND])
+            )
             file.write(riff_chunk(b"ANMF", header + image))
         file.write(riff_chunk(b"XMP ", MARK.encode()))
         size = file.tell()
@@ -43,7 +49,8 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
 
 def _image_chunks(still: bytes) -> bytes:
     """The chunks of a still WebP that make up its image."""
-    at, kept = 12, b""
+    at = 12
+    kept = b""
     while at < len(still):
         name, size = struct.unpack_from("<4sI", still, at)
         end = at + 8 + size + size % 2

@@ -24,15 +24,16 @@ from .clip import Stream
 from .output import FORMATS, Format, Segment, check_output, video_format
 from .part import Part, Settings
 
-# Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or 44 MB of EXR.
+# Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or
+# 44 MB of EXR.
 QUEUE_FRAMES = 8
 
 
 class FrameWriter:
     """Takes frames, stores them as segments of a `Part`, in a thread of its own, and joins these to the finished video.
 
-    Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it. A resumable writer
-    then keeps what is finished, unless the same exception would occur again.
+    Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it.
+    A resumable writer then keeps what is finished, unless the same exception would occur again.
 
     Attributes
     ----------
@@ -43,16 +44,29 @@ class FrameWriter:
     """
 
     def __init__(
-        self, part: Part, video: Format, stream: Stream, shape: tuple[int, int, int], *, resumable: bool
+        self,
+        part: Part,
+        video: Format,
+        stream: Stream,
+        shape: tuple[int, int, int],
+        *,
+        resumable: bool,
     ) -> None:
-        self.path, self.frames, self.encode_seconds = part.video, part.frames, 0.0
-        self._part, self._format, self._stream = part, video, stream
-        self._shape, self._resumable = shape, resumable
+        self.path = part.video
+        self.frames = part.frames
+        self.encode_seconds = 0.0
+        self._part = part
+        self._format = video
+        self._stream = stream
+        self._shape = shape
+        self._resumable = resumable
         self._type = np.dtype(np.float16 if video.linear else np.uint8)
-        self.sound: NDArray | None = None  # heard with the frames, if set before it is closed; see `Stream`
+        # heard with the frames, if set before it is closed; see `Stream`
+        self.sound: NDArray | None = None
         self._segment: Segment | None = None
         self._pending = 0  # frames of the segment
-        self._error: Exception | None = None  # what made encoding fail; frames after that are dropped
+        # what made encoding fail; frames after that are dropped
+        self._error: Exception | None = None
         self._abandoned = self._finished = False  # whether the video is given up, or in its place
         self._queue: queue.Queue[NDArray | None] = queue.Queue(QUEUE_FRAMES)
         self._thread = threading.Thread(target=self._run, name="video encoder", daemon=True)
@@ -75,7 +89,10 @@ class FrameWriter:
         if not self._thread.is_alive():
             raise VideoError(f"the video {self.path} is closed; open another writer")
         if frame.shape != self._shape or frame.dtype != self._type:
-            raise VideoError(f"frame is {frame.dtype} {list(frame.shape)}; valid is {self._type} {list(self._shape)}")
+            raise VideoError(
+                f"frame is {frame.dtype} {list(frame.shape)}; valid is {self._type} "
+                f"{list(self._shape)}"
+            )
         self._raise_error()
         self._queue.put(frame.copy())
         self.frames += 1
@@ -158,8 +175,8 @@ class FrameWriter:
     def _run(self) -> None:
         """Encode the frames of the queue, and after the last, at None, finish the video.
 
-        An error is kept instead of ending the thread: it must go on taking frames from the queue, or `write` would wait
-        for ever.
+        An error is kept instead of ending the thread: it must go on taking frames from the queue,
+        or `write` would wait for ever.
         """
         ended = False
         while not ended:
@@ -189,7 +206,8 @@ class FrameWriter:
         if self._segment is not None:
             self._segment.finish()
             self._part.store(self._pending)
-            self._segment, self._pending = None, 0
+            self._segment = None
+            self._pending = 0
 
     def _finish(self) -> None:
         self._store()
@@ -215,11 +233,12 @@ def open_writer(
 ) -> FrameWriter:
     """Start a video, or continue one; the ending of `path` chooses its format.
 
-    `.mp4` is H.264, `.webm` VP9, `.gif` and `.webp` are animated images; a name without ending becomes a folder of PNG
-    or EXR frames. Missing parent folders are created. Nothing appears at `path` before the video is complete; an
-    earlier file stays until then; one that was not written here is replaced only with `overwrite`. A link is written
-    through. Meanwhile the frames are in a folder beside it, `path` with `.part` appended, as
-    playable clips or as images. They join to the same video, bit for bit, however often the work was interrupted.
+    `.mp4` is H.264, `.webm` VP9, `.gif` and `.webp` are animated images; a name without ending
+    becomes a folder of PNG or EXR frames. Missing parent folders are created. Nothing appears at
+    `path` before the video is complete; an earlier file stays until then; one that was not written
+    here is replaced only with `overwrite`. A link is written through. Meanwhile the frames are in a
+    folder beside it, `path` with `.part` appended, as playable clips or as images. They join to the
+    same video, bit for bit, however often the work was interrupted.
 
     Parameters
     ----------
@@ -234,26 +253,45 @@ def open_writer(
     frame_format : str
         Of a folder's frames, "png" or "exr".
     settings : mapping, optional
-        Everything that decides the pixels, by name. With it, finished segments survive an interruption.
+        Everything that decides the pixels, by name. With it, finished segments survive an
+        interruption.
     resume : bool
-        Continue an interrupted writer of the same settings: the next frame to write is number `frames`.
+        Continue an interrupted writer of the same settings: the next frame to write is number
+        `frames`.
     overwrite : bool
         Replace an older file, or older frames, that were not written here.
 
     Raises
     ------
     VideoError
-        If `check_output` refuses the arguments, another process is writing this video, or, with `resume`, the
-        interrupted video has other settings.
+        If `check_output` refuses the arguments, another process is writing this video, or, with
+        `resume`, the interrupted video has other settings.
     EncodingError
         If the folder cannot be written.
     """
     path = Path(path)
-    check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format, overwrite=overwrite)
+    check_output(
+        path,
+        width,
+        height,
+        fps,
+        transparent=transparent,
+        frame_format=frame_format,
+        overwrite=overwrite,
+    )
     video = FORMATS[video_format(path, frame_format)]
     try:
-        part = Part(final_path(path), video.suffix, video.length, settings or {}, resume=resume, overwrite=overwrite)
+        part = Part(
+            final_path(path),
+            video.suffix,
+            video.length,
+            settings or {},
+            resume=resume,
+            overwrite=overwrite,
+        )
     except OSError as error:
         raise EncodingError(f"cannot write the video {path}: {error.strerror}") from error
     shape = (height, width, 4 if transparent else 3)
-    return FrameWriter(part, video, Stream(width, height, fps), shape, resumable=settings is not None)
+    return FrameWriter(
+        part, video, Stream(width, height, fps), shape, resumable=settings is not None
+    )

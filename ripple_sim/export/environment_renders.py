@@ -1,8 +1,9 @@
 """An environment's own `render` runs, and what it draws with draws the ripples.
 
-Environments add more than a camera: markers of goals, overlays, settings of their own. Two classes draw for nearly all
-of them, Gymnasium's `MujocoRenderer` and `mujoco.Renderer`. For as long as `RenderedInPlace.replacing` lasts, those of
-one model draw through `RippleRenderer`. Needs Gymnasium.
+Environments add more than a camera: markers of goals, overlays, settings of their own. Two classes
+draw for nearly all of them, Gymnasium's `MujocoRenderer` and `mujoco.Renderer`. For as long as
+`RenderedInPlace.replacing` lasts, those of one model draw through `RippleRenderer`. Needs
+Gymnasium.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ _MAX_GEOM = 10_000
 def depth_buffer(model: mujoco.MjModel, depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """What Gymnasium returns for depths [m]: MuJoCo's depth buffer, 0 at the near plane and 1 at the far one."""
     near, far = model.stat.extent * np.array([model.vis.map.znear, model.vis.map.zfar])
-    return np.clip((1 / near - 1 / depth.astype(np.float64)) / (1 / near - 1 / far), 0, 1).astype(np.float32)
+    return np.clip((1 / near - 1 / depth.astype(np.float64)) / (1 / near - 1 / far), 0, 1).astype(
+        np.float32
+    )
 
 
 def frames_of(renderer: RippleRenderer, mode: str) -> Any:
@@ -84,11 +87,15 @@ class RippleViewer(OffScreenViewer):
         """The scene that is drawn."""
         return self._renderer.scene
 
-    def render(self, render_mode: str | None, camera_id: int | None = None, segmentation: bool = False) -> Any:
+    def render(
+        self, render_mode: str | None, camera_id: int | None = None, segmentation: bool = False
+    ) -> Any:
         """Draw the present state of the data, as Gymnasium's viewer does."""
         if camera_id is not None:
             is_free = camera_id == -1
-            self.cam.type = mujoco.mjtCamera.mjCAMERA_FREE if is_free else mujoco.mjtCamera.mjCAMERA_FIXED
+            self.cam.type = (
+                mujoco.mjtCamera.mjCAMERA_FREE if is_free else mujoco.mjtCamera.mjCAMERA_FIXED
+            )
             self.cam.fixedcamid = camera_id
         self._renderer.update_scene(self.data, self.cam, self.vopt)
         for marker in self._markers:
@@ -104,7 +111,9 @@ class RippleViewer(OffScreenViewer):
         self._renderer.disable_segmentation_rendering()
         kinds_and_ids = identity[..., ::-1]  # Gymnasium has the type first
         depth = frames_of(self._renderer, "depth_array")
-        return {"rgb_array": kinds_and_ids, "depth_array": depth}.get(render_mode or "", (kinds_and_ids, depth))
+        return {"rgb_array": kinds_and_ids, "depth_array": depth}.get(
+            render_mode or "", (kinds_and_ids, depth)
+        )
 
     def make_context_current(self) -> None:
         """Do nothing: each call of our renderer enters its own context."""
@@ -134,7 +143,11 @@ class RenderedInPlace:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, ripples: Ripples, looks: ByGeom[str] | None, lighting: str = "model"
+        self,
+        model: mujoco.MjModel,
+        ripples: Ripples,
+        looks: ByGeom[str] | None,
+        lighting: str = "model",
     ) -> None:
         self._model = model
         self._ripples = ripples
@@ -150,7 +163,13 @@ class RenderedInPlace:
         kind = width, height, max_geom
         if kind not in self._renderers:
             self._renderers[kind] = RippleRenderer(
-                self._model, self._ripples, height, width, max_geom, looks=self._looks, lighting=self._lighting
+                self._model,
+                self._ripples,
+                height,
+                width,
+                max_geom,
+                looks=self._looks,
+                lighting=self._lighting,
             )
         return self._renderers[kind]
 
@@ -198,7 +217,11 @@ class RenderedInPlace:
 
     def scene(self, drawn_by: mujoco.Renderer) -> mujoco.MjvScene | None:
         """The scene that is drawn for a `mujoco.Renderer`; None if its `update_scene` was not called within."""
-        return self.renderer(drawn_by.width, drawn_by.height).scene if drawn_by in self._taken_in else None
+        return (
+            self.renderer(drawn_by.width, drawn_by.height).scene
+            if drawn_by in self._taken_in
+            else None
+        )
 
     def render(self, drawn_by: mujoco.Renderer, out: NDArray | None) -> NDArray:
         """Draw what a `mujoco.Renderer` would."""

@@ -29,11 +29,14 @@ from .options import MOST_TRIANGLES, ExportOptions
 from .place import Unfinished, check_export, check_options, check_written
 from .source import Source
 
+_HEIGHT = 420  # [pixels]
+
 
 class Exporter:
     """Writes a model and its rippling surfaces to a file, frame by frame.
 
-    Use it as a context manager: the file appears, complete, when the block is left; after an exception there is none.
+    Use it as a context manager: the file appears, complete, when the block is left; after an
+    exception there is none.
 
     Parameters
     ----------
@@ -46,9 +49,11 @@ class Exporter:
     fps : float
         Frames per second of the file.
     camera : str or CameraEntry, optional
-        Name of a camera in the MJCF, or what `[camera]` of a scene file says; by default MuJoCo's free camera.
+        Name of a camera in the MJCF, or what `[camera]` of a scene file says; by default MuJoCo's
+        free camera.
     looks : mapping, optional
-        Geom, by its name or id, to the look of its surface, one of `LOOKS`; rubber by default, see `RippleRenderer`.
+        Geom, by its name or id, to the look of its surface, one of `LOOKS`; rubber by default, see
+        `RippleRenderer`.
     lighting : str
         "model", "studio" or "auto", see `Renderer`.
     tessellation : str
@@ -58,7 +63,8 @@ class Exporter:
     size : (width, height)
         Of the frames that the camera is meant for [pixels].
     limit : bool
-        Whether heights that are too large for the object are written smaller, see `DisplacementLimit`.
+        Whether heights that are too large for the object are written smaller, see
+        `DisplacementLimit`.
     chunk : int, optional
         Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside it.
     overwrite : bool
@@ -67,8 +73,8 @@ class Exporter:
     Raises
     ------
     RippleError
-        If the ending is unknown or needs a package that is not installed, something foreign stands in the output's
-        place, the ripples belong to another model, or an argument is invalid.
+        If the ending is unknown or needs a package that is not installed, something foreign stands
+        in the output's place, the ripples belong to another model, or an argument is invalid.
 
     Attributes
     ----------
@@ -78,7 +84,10 @@ class Exporter:
     """
 
     @checked(
-        ExportError, output=PATH, fps=POSITIVE, ripples=instance(Ripples, ", for instance Ripples(model, materials)")
+        ExportError,
+        output=PATH,
+        fps=POSITIVE,
+        ripples=instance(Ripples, ", for instance Ripples(model, materials)"),
     )
     def __init__(
         self,
@@ -110,7 +119,10 @@ class Exporter:
             camera=camera_entry(model, camera),
             size=size,
             lighting=lighting,
-            paints={name: paint_of(model, geom, named.get(name)) for name, geom in ripples.geom_ids.items()},
+            paints={
+                name: paint_of(model, geom, named.get(name))
+                for name, geom in ripples.geom_ids.items()
+            },
             limited=dict.fromkeys(ripples, limit),
             tessellation=tessellation,
             triangles=triangles,
@@ -127,7 +139,9 @@ class Exporter:
         return exporter
 
     def _begin(self, source: Source, output: str | Path, overwrite: bool) -> None:
-        self.output, self.frames, self._source = Path(output), 0, source
+        self.output = Path(output)
+        self.frames = 0
+        self._source = source
         ending = check_export(self.output, overwrite, chunked=source.chunk > 0)
         with self._reported():
             self._place: Unfinished | None = Unfinished(self.output, ending.made_here, overwrite)
@@ -143,7 +157,8 @@ class Exporter:
         Parameters
         ----------
         data : mujoco.MjData
-            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos` are written.
+            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos`
+            are written.
         impulses : sequence of Impulse, optional
             All since the frame before; by default those of the latest step.
 
@@ -229,19 +244,21 @@ def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> Cam
     """
     if not isinstance(camera, CameraEntry):
         free = model.vis.global_
-        camera = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
+        camera = CameraEntry(
+            name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy
+        )
     check_camera(model, camera)
     return camera
-
-
-_HEIGHT = 420  # [pixels]
 
 
 def framed(page: Path, aspect: float) -> str:
     """A page as HTML to be shown within another, `aspect` times as wide as high."""
     source = html.escape(page.read_text(encoding="utf-8"), quote=True)
     size = f'width="{round(_HEIGHT * aspect)}" height="{_HEIGHT}"'
-    return f'<iframe srcdoc="{source}" {size} style="border: 0; max-width: 100%" allowfullscreen></iframe>'
+    return (
+        f'<iframe srcdoc="{source}" {size} style="border: 0; max-width: 100%" '
+        f"allowfullscreen></iframe>"
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -270,9 +287,10 @@ def export_scene(
 ) -> ExportSummary:
     """Simulate a scene and write it to the file of another program.
 
-    The same scene and options give the same numbers on the same machine. Memory does not grow with the duration. In
-    chunks, the complete ones stay in a folder beside the output, `output` with `.part` appended, if the export is
-    interrupted. Resumed, the simulation runs again up to there and is checked to be the same.
+    The same scene and options give the same numbers on the same machine. Memory does not grow with
+    the duration. In chunks, the complete ones stay in a folder beside the output, `output` with
+    `.part` appended, if the export is interrupted. Resumed, the simulation runs again up to there
+    and is checked to be the same.
 
     Parameters
     ----------
@@ -288,8 +306,8 @@ def export_scene(
     Raises
     ------
     RippleError
-        Before anything is simulated if the output, an option or the scene is invalid; later if the physics becomes
-        unstable or the file cannot be written.
+        Before anything is simulated if the output, an option or the scene is invalid; later if the
+        physics becomes unstable or the file cannot be written.
     """
     adopt_warnings()
     check_options(options)
@@ -297,7 +315,9 @@ def export_scene(
     frames = frame_count(options, scene)
     simulation = Simulation.of(scene, options, on_step=on_step)
     if options.signals and not scene.sensors:
-        raise ExportError(f"scene {scene.name!r} has no sensors; add a [[sensor]], or leave out --signals")
+        raise ExportError(
+            f"scene {scene.name!r} has no sensors; add a [[sensor]], or leave out --signals"
+        )
     simulated = written = 0.0
     source = scene_source(scene, simulation, options)
     if options.chunk is not None:
@@ -312,7 +332,11 @@ def export_scene(
             **origin(scene, options),
         }
         source = dataclasses.replace(
-            source, chunk=options.chunk, output=Path(output), settings=settings, resume=options.resume
+            source,
+            chunk=options.chunk,
+            output=Path(output),
+            settings=settings,
+            resume=options.resume,
         )
     with Exporter.of(source, output, options.overwrite) as exporter:
         for number in range(frames):
@@ -321,7 +345,8 @@ def export_scene(
                 simulation.advance_frame()
             done = time.perf_counter()
             exporter.write(simulation.data, simulation.impulses)
-            simulated, written = simulated + done - start, written + time.perf_counter() - done
+            simulated = simulated + done - start
+            written = written + time.perf_counter() - done
             if progress is not None:
                 progress(number + 1, frames)
     return ExportSummary(Path(output), frames, simulated, written)

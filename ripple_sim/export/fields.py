@@ -20,7 +20,13 @@ from .source import Source, Writer
 from .tables import COLUMNS, rows
 
 CHUNK = 16  # entries that are kept in memory, and lie in one chunk
-_METADATA, _CHUNK_NAME = (".zgroup", ".zattrs", ".zarray", ".zmetadata"), re.compile(r"\d+(\.\d+)*")
+_METADATA = (".zgroup", ".zattrs", ".zarray", ".zmetadata")
+_CHUNK_NAME = re.compile(r"\d+(\.\d+)*")
+
+_IMPULSES = 4096  # in one chunk
+
+# of the columns of impulses in NumPy
+DTYPES = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}
 
 
 class Store:
@@ -35,7 +41,9 @@ class Store:
         self._growing: dict[str, Any] = {}
         self._waiting: dict[str, list[NDArray]] = {}
 
-    def fixed(self, name: str, dimensions: list[str], values: NDArray, unit: str = "", text: str = "") -> None:
+    def fixed(
+        self, name: str, dimensions: list[str], values: NDArray, unit: str = "", text: str = ""
+    ) -> None:
         """Write an array as a whole; `text` says what it is."""
         array = self._group.create_array(
             name, shape=values.shape, dtype=values.dtype, chunks=values.shape, fill_value=None
@@ -58,13 +66,18 @@ class Store:
         if name in self._group:
             del self._group[name]
         array = self._group.create_array(
-            name, shape=(before, *like.shape), dtype=like.dtype, chunks=(chunk, *like.shape), fill_value=None
+            name,
+            shape=(before, *like.shape),
+            dtype=like.dtype,
+            chunks=(chunk, *like.shape),
+            fill_value=None,
         )
         for first in range(0, before, chunk):
             last = min(first + chunk, before)
             array[first:last] = np.broadcast_to(like, (last - first, *like.shape))
         array.attrs.update(_attributes(dimensions, unit, text))
-        self._growing[name], self._waiting[name] = array, []
+        self._growing[name] = array
+        self._waiting[name] = []
         return array
 
     def add(self, name: str, value: ArrayLike) -> None:
@@ -91,42 +104,59 @@ class Store:
 def made_here(path: Path) -> bool:
     """Whether a folder is a store from here, with nothing else in it."""
     return read_object(path / ".zattrs").get("software") == MARK and all(
-        not each.is_symlink() and (each.is_dir() or each.name in _METADATA or _CHUNK_NAME.fullmatch(each.name))
+        not each.is_symlink()
+        and (each.is_dir() or each.name in _METADATA or _CHUNK_NAME.fullmatch(each.name))
         for each in path.rglob("*")
     )
 
 
 def _attributes(dimensions: list[str], unit: str, text: str) -> Mapping[str, Any]:
     attributes: dict[str, Any] = {"_ARRAY_DIMENSIONS": dimensions}
-    return {**attributes, **({"units": unit} if unit else {}), **({"long_name": text} if text else {})}
-
-
-_IMPULSES = 4096  # in one chunk
-DTYPES = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}  # of the columns of impulses in NumPy
+    return {
+        **attributes,
+        **({"units": unit} if unit else {}),
+        **({"long_name": text} if text else {}),
+    }
 
 
 class FieldWriter(Writer):
     """Writes heights, velocities, energies, poses and impulses to a Zarr store, with units and coordinates.
 
-    Variables of a target end in its name: `height_duck` has the dimensions time, chart_duck, row_duck and column_duck.
-    The places of texels have no time, but for surfaces that move.
+    Variables of a target end in its name: `height_duck` has the dimensions time, chart_duck,
+    row_duck and column_duck. The places of texels have no time, but for surfaces that move.
     """
 
     def __init__(self, source: Source, path: Path) -> None:
         self._source = source
-        self._store = store = Store(path, {"software": MARK, "fps": source.fps, "slow_motion": source.slow_motion})
+        self._store = store = Store(
+            path, {"software": MARK, "fps": source.fps, "slow_motion": source.slow_motion}
+        )
         model = source.model
-        store.fixed("body", ["body"], np.array([model.body(i).name or f"body {i}" for i in range(model.nbody)]))
+        store.fixed(
+            "body",
+            ["body"],
+            np.array([model.body(i).name or f"body {i}" for i in range(model.nbody)]),
+        )
         store.fixed("axis", ["axis"], np.array(["x", "y", "z"]))
         store.fixed("component", ["component"], np.array(["w", "x", "y", "z"]))
         store.grow("time", ["time"], np.zeros(()), "s", "time of the simulation")
-        places, turns = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 4))
-        store.grow("position", ["time", "body", "axis"], places, "m", "position of bodies in the world")
+        places = np.zeros((model.nbody, 3))
+        turns = np.zeros((model.nbody, 4))
+        store.grow(
+            "position", ["time", "body", "axis"], places, "m", "position of bodies in the world"
+        )
         store.grow("orientation", ["time", "body", "component"], turns, "1", "quaternion of bodies")
         self._targets = {name: _TargetFields(source, name, store) for name in source.ripples}
         for column, (unit, kind) in COLUMNS.items():
             one = np.zeros((), DTYPES[kind])
-            store.grow(f"impulse_{column}", ["impulse"], one, unit, f"{column} of an impulse", chunk=_IMPULSES)
+            store.grow(
+                f"impulse_{column}",
+                ["impulse"],
+                one,
+                unit,
+                f"{column} of an impulse",
+                chunk=_IMPULSES,
+            )
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame."""
@@ -144,10 +174,16 @@ class FieldWriter(Writer):
     def finish(self) -> None:
         """Complete the store, with the samples of sensors."""
         for name, sensor in self._source.sensors.items():
-            suffix, unit = re.sub(r"\W", "_", name), UNITS[sensor.kind]
-            time, point = f"time_{suffix}", f"point_{suffix}"
-            self._store.fixed(time, [time], sensor.times, "s", f"time of the samples of sensor {name}")
-            self._store.fixed(f"sensor_{suffix}", [time, point], sensor.samples, unit, f"{sensor.kind} at {name}")
+            suffix = re.sub(r"\W", "_", name)
+            unit = UNITS[sensor.kind]
+            time = f"time_{suffix}"
+            point = f"point_{suffix}"
+            self._store.fixed(
+                time, [time], sensor.times, "s", f"time of the samples of sensor {name}"
+            )
+            self._store.fixed(
+                f"sensor_{suffix}", [time, point], sensor.samples, unit, f"{sensor.kind} at {name}"
+            )
         self._store.finish()
 
 
@@ -155,10 +191,14 @@ class _TargetFields:
     """The variables of a target."""
 
     def __init__(self, source: Source, name: str, store: Store) -> None:
-        self._waves, self._store, self._suffix = source.ripples[name], store, re.sub(r"\W", "_", name)
+        self._waves = source.ripples[name]
+        self._store = store
+        self._suffix = re.sub(r"\W", "_", name)
         self._dimensions = [f"{each}_{self._suffix}" for each in ("chart", "row", "column")]
         self._ride: SurfaceRide | None = None
-        over_time, rest, suffix = ["time", *self._dimensions], self._waves.rest, self._suffix
+        over_time = ["time", *self._dimensions]
+        rest = self._waves.rest
+        suffix = self._suffix
         for axis, each in enumerate("xyz"):
             text = f"{each} of texels, geom's frame"
             store.fixed(f"{each}_{suffix}", self._dimensions, rest.positions[..., axis], "m", text)
@@ -166,19 +206,30 @@ class _TargetFields:
         one = np.zeros(rest.areas.shape, np.float32)
         store.grow(f"height_{suffix}", over_time, one, "m", "displacement along the outward normal")
         store.grow(f"velocity_{suffix}", over_time, one, "m/s", "rate of the height")
-        store.grow(f"energy_{suffix}", ["time"], np.zeros(()), "J", "kinetic plus potential energy of the waves")
+        store.grow(
+            f"energy_{suffix}",
+            ["time"],
+            np.zeros(()),
+            "J",
+            "kinetic plus potential energy of the waves",
+        )
 
     def write(self, V: NDArray[np.float64] | None, number: int) -> None:
         """Add the frame of a number, with the vertices of the mesh at V [m], or at rest."""
-        waves, suffix = self._waves, self._suffix
+        waves = self._waves
+        suffix = self._suffix
         self._store.add(f"height_{suffix}", waves.height)
         self._store.add(f"velocity_{suffix}", waves.velocity)
         self._store.add(f"energy_{suffix}", waves.energy())
         if V is not None and self._ride is None:
             self._ride = SurfaceRide(waves.rest)
-            for axis, each in enumerate("xyz"):  # the places get a time: at rest in the frames so far
-                rest, text = waves.rest.positions[..., axis], f"{each} of texels, geom's frame; the world's if soft"
-                self._store.grow(f"{each}_{suffix}", ["time", *self._dimensions], rest, "m", text, before=number)
+            # the places get a time: at rest in the frames so far
+            for axis, each in enumerate("xyz"):
+                rest = waves.rest.positions[..., axis]
+                text = f"{each} of texels, geom's frame; the world's if soft"
+                self._store.grow(
+                    f"{each}_{suffix}", ["time", *self._dimensions], rest, "m", text, before=number
+                )
         if self._ride is not None:
             positions, _ = self._ride.positions(waves.rest.mesh.V if V is None else V)
             for axis, each in enumerate("xyz"):

@@ -45,16 +45,17 @@ class Displaced(NamedTuple):
 class MovingMesh:
     """The surface of an atlas, displaced as the renderer displaces it.
 
-    A point lies at its place on the mesh plus its height times the smooth normal there; heights are interpolated
-    between the texels by the quadratic B-spline. Its normal is tipped against the gradient of the height, to first
-    order in the height. Creases stay sharp: a vertex has a point for each of its normals.
+    A point lies at its place on the mesh plus its height times the smooth normal there; heights are
+    interpolated between the texels by the quadratic B-spline. Its normal is tipped against the
+    gradient of the height, to first order in the height. Creases stay sharp: a vertex has a point
+    for each of its normals.
 
     Parameters
     ----------
     atlas : Atlas
     tessellation : str
-        One of `TESSELLATIONS`: the mesh's "own" triangles, or "refined" until no edge is longer than a mean texel, and
-        round in outline.
+        One of `TESSELLATIONS`: the mesh's "own" triangles, or "refined" until no edge is longer
+        than a mean texel, and round in outline.
     limit : bool
         Whether heights that are too large for the object are bent, see `DisplacementLimit`.
     triangles : int
@@ -71,25 +72,42 @@ class MovingMesh:
     """
 
     def __init__(
-        self, atlas: Atlas, tessellation: str = "refined", limit: bool = True, triangles: int = MOST_TRIANGLES
+        self,
+        atlas: Atlas,
+        tessellation: str = "refined",
+        limit: bool = True,
+        triangles: int = MOST_TRIANGLES,
     ) -> None:
-        mesh, smooth = atlas.mesh, smooth_normals(atlas.mesh.V, atlas.mesh.F)
+        mesh = atlas.mesh
+        smooth = smooth_normals(atlas.mesh.V, atlas.mesh.F)
         if tessellation == "own":  # vertices are split at creases
             each, self.F, normals, _, _ = split_corners(mesh.V, mesh.F)
-            self.uv, points, directions = mesh.corner_uv, mesh.V[each], smooth[each]
+            self.uv = mesh.corner_uv
+            points = mesh.V[each]
+            directions = smooth[each]
             chart, row, column = (place[each] for place in atlas.locate(mesh.V))
         else:  # as the renderer makes them, of about the size of texels
-            charts, length = Charts.of(atlas), float(np.sqrt(atlas.areas.mean()))
+            charts = Charts.of(atlas)
+            length = float(np.sqrt(atlas.areas.mean()))
             F, attributes, same = tessellated(
-                mesh, charts, smooth=smooth, max_length=length, max_faces=triangles, corner_uv=mesh.corner_uv
+                mesh,
+                charts,
+                smooth=smooth,
+                max_length=length,
+                max_faces=triangles,
+                corner_uv=mesh.corner_uv,
             )
             # vertices that differ in their texture coordinates or charts alone become one
             _, first, point = np.unique(same, return_index=True, return_inverse=True)
-            self.F, self.uv = point.ravel()[F], None if mesh.corner_uv is None else attributes[F][:, :, UV]
+            self.F = point.ravel()[F]
+            self.uv = None if mesh.corner_uv is None else attributes[F][:, :, UV]
             vertices = attributes[first]
-            points, directions, normals = (vertices[:, part] for part in (POSITION, DIRECTION, NORMAL))
+            points, directions, normals = (
+                vertices[:, part] for part in (POSITION, DIRECTION, NORMAL)
+            )
             chart, row, column = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
-        self.rest, self.directions = points.astype(np.float32), normalized(directions).astype(np.float32)
+        self.rest = points.astype(np.float32)
+        self.directions = normalized(directions).astype(np.float32)
         self._normals = normalized(normals).astype(np.float32)
         self._texels, self._offsets = spline_samples(chart, row, column, atlas.resolution)
         self._height_map = HeightMap.drawn(atlas, limit)
@@ -98,26 +116,33 @@ class MovingMesh:
     @functools.cached_property
     def vertices(self) -> MovingVertices:
         """The points as they ride on the mesh's own vertices."""
-        return MovingVertices(self._atlas.mesh.V, self._atlas.mesh.F, self.rest, self.directions, self._normals)
+        return MovingVertices(
+            self._atlas.mesh.V, self._atlas.mesh.F, self.rest, self.directions, self._normals
+        )
 
     @functools.cached_property
     def _gradients(self) -> MovedGradients:
         return MovedGradients(self._atlas)
 
     def shape(
-        self, height: NDArray[np.float32], velocity: NDArray[np.float32], V: NDArray[np.float64] | None = None
+        self,
+        height: NDArray[np.float32],
+        velocity: NDArray[np.float32],
+        V: NDArray[np.float64] | None = None,
     ) -> Displaced:
         """The surface under waves of a height [m] and a velocity [m/s], float32 [C, n, n] both.
 
-        With the vertices of its mesh at V [vertex_count, 3] [m], where they have moved; velocities are those of the
-        waves alone.
+        With the vertices of its mesh at V [vertex_count, 3] [m], where they have moved; velocities
+        are those of the waves alone.
         """
         points, normals, velocities = (np.empty_like(self.rest) for _ in range(3))
         shape = Displaced(points, normals, velocities, np.empty(len(self.rest), np.float32))
-        height_map, rates = self._height_map(height), self._height_map.rates(height, velocity)
+        height_map = self._height_map(height)
+        rates = self._height_map.rates(height, velocity)
         still = self.rest, self.directions, self._normals
         if V is not None:
-            still, height_map = self.vertices(V), self._gradients(height_map, V)
+            still = self.vertices(V)
+            height_map = self._gradients(height_map, V)
         _displace(height_map, rates, *still, self._texels, self._offsets, shape)
         return shape
 
@@ -135,17 +160,20 @@ def _displace(
 ) -> None:
     """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2].
 
-    The surface without waves has its points `still`, directions and normals `upright`, [n, 3]. `texels` [n, 3] are the
-    first of 3 x 3 (chart, row, column) on charts with halo, `offsets` [n, 2] are from the middle one [texels].
+    The surface without waves has its points `still`, directions and normals `upright`, [n, 3].
+    `texels` [n, 3] are the first of 3 x 3 (chart, row, column) on charts with halo, `offsets` [n,
+    2] are from the middle one [texels].
     """
     points, normals, velocities, heights = shape
     for i in range(len(points)):
         chart, row, column = texels[i]
-        down, across = spline_weights(offsets[i, 0]), spline_weights(offsets[i, 1])
+        down = spline_weights(offsets[i, 0])
+        across = spline_weights(offsets[i, 1])
         gx = gy = gz = h = v = np.float32(0)
         for j in range(3):
             for k in range(3):
-                weight, texel = down[j] * across[k], height_map[chart, row + j, column + k]
+                weight = down[j] * across[k]
+                texel = height_map[chart, row + j, column + k]
                 gx += weight * texel[0]
                 gy += weight * texel[1]
                 gz += weight * texel[2]
@@ -155,6 +183,10 @@ def _displace(
         for k in range(3):
             points[i, k] = still[i, k] + h * directions[i, k]
             velocities[i, k] = v * directions[i, k]
-        x, y, z = upright[i, 0] - gx, upright[i, 1] - gy, upright[i, 2] - gz
+        x = upright[i, 0] - gx
+        y = upright[i, 1] - gy
+        z = upright[i, 2] - gz
         scale = 1 / np.sqrt(x * x + y * y + z * z)
-        normals[i, 0], normals[i, 1], normals[i, 2] = x * scale, y * scale, z * scale
+        normals[i, 0] = x * scale
+        normals[i, 1] = y * scale
+        normals[i, 2] = z * scale

@@ -1,9 +1,9 @@
 """`PageWriter`: a run as one self-contained page, which plays in any browser and inside a notebook.
 
-What stays the same over time, meshes, looks, textures, camera and light, is written once. Heights and moving vertices
-are predicted from earlier ones and the frame before, and deflated. Triangles and vertices come in an order in which
-neighbours are close together: drawing then computes a vertex about once and not once for each of its triangles, and
-heights are predicted well from earlier ones.
+What stays the same over time, meshes, looks, textures, camera and light, is written once. Heights
+and moving vertices are predicted from earlier ones and the frame before, and deflated. Triangles
+and vertices come in an order in which neighbours are close together: drawing then computes a vertex
+about once and not once for each of its triangles, and heights are predicted well from earlier ones.
 """
 
 from __future__ import annotations
@@ -39,8 +39,35 @@ from .visuals import Finish, Solid, mean_color, solids, target_finish
 
 __all__ = ["PageWriter", "made_here"]
 
-_TRIANGLES, _SEGMENTS = 16_000, 6  # of a target, and of a primitive to a right angle
+# of a target, and of a primitive to a right angle
+_TRIANGLES = 16_000
+_SEGMENTS = 6
 _LARGEST_IMAGE = 1024  # [pixels]
+
+_LARGEST = 1 << 20
+_STEP = 5e-5  # of heights, in sizes of the object
+_PLACE_STEP = 2e-5  # of moving vertices, in sizes of the mesh
+_CHUNK = 16  # frames that are decoded together
+_SCRIPTS = (
+    *(
+        "algebra.js",
+        "decode.js",
+        "motion.js",
+        "light_shaders.js",
+        "shaders.js",
+        "environment.js",
+        "light.js",
+    ),
+    *(
+        "programs.js",
+        "parts.js",
+        "groups.js",
+        "lit_points.js",
+        "floor.js",
+        "drawing.js",
+        "player.js",
+    ),
+)
 
 
 class PagePart(NamedTuple):
@@ -54,7 +81,8 @@ class PagePart(NamedTuple):
 
 def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
     """A target at rest; its points follow along `directions`, and with its mesh's own vertices."""
-    model, geom = source.model, source.ripples.geom_ids[name]
+    model = source.model
+    geom = source.ripples.geom_ids[name]
     finish, uv = target_finish(source, name, mesh)
     soft = is_soft(model, geom)  # and so in the world
     meta = {
@@ -93,7 +121,11 @@ def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         {
             # in the camera's frame where the lamp turns with it
             "direction": light.direction.tolist(),
-            "head": bool(not studio and np.allclose(light.direction, pose.rotation[:, 2]) and light.position is None),
+            "head": bool(
+                not studio
+                and np.allclose(light.direction, pose.rotation[:, 2])
+                and light.position is None
+            ),
             "radiance": light.radiance.tolist(),
             "position": None if light.position is None else light.position.tolist(),
             "size": light.size,
@@ -125,20 +157,30 @@ def _solid_part(solid: Solid) -> PagePart:
     return _part(meta, solid.finish, solid.F, [solid.points, solid.normals], solid.uv)
 
 
-def _part(meta: dict[str, Any], finish: Finish, F: NDArray, fields: list[NDArray], uv: NDArray | None) -> PagePart:
+def _part(
+    meta: dict[str, Any], finish: Finish, F: NDArray, fields: list[NDArray], uv: NDArray | None
+) -> PagePart:
     """Points and directions in 16 bits each, triangles, and texture coordinates of their corners."""
     names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
     values = {name: float(getattr(finish.look, name)) for name in names}
-    look = {"color": finish.color.tolist(), "opacity": finish.opacity, "texture": finish.texture, **values}
+    look = {
+        "color": finish.color.tolist(),
+        "opacity": finish.opacity,
+        "texture": finish.texture,
+        **values,
+    }
     F, vertices, triangles = memory_order(F, fields[0])
     points, directions = (np.asarray(field, np.float64)[vertices] for field in fields)
-    low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-9)
+    low = points.min(axis=0)
+    size = max(float(np.ptp(points, axis=0).max()), 1e-9)
     place = np.rint((points - low) / size * 65535).astype("<u2")
     arrays = [place, np.rint(directions * 32767).astype("<i2"), F.astype("<u4")]
     if uv is not None:
         arrays.append(np.asarray(uv, "<f4")[triangles])
     counts = {"points": len(points), "triangles": len(F), "textured": uv is not None}
-    return PagePart({**meta, **look, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices)
+    return PagePart(
+        {**meta, **look, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices
+    )
 
 
 def _data_uri(model: mujoco.MjModel, texture: int) -> str:
@@ -150,14 +192,11 @@ def _data_uri(model: mujoco.MjModel, texture: int) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
-_LARGEST = 1 << 20
-
-
 def parents_of(F: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Two earlier vertices from which each vertex is predicted, [count, 2]; -1 without.
 
-    They are the other two of the first triangle in which it is the last, or else twice the first of the first triangle
-    in which it is the second. decode.js finds the same ones.
+    They are the other two of the first triangle in which it is the last, or else twice the first of
+    the first triangle in which it is the second. decode.js finds the same ones.
     """
     ordered = np.sort(F, axis=1)
     parents = np.full((count, 2), -1)
@@ -172,7 +211,9 @@ def quantised(heights: NDArray[np.float32], step: float) -> NDArray[np.int64]:
     return np.clip(np.rint(heights / step), -_LARGEST, _LARGEST).astype(np.int64)
 
 
-def residuals(now: NDArray[np.int64], before: NDArray[np.int64], parents: NDArray[np.int64]) -> bytes:
+def residuals(
+    now: NDArray[np.int64], before: NDArray[np.int64], parents: NDArray[np.int64]
+) -> bytes:
     """What is left of the steps [n] since the frame before after prediction: low bytes of all, then high bytes."""
     change = np.append(now - before, 0)  # -1: no parent, no change
     left = change[:-1] - (change[parents[:, 0]] + change[parents[:, 1]] >> 1)
@@ -186,24 +227,24 @@ def packed(content: bytes) -> str:
     return base64.b64encode(zlib.compress(content, 9)).decode()
 
 
-_STEP = 5e-5  # of heights, in sizes of the object
-_PLACE_STEP = 2e-5  # of moving vertices, in sizes of the mesh
-
-
 class PageTarget:
     """A target: its part of the page, and over time its heights and the vertices of its own mesh.
 
-    The part's finer surface follows that mesh, of which nothing is written while it rests. `step` is that of heights.
+    The part's finer surface follows that mesh, of which nothing is written while it rests. `step`
+    is that of heights.
     """
 
     def __init__(self, source: Source, name: str) -> None:
         self._waves = source.ripples[name]
-        self._surface = MovingMesh(self._waves.rest, source.tessellation, source.limited[name], _TRIANGLES)
+        self._surface = MovingMesh(
+            self._waves.rest, source.tessellation, source.limited[name], _TRIANGLES
+        )
         self.part = target_part(source, name, self._surface)
         self.step = _STEP * float(np.ptp(self._surface.rest, axis=0).max())
         self._point_parents = parents_of(self.part.F, len(self.part.vertices))
         mesh = self._waves.rest.mesh
-        self._rest, (self._F, self._order, _) = mesh.V, memory_order(mesh.F, mesh.V)
+        self._rest = mesh.V
+        (self._F, self._order, _) = memory_order(mesh.F, mesh.V)
         self._parents = parents_of(self._F, len(mesh.V))
         self._place_step = _PLACE_STEP * float(np.ptp(mesh.V, axis=0).max())
         self._frames: list[NDArray[np.float64]] = []
@@ -212,17 +253,21 @@ class PageTarget:
 
     def add(self, V: NDArray[np.float64] | None) -> bytes:
         """Add a frame, with the vertices of its own mesh at V [m], or at rest; return its coded heights."""
-        heights = self._surface.shape(self._waves.height, self._waves.velocity).height[self.part.vertices]
+        heights = self._surface.shape(self._waves.height, self._waves.velocity).height[
+            self.part.vertices
+        ]
         steps = quantised(heights, self.step)
         # a chunk begins from nothing, so that it can be decoded alone
-        before, self._last = self._last if self._frames else np.zeros_like(steps), steps
+        before = self._last if self._frames else np.zeros_like(steps)
+        self._last = steps
         self.moves = self.moves or V is not None
         self._frames.append(self._rest if V is None else np.array(V))
         return residuals(steps, before, self._point_parents)
 
     def told(self) -> dict[str, Any]:
         """The mesh at rest, and how the page's points ride on it."""
-        (corners, weights, off, *_), points = self._surface.vertices.rest, self.part.vertices
+        (corners, weights, off, *_) = self._surface.vertices.rest
+        points = self.part.vertices
         far = max(float(np.abs(off).max()), 1e-30)
         arrays = [
             self._rest[self._order].astype("<f4"),
@@ -231,35 +276,38 @@ class PageTarget:
             np.rint(weights[points, :2] * 65535).astype("<u2"),
             np.rint(off[points] / far * 32767).astype("<i2"),
         ]
-        meta = {"points": len(self._order), "triangles": len(self._F), "step": self._place_step, "far": far}
+        meta = {
+            "points": len(self._order),
+            "triangles": len(self._F),
+            "step": self._place_step,
+            "far": far,
+        }
         return {**meta, "arrays": packed(b"".join(each.tobytes() for each in arrays))}
 
     def chunk(self) -> tuple[list[list[float]], bytes]:
         """Middles [m] and coded vertices of the frames since the last chunk, both empty if the surface never moved."""
-        middles, planes, frames = [], [], self._frames
+        middles = []
+        planes = []
+        frames = self._frames
         before = np.zeros((3, len(self._order)), np.int64)  # a chunk can be decoded alone
         self._frames = []
         for V in frames if self.moves else ():
             middle = np.round(V.mean(axis=0), 6)
             steps = quantised((V - middle)[self._order].T, self._place_step)
-            planes += [residuals(now, last, self._parents) for now, last in zip(steps, before, strict=True)]
+            planes += [
+                residuals(now, last, self._parents) for now, last in zip(steps, before, strict=True)
+            ]
             middles.append(middle.tolist())
             before = steps
         return middles, b"".join(planes)
-
-
-_CHUNK = 16  # frames that are decoded together
-_SCRIPTS = (
-    *("algebra.js", "decode.js", "motion.js", "light_shaders.js", "shaders.js", "environment.js", "light.js"),
-    *("programs.js", "parts.js", "groups.js", "lit_points.js", "floor.js", "drawing.js", "player.js"),
-)
 
 
 class PageWriter(Writer):
     """Writes a page that plays a run: the player, what stays the same, and chunks of frames, each when it is full."""
 
     def __init__(self, source: Source, path: Path) -> None:
-        self._source, self._file = source, path.open("w", encoding="utf-8")
+        self._source = source
+        self._file = path.open("w", encoding="utf-8")
         self._targets = {name: PageTarget(source, name) for name in source.ripples}
         self._told: set[int] = set()  # targets whose motion has been told of
         self._poses: list[list[list[float]]] = []
@@ -271,16 +319,24 @@ class PageWriter(Writer):
         """Add a frame."""
         if number == 0:
             self._begin(data)
-        ripples, pose, turn = self._source.ripples, self._source.pose(data), np.zeros(4)
+        ripples = self._source.ripples
+        pose = self._source.pose(data)
+        turn = np.zeros(4)
         mujoco.mju_mat2Quat(turn, np.ascontiguousarray(pose.rotation).ravel())
         places = np.vstack([[*pose.position, *turn], np.hstack([data.xpos, data.xquat])])
         self._poses.append(np.round(places, 5).tolist())  # of the camera and all bodies
         self._arrows.append([])
         for each in impulses:  # point and inward direction in the world, and impulse [N s]
             _, rotation = target_pose(data, ripples.geom_ids[each.geom])
-            inwards = -rotation @ ripples[each.geom].atlas.normals[each.texel] * (-1 if each.inner else 1)
-            self._arrows[-1].append([round(float(x), 5) for x in (*each.point, *inwards, each.impulse)])
-        self._planes += [target.add(ripples.vertices(name, data)) for name, target in self._targets.items()]
+            inwards = (
+                -rotation @ ripples[each.geom].atlas.normals[each.texel] * (-1 if each.inner else 1)
+            )
+            self._arrows[-1].append(
+                [round(float(x), 5) for x in (*each.point, *inwards, each.impulse)]
+            )
+        self._planes += [
+            target.add(ripples.vertices(name, data)) for name, target in self._targets.items()
+        ]
         self._frames = number + 1
         if len(self._poses) == _CHUNK:
             self._flush()
@@ -288,16 +344,22 @@ class PageWriter(Writer):
     def finish(self) -> None:
         """Complete the page."""
         self._flush()
-        self._file.write(f'<script type="application/json" id="end">{{"frames": {self._frames}}}</script>\n')
+        self._file.write(
+            f'<script type="application/json" id="end">{{"frames": {self._frames}}}</script>\n'
+        )
         self._file.write("</body>\n</html>\n")
         self._file.close()
 
     def _begin(self, data: mujoco.MjData) -> None:
-        source, model = self._source, self._source.model
+        source = self._source
+        model = self._source.model
         targets = set(source.ripples.geom_ids.values())
         floor = find_floor(model, targets)
         found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
-        parts = [*(target.part for target in self._targets.values()), *(_solid_part(solid) for solid in found)]
+        parts = [
+            *(target.part for target in self._targets.values()),
+            *(_solid_part(solid) for solid in found),
+        ]
         aspect = source.size[0] / source.size[1]
         pose = source.pose(data).in_perspective(aspect, "the page")
         floor_meta = None if floor is None else floor_of(model, floor)
@@ -307,16 +369,23 @@ class PageWriter(Writer):
             "chunk": _CHUNK,
             "steps": [target.step for target in self._targets.values()],
             "parts": [part.meta for part in parts],
-            "images": {each["texture"]: _data_uri(model, each["texture"]) for each in textured if each["texture"] >= 0},
+            "images": {
+                each["texture"]: _data_uri(model, each["texture"])
+                for each in textured
+                if each["texture"] >= 0
+            },
             "floor": floor_meta,
             "light": light_of(source, data),
             "fovy": pose.fovy,
             "distance": pose.distance,
             "aspect": aspect,
-            "heat": color_table()[::8].tolist(),  # of the heights, from the lowest to the highest, sRGB
+            # of the heights, from the lowest to the highest, sRGB
+            "heat": color_table()[::8].tolist(),
         }
         folder = importlib.resources.files(__package__).joinpath("html")
-        page, *scripts = (folder.joinpath(name).read_text("utf-8") for name in ("page.html", *_SCRIPTS))
+        page, *scripts = (
+            folder.joinpath(name).read_text("utf-8") for name in ("page.html", *_SCRIPTS)
+        )
         page = page.replace("TITLE", html.escape(", ".join(self._targets))).replace("MARK", MARK)
         self._file.write(page.replace("SCRIPTS", "\n".join(scripts)))
         arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
@@ -333,13 +402,18 @@ class PageWriter(Writer):
             if not target.moves:
                 continue
             if number not in self._told:  # before it first moves
-                told, name = json.dumps(target.told()), f'class="motion" data-target="{number}"'
+                told = json.dumps(target.told())
+                name = f'class="motion" data-target="{number}"'
                 self._file.write(f'<script type="application/json" {name}>{told}</script>\n')
                 self._told.add(number)
             middles[number] = places
             self._planes.append(coded)
-        text = json.dumps({"poses": self._poses, "arrows": self._arrows, "middles": middles}).encode()
+        text = json.dumps(
+            {"poses": self._poses, "arrows": self._arrows, "middles": middles}
+        ).encode()
         content = len(text).to_bytes(4, "little") + text + b"".join(self._planes)
         self._file.write(f'<script type="text/plain" class="chunk">{packed(content)}</script>\n')
         self._file.flush()
-        self._poses, self._arrows, self._planes = [], [], []
+        self._poses = []
+        self._arrows = []
+        self._planes = []

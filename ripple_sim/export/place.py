@@ -24,25 +24,33 @@ from .source import Source, Writer
 
 Recognised = Callable[[Path], bool]
 
+MAX_FPS = 1000
+LARGEST_MESH = 10_000_000
+
 
 class Unfinished:
     """A hidden folder beside a path, in which all is written that then moves to its place.
 
-    `path` lies in the folder and has the target's name. What lies beside it there moves to its place too, and first.
-    The target is followed where it is a link. `recognised` says whether a file or folder at a path was made here; with
-    `overwrite` what was not is replaced, but never a folder of other things.
+    `path` lies in the folder and has the target's name. What lies beside it there moves to its
+    place too, and first. The target is followed where it is a link. `recognised` says whether a
+    file or folder at a path was made here; with `overwrite` what was not is replaced, but never a
+    folder of other things.
     """
 
     def __init__(self, target: Path, recognised: Recognised, overwrite: bool) -> None:
-        self._target, self._recognised, self._overwrite = final_path(target), recognised, overwrite
-        name, parent = self._target.name, self._target.parent
+        self._target = final_path(target)
+        self._recognised = recognised
+        self._overwrite = overwrite
+        name = self._target.name
+        parent = self._target.parent
         parent.mkdir(parents=True, exist_ok=True)
         self._folder = Path(tempfile.mkdtemp(prefix=f".{name[:100]}.", suffix=".part", dir=parent))
         self.path = self._folder / name
 
     def finish(self) -> None:
         """Move everything to its place, unless something foreign stands there by now."""
-        _check_replaceable(self._target, self._recognised, self._overwrite)  # again: a run takes long
+        # again: a run takes long
+        _check_replaceable(self._target, self._recognised, self._overwrite)
         made = {".png": made_here, ".usdc": self._recognised}
 
         def own(file: Path) -> bool:
@@ -50,7 +58,9 @@ class Unfinished:
 
         written = sorted(self._folder.iterdir(), key=lambda each: each == self.path)
         for each in written[:-1]:  # folders of images or chunks
-            check_folder(ExportError, each.suffix.removeprefix("."), self._target.with_name(each.name), own)
+            check_folder(
+                ExportError, each.suffix.removeprefix("."), self._target.with_name(each.name), own
+            )
         for each in written:
             target = self._target.with_name(each.name)
             if target.is_dir():
@@ -65,13 +75,18 @@ class Unfinished:
 def _check_replaceable(path: Path, recognised: Recognised, overwrite: bool) -> None:
     if path.is_dir():
         if not recognised(path):
-            raise ExportError(f"cannot write {path}: it is a folder of other things; name another output")
+            raise ExportError(
+                f"cannot write {path}: it is a folder of other things; name another output"
+            )
     elif path.exists():
         if not path.is_file():
-            raise ExportError(f"cannot write {path}: it exists and is not a file; name another output")
+            raise ExportError(
+                f"cannot write {path}: it exists and is not a file; name another output"
+            )
         if path.stat().st_size and not overwrite and not recognised(path):
             raise ExportError(
-                f"cannot write {path}: it exists and was not {MARK}; name another file, or add --overwrite"
+                f"cannot write {path}: it exists and was not {MARK}; name another file, or add "
+                f"--overwrite"
             )
 
 
@@ -82,7 +97,8 @@ class Ending:
     Attributes
     ----------
     home, kind : str
-        Module, below this package, and its class that writes the files; `made_here` of the module tells them.
+        Module, below this package, and its class that writes the files; `made_here` of the module
+        tells them.
     package, extra : str, optional
         What it needs beside ripple-sim, and the extra that brings it.
     chunks : bool
@@ -122,7 +138,9 @@ def ending_of(path: Path) -> Ending:
     suffix = path.suffix.lower()
     if path.name.lower() in ENDINGS or suffix not in ENDINGS:
         problem = f"ends in {path.suffix}" if path.suffix else "has no ending"
-        raise ExportError(f"output {str(path)!r} {problem}; valid is a name that ends in {', '.join(ENDINGS)}")
+        raise ExportError(
+            f"output {str(path)!r} {problem}; valid is a name that ends in {', '.join(ENDINGS)}"
+        )
     ending = ENDINGS[suffix]
     if ending.package is not None and importlib.util.find_spec(ending.package) is None:
         raise ExportError(
@@ -138,20 +156,25 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
     Raises
     ------
     ExportError
-        If the ending is unknown, needs what is not installed, has no chunks where they are wanted, or is another where
-        a link leads; something foreign stands in the path's place, or there can be no such name.
+        If the ending is unknown, needs what is not installed, has no chunks where they are wanted,
+        or is another where a link leads; something foreign stands in the path's place, or there can
+        be no such name.
     EncodingError
         If nothing can be written there.
     """
     ending = ending_of(path)
     if chunked and not ending.chunks:
         able = " and ".join(suffix for suffix, each in ENDINGS.items() if each.chunks)
-        raise ExportError(f"there are chunks of {able} files alone, not of {path.name}; leave chunk out")
+        raise ExportError(
+            f"there are chunks of {able} files alone, not of {path.name}; leave chunk out"
+        )
     try:
         final = final_path(path)
-        if final.suffix.lower() != path.suffix.lower():  # what is written there, and told again, goes by the ending
+        # what is written there, and told again, goes by the ending
+        if final.suffix.lower() != path.suffix.lower():
             raise ExportError(
-                f"output {str(path)!r} is a link to {final.name!r}; valid is a link to a name that ends in "
+                f"output {str(path)!r} is a link to {final.name!r}; valid is a link to a name that "
+                f"ends in "
                 f"{path.suffix}"
             )
         _check_replaceable(final, ending.made_here, overwrite)
@@ -159,27 +182,41 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
             return ending
     except OSError as error:
         kind = ExportError if error.errno in NO_NAME else EncodingError
-        raise kind(f"cannot write {path}: {error.strerror}; name a file in a folder you can write to") from error
-
-
-MAX_FPS, LARGEST_MESH = 1000, 10_000_000
+        raise kind(
+            f"cannot write {path}: {error.strerror}; name a file in a folder you can write to"
+        ) from error
 
 
 def check_options(options: ExportOptions) -> None:
     """Make sure that the options are possible, before anything that takes time; raises `RippleError`."""
     if options.fps > MAX_FPS:
-        raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
+        raise ExportError(
+            f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a "
+            f"second"
+        )
     if options.resume and options.chunk is None:
-        raise ExportError("only an export in chunks can be resumed; add --chunk, or leave --resume out")
+        raise ExportError(
+            "only an export in chunks can be resumed; add --chunk, or leave --resume out"
+        )
     check_written(options.size, options.tessellation, options.triangles, options.chunk)
 
 
-def check_written(size: tuple[int, int], tessellation: str, triangles: int, chunk: int | None) -> None:
+def check_written(
+    size: tuple[int, int], tessellation: str, triangles: int, chunk: int | None
+) -> None:
     """Make sure that options of an export in anybody's own loop are possible; raises `RippleError`."""
     check_size(*size)
     if not isinstance(triangles, int) or not 1 <= triangles <= LARGEST_MESH:
-        raise ExportError(f"there shall be {shown(triangles)} triangles; valid is a whole number, 1 to {LARGEST_MESH}")
+        raise ExportError(
+            f"there shall be {shown(triangles)} triangles; valid is a whole number, 1 to "
+            f"{LARGEST_MESH}"
+        )
     if chunk is not None and (not isinstance(chunk, int) or chunk < 1):
-        raise ExportError(f"a chunk shall have {shown(chunk)} frames; valid is a whole number from 1")
+        raise ExportError(
+            f"a chunk shall have {shown(chunk)} frames; valid is a whole number from 1"
+        )
     if tessellation not in TESSELLATIONS:
-        raise ExportError(f"tessellation is {shown(tessellation)}; valid are {' and '.join(map(repr, TESSELLATIONS))}")
+        raise ExportError(
+            f"tessellation is {shown(tessellation)}; valid are "
+            f"{' and '.join(map(repr, TESSELLATIONS))}"
+        )

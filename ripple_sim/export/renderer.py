@@ -55,13 +55,14 @@ _LIGHT = ("type", "cutoff", "exponent", "castshadow", "bulbradius")
 class RippleRenderer:
     """Renders a model and its rippling surfaces offscreen, with the interface of `mujoco.Renderer`.
 
-    Frames have lights, shadows and materials of their own; depth and segmentation are as in MuJoCo, with the ripples.
+    Frames have lights, shadows and materials of their own; depth and segmentation are as in MuJoCo,
+    with the ripples.
 
     Parameters
     ----------
     model : mujoco.MjModel
-        That of the ripples, or one that differs in its looks alone; or dm_control's wrapper of one, likewise the data
-        of each frame.
+        That of the ripples, or one that differs in its looks alone; or dm_control's wrapper of one,
+        likewise the data of each frame.
     ripples : Ripples
         Whose targets are drawn with their ripples.
     height : int
@@ -73,24 +74,26 @@ class RippleRenderer:
     font_scale : mujoco.mjtFontScale
         Without effect: no text is drawn.
     looks : mapping
-        Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default), jelly, clay and so
-        on. Its colour is the geom's, where the model gives it a texture or a colour, as in a scene file; one without
-        either is grey, as in MuJoCo, unless it is named here.
+        Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default),
+        jelly, clay and so on. Its colour is the geom's, where the model gives it a texture or a
+        colour, as in a scene file; one without either is grey, as in MuJoCo, unless it is named
+        here.
     gl : GLContext, optional
         By default the process's shared one.
     limit : bool
-        Whether heights that are too large for the object are drawn smaller, so that its surface does not pass through
-        itself; see `DisplacementLimit`.
+        Whether heights that are too large for the object are drawn smaller, so that its surface
+        does not pass through itself; see `DisplacementLimit`.
     lighting : str
-        "model": MuJoCo's own lights, the headlight among them, before the skybox or black; "studio": a photo studio in
-        their place; "auto": the studio where the model has no `<light>`.
+        "model": MuJoCo's own lights, the headlight among them, before the skybox or black;
+        "studio": a photo studio in their place; "auto": the studio where the model has no
+        `<light>`.
 
     Attributes
     ----------
     model : mujoco.MjModel
     scene : mujoco.MjvScene
-        What the latest `update_scene` took in. `render` draws what stands in it: whatever is changed, added or taken
-        away before is seen, in depth and segmentation too.
+        What the latest `update_scene` took in. `render` draws what stands in it: whatever is
+        changed, added or taken away before is seen, in depth and segmentation too.
     height : int
         [pixels].
     width : int
@@ -99,8 +102,8 @@ class RippleRenderer:
     Raises
     ------
     RippleError
-        If the ripples belong to another model, for an unknown look or geom, or if the driver cannot render frames of
-        this size.
+        If the ripples belong to another model, for an unknown look or geom, or if the driver cannot
+        render frames of this size.
     """
 
     @checked(
@@ -125,14 +128,19 @@ class RippleRenderer:
         limit: bool = True,
         lighting: str = "model",
     ) -> None:
-        self.model, self._ripples = own_model(model), ripples
+        self.model = own_model(model)
+        self._ripples = ripples
         check_targets(self.model, ripples.model, ripples.geom_ids)
         named = by_name(self.model, looks or {}, "looks")
         self._shown = ShownWaves(ripples, height)
-        self.height, self.width, self._looks, self._limit = int(height), int(width), named, limit
+        self.height = int(height)
+        self.width = int(width)
+        self._looks = named
+        self._limit = limit
         self._lighting = lighting
         self.scene = mujoco.MjvScene(self.model, max_geom)
-        self._usual_flags, self._told_flags = self.scene.flags.copy(), set[int]()
+        self._usual_flags = self.scene.flags.copy()
+        self._told_flags = set[int]()
         self._shows = "colours"
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
@@ -161,9 +169,9 @@ class RippleRenderer:
     def upload_texture(self, texture: int) -> None:
         """Draw a texture of the model, by its id, as it is now, as `mujoco.mjr_uploadTexture` does.
 
-        There is no need to call this: what a program writes into the model's textures, height fields and meshes is seen
-        when the next frame is drawn. Of more than a megabyte of textures, a change of single pixels may come some
-        frames later.
+        There is no need to call this: what a program writes into the model's textures, height
+        fields and meshes is seen when the next frame is drawn. Of more than a megabyte of textures,
+        a change of single pixels may come some frames later.
         """
         self._upload("texture", texture, self.model.ntex)
 
@@ -176,25 +184,30 @@ class RippleRenderer:
         self._upload("mesh", mesh, self.model.nmesh)
 
     def update_scene(
-        self, data: mujoco.MjData, camera: AnyCamera = -1, scene_option: mujoco.MjvOption | None = None
+        self,
+        data: mujoco.MjData,
+        camera: AnyCamera = -1,
+        scene_option: mujoco.MjvOption | None = None,
     ) -> None:
         """Take in the present state of bodies and ripples, which `render` draws, whatever becomes of them.
 
         Parameters
         ----------
         data : mujoco.MjData
-            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos` are drawn.
+            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos`
+            are drawn.
         camera : Camera, FixedCamera, str, int or mujoco.MjvCamera
-            A camera, or the name or the id of one in the MJCF, or one of MuJoCo's that is free, tracks a body or is
-            fixed; by default, and with -1, MuJoCo's free camera, aimed at the model's middle.
+            A camera, or the name or the id of one in the MJCF, or one of MuJoCo's that is free,
+            tracks a body or is fixed; by default, and with -1, MuJoCo's free camera, aimed at the
+            model's middle.
         scene_option : mujoco.MjvOption, optional
             What is shown: groups, contacts, joints and so on; MuJoCo's defaults by default.
 
         Raises
         ------
         SceneError
-            If the data belongs to another model, or the camera is none of these or not in the model; then it is a
-            ValueError, too.
+            If the data belongs to another model, or the camera is none of these or not in the
+            model; then it is a ValueError, too.
         """
         now = own_data(self.model, data, drawn=True)
         self._follow_shapes()
@@ -205,12 +218,14 @@ class RippleRenderer:
             own = self._own(camera)
         except SceneError as error:
             raise RenderError(str(error)) from None
-        option, everything = scene_option or mujoco.MjvOption(), int(mujoco.mjtCatBit.mjCAT_ALL)
+        option = scene_option or mujoco.MjvOption()
+        everything = int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self.model, state, option, None, own, everything, self.scene)
         pose = seen.pose()
         in_scene = pose_of_scene(self.scene.camera, pose.distance)
         seen = dataclasses.replace(in_scene, lens=pose.lens, focal_distance=pose.focal_distance)
-        self._camera_taken, self._lights_taken = _camera_content(self.scene), _light_content(self.scene)
+        self._camera_taken = _camera_content(self.scene)
+        self._lights_taken = _light_content(self.scene)
         heights = {name: self._ripples[name].snapshot() for name in self._height_maps}
         self._shown.look(state, heights, seen.pose())
         height_maps = {
@@ -220,7 +235,11 @@ class RippleRenderer:
         self._drawn, self._seen = (state, height_maps, seen), (now, self._entry(camera, own))
 
     def render(
-        self, data: mujoco.MjData | None = None, camera: AnyCamera | None = None, *, out: NDArray | None = None
+        self,
+        data: mujoco.MjData | None = None,
+        camera: AnyCamera | None = None,
+        *,
+        out: NDArray | None = None,
     ) -> NDArray:
         """Render what the latest `update_scene` took in, or the present state of the data.
 
@@ -234,23 +253,33 @@ class RippleRenderer:
         Returns
         -------
         array
-            Colours, uint8 [height, width, 3]; or depth, float32 [height, width]: distance along the camera's axis [m],
-            that of the far plane where nothing is; or segmentation, int32 [height, width, 2]: id and type (of
-            `mujoco.mjtObj`) of what is seen, -1 where nothing is. Before the first `update_scene` there is nothing.
+            Colours, uint8 [height, width, 3]; or depth, float32 [height, width]: distance along the
+            camera's axis [m], that of the far plane where nothing is; or segmentation, int32
+            [height, width, 2]: id and type (of `mujoco.mjtObj`) of what is seen, -1 where nothing
+            is. Before the first `update_scene` there is nothing.
 
         Raises
         ------
         RippleError
-            As `update_scene` does; if `out` has another shape (a ValueError, too); or after `close` (a RuntimeError,
-            too).
+            As `update_scene` does; if `out` has another shape (a ValueError, too); or after `close`
+            (a RuntimeError, too).
         """
         if self._renderer is None:
-            raise GLError("the renderer is closed: render cannot be called after close; make another one")
+            raise GLError(
+                "the renderer is closed: render cannot be called after close; make another one"
+            )
         if data is not None:
             self.update_scene(data, -1 if camera is None else camera)
-        shape = self.height, self.width, *{"colours": (3,), "depth": (), "segmentation": (2,)}[self._shows]
+        shape = (
+            self.height,
+            self.width,
+            *{"colours": (3,), "depth": (), "segmentation": (2,)}[self._shows],
+        )
         if out is not None and out.shape != shape:
-            raise RenderError(f"out has shape {list(out.shape)}; valid is {list(shape)}, that of the {self._shows}")
+            raise RenderError(
+                f"out has shape {list(out.shape)}; valid is {list(shape)}, that of the "
+                f"{self._shows}"
+            )
         if self._shows == "colours":  # MuJoCo has none of them in the others
             self._warn_of_flags()
         if self._drawn is None:
@@ -258,11 +287,14 @@ class RippleRenderer:
         elif self._shows == "colours":
             lights = self.scene.lights[: self.scene.nlight]
             edited = _light_content(self.scene) != self._lights_taken
-            frame = self._renderer.render(*self._now(), scene=self.scene, lights=lights if edited else None)
+            frame = self._renderer.render(
+                *self._now(), scene=self.scene, lights=lights if edited else None
+            )
         else:
             segmented = self._shows == "segmentation"
             image = self._renderer.surfaces(*self._now(), scene=self.scene, segmented=segmented)
-            nothing = (image.depth == 0) | (image.depth > self._far)  # beyond the far plane as in MuJoCo
+            # beyond the far plane as in MuJoCo
+            nothing = (image.depth == 0) | (image.depth > self._far)
             if self._shows == "depth":
                 frame = np.where(nothing, self._far, image.depth)
             else:
@@ -273,7 +305,9 @@ class RippleRenderer:
         return out
 
     def close(self) -> None:
-        """Release what is on the GPU; nothing can be rendered afterwards. Repeated calls do nothing.
+        """Release what is on the GPU; nothing can be rendered afterwards.
+
+        Repeated calls do nothing.
 
         Warns of waves that were there, but in no scene taken in higher than a pixel.
         """
@@ -290,11 +324,14 @@ class RippleRenderer:
 
     def _make_renderer(self) -> Renderer:
         """A renderer for the targets' surfaces as they are now."""
-        ripples, looks = self._ripples, self._looks
+        ripples = self._ripples
+        looks = self._looks
         self._atlases = {name: ripples[name].rest for name in ripples}
         self._height_maps = {name: drawn_heights(ripples, name, self._limit) for name in ripples}
         surfaces = {
-            geom: dataclasses.replace(surface_of(ripples[name], looks.get(name, "rubber")), grey=name not in looks)
+            geom: dataclasses.replace(
+                surface_of(ripples[name], looks.get(name, "rubber")), grey=name not in looks
+            )
             for name, geom in ripples.geom_ids.items()
         }
         renderer = Renderer(
@@ -311,22 +348,31 @@ class RippleRenderer:
     def _follow_shapes(self) -> None:
         """Draw targets whose surfaces a program has changed in the model on their new atlases."""
         self._ripples.follow_shapes()
-        changed = any(self._ripples[name].rest is not atlas for name, atlas in self._atlases.items())
+        changed = any(
+            self._ripples[name].rest is not atlas for name, atlas in self._atlases.items()
+        )
         if changed and self._renderer is not None:
             self._renderer.close()
             self._renderer = self._make_renderer()
 
     def _upload(self, kind: str, index: int, count: int) -> None:
         if self._renderer is None:
-            raise GLError(f"the renderer is closed: upload_{kind} cannot be called after close; make another one")
+            raise GLError(
+                f"the renderer is closed: upload_{kind} cannot be called after close; make another "
+                f"one"
+            )
         if not 0 <= index < count:
-            raise RenderError(f"{kind} is {index!r}; the model has {count} of them, with ids from 0")
+            raise RenderError(
+                f"{kind} is {index!r}; the model has {count} of them, with ids from 0"
+            )
         self._renderer.upload(kind, index)
 
     def _now(self) -> tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint]:
         """What is to be drawn: bodies and waves as they were taken in, seen with the scene's camera as it is."""
         if self._drawn is None:
-            raise RenderError("there is nothing to render; call update_scene(data) before, or render(data)")
+            raise RenderError(
+                "there is nothing to render; call update_scene(data) before, or render(data)"
+            )
         state, height_maps, seen = self._drawn
         if _camera_content(self.scene) != self._camera_taken:
             try:
@@ -357,7 +403,9 @@ class RippleRenderer:
             self._told_flags |= new
             names = ", ".join(mujoco.mjtRndFlag(flag).name for flag in sorted(new))
             valid = ", ".join(mujoco.mjtRndFlag(flag).name for flag in sorted(followed))
-            warn_caller(f"the scene's flags have no effect: {names}; those that have some here are {valid}")
+            warn_caller(
+                f"the scene's flags have no effect: {names}; those that have some here are {valid}"
+            )
 
     def _own(self, camera: AnyCamera) -> mujoco.MjvCamera:
         """A camera of MuJoCo's for its scene; for ours the scene's own, which is set to what ours sees."""
@@ -381,14 +429,19 @@ class RippleRenderer:
         x, y, z = map(float, own.lookat)
         fovy = 45.0 if self.model.vis.global_.orthographic else float(self.model.vis.global_.fovy)
         return CameraEntry(
-            lookat=(x, y, z), distance=own.distance, azimuth=own.azimuth, elevation=own.elevation, fovy=fovy
+            lookat=(x, y, z),
+            distance=own.distance,
+            azimuth=own.azimuth,
+            elevation=own.elevation,
+            fovy=fovy,
         )
 
     def _repr_html_(self) -> str | None:
         """HTML for a notebook: the present state of what was rendered last, to turn and to zoom."""
         if self._seen is None:
             return None
-        (data, camera), size = self._seen, (self.width, self.height)
+        (data, camera) = self._seen
+        size = (self.width, self.height)
         with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
             page = Path(folder) / "now.html"
             with Exporter(

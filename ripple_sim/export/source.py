@@ -48,7 +48,8 @@ class Source:
     output : Path
         Of a run in chunks; beside it stands NAME.part with the complete ones until all is complete.
     settings : mapping, optional
-        Everything that decides what is written, by name. With it complete chunks survive an interruption.
+        Everything that decides what is written, by name. With it complete chunks survive an
+        interruption.
     resume : bool
         Keep those that are there.
     sensors : mapping
@@ -77,7 +78,9 @@ class Source:
 
     def mesh(self, name: str) -> MovingMesh:
         """The surface of a target."""
-        return MovingMesh(self.ripples[name].rest, self.tessellation, self.limited[name], self.triangles)
+        return MovingMesh(
+            self.ripples[name].rest, self.tessellation, self.limited[name], self.triangles
+        )
 
     def pose(self, data: mujoco.MjData) -> Pose:
         """The camera in the world."""

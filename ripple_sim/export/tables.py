@@ -38,6 +38,8 @@ SIGNALS = {
     "unit": ("", "string"),
 }
 
+_GROUP = 10_000  # rows that are kept in memory
+
 
 def header(columns: Mapping[str, tuple[str, str]]) -> list[str]:
     """The names of columns, with their units."""
@@ -45,13 +47,21 @@ def header(columns: Mapping[str, tuple[str, str]]) -> list[str]:
 
 
 HEADER = header(COLUMNS)
-_GROUP = 10_000  # rows that are kept in memory
 
 
 def rows(number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> Iterator[tuple]:
     """The impulses of a frame of a number, in the order of the columns."""
     for each in impulses:
-        yield (number, data.time, each.geom, each.other, *map(float, each.point), each.impulse, *each.texel, each.inner)
+        yield (
+            number,
+            data.time,
+            each.geom,
+            each.other,
+            *map(float, each.point),
+            each.impulse,
+            *each.texel,
+            each.inner,
+        )
 
 
 def samples(sensors: Mapping[str, Sensor]) -> Iterator[tuple]:
@@ -67,13 +77,16 @@ class CsvWriter(Writer):
     """Writes impulses or samples as comma-separated values, one a row, units in the header."""
 
     def __init__(self, source: Source, path: Path) -> None:
-        self._source, self._file = source, path.open("w", newline="", encoding="utf-8")
+        self._source = source
+        self._file = path.open("w", newline="", encoding="utf-8")
         self._writer = csv.writer(self._file)
         self._writer.writerow(header(SIGNALS if source.signals else COLUMNS))
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add the impulses of a frame, or the samples that are there."""
-        self._writer.writerows(samples(self._source.sensors) if self._source.signals else rows(number, data, impulses))
+        self._writer.writerows(
+            samples(self._source.sensors) if self._source.signals else rows(number, data, impulses)
+        )
 
     def finish(self) -> None:
         """Complete the file."""
@@ -88,7 +101,11 @@ class ParquetWriter(Writer):
 
         self._source = source
         fields = [
-            pyarrow.field(name, getattr(pyarrow, f"{kind}_" if kind == "bool" else kind)(), metadata={"unit": unit})
+            pyarrow.field(
+                name,
+                getattr(pyarrow, f"{kind}_" if kind == "bool" else kind)(),
+                metadata={"unit": unit},
+            )
             for name, (unit, kind) in (SIGNALS if source.signals else COLUMNS).items()
         ]
         self._schema = pyarrow.schema(fields, metadata={"software": MARK})
@@ -97,7 +114,9 @@ class ParquetWriter(Writer):
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add the impulses of a frame, or the samples that are there."""
-        self._rows += samples(self._source.sensors) if self._source.signals else rows(number, data, impulses)
+        self._rows += (
+            samples(self._source.sensors) if self._source.signals else rows(number, data, impulses)
+        )
         if len(self._rows) >= _GROUP:
             self._flush()
 
@@ -109,7 +128,9 @@ class ParquetWriter(Writer):
     def _flush(self) -> None:
         import pyarrow
 
-        columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [[] for _ in self._schema]
+        columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [
+            [] for _ in self._schema
+        ]
         self._file.write_table(pyarrow.table(columns, schema=self._schema))
         self._rows = []
 

@@ -1,7 +1,7 @@
 """`UsdWriter`: a run as a stage of Universal Scene Description.
 
-The camera has its motion, lens and shutter. The frames of a long run may lie in files of their own, value clips, which
-a root layer joins. Metadata tell a file made here from others.
+The camera has its motion, lens and shutter. The frames of a long run may lie in files of their own,
+value clips, which a root layer joins. Metadata tell a file made here from others.
 """
 
 from __future__ import annotations
@@ -33,6 +33,22 @@ from .source import Source
 from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
 from .visuals import solids, target_finish
 
+# at least every so many frames the simulation's state is fingerprinted, to be compared on resuming
+_CHECKED = 16
+_MANIFEST = "manifest.usdc"
+
+# height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
+_SENSOR = 0.024
+_TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
+
+# of the camera's distance
+_NEAR = 0.01
+_FAR = 1000.0
+
+# time of the files in a .usdz, 1980-01-02, so that the same run gives the same bytes
+_PACKED = 315_619_200
+_KEPT = 8  # so many frames are kept in memory, and then appended to the file
+
 
 def succeed(work: Callable[..., bool], *arguments: object) -> None:
     """Do what says whether it could write, and raise OSError if it could not."""
@@ -42,20 +58,21 @@ def succeed(work: Callable[..., bool], *arguments: object) -> None:
         reason = "it could not be written"
     except Tf.ErrorException as error:
         text = " ".join(str(error).split())
-        reason = first[1] if (first := re.search(r"line \d+ in file \S+ : '(.*?)'(?= Error in |$)", text)) else text
+        reason = (
+            first[1]
+            if (first := re.search(r"line \d+ in file \S+ : '(.*?)'(?= Error in |$)", text))
+            else text
+        )
     raise OSError(reason)
-
-
-_CHECKED = 16  # at least every so many frames the simulation's state is fingerprinted, to be compared on resuming
-_MANIFEST = "manifest.usdc"
 
 
 class Chunks:
     """Takes time samples into layers of some frames each, which wait in a folder until the run is complete.
 
-    A layer has the first frame of the next one, too, so that readers interpolate between the two. What is the same at
-    all times belongs in the stage's root layer. A layer is in memory until it is complete: one whose file could not be
-    written, as on a full disk, ends the process as soon as the stage lets go of it.
+    A layer has the first frame of the next one, too, so that readers interpolate between the two.
+    What is the same at all times belongs in the stage's root layer. A layer is in memory until it
+    is complete: one whose file could not be written, as on a full disk, ends the process as soon as
+    the stage lets go of it.
 
     Parameters
     ----------
@@ -65,18 +82,27 @@ class Chunks:
     Raises
     ------
     VideoError
-        If another process writes to the same place, or a run that is to be resumed has other settings, or is damaged.
+        If another process writes to the same place, or a run that is to be resumed has other
+        settings, or is damaged.
     """
 
     def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
-        self._stage, self._path, self._source = stage, path, source
-        target, settings = final_path(source.output), source.settings or {}
+        self._stage = stage
+        self._path = path
+        self._source = source
+        target = final_path(source.output)
+        settings = source.settings or {}
         # None once it is handed over or closed
-        self._part: Any = Part(target, ".usdc", source.chunk, settings, resume=source.resume, overwrite=True)
-        if damaged := [segment.name for segment, _ in self._part.segments if not made_here(segment)]:
+        self._part: Any = Part(
+            target, ".usdc", source.chunk, settings, resume=source.resume, overwrite=True
+        )
+        if damaged := [
+            segment.name for segment, _ in self._part.segments if not made_here(segment)
+        ]:
             self._part.keep()
             raise VideoError(
-                f"cannot resume {source.output}: {damaged[0]} is damaged; leave --resume out to start again"
+                f"cannot resume {source.output}: {damaged[0]} is damaged; leave --resume out to "
+                f"start again"
             )
         self.stored = self._part.frames
         self._layer: Any = None  # open while frames wait
@@ -91,7 +117,8 @@ class Chunks:
             self._layer = layer = Sdf.Layer.CreateAnonymous(".usdc")
             layer.comment = MARK
             root = self._stage.GetRootLayer()
-            layer.timeCodesPerSecond, layer.framesPerSecond = root.timeCodesPerSecond, root.framesPerSecond
+            layer.timeCodesPerSecond = root.timeCodesPerSecond
+            layer.framesPerSecond = root.framesPerSecond
             self._stage.GetSessionLayer().subLayerPaths = [layer.identifier]
         self._sample(write)
         self._waiting += 1
@@ -106,7 +133,8 @@ class Chunks:
         """Complete the layers, hand them over to a folder, and join them in the root layer up to the last frame."""
         if self._layer is not None:
             self._end()
-        part, self._part = self._part, None
+        part = self._part
+        self._part = None
         names = [(segment.name, first) for segment, first in part.segments]
         part.hand_over(folder)
         first_layer = Sdf.Layer.FindOrOpen(str(folder / names[0][0]))
@@ -114,16 +142,21 @@ class Chunks:
         manifest.comment = MARK
         manifest.Export(str(folder / _MANIFEST))
         clips = Usd.ClipsAPI(self._stage.GetPrimAtPath(self._path))
-        clips.SetClipAssetPaths(Sdf.AssetPathArray([Sdf.AssetPath(f"./{folder.name}/{name}") for name, _ in names]))
+        clips.SetClipAssetPaths(
+            Sdf.AssetPathArray([Sdf.AssetPath(f"./{folder.name}/{name}") for name, _ in names])
+        )
         clips.SetClipPrimPath(str(self._path))
-        clips.SetClipActive(Vt.Vec2dArray([(first, number) for number, (_, first) in enumerate(names)]))
+        clips.SetClipActive(
+            Vt.Vec2dArray([(first, number) for number, (_, first) in enumerate(names)])
+        )
         clips.SetClipTimes(Vt.Vec2dArray([(0, 0), (max(last, 1), max(last, 1))]))
         clips.SetClipManifestAssetPath(Sdf.AssetPath(f"./{folder.name}/{_MANIFEST}"))
 
     def close(self) -> str:
         """Give up; keep complete layers if the run can be resumed, and say so."""
         self._drop()
-        part, self._part = self._part, None
+        part = self._part
+        self._part = None
         if part is not None and self._source.settings is None:
             part.remove()
             return ""
@@ -144,20 +177,16 @@ class Chunks:
         self._layer = None
 
 
-_SENSOR = 0.024  # height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
-_TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
-_NEAR, _FAR = 0.01, 1000.0  # of the camera's distance
-_PACKED = 315_619_200  # time of the files in a .usdz, 1980-01-02, so that the same run gives the same bytes
-_KEPT = 8  # so many frames are kept in memory, and then appended to the file
-
-
 class UsdWriter:
     """Writes a run to a .usdc, .usda or .usdz file, in metres, with z up, a time code a frame."""
 
     def __init__(self, source: Source, path: Path) -> None:
-        self._source, self._path = source, path
+        self._source = source
+        self._path = path
         # text and packages are made of a binary file, which alone can grow
-        self._binary = path if path.suffix.lower() == ".usdc" else path.with_name(f"{path.stem}.whole.usdc")
+        self._binary = (
+            path if path.suffix.lower() == ".usdc" else path.with_name(f"{path.stem}.whole.usdc")
+        )
         self._images = path.with_name(f"{path.stem}.textures")
         layer = Sdf.Layer.CreateNew(str(self._binary))
         layer.comment = MARK
@@ -168,19 +197,25 @@ class UsdWriter:
         stage.SetFramesPerSecond(source.fps)
         world = UsdGeom.Xform.Define(stage, "/World")
         stage.SetDefaultPrim(world.GetPrim())
-        self._materials = Materials(stage, world.GetPath().AppendChild("Looks"), source.model, self._images)
+        self._materials = Materials(
+            stage, world.GetPath().AppendChild("Looks"), source.model, self._images
+        )
         self._camera = UsdGeom.Camera.Define(stage, world.GetPath().AppendChild("camera"))
         self._camera.CreateShutterOpenAttr(0.0)
         self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
         self._lamps = Lamps(stage, world.GetPath().AppendChild("lights"), source)
         bodies = UsdGeom.Scope.Define(stage, "/World/bodies").GetPath()
         self._bodies = [
-            UsdGeom.Xform.Define(stage, child(stage, bodies, source.model.body(i).name or f"body_{i}"))
+            UsdGeom.Xform.Define(
+                stage, child(stage, bodies, source.model.body(i).name or f"body_{i}")
+            )
             for i in range(source.model.nbody)
         ]
         for solid in solids(source.model, set(source.ripples.geom_ids.values())):
             body = self._bodies[solid.body].GetPath()
-            mesh = define_mesh(stage, child(stage, body, solid.name), solid.F, solid.uv, open_surface=False)
+            mesh = define_mesh(
+                stage, child(stage, body, solid.name), solid.F, solid.uv, open_surface=False
+            )
             place(mesh, solid.position, solid.quaternion)
             mesh.CreatePointsAttr(vectors(solid.points))
             mesh.CreateNormalsAttr(vectors(solid.normals))
@@ -221,7 +256,9 @@ class UsdWriter:
             case ".usdz":
                 for packed in (self._binary, *self._images.glob("*")):
                     os.utime(packed, (_PACKED, _PACKED))
-                succeed(UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path))
+                succeed(
+                    UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path)
+                )
                 shutil.rmtree(self._images, ignore_errors=True)  # they are in the package now
         if self._binary != self._path:
             self._binary.unlink()
@@ -258,9 +295,11 @@ class UsdWriter:
 
     def _shapes(self, data: mujoco.MjData) -> dict[str, Displaced]:
         """The surfaces of a frame; call it frame by frame."""
-        source, shapes = self._source, {}
+        source = self._source
+        shapes = {}
         for name, (surface, _) in self._surfaces.items():
-            waves, V = source.ripples[name], source.ripples.vertices(name, data)
+            waves = source.ripples[name]
+            V = source.ripples.vertices(name, data)
             shape = surface.shape(waves.height, waves.velocity / np.float32(source.slow_motion), V)
             if V is not None:
                 # waves and motion together, since the frame before
@@ -275,7 +314,8 @@ class UsdWriter:
         for body, prim in enumerate(self._bodies):
             if not _stands(self._source.model, body):
                 place(prim, data.xpos[body], data.xquat[body], time)
-        source, pose = self._source, self._source.pose(data)
+        source = self._source
+        pose = self._source.pose(data)
         quaternion = np.zeros(4)
         mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
         place(self._camera, pose.position, quaternion, time)
@@ -290,9 +330,12 @@ class UsdWriter:
             mesh.GetExtentAttr().Set(extent(shape.points), time)
 
     def _define_surface(self, name: str) -> tuple[MovingMesh, UsdGeom.Mesh]:
-        source, model = self._source, self._source.model
+        source = self._source
+        model = self._source.model
         geom = source.ripples.geom_ids[name]
-        surface, atlas, soft = source.mesh(name), source.ripples[name].rest, is_soft(model, geom)
+        surface = source.mesh(name)
+        atlas = source.ripples[name].rest
+        soft = is_soft(model, geom)
         finish, uv = target_finish(source, name, surface)
         uv = surface.uv if uv is None else uv
         body = self._bodies[0 if soft else int(model.geom_bodyid[geom])]
@@ -300,14 +343,21 @@ class UsdWriter:
         mesh = define_mesh(self._stage, path, surface.F, uv, open_surface=not atlas.mesh.closed)
         if not soft:
             place(mesh, model.geom_pos[geom], model.geom_quat[geom])
-        mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateVelocitiesAttr(), mesh.CreateExtentAttr()
+        (
+            mesh.CreatePointsAttr(),
+            mesh.CreateNormalsAttr(),
+            mesh.CreateVelocitiesAttr(),
+            mesh.CreateExtentAttr(),
+        )
         self._materials.bind(mesh, finish)
         return surface, mesh
 
 
 def _stands(model: mujoco.MjModel, body: int) -> bool:
     """Whether a body is fixed to the world."""
-    return int(model.body_weldid[body]) == 0 and int(model.body_mocapid[model.body_rootid[body]]) < 0
+    return (
+        int(model.body_weldid[body]) == 0 and int(model.body_mocapid[model.body_rootid[body]]) < 0
+    )
 
 
 def made_here(path: Path) -> bool:

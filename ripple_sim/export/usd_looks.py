@@ -20,16 +20,28 @@ from ripple_sim.render.visuals.visual import texture_pixels
 from .source import Source
 from .visuals import Finish
 
+_LEAST_RADIUS = 0.01  # of a lamp whose MJCF gives none [m]
+_STUDIO_SKY = 0.25  # radiance that stands for the studio's soft boxes, which USD has no equal of
+_COAT_ROUGHNESS = 0.1
+_WATER = 1.33  # refractive index of what is transparent
+
 
 def define_mesh(
-    stage: Usd.Stage, path: Sdf.Path, F: NDArray[np.int64], uv: NDArray[np.float64] | None, *, open_surface: bool
+    stage: Usd.Stage,
+    path: Sdf.Path,
+    F: NDArray[np.int64],
+    uv: NDArray[np.float64] | None,
+    *,
+    open_surface: bool,
 ) -> UsdGeom.Mesh:
     """Define a mesh of triangles [m, 3], with texture coordinates [m, 3, 2] of their corners."""
     mesh = UsdGeom.Mesh.Define(stage, path)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateDoubleSidedAttr(open_surface)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(F), 3))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(F, np.int32).ravel()))
+    mesh.CreateFaceVertexIndicesAttr(
+        Vt.IntArray.FromNumpy(np.ascontiguousarray(F, np.int32).ravel())
+    )
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     if uv is not None:
         kind = Sdf.ValueTypeNames.TexCoord2fArray
@@ -50,7 +62,9 @@ def extent(points: NDArray) -> Vt.Vec3fArray:
     return vectors(np.stack([points.min(axis=0), points.max(axis=0)]))
 
 
-def place(prim: UsdGeom.Xformable, position: NDArray, quaternion: NDArray, time: float | None = None) -> None:
+def place(
+    prim: UsdGeom.Xformable, position: NDArray, quaternion: NDArray, time: float | None = None
+) -> None:
     """Set where a prim is in its parent's frame: position [m], and quaternion, w first."""
     moment = Usd.TimeCode.Default() if time is None else Usd.TimeCode(time)
     translate, orient = placing(prim)
@@ -67,7 +81,8 @@ def placing(prim: UsdGeom.Xformable) -> tuple[UsdGeom.XformOp, UsdGeom.XformOp]:
 def child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:
     """A path under a parent that is not taken, called as much like a name as USD allows."""
     valid = Tf.MakeValidIdentifier(name)
-    path, number = parent.AppendChild(valid), 1
+    path = parent.AppendChild(valid)
+    number = 1
     while stage.GetPrimAtPath(path):
         number += 1
         path = parent.AppendChild(f"{valid}_{number}")
@@ -79,20 +94,17 @@ def keep(prim: Usd.Prim, name: str, value: float) -> None:
     prim.CreateAttribute(f"userProperties:{name}", Sdf.ValueTypeNames.Float).Set(float(value))
 
 
-_LEAST_RADIUS = 0.01  # of a lamp whose MJCF gives none [m]
-_STUDIO_SKY = 0.25  # radiance that stands for the studio's soft boxes, which USD has no equal of
-
-
 class Lamps:
     """The lights of a source, which stand still or turn with the camera as its renderer's do.
 
-    A white surface that faces a far light has the radiance that it has in the renderer; so it has at the model's middle
-    for a near one, which falls off with the square of the distance everywhere else, as light does. They stand under the
-    prim at a path.
+    A white surface that faces a far light has the radiance that it has in the renderer; so it has
+    at the model's middle for a near one, which falls off with the square of the distance everywhere
+    else, as light does. They stand under the prim at a path.
     """
 
     def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
-        self._stage, self._source = stage, source
+        self._stage = stage
+        self._source = source
         self._path = UsdGeom.Scope.Define(stage, path).GetPath()
         self._lamps: list[UsdGeom.Xformable] = []
 
@@ -102,17 +114,21 @@ class Lamps:
         for index, light in enumerate(lighting.lights):
             path = self._path.AppendChild(f"lamp_{index}")
             if light.position is None:
-                lamp, angle = UsdLux.DistantLight.Define(self._stage, path), 2 * np.arctan(light.size)
+                lamp = UsdLux.DistantLight.Define(self._stage, path)
+                angle = 2 * np.arctan(light.size)
                 lamp.CreateAngleAttr(float(np.degrees(angle)))
                 lamp.CreateNormalizeAttr(True)
                 _set_light(lamp, light.radiance, np.pi, light.gloss)
-                keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())  # [W/m^2], as Blender has it
+                # [W/m^2], as Blender has it
+                keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())
                 keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
             else:
                 lamp = UsdLux.SphereLight.Define(self._stage, path)
                 lamp.CreateRadiusAttr(max(light.size, _LEAST_RADIUS))
                 lamp.CreateNormalizeAttr(True)
-                distance = max(float(np.linalg.norm(light.position - self._source.model.stat.center)), 1e-3)
+                distance = max(
+                    float(np.linalg.norm(light.position - self._source.model.stat.center)), 1e-3
+                )
                 # a sphere's irradiance is its intensity over four times the distance squared
                 strength = np.pi / float(light.falloff @ [1.0, distance, distance**2])
                 _set_light(lamp, light.radiance, 4 * distance**2 * strength, light.gloss)
@@ -126,7 +142,9 @@ class Lamps:
             self._lamps.append(lamp)
         sky = lighting.ambient + (_STUDIO_SKY if lighting.studio else 0.0)
         if sky.any():
-            _set_light(UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky")), sky, 1.0)
+            _set_light(
+                UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky")), sky, 1.0
+            )
 
     def write(self, data: mujoco.MjData, time: float) -> None:
         """Add a frame."""
@@ -139,22 +157,24 @@ class Lamps:
         return lighting_of(self._source.model, data, self._source.pose(data), self._source.lighting)
 
 
-def _set_light(lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float, gloss: float = 1.0) -> None:
+def _set_light(
+    lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float, gloss: float = 1.0
+) -> None:
     brightest = max(float(radiance.max()), 1e-9)
     lamp.CreateColorAttr(Gf.Vec3f(*(float(each) / brightest for each in radiance)))
     lamp.CreateIntensityAttr(intensity * brightest)
     lamp.CreateSpecularAttr(gloss)
 
 
-_COAT_ROUGHNESS = 0.1
-_WATER = 1.33  # refractive index of what is transparent
-
-
 class Materials:
     """Materials under the prim at a path, and their images in a folder beside the stage's file, made when needed."""
 
-    def __init__(self, stage: Usd.Stage, path: Sdf.Path, model: mujoco.MjModel, images: Path) -> None:
-        self._stage, self._model, self._images = stage, model, images
+    def __init__(
+        self, stage: Usd.Stage, path: Sdf.Path, model: mujoco.MjModel, images: Path
+    ) -> None:
+        self._stage = stage
+        self._model = model
+        self._images = images
         self._path = UsdGeom.Scope.Define(stage, path).GetPath()
         self._made: dict[tuple, UsdShade.Material] = {}
         self._textures: dict[int, str] = {}
@@ -174,7 +194,8 @@ class Materials:
         material = UsdShade.Material.Define(self._stage, path)
         shader = UsdShade.Shader.Define(self._stage, path.AppendChild("surface"))
         shader.CreateIdAttr("UsdPreviewSurface")
-        look, color = finish.look, Gf.Vec3f(*map(float, finish.color))
+        look = finish.look
+        color = Gf.Vec3f(*map(float, finish.color))
         for name, value in (
             ("roughness", look.roughness),
             ("metallic", look.metallic),
@@ -186,12 +207,15 @@ class Materials:
             shader.CreateInput(name, Sdf.ValueTypeNames.Float).Set(float(value))
         diffuse = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
         if look.emission:
-            shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).Set(color * look.emission)
+            shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).Set(
+                color * look.emission
+            )
         if finish.texture >= 0:
             diffuse.ConnectToSource(self._image(path, finish.texture, color))
         else:
             diffuse.Set(color)
-        # what UsdPreviewSurface has no word for; Blender takes such attributes over as custom properties
+        # what UsdPreviewSurface has no word for; Blender takes such attributes over as custom
+        # properties
         for name, value in (
             ("translucency", look.translucency),
             ("sheen", look.sheen),
@@ -212,7 +236,9 @@ class Materials:
         if texture not in self._textures:  # where it is, from the stage's file
             self._images.mkdir(exist_ok=True)
             name = f"texture_{texture}.png"
-            Image.fromarray(texture_pixels(self._model, texture)).save(self._images / name, pnginfo=png_mark())
+            Image.fromarray(texture_pixels(self._model, texture)).save(
+                self._images / name, pnginfo=png_mark()
+            )
             self._textures[texture] = f"./{self._images.name}/{name}"
         image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._textures[texture])
         image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")

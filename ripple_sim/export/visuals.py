@@ -15,7 +15,14 @@ from ripple_sim.render.visuals.corners import normalized
 from ripple_sim.render.visuals.geoms import visuals_of
 from ripple_sim.render.visuals.shapes import Shape, sizes
 from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
-from ripple_sim.render.visuals.visual import Look, Visual, geom_visual, look_of, texture_pixels, visible_geoms
+from ripple_sim.render.visuals.visual import (
+    Look,
+    Visual,
+    geom_visual,
+    look_of,
+    texture_pixels,
+    visible_geoms,
+)
 
 from .moving_mesh import MovingMesh
 from .source import Source
@@ -63,12 +70,15 @@ def solids(model: mujoco.MjModel, targets: set[int], segments: int = 12) -> list
     return [_solid(model, visual, make(segments)) for visual, (_, make) in visuals_of(model, geoms)]
 
 
-def target_finish(source: Source, name: str, mesh: MovingMesh) -> tuple[Finish, NDArray[np.float64] | None]:
+def target_finish(
+    source: Source, name: str, mesh: MovingMesh
+) -> tuple[Finish, NDArray[np.float64] | None]:
     """How a target looks, as in the renderer; and places [m, 3, 2] of its mesh's corners in its flat texture, if any.
 
     See `Solid` for the places.
     """
-    model, geom = source.model, source.ripples.geom_ids[name]
+    model = source.model
+    geom = source.ripples.geom_ids[name]
     finish = _finish(model, *painted(model, geom, *source.paints[name], mesh.uv is not None))
     if finish.texture < 0:
         return finish, None
@@ -80,7 +90,11 @@ def target_finish(source: Source, name: str, mesh: MovingMesh) -> tuple[Finish, 
 
 
 def _finish(
-    model: mujoco.MjModel, look: Look, color: NDArray[np.float64], mapping: TextureMapping, opacity: float = 1.0
+    model: mujoco.MjModel,
+    look: Look,
+    color: NDArray[np.float64],
+    mapping: TextureMapping,
+    opacity: float = 1.0,
 ) -> Finish:
     """Surface with a flat texture, or else the mean colour of any other."""
     if mapping.kind == MappingKind.FLAT_IMAGE:
@@ -88,7 +102,9 @@ def _finish(
     return Finish(look, color * mean_color(model, mapping), opacity, -1)
 
 
-def texture_places(mapping: TextureMapping, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+def texture_places(
+    mapping: TextureMapping, coordinates: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Places [..., 2] in a flat texture, v from its lower edge, of a mapping's coordinates [..., 2 or 3]."""
     places = coordinates[..., :2] * mapping.tiling[:2] + mapping.tiling[2:]
     return np.stack([places[..., 0], 1.0 - places[..., 1]], axis=-1)
@@ -98,20 +114,29 @@ def mean_color(model: mujoco.MjModel, mapping: TextureMapping) -> NDArray[np.flo
     """Mean linear colour of a mapping's texture [3], white without one."""
     if mapping.texture < 0:
         return np.ones(3)
-    return srgb_to_linear(texture_pixels(model, mapping.texture)[::4, ::4] / 255.0).mean(axis=(0, 1))
+    return srgb_to_linear(texture_pixels(model, mapping.texture)[::4, ::4] / 255.0).mean(
+        axis=(0, 1)
+    )
 
 
 def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
-    points, mapping = mesh.positions(*sizes(model, visual)), mapping_of(model, visual)
+    points = mesh.positions(*sizes(model, visual))
+    mapping = mapping_of(model, visual)
     uv = None
     if mapping.kind == MappingKind.FLAT_IMAGE:
         # a mesh asset counts v as MuJoCo does, from the upper edge
         own = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
         uv = texture_places(mapping, own)[mesh.faces]
-    kind, own = ("site", model.site(visual.index)) if visual.site else ("geom", model.geom(visual.index))
-    name, position, quaternion = own.name or f"{kind}_{visual.index}", np.array(own.pos), np.array(own.quat)
+    kind, own = (
+        ("site", model.site(visual.index)) if visual.site else ("geom", model.geom(visual.index))
+    )
+    name = own.name or f"{kind}_{visual.index}"
+    position = np.array(own.pos)
+    quaternion = np.array(own.quat)
     normals = normalized(mesh.normals)
     if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
         normals = normalized(normals / visual.half_sizes)
     finish = _finish(model, look_of(model, visual), visual.color, mapping, visual.opacity)
-    return Solid(finish, name, int(own.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv)
+    return Solid(
+        finish, name, int(own.bodyid[0]), position, quaternion, points, normals, mesh.faces, uv
+    )

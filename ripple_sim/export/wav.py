@@ -23,11 +23,19 @@ class WavWriter(Writer):
     """
 
     def __init__(self, source: Source, path: Path) -> None:
-        self._source, self._path = source, path
-        self._microphone = None if source.sensors else Microphone(source.ripples, source.slow_motion)
+        self._source = source
+        self._path = path
+        self._microphone = (
+            None if source.sensors else Microphone(source.ripples, source.slow_motion)
+        )
         if len({sensor.rate for sensor in source.sensors.values()}) > 1:
-            rates = ", ".join(f"{name!r} {sensor.rate:g}" for name, sensor in source.sensors.items())
-            raise ExportError(f"the sensors of a .wav have one rate; these have {rates}: change them, or write .zarr")
+            rates = ", ".join(
+                f"{name!r} {sensor.rate:g}" for name, sensor in source.sensors.items()
+            )
+            raise ExportError(
+                f"the sensors of a .wav have one rate; these have {rates}: change them, or write "
+                f".zarr"
+            )
         self._frames = 0
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
@@ -44,8 +52,11 @@ class WavWriter(Writer):
             rate = self._microphone.rate
         else:
             each = [sensor.samples for sensor in source.sensors.values()]
-            shortest = min(map(len, each))  # of sensors of coarser surfaces the last samples come later
-            signals = np.concatenate([samples[:shortest] for samples in each], axis=1).astype(np.float64)
+            # of sensors of coarser surfaces the last samples come later
+            shortest = min(map(len, each))
+            signals = np.concatenate([samples[:shortest] for samples in each], axis=1).astype(
+                np.float64
+            )
             rate = next(iter(source.sensors.values())).rate
         write_wav(self._path, signals * gain(signals), round(rate / source.slow_motion))
 

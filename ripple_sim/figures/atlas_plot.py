@@ -26,7 +26,31 @@ from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 from ripple_sim.solver.mesh.queries import RayScene
 
 OVERSAMPLING = 2  # finer pixels along each side of a pixel
-_LIGHT = np.array([-0.45, 0.55, 0.7]) / np.linalg.norm([-0.45, 0.55, 0.7])  # to the right, up, to the eye
+# to the right, up, to the eye
+_LIGHT = np.array([-0.45, 0.55, 0.7]) / np.linalg.norm([-0.45, 0.55, 0.7])
+
+_GRID_CELLS = 39  # along the side of a square that holds all charts
+_INK = np.array([0.10, 0.13, 0.20])
+
+# The belt of four charts from left to right, the second in the middle of the cross, and those above
+# and below it.
+BELT = (1, 3, 0, 2)
+ABOVE = 4
+BELOW = 5
+_GAP = 0.12  # between squares, of their side
+_ENDINGS = (".png", ".jpg", ".pdf", ".svg")
+_DPI = 120
+
+# Finer than an even spread is blue, coarser is red; the ends stand for a factor of 2.
+STRETCH_COLORS = LinearSegmentedColormap.from_list(
+    "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
+)
+STRETCH_RANGE = 2.0
+_HUES = 12
+
+# Thin is dark, as bone near the skin is in a scan that is looked through.
+_COLORS = colormaps["viridis"]
+_SHOWN = (0.005, 0.97)  # shares of the area between which the colours run
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +60,8 @@ class View:
     Attributes
     ----------
     azimuth, elevation : float
-        Where the eye is [degrees]; azimuth 0 looks along the negative forward axis, which points out of the screen.
+        Where the eye is [degrees]; azimuth 0 looks along the negative forward axis, which points
+        out of the screen.
     up : str
         Axis of the mesh's file that points up: "y" or "z".
     """
@@ -49,14 +74,23 @@ class View:
     def axes(self) -> NDArray[np.float64]:
         """Unit vectors to the right, up and towards the eye, as rows, shape [3, 3]."""
         azimuth, elevation = np.radians([self.azimuth, self.elevation])
-        eye = np.array([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)])
+        eye = np.array(
+            [
+                np.sin(azimuth) * np.cos(elevation),
+                np.sin(elevation),
+                np.cos(azimuth) * np.cos(elevation),
+            ]
+        )
         right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
         axes = np.stack([right, np.cross(eye, right), eye])
         return axes if self.up == "y" else axes[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
 
 
 def lit(
-    colors: NDArray[np.float64], normals: NDArray[np.float64], openness: NDArray[np.float64], view: View
+    colors: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    openness: NDArray[np.float64],
+    view: View,
 ) -> NDArray[np.float64]:
     """Colours under a soft light from the upper left, with a little sheen; flat enough for colours to be read."""
     local = normals @ view.axes.T
@@ -75,19 +109,19 @@ def screen(size: int, half_width: float) -> tuple[NDArray[np.float64], NDArray[n
     return x, y
 
 
-def antialiased(shape: tuple[int, ...], seen: NDArray[np.int64], colors: NDArray[np.float64]) -> NDArray[np.float64]:
+def antialiased(
+    shape: tuple[int, ...], seen: NDArray[np.int64], colors: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """RGBA image, averaged over the oversampling, of colours [k, 3] at the pixels `seen`."""
     fine = np.zeros((shape[0] * shape[1], 4))
-    fine[seen, :3], fine[seen, 3] = colors, 1.0
+    fine[seen, :3] = colors
+    fine[seen, 3] = 1.0
     k = OVERSAMPLING
     coarse = fine.reshape(shape[0] // k, k, shape[1] // k, k, 4).mean(axis=(1, 3))
-    # colours are summed where something is seen only: undo the dilution, which alpha already expresses
+    # colours are summed where something is seen only: undo the dilution, which alpha already
+    # expresses
     coarse[..., :3] /= np.maximum(coarse[..., 3:], 1e-9)
     return np.clip(coarse, 0, 1)
-
-
-_GRID_CELLS = 39  # along the side of a square that holds all charts
-_INK = np.array([0.10, 0.13, 0.20])
 
 
 class AtlasPainter:
@@ -102,12 +136,18 @@ class AtlasPainter:
         Whether the texel grid is drawn on the mesh.
     """
 
-    def __init__(self, atlas: Atlas, colors: NDArray[np.float64], *, with_grid: bool = True) -> None:
-        self._atlas, self._colors, self._with_grid = atlas, colors, with_grid
-        V, F = atlas.mesh.V, atlas.mesh.F
+    def __init__(
+        self, atlas: Atlas, colors: NDArray[np.float64], *, with_grid: bool = True
+    ) -> None:
+        self._atlas = atlas
+        self._colors = colors
+        self._with_grid = with_grid
+        V = atlas.mesh.V
+        F = atlas.mesh.F
         middle = (V.min(axis=0) + V.max(axis=0)) / 2
         self._vertices = (V - middle) / np.linalg.norm(V - middle, axis=1).max()
-        self._scene, self._corner_normals = RayScene(self._vertices, F), corner_normals(self._vertices, F)
+        self._scene = RayScene(self._vertices, F)
+        self._corner_normals = corner_normals(self._vertices, F)
         self._baked = bake(self._vertices, F, atlas.mesh.vertex_normals)
 
     def mesh(self, view: View, size: int) -> NDArray[np.float64]:
@@ -119,20 +159,27 @@ class AtlasPainter:
         origins = (middle[0] + x)[..., None] * right + (middle[1] + y)[..., None] * up + 4 * eye
         triangle, _, *inside = self._scene.cast(origins.reshape(-1, 3), np.tile(-eye, (x.size, 1)))
         seen = np.flatnonzero(triangle >= 0)
-        triangle, (u, v) = triangle[seen], (each[seen].astype(np.float64) for each in inside)
+        triangle = triangle[seen]
+        (u, v) = (each[seen].astype(np.float64) for each in inside)
         weights = np.stack([1 - u - v, u, v], axis=1)
         mesh = self._atlas.mesh
         corners = mesh.F[triangle]
         points = np.einsum("ki,kij->kj", weights, mesh.V[corners])
         normals = np.einsum("ki,kij->kj", weights, self._corner_normals[triangle])
         # an open surface shows its inner side too
-        flat = np.cross(*np.moveaxis(self._vertices[corners[:, 1:]] - self._vertices[corners[:, :1]], 1, 0))
+        flat = np.cross(
+            *np.moveaxis(self._vertices[corners[:, 1:]] - self._vertices[corners[:, :1]], 1, 0)
+        )
         inner = flat @ eye < 0
         baked = np.where(inner[:, None], self._baked[corners, 2], self._baked[corners, 0])
         normals[inner] *= -1
         coordinates = self._atlas.chart_map.coordinates(mesh, triangle, points)
-        colors = self.paint(*self._atlas.chart_map.chart_points(coordinates, self._atlas.resolution))
-        return antialiased(x.shape, seen, lit(colors, normals, np.einsum("ki,ki->k", weights, baked), view))
+        colors = self.paint(
+            *self._atlas.chart_map.chart_points(coordinates, self._atlas.resolution)
+        )
+        return antialiased(
+            x.shape, seen, lit(colors, normals, np.einsum("ki,ki->k", weights, baked), view)
+        )
 
     def paint(
         self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
@@ -141,7 +188,12 @@ class AtlasPainter:
         return self.grid(chart, row, column, on_surface=True)
 
     def grid(
-        self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64], *, on_surface: bool
+        self,
+        chart: NDArray[np.int64],
+        row: NDArray[np.float64],
+        column: NDArray[np.float64],
+        *,
+        on_surface: bool,
     ) -> NDArray[np.float64]:
         """Colours of places on the charts [k, 3]: the texel's, under a grid of fine lines and the charts' borders.
 
@@ -163,13 +215,16 @@ class AtlasPainter:
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:
         """Width of rows and of columns on the surface, in units of an even spread's, [2, C, n, n]."""
-        with_halo, areas = self._atlas.texels.halo_positions, self._atlas.areas
+        with_halo = self._atlas.texels.halo_positions
+        areas = self._atlas.areas
         own = with_halo[:, 1:-1, 1:-1]
         even = np.sqrt(areas.mean())
 
         def width(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
             sides = np.stack([np.linalg.norm(each - own, axis=-1) for each in (before, after)])
-            side = np.where(np.isfinite(sides), sides, 0.0).sum(axis=0) / np.isfinite(sides).sum(axis=0).clip(1)
+            side = np.where(np.isfinite(sides), sides, 0.0).sum(axis=0) / np.isfinite(sides).sum(
+                axis=0
+            ).clip(1)
             return areas / np.maximum(side, 1e-6 * even)
 
         rows = width(with_halo[:, 1:-1, :-2], with_halo[:, 1:-1, 2:])
@@ -177,12 +232,9 @@ class AtlasPainter:
         return np.stack([rows, columns]) / even
 
 
-# The belt of four charts from left to right, the second in the middle of the cross, and those above and below it.
-BELT, ABOVE, BELOW = (1, 3, 0, 2), 4, 5
-_GAP = 0.12  # between squares, of their side
-
-
-def sphere_image(painter: AtlasPainter, resolution: int, view: View, size: int) -> NDArray[np.float64]:
+def sphere_image(
+    painter: AtlasPainter, resolution: int, view: View, size: int
+) -> NDArray[np.float64]:
     """RGBA image [size, size, 4] of the unit sphere that the cube layout maps a mesh onto."""
     x, y = screen(size * OVERSAMPLING, 1.01)
     seen = np.flatnonzero((x**2 + y**2).ravel() < 1)
@@ -196,12 +248,19 @@ def sphere_image(painter: AtlasPainter, resolution: int, view: View, size: int) 
 def cross(painter: AtlasPainter, resolution: int, size: int) -> NDArray[np.float64]:
     """RGBA image [3 size, 4 size, 4] of a cube's charts unfolded: the belt, and a chart above and below it."""
     image = np.zeros((3 * size, 4 * size, 4))
-    for chart, i, k in [(chart, 1, k) for k, chart in enumerate(BELT)] + [(ABOVE, 0, 1), (BELOW, 2, 1)]:
-        image[i * size : (i + 1) * size, k * size : (k + 1) * size] = _square(painter, chart, resolution, size)
+    for chart, i, k in [(chart, 1, k) for k, chart in enumerate(BELT)] + [
+        (ABOVE, 0, 1),
+        (BELOW, 2, 1),
+    ]:
+        image[i * size : (i + 1) * size, k * size : (k + 1) * size] = _square(
+            painter, chart, resolution, size
+        )
     return image
 
 
-def squares(painter: AtlasPainter, shape: tuple[int, int, int], width: int, height: int) -> NDArray[np.float64]:
+def squares(
+    painter: AtlasPainter, shape: tuple[int, int, int], width: int, height: int
+) -> NDArray[np.float64]:
     """RGBA image, at most [height, width, 4], of all charts side by side, the first at the upper left."""
     count, n, _ = shape
     columns = max(range(1, count + 1), key=lambda k: min(width / k, height / -(-count // k)))
@@ -211,7 +270,9 @@ def squares(painter: AtlasPainter, shape: tuple[int, int, int], width: int, heig
     image = np.zeros((rows * pitch, columns * pitch, 4))
     for chart in range(count):
         i, k = divmod(chart, columns)
-        image[i * pitch : i * pitch + size, k * pitch : k * pitch + size] = _square(painter, chart, n, size)
+        image[i * pitch : i * pitch + size, k * pitch : k * pitch + size] = _square(
+            painter, chart, n, size
+        )
     return image
 
 
@@ -225,24 +286,28 @@ def _square(painter: AtlasPainter, chart: int, resolution: int, size: int) -> ND
 
 TEXT, FAINT = "#1b2432", "#6b7685"
 
-_ENDINGS = (".png", ".jpg", ".pdf", ".svg")
-_DPI = 120
-
 
 def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
     """Raise `AtlasError` if the ending is unknown, the folder missing, or the file another's that must not go."""
     path = Path(path)
     if path.suffix.lower() not in _ENDINGS:
-        raise AtlasError(f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}")
+        raise AtlasError(
+            f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}"
+        )
     if not path.absolute().parent.is_dir() or path.is_dir():
-        raise AtlasError(f"plot file {str(path)!r} cannot be written: name a file in a folder that exists")
+        raise AtlasError(
+            f"plot file {str(path)!r} cannot be written: name a file in a folder that exists"
+        )
     try:
         final = final_path(path)
     except OSError as error:
-        raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror}; name another file") from error
+        raise AtlasError(
+            f"plot file {str(path)!r} cannot be written: {error.strerror}; name another file"
+        ) from error
     if final.exists() and not (overwrite or made_here(final)):
         raise AtlasError(
-            f"plot file {str(path)!r} cannot be written: it exists and was not {MARK}; name another file, or add "
+            f"plot file {str(path)!r} cannot be written: it exists and was not {MARK}; name "
+            f"another file, or add "
             "--overwrite"
         )
 
@@ -255,13 +320,24 @@ def dressed(title: str, subtitle: str) -> Figure:
     return figure
 
 
-def show(figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = "") -> None:
+def show(
+    figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = ""
+) -> None:
     """Put an image at a place of a figure, left, bottom, width, height in shares of it."""
     axes = figure.add_axes(place)
     axes.imshow(image, interpolation="antialiased")
     axes.set_axis_off()
     if caption:
-        axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=11.5, color=FAINT)
+        axes.text(
+            0.5,
+            -0.03,
+            caption,
+            transform=axes.transAxes,
+            ha="center",
+            va="top",
+            fontsize=11.5,
+            color=FAINT,
+        )
 
 
 def save_plot(figure: Figure, path: str | Path) -> None:
@@ -275,23 +351,22 @@ def save_plot(figure: Figure, path: str | Path) -> None:
         with atomic_write(Path(path)) as unfinished:
             figure.savefig(unfinished, format=ending[1:], dpi=_DPI, **mark)
     except OSError as error:
-        raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
-
-
-# Finer than an even spread is blue, coarser is red; the ends stand for a factor of 2.
-STRETCH_COLORS = LinearSegmentedColormap.from_list(
-    "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
-)
-STRETCH_RANGE = 2.0
-_HUES = 12
+        raise AtlasError(
+            f"plot file {str(path)!r} cannot be written: {error.strerror or error}"
+        ) from error
 
 
 def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
     """Stretch at every texel, [C, n, n]: sqrt(real area over even share).
 
-    In the cube layout the even share is that of the texel on the sphere, in others the same for all texels.
+    In the cube layout the even share is that of the texel on the sphere, in others the same for all
+    texels.
     """
-    share = sphere_atlas(1.0, atlas.resolution).areas if atlas.layout == "cube" else np.ones_like(atlas.areas)
+    share = (
+        sphere_atlas(1.0, atlas.resolution).areas
+        if atlas.layout == "cube"
+        else np.ones_like(atlas.areas)
+    )
     return np.sqrt((atlas.areas / atlas.areas.sum()) / (share / share.sum()))
 
 
@@ -308,10 +383,14 @@ def chart_colors(topology: TexelTopology) -> NDArray[np.float64]:
         # steps of 5 hues of 12 visit all of them, far from each other
         free = (hue for hue in (5 * (chart + k) % _HUES for k in range(_HUES)) if hue not in near)
         hues[chart] = next(free, chart % _HUES)
-    return np.array([colorsys.hls_to_rgb(hue / _HUES, 0.74 - 0.08 * (hue % 2), 0.62) for hue in hues.tolist()])
+    return np.array(
+        [colorsys.hls_to_rgb(hue / _HUES, 0.74 - 0.08 * (hue % 2), 0.62) for hue in hues.tolist()]
+    )
 
 
-def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
+def plot_atlas(
+    atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y"
+) -> None:
     """Write a figure of an atlas and its quality, with a subtitle below its title.
 
     Parameters
@@ -330,14 +409,22 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     stretch = texel_stretch(atlas)
     figure = dressed(title, subtitle)
     painter = AtlasPainter(atlas, STRETCH_COLORS(stretch_shade(stretch))[..., :3])
-    front, back = View(up=up), View(azimuth=View.azimuth + 180, up=up)
+    front = View(up=up)
+    back = View(azimuth=View.azimuth + 180, up=up)
     if atlas.layout == "cube":
-        large, small = painter, (sphere_image(painter, atlas.resolution, front, 380), "on the sphere")
+        large = painter
+        small = (sphere_image(painter, atlas.resolution, front, 380), "on the sphere")
         page = cross(painter, atlas.resolution, 160), "the six charts, unfolded"
     else:
-        colors = np.broadcast_to(chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3))
-        large, small = AtlasPainter(atlas, colors), (painter.mesh(front, 380), "stretch")
-        page = squares(painter, atlas.texels.shape, 672, 508), f"the {len(colors)} charts, side by side"
+        colors = np.broadcast_to(
+            chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3)
+        )
+        large = AtlasPainter(atlas, colors)
+        small = (painter.mesh(front, 380), "stretch")
+        page = (
+            squares(painter, atlas.texels.shape, 672, 508),
+            f"the {len(colors)} charts, side by side",
+        )
     show(figure, (0.025, 0.05, 0.37, 0.82), large.mesh(front, 800))
     show(figure, (0.42, 0.50, 0.20, 0.38), large.mesh(back, 400), "the other side")
     show(figure, (0.42, 0.07, 0.20, 0.355), *small)
@@ -352,14 +439,20 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     bins = np.geomspace(1 / STRETCH_RANGE, STRETCH_RANGE, 121)
     share, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
     colors = STRETCH_COLORS(stretch_shade(np.sqrt(bins[1:] * bins[:-1])))  # those of the middles
-    axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
+    axes.bar(
+        bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none"
+    )
     axes.stairs(share / share.max(), bins, color=FAINT, linewidth=0.7)  # pale bars need an outline
-    axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")
+    axes.bar(
+        bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none"
+    )
     axes.set_xscale("log")
     axes.set_xlim(bins[0], bins[-1])
     axes.set_ylim(-0.17, 1.02)
     ticks = [0.5, 0.6, 0.7, 0.8, 1.0, 1.25, 1.5, 2.0]
-    axes.set_xticks(ticks, ["≤ ½", *(f"{t:g}" for t in ticks[1:-1]), "≥ 2"], fontsize=10, color=TEXT)
+    axes.set_xticks(
+        ticks, ["≤ ½", *(f"{t:g}" for t in ticks[1:-1]), "≥ 2"], fontsize=10, color=TEXT
+    )
     axes.set_xticks([], minor=True)
     axes.set_yticks([])
     axes.tick_params(length=0, pad=3)
@@ -379,23 +472,27 @@ def _figures(figure: Figure, atlas: Atlas) -> None:
         "texel edges / even grid": ("{edge_min:.2f} to {edge_max:.2f}", 1 / even),
     }
     for index, (name, (form, unit)) in enumerate(shown.items()):
-        left, k = (0.655, 0.83)[index // 3], index % 3
+        left = (0.655, 0.83)[index // 3]
+        k = index % 3
         values = {key: value if unit == 1.0 else value * unit for key, value in quality.items()}
         try:
             text = form.format(**values)
         except KeyError:  # the layout does not know it
             text = "-"
-        figure.text(left, 0.196 - 0.062 * k, text, fontsize=16, fontweight="bold", color=TEXT, va="center")
+        figure.text(
+            left, 0.196 - 0.062 * k, text, fontsize=16, fontweight="bold", color=TEXT, va="center"
+        )
         figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=FAINT, va="center")
 
 
-# Thin is dark, as bone near the skin is in a scan that is looked through.
-_COLORS = colormaps["viridis"]
-_SHOWN = (0.005, 0.97)  # shares of the area between which the colours run
-
-
 def plot_thickness(
-    atlas: Atlas, thickness: NDArray[np.float64], path: str | Path, *, title: str, subtitle: str = "", up: str = "y"
+    atlas: Atlas,
+    thickness: NDArray[np.float64],
+    path: str | Path,
+    *,
+    title: str,
+    subtitle: str = "",
+    up: str = "y",
 ) -> None:
     """Write a figure of the thickness [m] of a layer, [C, n, n], see `thickness_map`; else as `plot_atlas`."""
     check_plot_path(path)
@@ -404,12 +501,25 @@ def plot_thickness(
     painter = AtlasPainter(atlas, _COLORS(shade)[..., :3], with_grid=False)
     figure = dressed(title, subtitle)
     show(figure, (0.03, 0.17, 0.45, 0.70), painter.mesh(View(up=up), 800))
-    show(figure, (0.52, 0.17, 0.45, 0.70), painter.mesh(View(azimuth=View.azimuth + 180, up=up), 800), "the other side")
+    show(
+        figure,
+        (0.52, 0.17, 0.45, 0.70),
+        painter.mesh(View(azimuth=View.azimuth + 180, up=up), 800),
+        "the other side",
+    )
     # share of the surface over thickness, in the colours of the images, as their legend
-    axes, bins = figure.add_axes((0.3, 0.075, 0.38, 0.07)), np.linspace(low, high, 101)
+    axes = figure.add_axes((0.3, 0.075, 0.38, 0.07))
+    bins = np.linspace(low, high, 101)
     share, _ = np.histogram(thickness.clip(low, high), bins, weights=atlas.areas)
     colors = _COLORS((bins[:-1] - bins[0]) / (bins[-1] - bins[0]))
-    axes.bar(bins[:-1] * 1e3, share / share.max(), np.diff(bins) * 1e3, align="edge", color=colors, edgecolor="none")
+    axes.bar(
+        bins[:-1] * 1e3,
+        share / share.max(),
+        np.diff(bins) * 1e3,
+        align="edge",
+        color=colors,
+        edgecolor="none",
+    )
     axes.set_yticks([])
     axes.set_xlim(low * 1e3, high * 1e3)
     axes.spines[["top", "left", "right"]].set_visible(False)

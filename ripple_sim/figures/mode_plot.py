@@ -12,18 +12,33 @@ from ripple_sim.solver import Atlas, Modes, texel_atlas
 from ripple_sim.solver.mesh.queries import RayScene
 from ripple_sim.solver.texels.halo import sampling_matrix
 
-from .atlas_plot import STRETCH_COLORS, TEXT, AtlasPainter, View, check_plot_path, dressed, save_plot, show
+from .atlas_plot import (
+    STRETCH_COLORS,
+    TEXT,
+    AtlasPainter,
+    View,
+    check_plot_path,
+    dressed,
+    save_plot,
+    show,
+)
 
-# Height of a mode where it is largest, at most: of the radius of a sheet, or of a body, which must not pass through
-# itself, and of the mode's wave length.
-_SHEET, _BODY, _OF_WAVE = 0.3, 0.05, 0.12
+# Height of a mode where it is largest, at most: of the radius of a sheet, or of a body, which must
+# not pass through itself, and of the mode's wave length.
+_SHEET = 0.3
+_BODY = 0.05
+_OF_WAVE = 0.12
 
 # Thickness over size of what is a sheet, which is looked at from higher up.
-_FLAT, _HIGH = 0.2, 32.0
+_FLAT = 0.2
+_HIGH = 32.0
 
-# Place of all pictures, left, bottom, width and height in shares of the figure; how much of the width they fill; the
-# height of a caption, and the largest picture [pixels].
-_PLACE, _FILLED, _CAPTION, _LARGEST = (0.03, 0.02, 0.94, 0.85), 0.92, 54, 640
+# Place of all pictures, left, bottom, width and height in shares of the figure; how much of the
+# width they fill; the height of a caption, and the largest picture [pixels].
+_PLACE = (0.03, 0.02, 0.94, 0.85)
+_FILLED = 0.92
+_CAPTION = 54
+_LARGEST = 640
 
 
 class ModePainter(AtlasPainter):
@@ -32,23 +47,29 @@ class ModePainter(AtlasPainter):
     def __init__(self, atlas: Atlas) -> None:
         fine = texel_atlas(atlas.texels)
         super().__init__(fine, np.ones((*atlas.areas.shape, 3)), with_grid=False)
-        self._rest, self._normals = self._vertices, fine.mesh.vertex_normals
+        self._rest = self._vertices
+        self._normals = fine.mesh.vertex_normals
         self._at_vertices = fine.sampling_matrix(fine.mesh.V)
         self._wave_matrix = atlas.stiffness()
         # as a share of the radius, in which the painter's vertices are
-        self._radius = np.linalg.norm(np.ptp(fine.mesh.V, axis=0)) / np.linalg.norm(np.ptp(self._rest, axis=0))
+        self._radius = np.linalg.norm(np.ptp(fine.mesh.V, axis=0)) / np.linalg.norm(
+            np.ptp(self._rest, axis=0)
+        )
         self._highest = _SHEET if _is_sheet(atlas) else _BODY
         self._shape = np.zeros(atlas.areas.size)
 
     def mode(self, shape: NDArray[np.float64], view: View, size: int) -> NDArray[np.float64]:
         """RGBA image [size, size, 4] of a shape [C, n, n], of at most 1."""
         flat = self._shape = shape.ravel()
-        wave_number = np.sqrt(flat @ (self._wave_matrix @ flat) / (flat @ (self._atlas.areas.ravel() * flat)))
+        wave_number = np.sqrt(
+            flat @ (self._wave_matrix @ flat) / (flat @ (self._atlas.areas.ravel() * flat))
+        )
         wave = 2 * np.pi / max(wave_number * self._radius, 1e-9)
         height = min(self._highest, _OF_WAVE * wave) * (self._at_vertices @ flat)
         self._vertices = self._rest + height[:, None] * self._normals
         F = self._atlas.mesh.F
-        self._scene, self._corner_normals = RayScene(self._vertices, F), corner_normals(self._vertices, F)
+        self._scene = RayScene(self._vertices, F)
+        self._corner_normals = corner_normals(self._vertices, F)
         return self.mesh(view, size)
 
     def paint(
@@ -59,7 +80,9 @@ class ModePainter(AtlasPainter):
         return STRETCH_COLORS(0.5 + 0.5 * value)[:, :3]
 
 
-def plot_modes(atlas: Atlas, found: Modes, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
+def plot_modes(
+    atlas: Atlas, found: Modes, path: str | Path, *, title: str, subtitle: str = "", up: str = "y"
+) -> None:
     """Write a figure with a picture of each mode, its frequency and its decay time.
 
     Parameters
@@ -70,7 +93,8 @@ def plot_modes(atlas: Atlas, found: Modes, path: str | Path, *, title: str, subt
     path : path
         Ends in .png, .jpg, .pdf or .svg.
     up : str
-        Axis of the mesh that points up, "y" or "z"; a flat sheet in the plane of the other two lies down in any case.
+        Axis of the mesh that points up, "y" or "z"; a flat sheet in the plane of the other two lies
+        down in any case.
 
     Raises
     ------
@@ -80,7 +104,8 @@ def plot_modes(atlas: Atlas, found: Modes, path: str | Path, *, title: str, subt
     check_plot_path(path)
     thin = "xyz"[np.ptp(atlas.mesh.V, axis=0).argmin()]
     view = View(up=thin, elevation=_HIGH) if _is_sheet(atlas) and thin != "x" else View(up=up)
-    painter, figure = ModePainter(atlas), dressed(title, subtitle)
+    painter = ModePainter(atlas)
+    figure = dressed(title, subtitle)
     left, bottom, width, height = _PLACE
     across, along = figure.get_size_inches() * figure.dpi
     count = len(found.shapes)
@@ -88,24 +113,38 @@ def plot_modes(atlas: Atlas, found: Modes, path: str | Path, *, title: str, subt
     images = np.stack([painter.mode(shape, view, size) for shape in found.shapes])
     seen = images[..., 3].max(axis=0)
     rows, columns = (np.flatnonzero(seen.max(axis=axis)) for axis in (1, 0))
-    images = images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]  # without the margin that all have
+    # without the margin that all have
+    images = images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     aspect = images.shape[1] / images.shape[2]
 
     def scale(columns: int) -> float:
         """Width of the pictures [pixels]."""
-        return min(_FILLED * width * across / columns, (height * along / -(-count // columns) - _CAPTION) / aspect)
+        return min(
+            _FILLED * width * across / columns,
+            (height * along / -(-count // columns) - _CAPTION) / aspect,
+        )
 
     most = max(range(1, count + 1), key=scale)  # pictures side by side
-    pitch, box = width / most, scale(most) / across
+    pitch = width / most
+    box = scale(most) / across
     for k, image in enumerate(images):
         row, column = divmod(k, most)
-        x, y = left + (column + 0.5) * pitch, bottom + height * (1 - row / -(-count // most))
+        x = left + (column + 0.5) * pitch
+        y = bottom + height * (1 - row / -(-count // most))
         tall = aspect * box * across / along
         show(figure, (x - box / 2, y - tall, box, tall), image)
         frequency = found.frequencies[k]
         digits = max(0, 3 - int(np.floor(np.log10(frequency)))) if frequency else 0  # four in all
         caption = f"{k + 1}:  {frequency:.{digits}f} Hz"
-        figure.text(x, y - tall - _CAPTION / 3 / along, caption, fontsize=12, color=TEXT, ha="center", va="center")
+        figure.text(
+            x,
+            y - tall - _CAPTION / 3 / along,
+            caption,
+            fontsize=12,
+            color=TEXT,
+            ha="center",
+            va="center",
+        )
     save_plot(figure, path)
 
 

@@ -1,7 +1,7 @@
 """Marks of contacts with the targets and their impulses, which stay long enough to be seen, and what draws them.
 
-A `Sprite` is a small transparent image that is drawn once and laid over many frames: shapes, text, and arrows with a
-light rim and smooth edges.
+A `Sprite` is a small transparent image that is drawn once and laid over many frames: shapes, text,
+and arrows with a light rim and smooth edges.
 """
 
 from __future__ import annotations
@@ -23,17 +23,31 @@ from ripple_sim.simulation import Simulation
 
 Color = tuple[int, int, int]
 
-INK, FAINT, PAPER = (27, 36, 50), (97, 107, 122), (255, 255, 255)
+INK = (27, 36, 50)
+FAINT = (97, 107, 122)
+PAPER = (255, 255, 255)
 
 _SUPERSAMPLING = 8
 _CORNERS = {"left": 0.0, "middle": 0.5, "right": 1.0}
+
+# in thicknesses of the shaft
+HEAD_LENGTH = 6.0
+HEAD_WIDTH = 2.2
+DOT = 1.5
+RIM = 0.7
+MEMORY = 0.25  # time in which a mark fades to 1/e [s]; it holds the impulse of about this time
+
+# shares of its largest impulse at which a mark begins to fade, and disappears
+_FADING = 0.35
+_FADED = 0.08
+_SAME_PLACE = 0.05  # contacts closer than this share of the target's size are one moving contact
 
 
 class Sprite:
     """Shapes and text with smooth edges on a transparent background.
 
-    Coordinates are in pixels from the upper left corner, x to the right and y down; whole numbers lie between pixels.
-    Colours are sRGB, 0 to 255.
+    Coordinates are in pixels from the upper left corner, x to the right and y down; whole numbers
+    lie between pixels. Colours are sRGB, 0 to 255.
 
     Parameters
     ----------
@@ -42,42 +56,64 @@ class Sprite:
     """
 
     def __init__(self, width: int, height: int) -> None:
-        self.width, self.height = width, height
+        self.width = width
+        self.height = height
         self._color = np.zeros((height, width, 3), np.float32)  # times alpha
         self._alpha = np.zeros((height, width, 1), np.float32)
 
-    def fill(self, coverage: NDArray[np.floating], color: NDArray | Color, opacity: float = 1.0) -> None:
+    def fill(
+        self, coverage: NDArray[np.floating], color: NDArray | Color, opacity: float = 1.0
+    ) -> None:
         """Lay a colour, or an image [height, width, 3], over the share `coverage`, 0 to 1, of each pixel."""
         alpha = (opacity * coverage[..., None]).astype(np.float32)
         self._color += alpha * (np.asarray(color, dtype=np.float32) - self._color)
         self._alpha += alpha * (1 - self._alpha)
 
     def box(
-        self, left: float, top: float, right: float, bottom: float, color: NDArray | Color, opacity: float = 1.0
+        self,
+        left: float,
+        top: float,
+        right: float,
+        bottom: float,
+        color: NDArray | Color,
+        opacity: float = 1.0,
     ) -> None:
         """Fill an upright rectangle."""
-        across, down = overlap(left, right, self.width), overlap(top, bottom, self.height)
+        across = overlap(left, right, self.width)
+        down = overlap(top, bottom, self.height)
         self.fill(down * across.T, color, opacity)
 
     def polygon(self, corners: list[tuple[float, float]], color: NDArray | Color) -> None:
         """Fill a polygon."""
-        self.fill(self._drawn(lambda draw, k: draw.polygon([(k * x, k * y) for x, y in corners], 255)), color)
+        self.fill(
+            self._drawn(lambda draw, k: draw.polygon([(k * x, k * y) for x, y in corners], 255)),
+            color,
+        )
 
     def disc(self, x: float, y: float, radius: float, color: Color) -> None:
         """Fill a circle."""
-        across, down = np.arange(self.width) + 0.5 - x, np.arange(self.height) + 0.5 - y
+        across = np.arange(self.width) + 0.5 - x
+        down = np.arange(self.height) + 0.5 - y
         self.fill(np.clip(radius + 0.5 - np.hypot(across, down[:, None]), 0, 1), color)
 
     def panel(self, radius: float, opacity: float) -> None:
         """Fill the whole sprite with paper, its corners rounded."""
         size = (0, 0, _SUPERSAMPLING * self.width - 1, _SUPERSAMPLING * self.height - 1)
-        self.fill(self._drawn(lambda draw, k: draw.rounded_rectangle(size, k * radius, 255)), PAPER, opacity)
+        self.fill(
+            self._drawn(lambda draw, k: draw.rounded_rectangle(size, k * radius, 255)),
+            PAPER,
+            opacity,
+        )
 
-    def text(self, x: float, y: float, text: str, size: int, color: Color = INK, align: str = "left") -> None:
+    def text(
+        self, x: float, y: float, text: str, size: int, color: Color = INK, align: str = "left"
+    ) -> None:
         """Write a line on the baseline y that begins, is centred or ends at x ("left", "middle", "right")."""
         mask = Image.new("L", (self.width, self.height))
         x -= _CORNERS[align] * text_width(text, size)
-        ImageDraw.Draw(mask).text((round(x), round(y)), text, font=_font(size), fill=255, anchor="ls")
+        ImageDraw.Draw(mask).text(
+            (round(x), round(y)), text, font=_font(size), fill=255, anchor="ls"
+        )
         self.fill(np.asarray(mask, dtype=np.float32) / 255, color)
 
     def over(self, frame: NDArray[np.uint8], left: int, top: int) -> None:
@@ -85,12 +121,16 @@ class Sprite:
 
         The frame is uint8 [height, width, 3], or [height, width, 4] with straight alpha.
         """
-        x0, y0 = max(left, 0), max(top, 0)
-        x1, y1 = min(left + self.width, frame.shape[1]), min(top + self.height, frame.shape[0])
+        x0 = max(left, 0)
+        y0 = max(top, 0)
+        x1 = min(left + self.width, frame.shape[1])
+        y1 = min(top + self.height, frame.shape[0])
         if x0 >= x1 or y0 >= y1:
             return
         inside = np.s_[y0 - top : y1 - top, x0 - left : x1 - left]
-        under, color, alpha = frame[y0:y1, x0:x1], self._color[inside], self._alpha[inside]
+        under = frame[y0:y1, x0:x1]
+        color = self._color[inside]
+        alpha = self._alpha[inside]
         if frame.shape[2] == 3:
             under[:] = under * (1 - alpha) + color + 0.5
             return
@@ -126,10 +166,9 @@ def overlap(low: ArrayLike, high: ArrayLike, count: int) -> NDArray[np.float32]:
     return np.diff(np.clip(edge, low, high), axis=0).astype(np.float32)
 
 
-HEAD_LENGTH, HEAD_WIDTH, DOT, RIM = 6.0, 2.2, 1.5, 0.7  # in thicknesses of the shaft
-
-
-def draw_arrow(sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float, opacity: ArrayLike = (1.0,)) -> None:
+def draw_arrow(
+    sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float, opacity: ArrayLike = (1.0,)
+) -> None:
     """Draw an arrow with a dot at its tip.
 
     Parameters
@@ -141,13 +180,17 @@ def draw_arrow(sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float
     opacity : [k]
         0 to 1, at equal distances from tip to tail.
     """
-    tip, opacity = np.asarray(tip, dtype=np.float64), np.asarray(opacity, dtype=np.float64)
+    tip = np.asarray(tip, dtype=np.float64)
+    opacity = np.asarray(opacity, dtype=np.float64)
     way = np.asarray(tail, dtype=np.float64) - tip
     length = float(np.hypot(*way))
     along = way / max(length, 1e-9)
-    x, y = np.arange(sprite.width) + 0.5 - tip[0], np.arange(sprite.height)[:, None] + 0.5 - tip[1]
-    u, across = x * along[0] + y * along[1], np.abs(y * along[0] - x * along[1])
-    # distance of the pixels from the shape, `u` along the arrow from its tip and `across`; negative inside
+    x = np.arange(sprite.width) + 0.5 - tip[0]
+    y = np.arange(sprite.height)[:, None] + 0.5 - tip[1]
+    u = x * along[0] + y * along[1]
+    across = np.abs(y * along[0] - x * along[1])
+    # distance of the pixels from the shape, `u` along the arrow from its tip and `across`; negative
+    # inside
     outside = np.hypot(u, across) - DOT * thickness
     if length >= DOT * thickness:  # else all of it is within the dot
         head = min(HEAD_LENGTH * thickness, length)
@@ -159,11 +202,6 @@ def draw_arrow(sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float
     here = np.interp(place, np.arange(len(opacity)), opacity)
     sprite.fill(np.clip(0.5 - (outside - RIM * thickness), 0, 1) * here, PAPER, 0.9)
     sprite.fill(np.clip(0.5 - outside, 0, 1) * here, INK)
-
-
-MEMORY = 0.25  # time in which a mark fades to 1/e [s]; it holds the impulse of about this time
-_FADING, _FADED = 0.35, 0.08  # shares of its largest impulse at which a mark begins to fade, and disappears
-_SAME_PLACE = 0.05  # contacts closer than this share of the target's size are one moving contact
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -212,7 +250,10 @@ class ContactMarks:
         self._fade = math.exp(-dt / MEMORY)
         self._contacts: list[_Contact] = []
         ripples = simulation.ripples
-        self._near = {name: _SAME_PLACE * float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples}
+        self._near = {
+            name: _SAME_PLACE * float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max())
+            for name in ripples
+        }
 
     def follow(self) -> list[Mark]:
         """Take in the simulation's present frame; return the marks to draw, the weakest first."""
@@ -220,16 +261,25 @@ class ContactMarks:
             contact.impulse *= self._fade
         for impulse in self._simulation.impulses:
             self._add(impulse)
-        self._contacts = [contact for contact in self._contacts if contact.impulse > _FADED * contact.largest]
+        self._contacts = [
+            contact for contact in self._contacts if contact.impulse > _FADED * contact.largest
+        ]
         touched = {contact.geom for contact in self._contacts}
-        heights, marks = {name: self._simulation.ripples[name].height for name in sorted(touched)}, []
+        heights = {name: self._simulation.ripples[name].height for name in sorted(touched)}
+        marks = []
         for contact in sorted(self._contacts, key=lambda contact: contact.impulse):
-            (position, rotation), waves = self._pose(contact.geom), self._simulation.ripples[contact.geom]
-            normal, height = waves.atlas.normals[contact.texel], float(heights[contact.geom][contact.texel])
-            place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
+            (position, rotation) = self._pose(contact.geom)
+            waves = self._simulation.ripples[contact.geom]
+            normal = waves.atlas.normals[contact.texel]
+            height = float(heights[contact.geom][contact.texel])
+            place = (
+                contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
+            )
             opacity = min((contact.impulse / contact.largest - _FADED) / (_FADING - _FADED), 1.0)
             point = position + rotation @ (place + height * normal)
-            marks.append(Mark(point, axis=rotation @ normal, impulse=contact.impulse, opacity=opacity))
+            marks.append(
+                Mark(point, axis=rotation @ normal, impulse=contact.impulse, opacity=opacity)
+            )
         return marks
 
     def _add(self, hit: Impulse) -> None:
@@ -237,7 +287,8 @@ class ContactMarks:
             return
         position, rotation = self._pose(hit.geom)
         atlas = self._simulation.ripples[hit.geom].atlas
-        place = atlas.project((hit.point - position) @ rotation)[0][0]  # a fast target has moved since the contact
+        # a fast target has moved since the contact
+        place = atlas.project((hit.point - position) @ rotation)[0][0]
         for contact in self._contacts:
             same = (contact.geom, contact.other) == (hit.geom, hit.other)
             if same and np.linalg.norm(contact.place - place) < self._near[hit.geom]:
@@ -245,7 +296,8 @@ class ContactMarks:
         else:
             contact = _Contact(hit.geom, hit.other, place, hit.texel)
             self._contacts.append(contact)
-        contact.place, contact.texel = place, hit.texel
+        contact.place = place
+        contact.texel = hit.texel
         contact.impulse += hit.impulse
         contact.largest = max(contact.largest, contact.impulse)
 

@@ -1,11 +1,13 @@
 """The content of the overlays, gathered from running simulations frame by frame.
 
-`Notebook` follows one simulation, or two of one scene side by side, and notes for each frame what is to be shown:
-fields for heatmaps, marks of contacts, energies so far, and the ends of their scales, round numbers that are steady.
+`Notebook` follows one simulation, or two of one scene side by side, and notes for each frame what
+is to be shown: fields for heatmaps, marks of contacts, energies so far, and the ends of their
+scales, round numbers that are steady.
 
-The colour map of heatmaps is blue for negative, almost white for zero, red for positive values: a curve in CIELAB of
-constant speed, so that equal steps of the value look equally large. Both arms have the same lightness at the same
-distance from zero, and blue differs from orange-red in every common colour vision.
+The colour map of heatmaps is blue for negative, almost white for zero, red for positive values: a
+curve in CIELAB of constant speed, so that equal steps of the value look equally large. Both arms
+have the same lightness at the same distance from zero, and blue differs from orange-red in every
+common colour vision.
 """
 
 from __future__ import annotations
@@ -34,12 +36,42 @@ SIZE = 513  # odd: zero has a colour of its own
 
 # lightness, chroma at equal distances from zero; hues of the two arms [degrees]
 _ARM = np.array([(96.0, 0.0), (85.0, 19.0), (70.0, 39.0), (53.0, 49.0), (34.0, 45.0)])
-_BLUE, _RED = (245.0, 285.0), (62.0, 30.0)  # near zero, at the end
+# near zero, at the end
+_BLUE = (245.0, 285.0)
+_RED = (62.0, 30.0)
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])  # D65
 _XYZ_TO_RGB = np.array(
-    [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+    [
+        [3.2404542, -1.5371385, -0.4985314],
+        [-0.9692660, 1.8760108, 0.0415560],
+        [0.0556434, -0.2040259, 1.0572252],
+    ]
 )
+
+OWN = "fem"
+
+# By wave operator: a title, and a remark.
+TITLES = {
+    OWN: ("ripple-sim", "finite elements"),
+    "paper": ("paper", "real distances, 4 neighbours"),
+    "uncorrected": ("uncorrected", "one distance everywhere"),
+    "dynamic-paint": ("Dynamic Paint", "real distances, 8 neighbours"),
+}
+BASELINES = tuple(name for name in TITLES if name != OWN)
+COLUMNS = 512  # of a trace
+MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # halves of these are short numbers too
+_EASE = 0.12  # time in which a limit covers most of the way to its new value [s]
+_FAR = 4.0  # a limit that is more than this factor away catches up at once
+
+# The colours end at this share of the targets' size, or of their wave speed, until higher waves
+# come.
+_LEAST = 1e-3
+
+# A contact's first dent is much deeper than its waves, but brief [s].
+_MEMORY = 0.25
 
 
 @functools.lru_cache(maxsize=1)
@@ -60,33 +92,26 @@ def colors(values: ArrayLike, limit: float) -> NDArray[np.uint8]:
 
 def lab_to_srgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
     """SRGB values (IEC 61966-2-1) of CIELAB colours under D65, [..., 3]; outside of 0 to 1 where sRGB has none."""
-    f = (lab[..., :1] + 16) / 116 + np.stack([lab[..., 1] / 500, np.zeros(lab.shape[:-1]), -lab[..., 2] / 200], axis=-1)
+    f = (lab[..., :1] + 16) / 116 + np.stack(
+        [lab[..., 1] / 500, np.zeros(lab.shape[:-1]), -lab[..., 2] / 200], axis=-1
+    )
     xyz = _WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
     return linear_to_srgb(xyz @ _XYZ_TO_RGB.T)
 
 
 def _arm(hue_near: float, hue_end: float) -> NDArray[np.float64]:
     """CIELAB colours from zero to an end, through the control points, [SIZE // 2 + 1, 3]."""
-    place, knots = np.linspace(0, 1, 1025), np.linspace(0, 1, len(_ARM))
-    lightness, chroma = (np.polyval(np.polyfit(knots, column, len(knots) - 1), place) for column in _ARM.T)
+    place = np.linspace(0, 1, 1025)
+    knots = np.linspace(0, 1, len(_ARM))
+    lightness, chroma = (
+        np.polyval(np.polyfit(knots, column, len(knots) - 1), place) for column in _ARM.T
+    )
     hue = np.radians(hue_near + (hue_end - hue_near) * place)
     lab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=1)
     # points of that curve at equal differences of colour (CIE 1976)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lab, axis=0), axis=1))])
     even = np.linspace(0, length[-1], SIZE // 2 + 1)
     return np.stack([np.interp(even, length, column) for column in lab.T], axis=1)
-
-
-OWN = "fem"
-
-# By wave operator: a title, and a remark.
-TITLES = {
-    OWN: ("ripple-sim", "finite elements"),
-    "paper": ("paper", "real distances, 4 neighbours"),
-    "uncorrected": ("uncorrected", "one distance everywhere"),
-    "dynamic-paint": ("Dynamic Paint", "real distances, 8 neighbours"),
-}
-BASELINES = tuple(name for name in TITLES if name != OWN)
 
 
 def compared_operators(baseline: str | None) -> tuple[str, ...]:
@@ -97,14 +122,17 @@ def compared_operators(baseline: str | None) -> tuple[str, ...]:
     if baseline is None:
         return (OWN,)
     if baseline not in BASELINES:
-        raise SceneError(f"there is no operator {baseline!r} to compare with; valid are {', '.join(BASELINES)}")
+        raise SceneError(
+            f"there is no operator {baseline!r} to compare with; valid are {', '.join(BASELINES)}"
+        )
     return OWN, baseline
 
 
 def magnitude(field: NDArray[np.float32]) -> float:
     """Mean magnitude of a field with halo, weighted by the magnitude itself: how high the waves are.
 
-    The calm surface around a small wave does not count, and the few texels in the dent under a contact count little.
+    The calm surface around a small wave does not count, and the few texels in the dent under a
+    contact count little.
     """
     inside = np.abs(field[:, 1:-1, 1:-1]).ravel()
     total = float(inside.sum(dtype=np.float64))
@@ -116,36 +144,32 @@ def grid_spacing(resolution: int) -> int:
     return 1 << max(0, (resolution // 16).bit_length() - 1)
 
 
-COLUMNS = 512  # of a trace
-MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
-
-
-def curve(values: NDArray[np.float64], frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def curve(
+    values: NDArray[np.float64], frames: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Frame numbers and values of a curve of a value a frame so far, of so many frames in all.
 
     It has at most `MOST_POINTS`: of several frames the largest value is kept.
     """
     begins = np.arange(0, len(values), -(-frames // MOST_POINTS))
-    return begins.astype(np.float64), np.maximum.reduceat(values, begins) if len(values) else np.zeros(0)
-
-
-_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # halves of these are short numbers too
-_EASE = 0.12  # time in which a limit covers most of the way to its new value [s]
-_FAR = 4.0  # a limit that is more than this factor away catches up at once
+    return begins.astype(np.float64), np.maximum.reduceat(values, begins) if len(
+        values
+    ) else np.zeros(0)
 
 
 def round_up(value: float, steps: tuple[float, ...] = _STEPS) -> float:
     """Return the smallest of `steps` times a power of ten that is at least a positive value."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
-    return next((step * power for step in steps if value <= step * power * (1 + 1e-9)), 10.0 * power)
+    return next(
+        (step * power for step in steps if value <= step * power * (1 + 1e-9)), 10.0 * power
+    )
 
 
 class Limit:
     """End of a scale that follows the magnitudes so far and never shrinks.
 
-    Its goals are round numbers, so it seldom moves, and it glides from one to the next. It depends on the magnitudes
-    alone: the same run has the same limits.
+    Its goals are round numbers, so it seldom moves, and it glides from one to the next. It depends
+    on the magnitudes alone: the same run has the same limits.
 
     Parameters
     ----------
@@ -154,12 +178,14 @@ class Limit:
     fixed : float, optional
         The limit, for good.
     memory : float
-        Magnitudes are averaged over about this time [s], so that brief peaks do not count. 0: each counts.
+        Magnitudes are averaged over about this time [s], so that brief peaks do not count. 0: each
+        counts.
     """
 
     def __init__(self, floor: float = 0.0, fixed: float | None = None, memory: float = 0.0) -> None:
         self._fixed = fixed is not None
-        self._memory, self._mean = memory, 0.0
+        self._memory = memory
+        self._mean = 0.0
         self.goal = fixed if fixed is not None else round_up(floor) if floor > 0 else 0.0
         self.value = self.goal
 
@@ -167,7 +193,9 @@ class Limit:
         """Take in a magnitude, dt seconds after the last one; return the limit, 0 while there is none."""
         if self._fixed:
             return self.value
-        self._mean += (magnitude - self._mean) * (-math.expm1(-dt / self._memory) if self._memory else 1.0)
+        self._mean += (magnitude - self._mean) * (
+            -math.expm1(-dt / self._memory) if self._memory else 1.0
+        )
         if self._mean > self.goal:
             self.goal = round_up(self._mean)
         self.value = max(self.value, self.goal / _FAR) if self.value else self.goal
@@ -190,11 +218,6 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text.replace("-", "\N{MINUS SIGN}")
 
 
-# The colours end at this share of the targets' size, or of their wave speed, until higher waves come.
-_LEAST = 1e-3
-# A contact's first dent is much deeper than its waves, but brief [s].
-_MEMORY = 0.25
-
 Trace: TypeAlias = tuple[str, NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], str]
 Scale: TypeAlias = tuple[float, float]  # its present end, and the round number that this approaches
 
@@ -216,7 +239,8 @@ class Notes:
     ledgers : sequence of Energy
         Of bodies, waves and both, now.
     traces : sequence of (name, times [s], least, greatest, unit)
-        Of the first point of each sensor of the first run: one value a column, over the time so far.
+        Of the first point of each sensor of the first run: one value a column, over the time so
+        far.
     """
 
     time: float
@@ -236,7 +260,10 @@ def traces(sensors: Mapping[str, Sensor]) -> list[Trace]:
     for name, sensor in sensors.items():
         values = sensor.samples[:, 0]
         begins = np.arange(0, len(values), max(1, -(-len(values) // COLUMNS)))
-        low, high = (each.reduceat(values, begins) if len(values) else values for each in (np.minimum, np.maximum))
+        low, high = (
+            each.reduceat(values, begins) if len(values) else values
+            for each in (np.minimum, np.maximum)
+        )
         made.append((name, sensor.times[begins], low, high, UNITS[sensor.kind]))
     return made
 
@@ -254,22 +281,32 @@ class Notebook:
         Frames in a second of the scene's time.
     """
 
-    def __init__(self, request: Request, simulations: Sequence[Simulation], frames: int, rate: float) -> None:
-        self._request, self._simulations, self._dt = request, simulations, 1 / rate
+    def __init__(
+        self, request: Request, simulations: Sequence[Simulation], frames: int, rate: float
+    ) -> None:
+        self._request = request
+        self._simulations = simulations
+        self._dt = 1 / rate
         ripples = simulations[0].ripples
         if request.heatmap == "velocity":
             size = max(float(np.max(ripples[name].material.speed)) for name in ripples)
         else:
             size = max(float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples)
         self._heatmap_limit = Limit(_LEAST * size, request.limit, _MEMORY)
-        self._mark_limit, self._energy_limit = Limit(), Limit()
+        self._mark_limit = Limit()
+        self._energy_limit = Limit()
         self._marks = [ContactMarks(simulation, self._dt) for simulation in simulations]
-        self._energies, self._followed = np.zeros((len(simulations), frames)), 0
+        self._energies = np.zeros((len(simulations), frames))
+        self._followed = 0
 
     def follow(self) -> Notes:
         """Take in the simulations' present frame. Call it for every frame, rendered or not."""
         request = self._request
-        heatmaps = [self._heatmaps(each.ripples, request.heatmap) for each in self._simulations if request.heatmap]
+        heatmaps = [
+            self._heatmaps(each.ripples, request.heatmap)
+            for each in self._simulations
+            if request.heatmap
+        ]
         marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []
         ledgers = [simulation.energy for simulation in self._simulations] if request.energy else []
         if ledgers:
@@ -282,9 +319,13 @@ class Notebook:
             heatmaps=heatmaps,
             heatmap_scale=self._scale(self._heatmap_limit, magnitudes),
             marks=marks,
-            mark_scale=self._scale(self._mark_limit, [mark.impulse for run in marks for mark in run]),
+            mark_scale=self._scale(
+                self._mark_limit, [mark.impulse for run in marks for mark in run]
+            ),
             energies=[(frames * self._dt, values) for frames, values in curves],
-            energy_scale=self._scale(self._energy_limit, [values[-1] for _, values in curves if len(values)]),
+            energy_scale=self._scale(
+                self._energy_limit, [values[-1] for _, values in curves if len(values)]
+            ),
             ledgers=ledgers,
             traces=traces(self._simulations[0].sensors) if request.sensors else [],
         )
@@ -294,4 +335,7 @@ class Notebook:
 
     def _heatmaps(self, ripples: Ripples, shown: str) -> dict[str, NDArray[np.float32]]:
         each = {name: ripples[name] for name in ripples}
-        return {name: with_filled_halo(on.atlas.texels.topology, getattr(on, shown)) for name, on in each.items()}
+        return {
+            name: with_filled_halo(on.atlas.texels.topology, getattr(on, shown))
+            for name, on in each.items()
+        }

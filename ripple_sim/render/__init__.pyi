@@ -54,6 +54,10 @@ from .targets import (
     SurfaceBuffers as SurfaceBuffers,
     SurfaceImage as SurfaceImage,
 )
-from .tone_mapping import linear_to_srgb as linear_to_srgb, srgb_to_linear as srgb_to_linear, tone_mapped as tone_mapped
+from .tone_mapping import (
+    linear_to_srgb as linear_to_srgb,
+    srgb_to_linear as srgb_to_linear,
+    tone_mapped as tone_mapped,
+)
 from .visuals.lights import LIGHTING as LIGHTING
 from .visuals.visual import LOOKS as LOOKS

@@ -1,8 +1,9 @@
 """Cameras and what they see of the world.
 
-MuJoCo's free camera and cameras fixed in a model, which have a pose; matrices of view and projection, for column
-vectors, in OpenGL's conventions; and bounding balls, with the boxes about them in a frame. Balls are float64 [k, 4]:
-centre in the world and radius [m], which may be infinite.
+MuJoCo's free camera and cameras fixed in a model, which have a pose; matrices of view and
+projection, for column vectors, in OpenGL's conventions; and bounding balls, with the boxes about
+them in a frame. Balls are float64 [k, 4]: centre in the world and radius [m], which may be
+infinite.
 """
 
 from __future__ import annotations
@@ -22,13 +23,18 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import RippleError, shown, warn_caller
 
 # Clip planes of a camera that says nothing of them, in its distances.
-_NEAR, _FAR = 0.02, 200.0
+_NEAR = 0.02
+_FAR = 200.0
 _ROUND_OFF = 1e-4  # of MuJoCo's frustums, which have single precision, relative
 _SLACK = 0.99  # of the distance of the first thing, where the near plane may be
-# Least distance of the focus, in extents of the model: of a camera among what it shows; and of one that a body carries,
-# which looks at what is about it.
-_LEAST_FOCUS, _LEAST_FOCUS_RIDING = 0.05, 0.5
-_AT_BODY, _AT_MASS = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY), int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM)
+# Least distance of the focus, in extents of the model: of a camera among what it shows; and of one
+# that a body carries, which looks at what is about it.
+_LEAST_FOCUS = 0.05
+_LEAST_FOCUS_RIDING = 0.5
+_AT_BODY = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY)
+_AT_MASS = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM)
+
+_CLOSEST = 0.01  # gap between the eye and a ball, in radii, below which it may show anywhere
 
 
 @dataclass(frozen=True)
@@ -46,19 +52,20 @@ class Pose:
     fovy : float
         Vertical field of view [degrees]; of an orthographic camera the height of what it sees [m].
     lens : tuple of float
-        The eye may be off the camera's position, at a point of the lens (to the right, up) [m]. Points of the plane in
-        focus then stay where they are in the frame.
+        The eye may be off the camera's position, at a point of the lens (to the right, up) [m].
+        Points of the plane in focus then stay where they are in the frame.
     focal_distance : float
         Of the plane in focus [m].
     orthographic : bool
         Whether rays are parallel, in place of a perspective view.
     centre : tuple of float
-        Where the middle of the frame is off the camera's axis (to the right, up): a metre in front of the eye, or with
-        parallel rays anywhere [m].
+        Where the middle of the frame is off the camera's axis (to the right, up): a metre in front
+        of the eye, or with parallel rays anywhere [m].
     half_width : float, optional
         Half the width of what is seen, there [m]; by default pixels are square.
     clip : tuple of float, optional
-        Distances of the near and the far plane [m]; by default they follow the distance of the focus.
+        Distances of the near and the far plane [m]; by default they follow the distance of the
+        focus.
     """
 
     position: NDArray[np.float64]
@@ -124,7 +131,9 @@ class Pose:
 
     def has_square_pixels(self, aspect: float) -> bool:
         """Whether pixels of a frame of an aspect, width over height, are as wide as high."""
-        return bool(np.isclose(self.half_sizes(aspect)[0], aspect * self.half_height, rtol=_ROUND_OFF))
+        return bool(
+            np.isclose(self.half_sizes(aspect)[0], aspect * self.half_height, rtol=_ROUND_OFF)
+        )
 
     def in_perspective(self, aspect: float, shown_by: str) -> Pose:
         """For what can show no other: itself in plain perspective, where what is in focus has the same height.
@@ -134,19 +143,27 @@ class Pose:
         if self.is_plain(aspect):
             return self
         warn_caller(
-            f"{shown_by} shows the camera in perspective, centred and with square pixels, which it is not; "
+            f"{shown_by} shows the camera in perspective, centred and with square pixels, which it "
+            f"is not; "
             "RippleRenderer and ripple-sim render show it as it is"
         )
         half_height = self.half_height / self.distance if self.orthographic else self.half_height
         fovy = float(np.degrees(2 * np.arctan(half_height)))
-        return dataclasses.replace(self, fovy=fovy, orthographic=False, centre=(0.0, 0.0), half_width=None)
+        return dataclasses.replace(
+            self, fovy=fovy, orthographic=False, centre=(0.0, 0.0), half_width=None
+        )
 
     def pose(self) -> Pose:
         """Itself: a pose is a viewpoint."""
         return self
 
-    def projection(self, aspect: float, planes: tuple[float, float] | None = None) -> NDArray[np.float64]:
-        """Eye to clip coordinates, shape [4, 4]; see `view_matrix`. The `planes` are the clip planes by default."""
+    def projection(
+        self, aspect: float, planes: tuple[float, float] | None = None
+    ) -> NDArray[np.float64]:
+        """Eye to clip coordinates, shape [4, 4]; see `view_matrix`.
+
+        The `planes` are the clip planes by default.
+        """
         near, far = planes or self.clip_planes
         if not self.orthographic and self.half_width is None:
             return perspective(self.fovy, aspect, near, far, self.shear)
@@ -154,13 +171,16 @@ class Pose:
         projection = np.zeros((4, 4))
         projection[[0, 1], [0, 1]] = scale
         projection[:2, 2] = scale * self.shear
-        projection[2:, 2:] = _parallel_depth(near, far) if self.orthographic else _perspective_depth(near, far)
+        projection[2:, 2:] = (
+            _parallel_depth(near, far) if self.orthographic else _perspective_depth(near, far)
+        )
         return projection
 
     def local(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Points [..., 3] of the world as the eye has them: to the right and up [..., 2], and distances [...] [m].
 
-        The former are off the ray through the middle of the frame, the latter along the camera's axis.
+        The former are off the ray through the middle of the frame, the latter along the camera's
+        axis.
         """
         local = (points - self.eye) @ self.rotation
         depth = -local[..., 2]
@@ -181,7 +201,8 @@ class Pose:
         Returns
         -------
         array, shape [..., 2]
-            Columns and rows, from the frame's upper left corner [pixels]; nonsense behind a camera in perspective.
+            Columns and rows, from the frame's upper left corner [pixels]; nonsense behind a camera
+            in perspective.
         array, shape [...]
             Distances along the camera's axis [m].
         """
@@ -223,13 +244,16 @@ class Camera:
 
     def __post_init__(self) -> None:
         try:
-            values = np.array([*self.lookat, self.distance, self.azimuth, self.elevation, self.fovy])
+            values = np.array(
+                [*self.lookat, self.distance, self.azimuth, self.elevation, self.fovy]
+            )
         except (TypeError, ValueError):  # no sequence, or sequences in place of numbers
             values = np.array(None)
         valid = values.shape == (7,) and values.dtype.kind in "iuf" and np.isfinite(values).all()
         if not (valid and self.distance > 0 and 0 < self.fovy < 180):
             raise RippleError(
-                f"camera {shown(self)} is invalid: lookat must be three numbers, every number finite, the distance "
+                f"camera {shown(self)} is invalid: lookat must be three numbers, every number "
+                f"finite, the distance "
                 "positive [m], and fovy between 0 and 180 degrees"
             )
 
@@ -237,11 +261,17 @@ class Camera:
         """Return position and axes in the world."""
         azimuth, elevation = np.radians([self.azimuth, self.elevation])
         forward = np.array(
-            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+            [
+                np.cos(elevation) * np.cos(azimuth),
+                np.cos(elevation) * np.sin(azimuth),
+                np.sin(elevation),
+            ]
         )
         right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
         rotation = np.stack([right, np.cross(right, forward), -forward], axis=1)
-        return Pose(np.asarray(self.lookat) - self.distance * forward, rotation, self.distance, self.fovy)
+        return Pose(
+            np.asarray(self.lookat) - self.distance * forward, rotation, self.distance, self.fovy
+        )
 
     @staticmethod
     def from_mjcf(model: Any, data: Any, name: str | int) -> FixedCamera:
@@ -261,7 +291,9 @@ class Camera:
         # the scene's camera has single precision
         fovy = pose.fovy if model.cam_sensorsize[index].any() else float(model.cam_fovy[index])
         rotation = np.array(data.cam_xmat[index]).reshape(3, 3)
-        return dataclasses.replace(pose, position=np.array(data.cam_xpos[index]), rotation=rotation, fovy=fovy)
+        return dataclasses.replace(
+            pose, position=np.array(data.cam_xpos[index]), rotation=rotation, fovy=fovy
+        )
 
 
 # A camera with a given pose, such as one that a MuJoCo model fixes to a body.
@@ -274,13 +306,15 @@ Viewpoint: TypeAlias = Camera | Pose
 def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> Viewpoint:
     """The viewpoint of whatever stands for a camera, as posed in `data`.
 
-    Cameras of MuJoCo's see what they see in MuJoCo: orthographic ones, those with intrinsics, and clip planes too.
+    Cameras of MuJoCo's see what they see in MuJoCo: orthographic ones, those with intrinsics, and
+    clip planes too.
 
     Parameters
     ----------
     camera : Viewpoint, str, int or mujoco.MjvCamera
-        A viewpoint itself; the name or the id of a camera in the MJCF; -1 for MuJoCo's free camera, aimed at the
-        model's middle; or a camera of MuJoCo's that is free, tracks a body or is fixed.
+        A viewpoint itself; the name or the id of a camera in the MJCF; -1 for MuJoCo's free camera,
+        aimed at the model's middle; or a camera of MuJoCo's that is free, tracks a body or is
+        fixed.
 
     Raises
     ------
@@ -294,7 +328,9 @@ def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> V
         return Camera.from_mjcf(model, data, camera.fixedcamid)
     if camera.type == mujoco.mjtCamera.mjCAMERA_TRACKING:
         data = with_camera_poses(model, data)
-    return _as_in_mujoco(model, data, camera, max(camera.distance, _LEAST_FOCUS * model.stat.extent))
+    return _as_in_mujoco(
+        model, data, camera, max(camera.distance, _LEAST_FOCUS * model.stat.extent)
+    )
 
 
 def mujoco_camera(model: mujoco.MjModel, camera: Any) -> mujoco.MjvCamera:
@@ -316,7 +352,8 @@ def mujoco_camera(model: mujoco.MjModel, camera: Any) -> mujoco.MjvCamera:
         return found
     if not isinstance(camera, mujoco.MjvCamera):
         raise SceneError(
-            f"camera is {type(camera).__name__}; valid are a Camera, a FixedCamera, the name or the id of a camera in "
+            f"camera is {type(camera).__name__}; valid are a Camera, a FixedCamera, the name or "
+            f"the id of a camera in "
             "the model, -1 for the free camera, and a mujoco.MjvCamera"
         )
     if camera.type == kinds.mjCAMERA_FIXED:
@@ -324,13 +361,16 @@ def mujoco_camera(model: mujoco.MjModel, camera: Any) -> mujoco.MjvCamera:
     elif camera.type == kinds.mjCAMERA_TRACKING:
         if not 0 <= camera.trackbodyid < model.nbody:
             raise SceneError(
-                f"the MjvCamera's trackbodyid is {camera.trackbodyid}; valid are 0 to {model.nbody - 1}, the model's "
+                f"the MjvCamera's trackbodyid is {camera.trackbodyid}; valid are 0 to "
+                f"{model.nbody - 1}, the model's "
                 "bodies"
             )
     elif camera.type != kinds.mjCAMERA_FREE:
         raise SceneError(
-            f"the MjvCamera's type is {camera.type}; valid are mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
-            f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and mjCAMERA_FIXED ({int(kinds.mjCAMERA_FIXED)})"
+            f"the MjvCamera's type is {camera.type}; valid are mjCAMERA_FREE "
+            f"({int(kinds.mjCAMERA_FREE)}), "
+            f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and mjCAMERA_FIXED "
+            f"({int(kinds.mjCAMERA_FIXED)})"
         )
     return camera
 
@@ -340,14 +380,22 @@ def _camera_id(model: mujoco.MjModel, name: Any) -> int:
     named = isinstance(name, str)
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name) if named else int(name)
     if not 0 <= index < model.ncam:
-        wrong = f'"{name}" does not exist' if named else f"id {index} is out of range [-1, {model.ncam})"
+        wrong = (
+            f'"{name}" does not exist'
+            if named
+            else f"id {index} is out of range [-1, {model.ncam})"
+        )
         names = ", ".join(f"{model.camera(i).name!r} (id {i})" for i in range(model.ncam)) or "none"
         shown_name = repr(name) if named else index
-        raise SceneError(f"The camera {wrong}. The model has no camera {shown_name}; it has: {names}")
+        raise SceneError(
+            f"The camera {wrong}. The model has no camera {shown_name}; it has: {names}"
+        )
     return index
 
 
-def _as_in_mujoco(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera, distance: float) -> Pose:
+def _as_in_mujoco(
+    model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera, distance: float
+) -> Pose:
     """What a camera of MuJoCo's sees in MuJoCo."""
     scene = mujoco.MjvScene()
     mujoco.mjv_updateCamera(model, data, camera, scene)
@@ -371,14 +419,20 @@ def pose_of_scene(cameras: Sequence[mujoco.MjvGLCamera], distance: float) -> Pos
     """
     left, right = cameras
     if left.orthographic != right.orthographic:
-        raise SceneError("of the scene's two cameras one is orthographic; set `orthographic` of both alike")
+        raise SceneError(
+            "of the scene's two cameras one is orthographic; set `orthographic` of both alike"
+        )
     camera = mujoco.mjv_averageCamera(left, right)
-    near, far = float(camera.frustum_near), float(camera.frustum_far)
-    low, high = float(camera.frustum_bottom), float(camera.frustum_top)
+    near = float(camera.frustum_near)
+    far = float(camera.frustum_far)
+    low = float(camera.frustum_bottom)
+    high = float(camera.frustum_top)
     if not (0 < near < far and low < high):
         raise SceneError(
-            f"the scene's camera sees nothing: its frustum is {low:g} m to {high:g} m high, from {near:g} m to {far:g} "
-            "m away; call mjv_updateScene or mjv_updateCamera, or set its frustum so that near is positive and less "
+            f"the scene's camera sees nothing: its frustum is {low:g} m to {high:g} m high, from "
+            f"{near:g} m to {far:g} "
+            "m away; call mjv_updateScene or mjv_updateCamera, or set its frustum so that near is "
+            "positive and less "
             "than far, and bottom less than top"
         )
     forward = np.array(camera.forward, dtype=np.float64)
@@ -392,7 +446,9 @@ def pose_of_scene(cameras: Sequence[mujoco.MjvGLCamera], distance: float) -> Pos
         np.array(camera.pos, dtype=np.float64),
         np.stack([across, np.cross(across, forward), -forward], axis=1),
         distance,
-        fovy=2 * half_height if camera.orthographic else float(np.degrees(2 * np.arctan(half_height))),
+        fovy=2 * half_height
+        if camera.orthographic
+        else float(np.degrees(2 * np.arctan(half_height))),
         orthographic=bool(camera.orthographic),
         centre=(scale * float(camera.frustum_center), scale * (low + high) / 2),
         half_width=scale * float(camera.frustum_width) or None,
@@ -400,10 +456,13 @@ def pose_of_scene(cameras: Sequence[mujoco.MjvGLCamera], distance: float) -> Pos
     )
 
 
-def set_scene_camera(cameras: Sequence[mujoco.MjvGLCamera], pose: Pose, model: mujoco.MjModel) -> None:
+def set_scene_camera(
+    cameras: Sequence[mujoco.MjvGLCamera], pose: Pose, model: mujoco.MjModel
+) -> None:
     """Let both cameras of a scene of MuJoCo's see what a pose sees, through the middle of its lens.
 
-    Where the pose says nothing of clip planes they are the model's, but the near one no farther than the pose needs.
+    Where the pose says nothing of clip planes they are the model's, but the near one no farther
+    than the pose needs.
     """
     extent = model.stat.extent
     near, far = pose.clip or (
@@ -432,7 +491,8 @@ def with_camera_poses(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjDa
     if not model.ncam or np.asarray(data.cam_xmat).any():
         return data
     warn_caller(
-        "the data has no poses of cameras, which mj_kinematics alone does not compute: they are computed for this "
+        "the data has no poses of cameras, which mj_kinematics alone does not compute: they are "
+        "computed for this "
         "picture; call mj_forward, or mj_comPos and mj_camlight after mj_kinematics"
     )
     data = copy.copy(data)
@@ -444,11 +504,12 @@ def with_camera_poses(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjDa
 def _focus_distance(model: mujoco.MjModel, data: mujoco.MjData, camera: int) -> float:
     """How far from a camera of the MJCF what it is about lies [m].
 
-    That is the body that it turns to; or, where a body carries it, the middle of all that moves along; or else the
-    model's middle.
+    That is the body that it turns to; or, where a body carries it, the middle of all that moves
+    along; or else the model's middle.
     """
     position = data.cam_xpos[camera]
-    target, carrier = int(model.cam_targetbodyid[camera]), int(model.cam_bodyid[camera])
+    target = int(model.cam_targetbodyid[camera])
+    carrier = int(model.cam_bodyid[camera])
     extent = float(model.stat.extent)
     if model.cam_mode[camera] in (_AT_BODY, _AT_MASS) and target >= 0:
         aim = data.xpos[target] if model.cam_mode[camera] == _AT_BODY else data.subtree_com[target]
@@ -474,7 +535,8 @@ def perspective(
 ) -> NDArray[np.float64]:
     """Eye to clip coordinates, shape [4, 4].
 
-    `fovy` in degrees; `aspect` is width over height; `near` and `far` in metres; for `shear` see `Pose`.
+    `fovy` in degrees; `aspect` is width over height; `near` and `far` in metres; for `shear` see
+    `Pose`.
     """
     scale = 1.0 / np.tan(np.radians(fovy) / 2)
     projection = np.zeros((4, 4))
@@ -502,14 +564,17 @@ def orthographic(half_width: float, depth: float) -> NDArray[np.float64]:
     return matrix
 
 
-def within(balls: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+def within(
+    balls: NDArray[np.float64], point: NDArray[np.float64], reach: float
+) -> NDArray[np.float64]:
     """The balls that any point within `reach` [m] of a point [3] touches."""
     return balls[np.linalg.norm(balls[:, :3] - point, axis=1) - balls[:, 3] < reach]
 
 
 def enclosing(balls: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """Centre [3] and radius of a ball that contains others."""
-    centres, radii = balls[:, :3], balls[:, 3]
+    centres = balls[:, :3]
+    radii = balls[:, 3]
     centre = ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0)) / 2
     return centre, float((np.linalg.norm(centres - centre, axis=1) + radii).max())
 
@@ -534,11 +599,11 @@ def balls_about(triangles: NDArray[np.float64], count: int) -> NDArray[np.float6
         groups = halves
     corners = [group.reshape(-1, 3) for group in groups]
     centres = np.array([(each.min(axis=0) + each.max(axis=0)) / 2 for each in corners])
-    radii = [np.linalg.norm(each - centre, axis=1).max() for each, centre in zip(corners, centres, strict=True)]
+    radii = [
+        np.linalg.norm(each - centre, axis=1).max()
+        for each, centre in zip(corners, centres, strict=True)
+    ]
     return np.column_stack([centres, radii])
-
-
-_CLOSEST = 0.01  # gap between the eye and a ball, in radii, below which it may show anywhere
 
 
 def boxes_of(balls: NDArray[np.float64], pose: Pose, size: tuple[int, int]) -> NDArray[np.int64]:
@@ -547,13 +612,16 @@ def boxes_of(balls: NDArray[np.float64], pose: Pose, size: tuple[int, int]) -> N
     Returns
     -------
     int64 [k, 4]
-        Left, lower, right and upper edge [pixels], counted from the lower left. Balls behind the camera have a box of
-        size 0.
+        Left, lower, right and upper edge [pixels], counted from the lower left. Balls behind the
+        camera have a box of size 0.
     """
-    centres, radii = balls[:, :3], balls[:, 3]
+    centres = balls[:, :3]
+    radii = balls[:, 3]
     local = (centres - pose.eye) @ pose.rotation
-    beside, middle = local[:, :2], -local[:, 2]
-    near, far = middle - radii, middle + radii
+    beside = local[:, :2]
+    middle = -local[:, 2]
+    near = middle - radii
+    far = middle + radii
     seen = np.isfinite(radii) if pose.orthographic else near > _CLOSEST * radii
     scale = np.array(size) / (2 * pose.half_sizes(size[0] / size[1]))
     # in perspective the nearest point of the ball's box is seen under the widest angle
@@ -572,7 +640,9 @@ def boxes_of(balls: NDArray[np.float64], pose: Pose, size: tuple[int, int]) -> N
     return boxes
 
 
-def _on_screen(beside: NDArray[np.float64], depth: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
+def _on_screen(
+    beside: NDArray[np.float64], depth: NDArray[np.float64], pose: Pose
+) -> NDArray[np.float64]:
     """Where points beside the eye [k, 2], at depths [k, 1] [m], are off the middle of the frame; see `half_sizes`."""
     if pose.orthographic:
         return beside - depth * pose.shear

@@ -12,9 +12,25 @@ import numpy as np
 
 from .tone_mapping import CURVES
 
-MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
+MAX_LIGHTS = 8
+MAX_SHADOWS = 4
+MAX_OCCLUDERS = 16
+SOFT_BOXES = 3
 HELD_LIGHTS = 2  # that come to fragments as varyings
 OBJECT_COLUMNS = 64  # objects in a row of their table; a power of two
+
+# Depths that stand for what a pixel shows, exact in every depth buffer; `NAME_LEVEL` in GLSL.
+LEVELS = {
+    "OPEN": 1.0,  # background that is smooth
+    "SHADED": 0.75,  # background that a shadow may reach, or that is not smooth
+    "MIXED": 0.5,  # solids in some of the samples
+    "SOLID": 0.25,  # solids in all of them
+    "LAYER": 0.125,  # the transparent object that is being drawn
+}
+
+# Shapes of what std140 and std430 lay out alike, in float32: the columns of a mat3 are padded to
+# four.
+_SHAPES: dict[str, tuple[int, ...]] = {"vec4": (4,), "mat3": (3, 4), "mat4": (4, 4)}
 
 
 class Unit(IntEnum):
@@ -85,18 +101,6 @@ class CasterMap(IntEnum):
     TRANSMISSION = 2  # what something transparent takes from a light
 
 
-# Depths that stand for what a pixel shows, exact in every depth buffer; `NAME_LEVEL` in GLSL.
-LEVELS = {
-    "OPEN": 1.0,  # background that is smooth
-    "SHADED": 0.75,  # background that a shadow may reach, or that is not smooth
-    "MIXED": 0.5,  # solids in some of the samples
-    "SOLID": 0.25,  # solids in all of them
-    "LAYER": 0.125,  # the transparent object that is being drawn
-}
-
-# Shapes of what std140 and std430 lay out alike, in float32: the columns of a mat3 are padded to four.
-_SHAPES: dict[str, tuple[int, ...]] = {"vec4": (4,), "mat3": (3, 4), "mat4": (4, 4)}
-
 Member: TypeAlias = "str | Struct | tuple[str | Struct, int]"
 
 
@@ -108,12 +112,14 @@ class Struct:
     name : str
         In GLSL.
     **members
-        "vec4", "mat3", "mat4" or another struct, or a pair of one of these and the length of an array of them.
+        "vec4", "mat3", "mat4" or another struct, or a pair of one of these and the length of an
+        array of them.
 
     Attributes
     ----------
     dtype : numpy.dtype
-        Matrices are stored column by column: a mat4 is [column, row], a mat3 [column, row and padding].
+        Matrices are stored column by column: a mat4 is [column, row], a mat3 [column, row and
+        padding].
     members : str
         The declarations, to be put between the braces of a struct or block.
     """
@@ -125,7 +131,9 @@ class Struct:
         for member, given in members.items():
             kind, count = given if isinstance(given, tuple) else (given, None)
             word = kind if isinstance(kind, str) else kind.name
-            declarations.append(f"{word} {member};" if count is None else f"{word} {member}[{count}];")
+            declarations.append(
+                f"{word} {member};" if count is None else f"{word} {member}[{count}];"
+            )
             base, shape = ("f4", _SHAPES[kind]) if isinstance(kind, str) else (kind.dtype, ())
             fields.append((member, base, shape if count is None else (count, *shape)))
         self.dtype: np.dtype[Any] = np.dtype(fields)
@@ -140,27 +148,35 @@ def numbered(names: type[IntEnum], suffix: str = "") -> dict[str, int]:
 LIGHT = Struct(
     "Light",
     position="vec4",  # xyz [m]; w: 1 for a light at a position, 0 for one far away
-    direction="vec4",  # towards the light, or against the beam of a spotlight; w: cosine of the beam's half angle
+    # towards the light, or against the beam of a spotlight; w: cosine of the beam's half angle
+    direction="vec4",
     radiance="vec4",  # of a white surface facing the light; w: exponent of the beam
-    falloff="vec4",  # attenuation: constant, linear [1/m], quadratic [1/m^2]; share of the radiance in highlights
+    # attenuation: constant, linear [1/m], quadratic [1/m^2]; share of the radiance in highlights
+    falloff="vec4",
 )
 SHADOW = Struct(
     "Shadow",
     matrix="mat4",  # world to shadow map, all three coordinates 0 to 1 after the division
     planes="mat4",  # its inverse transpose, which transforms planes
-    depth="vec4",  # (x z + y) / (z z + w) turns a depth of the map into the distance from the light [m]
+    # (x z + y) / (z z + w) turns a depth of the map into the distance from the light [m]
+    depth="vec4",
     width="vec4",  # x + y times that distance: the map's width [m]; z: its texels
-    penumbra="vec4",  # x: tangent of the light's angular radius; y: radius of a near light [m]; z: widest, in the map
-    floor="vec4",  # bounding box of the shadows on the floor, in the floor map: lower and upper corner
+    # x: tangent of the light's angular radius; y: radius of a near light [m]; z: widest, in the map
+    penumbra="vec4",
+    # bounding box of the shadows on the floor, in the floor map: lower and upper corner
+    floor="vec4",
 )
 FRAME = Struct(
     "Frame",
     view_projection="mat4",
     eye="vec4",  # xyz [m]; w: distance of the focus [m]
-    focus="vec4",  # the point that the camera is about [m]; w: how far away the floor begins to show [m]
-    ray="vec4",  # through the middle of the frame, one metre along the camera's axis; w: near plane [m]
+    # the point that the camera is about [m]; w: how far away the floor begins to show [m]
+    focus="vec4",
+    # through the middle of the frame, one metre along the camera's axis; w: near plane [m]
+    ray="vec4",
     ray_right="vec4",  # from there to the frame's right edge; w: far plane [m]
-    ray_up="vec4",  # likewise; w: 1 where rays are parallel and start beside each other, 0 in perspective
+    # likewise; w: 1 where rays are parallel and start beside each other, 0 in perspective
+    ray_up="vec4",
     zenith="vec4",  # radiance of the background overhead
     horizon="vec4",
     sky="vec4",  # ambient radiance from above; w: share of the soft boxes in it
@@ -174,13 +190,15 @@ FRAME = Struct(
     floor_albedo="vec4",  # mean
     floor_light="vec4",  # irradiance over pi where nothing shades the floor
     floor_map="vec4",  # the floor map: xy centre, z half width [m]
-    floor_fade="vec4",  # x, y: where it begins and ends to fade into the background, in distances of the focus
+    # x, y: where it begins and ends to fade into the background, in distances of the focus
+    floor_fade="vec4",
     lights=(LIGHT, MAX_LIGHTS),  # the first ones cast shadows
     shadows=(SHADOW, MAX_SHADOWS),
     # without a backdrop, colours in sRGB
     fog="vec4",  # its colour; w: 1 with fog
     haze="vec4",  # the colour of the haze over the floor's horizon; w: 1 with haze
-    haze_cone="vec4",  # x: its width, y: how high it is densest (see background.glsl), z: how far the skybox is [m]
+    # x: its width, y: how high it is densest (see background.glsl), z: how far the skybox is [m]
+    haze_cone="vec4",
     shown_far="vec4",  # x, y: where fog begins and is complete [m]; z: 1 where the skybox is shown
     counts="vec4",  # y: lights, z: number of the exposure, w: lights that cast shadows
 )
@@ -188,9 +206,11 @@ OBJECT = Struct(
     "Object",
     base="vec4",  # roughness, metallic, sheen, coat
     volume="vec4",  # translucency, transparency, emission, opacity
-    # geom, size [m], shadow bias [m]; 1: colours are those of a heatmap, -1: a sheet's back is lit as its front
+    # geom, size [m], shadow bias [m]; 1: colours are those of a heatmap, -1: a sheet's back is lit
+    # as its front
     place="vec4",
-    # layer; 1 with a height map, 0 without; bits of the occluders near a geom; a chart's side with its halo [texels]
+    # layer; 1 with a height map, 0 without; bits of the occluders near a geom; a chart's side with
+    # its halo [texels]
     height_map="vec4",
     rotation="mat3",  # of the height map's gradients, into the world
 )

@@ -11,7 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.soft import is_soft, target_pose
-from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation, DeviceTessellation, Displacement
+from ripple_sim.render.surfaces.adaptive import (
+    AdaptiveTessellation,
+    DeviceTessellation,
+    Displacement,
+)
 from ripple_sim.render.surfaces.moving import MovingOcclusion, MovingVertices
 from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearance
 from ripple_sim.render.surfaces.tessellation import BAKED, DIRECTION, NORMAL, POSITION
@@ -36,7 +40,8 @@ _HIGHEST_BIAS = 0.015  # of shadows, in radii
 class SurfaceMesh:
     """A target on the GPU: triangles of a few pixels, so that it is round in outline and displaces smoothly.
 
-    Where waves are sharp, a frame has up to four triangles in place of one. An open surface shows both of its sides.
+    Where waves are sharp, a frame has up to four triangles in place of one. An open surface shows
+    both of its sides.
 
     Parameters
     ----------
@@ -54,8 +59,8 @@ class SurfaceMesh:
     numbers : list of int
         Its one number in the table of objects.
     transparent, blocks, occludes, casts : bool
-        Whether the scene behind shows through, and whether no light passes; whether it hides the sky from what is
-        below, and casts shadows, as every target does.
+        Whether the scene behind shows through, and whether no light passes; whether it hides the
+        sky from what is below, and casts shadows, as every target does.
     """
 
     def __init__(
@@ -67,27 +72,46 @@ class SurfaceMesh:
         index: int,
         size: tuple[int, int],
     ) -> None:
-        resources, page = assets.resources, surface.charts.page
-        self.geom, self._open, self._gl, self._resources = geom, surface.open, resources.gl, resources
+        resources = assets.resources
+        page = surface.charts.page
+        self.geom = geom
+        self._open = surface.open
+        self._gl = resources.gl
+        self._resources = resources
         self._assets = assets
-        self._objects, self._height_maps, self._layer = assets.objects, height_maps, index
-        self._page, self._shape = page, (page.charts, page.block, page.block, 4)
+        self._objects = assets.objects
+        self._height_maps = height_maps
+        self._layer = index
+        self._page = page
+        self._shape = (page.charts, page.block, page.block, 4)
         self._middle = np.zeros(3)  # of what is soft its own, of a geom that of its frame
         if is_soft(assets.model, geom):
             self._middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
         self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
         visual = geom_visual(assets.model, geom)
         look, _, mapping = appearance(assets.model, visual, surface)
-        self.occludes, self.casts, self.is_plane = True, True, False
+        self.occludes = True
+        self.casts = True
+        self.is_plane = False
         heatmap = surface.heatmap_colors is not None
         number = assets.objects.add(
-            look, geom, identity=visual.identity, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block
+            look,
+            geom,
+            identity=visual.identity,
+            size=self._radius,
+            heatmap=heatmap,
+            height_map=index,
+            chart=page.block,
         )
         self.numbers = [number]
         pixel = 2 * self._radius / size[1]
-        self._vertices = vertices = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
+        self._vertices = vertices = surface_vertices(
+            surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE
+        )
         self._balls = vertices.balls
-        self._adaptive = AdaptiveTessellation(vertices, page, _TOLERANCE * pixel, min_length=1.5 * _PIXELS * pixel)
+        self._adaptive = AdaptiveTessellation(
+            vertices, page, _TOLERANCE * pixel, min_length=1.5 * _PIXELS * pixel
+        )
         self._indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
         self._written: NDArray[np.int32] | None = None  # the triangles that the buffer holds
         self._on_device: DeviceTessellation | None = None
@@ -101,16 +125,22 @@ class SurfaceMesh:
         self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
         self._programs: dict[MappingKind, tuple[moderngl.Program, moderngl.VertexArray]] = {}
         moved = (displacement.moved, "4f", "in_moved")
-        # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
-        whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse))
+        # whoever looks from afar, or for shapes alone, need not see every wave split in its
+        # triangles
+        whole, coarse = (
+            resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse)
+        )
         lens = int(not self._open and look.transparency > 0.0)
         self._casters = {
             seen: resources.vertex_array(
-                resources.program("passes/casters", MOVED=1, MAP=seen, SOLID=lens), [moved], triangles
+                resources.program("passes/casters", MOVED=1, MAP=seen, SOLID=lens),
+                [moved],
+                triangles,
             )
             for seen, triangles in zip(CasterMap, (whole, coarse, self._indices), strict=True)
         }
-        self._surface, self._mapping = surface, mapping
+        self._surface = surface
+        self._mapping = mapping
         self.paint(visual)
 
     def paint(self, visual: Visual) -> None:
@@ -121,7 +151,8 @@ class SurfaceMesh:
         self.transparent = look.transparency > 0.0 or opacity < 1.0
         self.blocks = not self.transparent
         self._color = (*rgb, float(self.numbers[0]))
-        passing = 1.0 - opacity + opacity * look.transparency * rgb  # linear colour of the light that passes
+        # linear colour of the light that passes
+        passing = 1.0 - opacity + opacity * look.transparency * rgb
         self._casters[CasterMap.ALBEDO].program["color"] = tuple(rgb - passing)
         self._casters[CasterMap.TRANSMISSION].program["transmission"] = tuple(passing)
         if mapping.key != self._mapping.key:
@@ -136,13 +167,19 @@ class SurfaceMesh:
 
     def _program_of(self, kind: MappingKind) -> tuple[moderngl.Program, moderngl.VertexArray]:
         """What the surface is drawn with into the G-buffer where its texture lies so."""
-        resources, surface, displacement = self._resources, self._surface, self._displacement
-        heatmap, grid = int(self._heatmap is not None), int(surface.grid > 0)
+        resources = self._resources
+        surface = self._surface
+        displacement = self._displacement
+        heatmap = int(self._heatmap is not None)
+        grid = int(surface.grid > 0)
         program = resources.program("surfaces/surface", MAPPING=kind, HEATMAP=heatmap, GRID=grid)
         program["resolution"] = float(self._page.resolution)
         if grid:
             program["grid_spacing"] = float(surface.grid)
-        content = [(displacement.moved, "4f", "in_moved"), (displacement.vertices, *displacement.KEPT)]
+        content = [
+            (displacement.moved, "4f", "in_moved"),
+            (displacement.vertices, *displacement.KEPT),
+        ]
         # what a program does not use is optimised away
         return program, resources.vertex_array(program, content, self._indices, skip_errors=True)
 
@@ -177,10 +214,14 @@ class SurfaceMesh:
                     self._resources, self._adaptive, self._page, self._layer, self._indices
                 )
             self._on_device.run(ctx)
-            midpoints, self._count, self._written = self._on_device.midpoints, self._on_device.command, None
+            midpoints = self._on_device.midpoints
+            self._count = self._on_device.command
+            self._written = None
         self._displacement.use(midpoints)
 
-    def update(self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: Occluders) -> None:
+    def update(
+        self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: Occluders
+    ) -> None:
         """Displace the vertices by the height map where the geom is, among bound occluders."""
         self._pose = rotation, origin
         near = int(occluders.near(self.ball(), np.array([self.geom]))[0])
@@ -208,8 +249,8 @@ class SurfaceMesh:
     def set_heatmap(self, values: NDArray[np.float32], limit: float) -> None:
         """Replace the heatmap's values, [C, n + 2, n + 2] with a halo; the colours range from -limit to limit.
 
-        Raises `RippleError` if the surface has no heatmap, the shape is another, or the limit is not a positive, finite
-        number.
+        Raises `RippleError` if the surface has no heatmap, the shape is another, or the limit is
+        not a positive, finite number.
         """
         if self._heatmap is None:
             raise RippleError(f"geom {self.geom} has no heatmap; give its `Surface` heatmap_colors")
@@ -223,7 +264,9 @@ class SurfaceMesh:
     def bounds(self, data: Any = None) -> NDArray[np.float64]:
         """Balls [k, 4] that together contain the displaced mesh, where it was updated last."""
         rotation, origin = self._pose
-        return np.column_stack([self._balls[:, :3] @ rotation.T + origin, self._balls[:, 3] + self._highest])
+        return np.column_stack(
+            [self._balls[:, :3] @ rotation.T + origin, self._balls[:, 3] + self._highest]
+        )
 
     def draw(self) -> None:
         """Draw into the G-buffer."""
@@ -272,11 +315,20 @@ class DrawnScene:
         Each can draw itself: into the G-buffer, or what a map of a light or of the floor has of it.
     """
 
-    def __init__(self, assets: Assets, targets: Mapping[int, Surface], size: tuple[int, int]) -> None:
-        self._assets, self._model, self._height = assets, assets.model, size[1]
+    def __init__(
+        self, assets: Assets, targets: Mapping[int, Surface], size: tuple[int, int]
+    ) -> None:
+        self._assets = assets
+        self._model = assets.model
+        self._height = size[1]
         ordered = sorted(targets.items())
-        self.height_maps = HeightMapTextures(assets.resources, [surface.charts.page for _, surface in ordered])
-        self.targets = [SurfaceMesh(assets, *each, self.height_maps, index, size) for index, each in enumerate(ordered)]
+        self.height_maps = HeightMapTextures(
+            assets.resources, [surface.charts.page for _, surface in ordered]
+        )
+        self.targets = [
+            SurfaceMesh(assets, *each, self.height_maps, index, size)
+            for index, each in enumerate(ordered)
+        ]
         self._occluders = Occluders(assets.resources, assets.model, np.zeros(0, dtype=np.int64))
         self._made: dict[tuple[Any, ...], Instances] = {}
         self.show([])
@@ -294,7 +346,9 @@ class DrawnScene:
         self._others = [visual for visual, _ in visuals if visual.site or visual.index < 0]
         solids = [visual for visual in of_geoms if visual.kind != plane]
         boxes = np.array([np.concatenate(box_of(self._model, visual)) for visual in solids])
-        self._occluders.hold(np.array([visual.index for visual in solids], dtype=np.int64), boxes.reshape(-1, 6))
+        self._occluders.hold(
+            np.array([visual.index for visual in solids], dtype=np.int64), boxes.reshape(-1, 6)
+        )
         for target in self.targets:
             if paints is not None and target.geom in paints:
                 target.paint(paints[target.geom])
@@ -312,13 +366,20 @@ class DrawnScene:
 
     def target(self, geom: int) -> SurfaceMesh:
         """The target of a geom; raises `RippleError` if the geom is no target."""
-        if (found := next((target for target in self.targets if target.geom == geom), None)) is not None:
+        if (
+            found := next((target for target in self.targets if target.geom == geom), None)
+        ) is not None:
             return found
         geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
     def update(
-        self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, sharp: bool = False
+        self,
+        ctx: moderngl.Context,
+        data: Any,
+        height_maps: Mapping[int, AnyHeightMap],
+        pose: Pose,
+        sharp: bool = False,
     ) -> None:
         """Bring everything on the GPU up to date; `sharp` is as for `Instances.update`."""
         for target in self.targets:
@@ -334,7 +395,9 @@ class DrawnScene:
     def balls(self, data: Any) -> NDArray[np.float64]:
         """Balls [k, 4] that contain everything."""
         others = [ball_of(self._model, data, visual) for visual in (*self._others, *self._planes)]
-        return np.concatenate([self._occluders.balls(data), *others, *(target.bounds() for target in self.targets)])
+        return np.concatenate(
+            [self._occluders.balls(data), *others, *(target.bounds() for target in self.targets)]
+        )
 
     def casters(self, data: Any, largest: float = 0.0) -> NDArray[np.float64]:
         """Balls that contain everything that may cast a shadow, but for planes larger than that radius [m].
@@ -344,7 +407,9 @@ class DrawnScene:
         others = [ball_of(self._model, data, visual) for visual in self._others if visual.casts]
         planes = [ball_of(self._model, data, visual) for visual in self._planes]
         others += [ball for ball in planes if ball[0, 3] <= largest]
-        return np.concatenate([self._occluders.balls(data), *others, *(target.ball() for target in self.targets)])
+        return np.concatenate(
+            [self._occluders.balls(data), *others, *(target.ball() for target in self.targets)]
+        )
 
     def draw(self) -> None:
         """Draw everything opaque into the G-buffer."""
@@ -354,12 +419,15 @@ class DrawnScene:
     def cast(self, seen: CasterMap, **uniforms: Any) -> None:
         """Draw into a map what belongs there: of opaque casters, of all that occludes the sky, of transparent casters.
 
-        Uniforms are those of casters.glsl: `matrix`, 16 numbers, column by column, and the `light` of a transmission.
+        Uniforms are those of casters.glsl: `matrix`, 16 numbers, column by column, and the `light`
+        of a transmission.
         """
         for each in self._casters[seen]:
             each.cast(seen, **uniforms)
 
-    def layers(self, data: Any, pose: Pose) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
+    def layers(
+        self, data: Any, pose: Pose
+    ) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
         """Everything transparent with the balls about it, the furthest first."""
         layers = [(each.bounds(data), each) for each in self.transparent]
 
@@ -367,6 +435,8 @@ class DrawnScene:
             if layer[1].is_plane:  # behind all else, as in MuJoCo
                 return float("inf")
             offset = layer[0][:, :3].mean(axis=0) - pose.eye
-            return float(-offset @ pose.rotation[:, 2] if pose.orthographic else np.linalg.norm(offset))
+            return float(
+                -offset @ pose.rotation[:, 2] if pose.orthographic else np.linalg.norm(offset)
+            )
 
         return sorted(layers, key=lambda layer: -distance(layer))

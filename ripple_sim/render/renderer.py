@@ -1,6 +1,7 @@
 """The renderer: a MuJoCo model and its rippled targets, drawn headless into frames.
 
-The passes of one frame in their order: shadow maps, floor map, reflection, G-buffer, shading, transparent layers.
+The passes of one frame in their order: shadow maps, floor map, reflection, G-buffer, shading,
+transparent layers.
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
-from ripple_sim.render.passes.shadows import Floor, FloorOcclusion, ShadowMaps, TransmissionMaps, find_floor
+from ripple_sim.render.passes.shadows import (
+    Floor,
+    FloorOcclusion,
+    ShadowMaps,
+    TransmissionMaps,
+    find_floor,
+)
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.visuals.lights import SceneLight, in_studio
 from ripple_sim.render.visuals.objects import Assets
@@ -33,7 +40,8 @@ _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow map
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow
 _MOST_GEOMS = 10_000  # of a scene, as of mujoco.Renderer
 # Memory for a pixel and for each of its samples, at least [bytes].
-_PIXEL, _SAMPLE = 8, 20
+_PIXEL = 8
+_SAMPLE = 20
 
 
 class _Passes(NamedTuple):
@@ -60,20 +68,22 @@ class Renderer:
     samples : int
         Samples a pixel for smooth edges; at most as many as the driver has. 0 or 1: none.
     lighting : str
-        "model": the lights and the skybox of the MJCF; "studio": a photo studio in their place; "auto": the studio
-        where the MJCF has no light.
+        "model": the lights and the skybox of the MJCF; "studio": a photo studio in their place;
+        "auto": the studio where the MJCF has no light.
     backdrop : bool
         Whether the floor fades into a backdrop or the horizon of the skybox; see `SceneLight`.
     alpha : bool
-        Frames have an alpha channel: the background is transparent, and only the shadows are left of the floor.
+        Frames have an alpha channel: the background is transparent, and only the shadows are left
+        of the floor.
     linear : bool
         Frames are linear light without tone mapping, in half floats.
 
     Raises
     ------
     RippleError
-        If the driver cannot make frames of this size, or memory holds none, a look or the lighting is unknown, or
-        linear frames are to show a heatmap or a grid, whose colours are the screen's.
+        If the driver cannot make frames of this size, or memory holds none, a look or the lighting
+        is unknown, or linear frames are to show a heatmap or a grid, whose colours are the
+        screen's.
     """
 
     def __init__(
@@ -89,17 +99,28 @@ class Renderer:
         alpha: bool = False,
         linear: bool = False,
     ) -> None:
-        if linear and any(surface.heatmap_colors is not None or surface.grid for surface in targets.values()):
+        if linear and any(
+            surface.heatmap_colors is not None or surface.grid for surface in targets.values()
+        ):
             raise RippleError(
-                "heatmaps and grids have the screen's colours, which linear light lacks: take linear=False"
+                "heatmaps and grids have the screen's colours, which linear light lacks: take "
+                "linear=False"
             )
-        self._gl, self._model, self._size = gl, model, size
+        self._gl = gl
+        self._model = model
+        self._size = size
         self._resources = resources = Resources(gl, self)
         self._format = frame_format = FrameFormat(size, samples, alpha, linear)
-        if gl.software:  # which takes the machine's memory; a GPU says itself that it has too little
+        # which takes the machine's memory; a GPU says itself that it has too little
+        if gl.software:
             width, height = size
             need = width * height * (_PIXEL + _SAMPLE * max(samples, 1))
-            require_memory(RippleError, need, f"drawing frames of {width}x{height} pixels", "take smaller frames")
+            require_memory(
+                RippleError,
+                need,
+                f"drawing frames of {width}x{height} pixels",
+                "take smaller frames",
+            )
         with gl:
             self._assets = assets = Assets(model, resources)
             self._backdrop = backdrop or in_studio(model, lighting)
@@ -120,23 +141,31 @@ class Renderer:
     def _choose_passes(self) -> None:
         """Take the passes for what is drawn; those that were made before are kept."""
         floor = self._floor
-        transparent, options = bool(self._scene.transparent), self._light.options
+        transparent = bool(self._scene.transparent)
+        options = self._light.options
         floor_kind = floor is not None and floor.tiled, floor is not None and floor.reflects
         kind = transparent, *floor_kind, *options.values()
         if options["SHADOWS"] not in self._shadow_maps:
-            self._shadow_maps[options["SHADOWS"]] = ShadowMaps(self._resources, options["SHADOWS"], self._size[1])
+            self._shadow_maps[options["SHADOWS"]] = ShadowMaps(
+                self._resources, options["SHADOWS"], self._size[1]
+            )
         self._shadows = self._shadow_maps[options["SHADOWS"]]
         if kind not in self._made_passes:
             self._made_passes[kind] = self._make_passes(transparent)
-        self._occlusion, self._shading, self._transmission, self._layers, self._mirror = self._made_passes[kind]
+        self._occlusion, self._shading, self._transmission, self._layers, self._mirror = (
+            self._made_passes[kind]
+        )
 
     def _make_passes(self, transparent: bool) -> _Passes:
         """Make the passes for what is drawn, with something transparent or without."""
-        resources, floor = self._resources, self._floor
+        resources = self._resources
+        floor = self._floor
         options = {**self._light.options, "TRANSMISSION": int(transparent)}
         occlusion = FloorOcclusion(resources, options, floor)
         shading = DeferredShading(resources, self._format, floor, options)
-        transmission, layers, mirror = None, None, None
+        transmission = None
+        layers = None
+        mirror = None
         if transparent:
             texels = self._shadows.size // _TRANSMISSION_TEXEL
             transmission = TransmissionMaps(resources, options["SHADOWS"], texels)
@@ -145,17 +174,23 @@ class Renderer:
             mirror = Mirror(resources, self._format, floor, options)
         return _Passes(occlusion, shading, transmission, layers, mirror)
 
-    def _show(self, data: Any, scene: mujoco.MjvScene | None, pose: Pose, segmented: bool = False) -> Any:
+    def _show(
+        self, data: Any, scene: mujoco.MjvScene | None, pose: Pose, segmented: bool = False
+    ) -> Any:
         """Draw what a scene of MuJoCo's has, by default all that it shows of the data, with surfaces for the targets.
 
-        Surfaces of targets that MuJoCo shows by default are drawn only if the scene has the target. What is `segmented`
-        has a `segid`. Planes are seen from the `pose`. What is not drawn is told once. Return where geoms and sites
-        are, as the scene has them.
+        Surfaces of targets that MuJoCo shows by default are drawn only if the scene has the target.
+        What is `segmented` has a `segid`. Planes are seen from the `pose`. What is not drawn is
+        told once. Return where geoms and sites are, as the scene has them.
         """
-        shown, edited = self._shown, scene is not None
+        shown = self._shown
+        edited = scene is not None
         if scene is None:
-            scene, kinds = self._own_scene, int(mujoco.mjtCatBit.mjCAT_ALL)
-            mujoco.mjv_updateScene(self._model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), kinds, scene)
+            scene = self._own_scene
+            kinds = int(mujoco.mjtCatBit.mjCAT_ALL)
+            mujoco.mjv_updateScene(
+                self._model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), kinds, scene
+            )
         self._assets.refresh()
         if shown.read(scene, pose.position, segmented, self._assets, doubled=edited):
             self._scene.show(shown.visuals, shown.targets, shown.hidden)
@@ -228,22 +263,24 @@ class Renderer:
         data : mujoco.MjData
             Poses of the geoms, after `mj_forward` or `mj_step`.
         height_maps : mapping
-            Geom id to height map, shape [C, n + 2, n + 2, 4]: gradient of the height (xyz, in the geom's frame) and
-            height [m] (w), each face with a halo of one texel. A target without one is flat. One that `HeightMap` made
-            of a field on the GPU is written there.
+            Geom id to height map, shape [C, n + 2, n + 2, 4]: gradient of the height (xyz, in the
+            geom's frame) and height [m] (w), each face with a halo of one texel. A target without
+            one is flat. One that `HeightMap` made of a field on the GPU is written there.
         camera : Camera, FixedCamera or ThroughLens
         exposure : int
-            Number of this exposure among those whose mean is a frame: each has another noise in its shadows.
+            Number of this exposure among those whose mean is a frame: each has another noise in its
+            shadows.
         scene : mujoco.MjvScene, optional
-            What is drawn beside the targets, and which of them; by default what MuJoCo shows of the data.
+            What is drawn beside the targets, and which of them; by default what MuJoCo shows of the
+            data.
         lights : sequence of mujoco.MjvLight, optional
             Those of the scene, where they are to replace the model's.
 
         Returns
         -------
         array, shape [height, width, 3], or [height, width, 4] with alpha
-            Top row first; a new array for every frame. uint8 in sRGB, alpha straight; or, of linear light, float16,
-            with ITU-R BT.709's primaries, multiplied by alpha.
+            Top row first; a new array for every frame. uint8 in sRGB, alpha straight; or, of linear
+            light, float16, with ITU-R BT.709's primaries, multiplied by alpha.
         """
         try:
             self.submit(data, height_maps, camera, exposure, scene, lights)
@@ -283,10 +320,11 @@ class Renderer:
         Returns
         -------
         moderngl.Framebuffer
-            RGBA8 in sRGB, or RGBA16F of linear light; bottom row first, multiplied by alpha. The next frame is drawn
-            over it.
+            RGBA8 in sRGB, or RGBA16F of linear light; bottom row first, multiplied by alpha. The
+            next frame is drawn over it.
         """
-        drawn, pose = self._scene, camera.pose()
+        drawn = self._scene
+        pose = camera.pose()
         with self._gl as ctx, self._resources.drawing():
             self._light.make_room(lights)
             poses = self._show(data, scene, pose)
@@ -296,7 +334,8 @@ class Renderer:
             self._gl.flush()
             flags = RenderFlags.of(scene)
             self._update(data, poses, pose, exposure, flags, lights)
-            # what shading looks up; a software driver stops for each texture that it is still drawing to
+            # what shading looks up; a software driver stops for each texture that it is still
+            # drawing to
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
             ctx.depth_func = "<="
             self._shadows.draw(drawn.cast)
@@ -315,7 +354,8 @@ class Renderer:
             drawn.draw()
             balls = drawn.balls(poses)
             boxes = boxes_of(balls, pose, self._size)
-            if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
+            # which would draw all this in the next call, holding the interpreter's lock
+            if self._gl.software:
                 self._gl.wait()
             self._occlusion.average()
             if self._mirror is not None and not flags.reflection and not self._backdrop:
@@ -326,7 +366,9 @@ class Renderer:
             shading.shade(ctx, boxes)
             if self._layers is not None:
                 for bounds, layer in drawn.layers(poses, pose):
-                    self._layers.add(ctx, layer.numbers[0], layer.draw, boxes_of(bounds, pose, self._size))
+                    self._layers.add(
+                        ctx, layer.numbers[0], layer.draw, boxes_of(bounds, pose, self._size)
+                    )
         return shading.frame
 
     def surfaces(
@@ -340,11 +382,14 @@ class Renderer:
     ) -> SurfaceImage:
         """Draw what is seen at the middle of each pixel, without light: distances, normals, geoms.
 
-        Transparent objects count as solid. Arguments are as for `render`; `size` (width, height) may be another than
-        that of the frames, of the same shape. Of a `scene` there are MuJoCo's shapes: boxes and cylinders without round
-        edges; if `segmented`, only what MuJoCo would segment.
+        Transparent objects count as solid. Arguments are as for `render`; `size` (width, height)
+        may be another than that of the frames, of the same shape. Of a `scene` there are MuJoCo's
+        shapes: boxes and cylinders without round edges; if `segmented`, only what MuJoCo would
+        segment.
         """
-        drawn, pose, size = self._scene, camera.pose(), size or self._size
+        drawn = self._scene
+        pose = camera.pose()
+        size = size or self._size
         with self._gl as ctx, self._resources.drawing():
             if self._buffers is None or self._buffers.size != size:
                 self._buffers = SurfaceBuffers(self._resources, size)
@@ -357,7 +402,9 @@ class Renderer:
                 for each in (*drawn.opaque, *drawn.transparent):
                     each.draw()
 
-            return self._buffers.draw(ctx, draw, self._assets.objects, -1 if self._floor is None else self._floor.geom)
+            return self._buffers.draw(
+                ctx, draw, self._assets.objects, -1 if self._floor is None else self._floor.geom
+            )
 
     def _update(
         self,
@@ -369,14 +416,19 @@ class Renderer:
         lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> None:
         """Bring the frame's uniforms up to date; `poses` are those of geoms and sites."""
-        frame, floor = self._frame, self._floor
+        frame = self._frame
+        floor = self._floor
         frame.set_camera(pose, self._format.aspect, self._scene.balls(poses))
-        casters = within(self._scene.casters(poses, pose.distance), pose.focus, _SHADOW_REACH * pose.distance)
+        casters = within(
+            self._scene.casters(poses, pose.distance), pose.focus, _SHADOW_REACH * pose.distance
+        )
         centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
         if floor is not None:
             floor.place(frame, poses, centre, radius)
             ground = floor.origin if floor.endless and floor.shown else None
-            shining = self._light.set(frame, data, pose, floor.albedo, floor.normal, lights, flags=flags, ground=ground)
+            shining = self._light.set(
+                frame, data, pose, floor.albedo, floor.normal, lights, flags=flags, ground=ground
+            )
         else:
             shining = self._light.set(frame, data, pose, lights=lights, flags=flags)
         if lights is not None and self._light.studio:

@@ -1,7 +1,7 @@
 """Objects on the GPU that are released together, and those that every pass shares.
 
-These are the uniform block of a frame, textures of sRGB pixels, which read as linear light, and the height maps of all
-targets.
+These are the uniform block of a frame, textures of sRGB pixels, which read as linear light, and the
+height maps of all targets.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from .camera import Pose, view_matrix
 from .contract import DEFINES, FRAME, Binding, Unit
 
 _PACKAGE = "ripple_sim.render"
+
+SRGB8_ALPHA8 = 0x8C43
 
 
 class Resources:
@@ -63,18 +65,27 @@ class Resources:
         defines = {"HOLD_UNIFORMS": int(self.gl.software), **DEFINES, **options}
         return self._own(self.gl.program(_PACKAGE, name, *captured, **defines))
 
-    def compute_shader(self, name: str, stage: str = "compute", **options: object) -> moderngl.ComputeShader:
+    def compute_shader(
+        self, name: str, stage: str = "compute", **options: object
+    ) -> moderngl.ComputeShader:
         """One of the renderer's compute shaders, likewise; it is shared."""
         return self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options)
 
-    def clamped_texture(self, size: tuple[int, ...], components: int, *, mipmaps: bool = False, **options: Any) -> Any:
+    def clamped_texture(
+        self, size: tuple[int, ...], components: int, *, mipmaps: bool = False, **options: Any
+    ) -> Any:
         """Texture (width, height), or array of them with a number of layers, that does not repeat.
 
         It is read linearly, over its mipmaps too where it has some.
         """
-        texture = (self.texture if len(size) == 2 else self.texture_array)(size, components, **options)
+        texture = (self.texture if len(size) == 2 else self.texture_array)(
+            size, components, **options
+        )
         texture.repeat_x = texture.repeat_y = False
-        texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR, moderngl.LINEAR)
+        texture.filter = (
+            moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR,
+            moderngl.LINEAR,
+        )
         return texture
 
     def release(self) -> None:
@@ -129,7 +140,9 @@ class FrameUniforms:
         self.values[name][:3] = xyz
         self.values[name][3] = w
 
-    def set_camera(self, pose: Pose, aspect: float, balls: NDArray[np.float64] | None = None) -> None:
+    def set_camera(
+        self, pose: Pose, aspect: float, balls: NDArray[np.float64] | None = None
+    ) -> None:
         """Set whatever depends on the camera; `aspect` is width over height, and the `balls` contain all solids."""
         near, far = planes = pose.clip_planes if balls is None else pose.planes_about(balls)
         half_width, half_height = pose.half_sizes(aspect)
@@ -145,9 +158,6 @@ class FrameUniforms:
         """Upload the values and bind the block for all programs."""
         self._buffer.write(self.values.tobytes())
         self._buffer.bind_to_uniform_block(Binding.FRAME)
-
-
-SRGB8_ALPHA8 = 0x8C43
 
 
 def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Texture:
@@ -166,7 +176,9 @@ def srgb_cube(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Textu
 
 
 def write_srgb(
-    resources: Resources, texture: moderngl.Texture | moderngl.TextureCube, pixels: NDArray[np.uint8]
+    resources: Resources,
+    texture: moderngl.Texture | moderngl.TextureCube,
+    pixels: NDArray[np.uint8],
 ) -> None:
     """Replace the pixels of a texture of `srgb_texture` or `srgb_cube` by others of the same shape."""
     if isinstance(texture, moderngl.TextureCube):
@@ -192,7 +204,9 @@ def _cube_texels(resources: Resources, pixels: NDArray[np.uint8]) -> tuple[int, 
     if len(pixels) != 6 * pixels.shape[1]:
         pixels = np.concatenate([pixels[: pixels.shape[1]]] * 6)
     with resources.gl as ctx:
-        faces = [fitted(face, ctx.info["GL_MAX_CUBE_MAP_TEXTURE_SIZE"]) for face in np.split(pixels, 6)]
+        faces = [
+            fitted(face, ctx.info["GL_MAX_CUBE_MAP_TEXTURE_SIZE"]) for face in np.split(pixels, 6)
+        ]
     return faces[0].shape[1], Image.fromarray(np.concatenate(faces)).convert("RGBA").tobytes()
 
 
@@ -204,7 +218,8 @@ def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
     scale = largest / max(height, width)
     size = max(1, round(scale * width)), max(1, round(scale * height))
     warn_caller(
-        f"a texture of {width}x{height} pixels is larger than the {largest} that the OpenGL driver takes: it is scaled "
+        f"a texture of {width}x{height} pixels is larger than the {largest} that the OpenGL driver "
+        f"takes: it is scaled "
         f"down to {size[0]}x{size[1]}"
     )
     return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
@@ -239,7 +254,9 @@ AnyHeightMap: TypeAlias = NDArray[np.float32] | DeviceHeightMap | MovedHeightMap
 
 
 class HeightMapTextures:
-    """A texture array with one layer a target: a page of its charts. Layers are as large as the largest page.
+    """A texture array with one layer a target: a page of its charts.
+
+    Layers are as large as the largest page.
 
     Parameters
     ----------
@@ -250,7 +267,9 @@ class HeightMapTextures:
     def __init__(self, resources: Resources, pages: Sequence[ChartPage]) -> None:
         self._pages = pages
         width, height = (max((page.size[axis] for page in pages), default=1) for axis in range(2))
-        self._texture = resources.clamped_texture((width, height, max(len(pages), 1)), 4, dtype="f4")
+        self._texture = resources.clamped_texture(
+            (width, height, max(len(pages), 1)), 4, dtype="f4"
+        )
 
     def write(self, layer: int, height_map: NDArray[np.float32] | DeviceHeightMap) -> float:
         """Replace a target's height map, [C, n + 2, n + 2, 4]; return the largest height in it [m]."""
@@ -264,10 +283,14 @@ class HeightMapTextures:
         self._texture.use(Unit.HEIGHT_MAPS)
 
 
-def write_page(texture: moderngl.TextureArray, page: ChartPage, layer: int, charts: NDArray[np.float32]) -> None:
+def write_page(
+    texture: moderngl.TextureArray, page: ChartPage, layer: int, charts: NDArray[np.float32]
+) -> None:
     """Write charts with halo, [C, n + 2, n + 2, ...], to the page in a layer of a texture array."""
     for first in range(0, len(charts), page.columns):
         # a row of charts at once: each write has its price
-        row = np.ascontiguousarray(np.concatenate(charts[first : first + page.columns], axis=1), dtype=np.float32)
+        row = np.ascontiguousarray(
+            np.concatenate(charts[first : first + page.columns], axis=1), dtype=np.float32
+        )
         x, y = page.corner(first)
         texture.write(row, viewport=(x, y, layer, row.shape[1], page.block, 1))

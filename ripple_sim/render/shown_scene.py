@@ -1,6 +1,7 @@
 """Which of a scene's entries are drawn as what: rippling surfaces, the floor, and everything else.
 
-An entry is compared with what it showed in the frame before, so that a frame in which only poses change costs little.
+An entry is compared with what it showed in the frame before, so that a frame in which only poses
+change costs little.
 """
 
 from __future__ import annotations
@@ -19,7 +20,15 @@ from ripple_sim.coupling.soft import is_soft
 
 from .visuals.geoms import shaped
 from .visuals.objects import Assets
-from .visuals.scene_entries import EntryPoses, content_of, identity_of, is_behind, is_of_model, own_visual, visuals_in
+from .visuals.scene_entries import (
+    EntryPoses,
+    content_of,
+    identity_of,
+    is_behind,
+    is_of_model,
+    own_visual,
+    visuals_in,
+)
 from .visuals.shapes import NamedShape
 from .visuals.visual import WALLS, Visual, geom_visual
 
@@ -40,7 +49,8 @@ class ShownScene:
     floor : int, optional
         Geom id of the plane that is drawn as the floor, where it is seen from above and opaque.
     cut_out : bool
-        Whether it is drawn as the floor from above in any case, and not at all from below: only its shadows are left.
+        Whether it is drawn as the floor from above in any case, and not at all from below: only its
+        shadows are left.
 
     Attributes
     ----------
@@ -56,7 +66,9 @@ class ShownScene:
         What is not drawn as the scene has it, in words.
     """
 
-    def __init__(self, model: Any, targets: Iterable[int], floor: int | None, cut_out: bool = False) -> None:
+    def __init__(
+        self, model: Any, targets: Iterable[int], floor: int | None, cut_out: bool = False
+    ) -> None:
         self._model = model
         self._cut_out = cut_out
         self._targets = {geom_visual(model, target).identity: target for target in targets}
@@ -83,17 +95,22 @@ class ShownScene:
     ) -> bool:
         """Take in what a scene has, seen from an eye [m]; whether that is something else than before, but for poses.
 
-        Of what is `segmented` there is only what has a number for it. With `doubled` what is transparent is as opaque
-        as in MuJoCo, which draws it twice.
+        Of what is `segmented` there is only what has a number for it. With `doubled` what is
+        transparent is as opaque as in MuJoCo, which draws it twice.
         """
         entries = [each for each in scene.geoms[: scene.ngeom] if each.segid >= 0 or not segmented]
-        content: list[tuple[Any, ...]] = [(*content_of(each), is_behind(each, eye)) for each in entries]
-        content.append((assets.version, *(getattr(self._model, name).tobytes() for name in _MATERIALS)))
+        content: list[tuple[Any, ...]] = [
+            (*content_of(each), is_behind(each, eye)) for each in entries
+        ]
+        content.append(
+            (assets.version, *(getattr(self._model, name).tobytes() for name in _MATERIALS))
+        )
         if content == self._content:
             self._place()
             return False
         self._content = content
-        self._eye, self._doubled = eye, doubled
+        self._eye = eye
+        self._doubled = doubled
         self._sort(scene, entries, assets.reshaped)
         return True
 
@@ -102,9 +119,15 @@ class ShownScene:
         return self._own_entries.of(data)
 
     def _sort(
-        self, scene: mujoco.MjvScene, entries: list[mujoco.MjvGeom], reshaped: Collection[tuple[str, int]]
+        self,
+        scene: mujoco.MjvScene,
+        entries: list[mujoco.MjvGeom],
+        reshaped: Collection[tuple[str, int]],
     ) -> None:
-        self.targets, self.floor, self.left_out, self._placed = {}, None, set(), []
+        self.targets = {}
+        self.floor = None
+        self.left_out = set()
+        self._placed = []
         visuals: list[Visual] = []
         own: dict[tuple[int, int], mujoco.MjvGeom] = {}
         for entry in entries:
@@ -125,7 +148,8 @@ class ShownScene:
                 continue
             elif identity not in self._colliders:
                 found = [
-                    self._as_seen(each, entry) for each in visuals_in(self._model, scene, entry, not first, reshaped)
+                    self._as_seen(each, entry)
+                    for each in visuals_in(self._model, scene, entry, not first, reshaped)
                 ]
                 visuals += found
                 if len(found) == 1 and found[0].pose is not None and found[0].corners is None:
@@ -133,29 +157,42 @@ class ShownScene:
         self.visuals = shaped(self._model, visuals)
         drawn = {visual.kind for visual, _ in self.visuals}
         self.left_out |= {_name_of(visual.kind) for visual in visuals if visual.kind not in drawn}
-        self.hidden = [target for target, each in self._own.items() if target not in self.targets and each.visible]
+        self.hidden = [
+            target
+            for target, each in self._own.items()
+            if target not in self.targets and each.visible
+        ]
         self._own_entries = EntryPoses(self._model, list(own.values()))
 
     def _place(self) -> None:
         """Bring the poses of what is none of the model's up to date."""
         for visual, entry in self._placed:
             position, rotation = visual.pose  # type: ignore[misc]
-            position[:], rotation[:] = entry.pos, entry.mat
+            position[:] = entry.pos
+            rotation[:] = entry.mat
 
     def _ripples(self, entry: mujoco.MjvGeom) -> bool:
         """Whether an entry of a target still has the shape of the rippling surface."""
         target = self._targets[identity_of(entry)]
         if is_soft(self._model, target):
             return True
-        own, visual = self._own[target], own_visual(self._model, entry)
+        own = self._own[target]
+        visual = own_visual(self._model, entry)
         same = visual.kind == own.kind and visual.asset == own.asset
-        same &= np.array_equal(visual.half_sizes.astype(np.float32), own.half_sizes.astype(np.float32))
+        same &= np.array_equal(
+            visual.half_sizes.astype(np.float32), own.half_sizes.astype(np.float32)
+        )
         if not same:
-            self.left_out.add(f"the ripples of {target_name(self._model, target)!r}, which has another shape")
+            self.left_out.add(
+                f"the ripples of {target_name(self._model, target)!r}, which has another shape"
+            )
         return bool(same)
 
     def _take_target(self, target: int, entry: mujoco.MjvGeom) -> None:
-        paint: dict[str, Any] = {"rgba": np.array(entry.rgba, dtype=np.float64), "material": int(entry.matid)}
+        paint: dict[str, Any] = {
+            "rgba": np.array(entry.rgba, dtype=np.float64),
+            "material": int(entry.matid),
+        }
         if is_soft(self._model, target):
             visual = replace(geom_visual(self._model, target), **paint)
         else:

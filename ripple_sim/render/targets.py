@@ -1,6 +1,7 @@
 """What is drawn into and read back: frames and their format, the G-buffer, and passes over a whole framebuffer.
 
-Surface images tell what each pixel shows: distance, normal, geom, and place on the height map; without light.
+Surface images tell what each pixel shows: distance, normal, geom, and place on the height map;
+without light.
 """
 
 from __future__ import annotations
@@ -34,9 +35,11 @@ class FrameFormat:
     samples : int
         Samples a pixel for smooth edges; at most as many as the driver has. 0 or 1: none.
     alpha : bool
-        Whether there is an alpha channel: the background is transparent, and only the shadows are left of the floor.
+        Whether there is an alpha channel: the background is transparent, and only the shadows are
+        left of the floor.
     linear : bool
-        Whether colours are linear light in half floats, without tone mapping, in place of sRGB in bytes.
+        Whether colours are linear light in half floats, without tone mapping, in place of sRGB in
+        bytes.
     """
 
     size: tuple[int, int]
@@ -120,11 +123,13 @@ class FramePass:
     program : moderngl.Program
     """
 
-    def __init__(self, resources: Resources, name: str, size: tuple[int, int], **options: object) -> None:
+    def __init__(
+        self, resources: Resources, name: str, size: tuple[int, int], **options: object
+    ) -> None:
         with resources.gl as ctx:
             widest = min(ctx.info["GL_MAX_VIEWPORT_DIMS"])
-        # The triangle over the frame lies within a viewport twice as large: where a driver clips it in two, derivatives
-        # along the cut would be undefined.
+        # The triangle over the frame lies within a viewport twice as large: where a driver clips it
+        # in two, derivatives along the cut would be undefined.
         self._reach = 2 if 2 * max(size) <= widest else 1
         self.program = resources.program(name, **options, TILES=0)
         self._triangle = resources.vertex_array(self.program, [])
@@ -143,14 +148,17 @@ class FramePass:
 class Readback:
     """Frames on their way from the GPU, first in, first out.
 
-    There are as many buffers as frames were ever on their way at a time: pixel buffers of the GPU, or plain memory
-    where the driver draws in that itself.
+    There are as many buffers as frames were ever on their way at a time: pixel buffers of the GPU,
+    or plain memory where the driver draws in that itself.
     """
 
     def __init__(self, resources: Resources, frame_format: FrameFormat) -> None:
-        self._gl, self._resources, self._format = resources.gl, resources, frame_format
+        self._gl = resources.gl
+        self._resources = resources
+        self._format = frame_format
         width, height = frame_format.size
-        # always four channels: drivers copy those as they are, and convert any other number on the processor
+        # always four channels: drivers copy those as they are, and convert any other number on the
+        # processor
         self._pixels = np.empty((height, width, 4), np.uint16 if frame_format.linear else np.uint8)
         self._free: list[moderngl.Buffer | NDArray] = []
         self._pending: deque[tuple[moderngl.Buffer | NDArray, int]] = deque()
@@ -164,7 +172,8 @@ class Readback:
             RGBA8, or RGBA16F of linear light; bottom row first, multiplied by alpha.
         """
         with self._gl:
-            if self._gl.software:  # which would draw the frame in the next call, holding the interpreter's lock
+            # which would draw the frame in the next call, holding the interpreter's lock
+            if self._gl.software:
                 self._gl.wait()
             if self._free:
                 buffer = self._free.pop()
@@ -181,8 +190,8 @@ class Readback:
         Returns
         -------
         array, shape [height, width, 3], or [height, width, 4] with alpha
-            Top row first; a fresh array for every frame. uint8, alpha straight; or, of linear light, float16,
-            multiplied by alpha.
+            Top row first; a fresh array for every frame. uint8, alpha straight; or, of linear
+            light, float16, multiplied by alpha.
 
         Raises
         ------
@@ -190,7 +199,9 @@ class Readback:
             If none is on its way.
         """
         if not self._pending:
-            raise RippleError("no frame is on its way from the GPU; submit one before each that is fetched")
+            raise RippleError(
+                "no frame is on its way from the GPU; submit one before each that is fetched"
+            )
         buffer, fence = self._pending.popleft()
         self._gl.wait_for(fence)
         if isinstance(buffer, np.ndarray):
@@ -200,7 +211,8 @@ class Readback:
             with self._gl:
                 buffer.read_into(pixels)
         frame = np.empty((*pixels.shape[:2], 4 if self._format.alpha else 3), pixels.dtype)
-        for channel in range(frame.shape[2]):  # all at once would be rows of three numbers, which are slow
+        # all at once would be rows of three numbers, which are slow
+        for channel in range(frame.shape[2]):
             frame[..., channel] = pixels[::-1, :, channel]
         self._free.append(buffer)
         if self._format.linear:
@@ -293,9 +305,11 @@ class SurfaceBuffers:
         self._resolve.run(self._framebuffer, 0.0)
         width, height = self.size
         shown, smooth, rippling = (
-            np.frombuffer(image.read(), np.float32).reshape(height, width, 4)[::-1] for image in self._images
+            np.frombuffer(image.read(), np.float32).reshape(height, width, 4)[::-1]
+            for image in self._images
         )
-        number = np.rint(smooth[..., 3]).astype(np.int32)  # with nothing at 0 and the floor at the end
+        # with nothing at 0 and the floor at the end
+        number = np.rint(smooth[..., 3]).astype(np.int32)
         floor = floor_geom, int(mujoco.mjtObj.mjOBJ_GEOM)
         return SurfaceImage(
             depth=shown[..., 3],

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# The sRGB transfer curve (IEC 61966-2-1): SLOPE x up to BREAK, and (1 + OFFSET) x^(1 / EXPONENT) - OFFSET above it.
-_BREAK, _SLOPE, _OFFSET, _EXPONENT = 0.0031308, 12.92, 0.055, 2.4
+# The sRGB transfer curve (IEC 61966-2-1): SLOPE x up to BREAK, and (1 + OFFSET) x^(1 / EXPONENT) -
+# OFFSET above it.
+_BREAK = 0.0031308
+_SLOPE = 12.92
+_OFFSET = 0.055
+_EXPONENT = 2.4
 _ENCODED_BREAK = 0.04045
 _SHOULDER = 0.72  # radiance from which on brightness rolls off
 _BLEACHING = 0.18  # how fast what is brighter turns white
@@ -26,14 +30,18 @@ def srgb_to_linear(srgb: ArrayLike) -> NDArray[np.float64]:
     """Linear values of sRGB values, 0 to 1 both, any shape."""
     value = np.asarray(srgb, dtype=np.float64)
     above = np.maximum(value, _ENCODED_BREAK)
-    return np.where(value <= _ENCODED_BREAK, value / _SLOPE, ((above + _OFFSET) / (1 + _OFFSET)) ** _EXPONENT)
+    return np.where(
+        value <= _ENCODED_BREAK, value / _SLOPE, ((above + _OFFSET) / (1 + _OFFSET)) ** _EXPONENT
+    )
 
 
 def linear_to_srgb(linear: ArrayLike) -> NDArray[np.float64]:
     """Inverse of `srgb_to_linear`; values beyond 0 to 1 continue the curve."""
     value = np.asarray(linear, dtype=np.float64)
     above = np.maximum(value, _BREAK)
-    return np.where(value <= _BREAK, _SLOPE * value, (1 + _OFFSET) * above ** (1 / _EXPONENT) - _OFFSET)
+    return np.where(
+        value <= _BREAK, _SLOPE * value, (1 + _OFFSET) * above ** (1 / _EXPONENT) - _OFFSET
+    )
 
 
 def tone_mapped(radiance: ArrayLike) -> NDArray[np.float64]:

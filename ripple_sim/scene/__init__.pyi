@@ -35,7 +35,12 @@ from .material_entry import (
     MaterialEntry as MaterialEntry,
     PresetEntry as PresetEntry,
 )
-from .overlays import HEATMAPS as HEATMAPS, NAMES as NAMES, Request as Request, parse_request as parse_request
+from .overlays import (
+    HEATMAPS as HEATMAPS,
+    NAMES as NAMES,
+    Request as Request,
+    parse_request as parse_request,
+)
 from .paint import load_image as load_image, mesh_image as mesh_image, paint_target as paint_target
 from .scene import (
     MAX_DURATION as MAX_DURATION,
@@ -56,7 +61,11 @@ from .scene_file import (
     parse_scene as parse_scene,
     uniform_material as uniform_material,
 )
-from .source import read_toml as read_toml, scene_path as scene_path, shipped_scenes as shipped_scenes
+from .source import (
+    read_toml as read_toml,
+    scene_path as scene_path,
+    shipped_scenes as shipped_scenes,
+)
 from .target_maps import (
     HeightEntry as HeightEntry,
     InsideEntry as InsideEntry,

@@ -31,17 +31,26 @@ BODY_SHAPES = {
 _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 
 # Of the bodies [m], [kg/m^3], and how high above the target they start [m].
-_RADII, _DENSITY, _HEIGHTS = (0.05, 0.085), 400.0, (0.8, 1.2)
+_RADII = (0.05, 0.085)
+_DENSITY = 400.0
+_HEIGHTS = (0.8, 1.2)
 
 _CLEAR = 0.2  # between the middles of bodies that fall one after the other [m]
-_UPWARD, _ROOM = 0.6, 0.05  # least upward part of the normal, and room on all sides [m], of a good landing point
+# least upward part of the normal, and room on all sides [m], of a good landing point
+_UPWARD = 0.6
+_ROOM = 0.05
 _STEPS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
 _TRIED = 1000  # points, among which there may be no good one
-_MOST_ROUNDS = 200  # of landing points that are tried: next to nothing of an upright sheet is seen from above
+# of landing points that are tried: next to nothing of an upright sheet is seen from above
+_MOST_ROUNDS = 200
 
-# Mass [kg] and speed [m/s] with which a ball of mean radius falls on the target, and its footprint's radius [m].
+# Mass [kg] and speed [m/s] with which a ball of mean radius falls on the target, and its
+# footprint's radius [m].
 _MEAN_RADIUS = (_RADII[0] + _RADII[1]) / 2
-TYPICAL_HIT = (_DENSITY * 4 / 3 * np.pi * _MEAN_RADIUS**3, float(np.sqrt(2 * 9.81 * sum(_HEIGHTS) / 2)))
+TYPICAL_HIT = (
+    _DENSITY * 4 / 3 * np.pi * _MEAN_RADIUS**3,
+    float(np.sqrt(2 * 9.81 * sum(_HEIGHTS) / 2)),
+)
 TYPICAL_FOOTPRINT = _MEAN_RADIUS / 2
 
 
@@ -71,7 +80,8 @@ def drop_model(
     """
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.002
-    # enough starting points to find the contacts of a body with a target, a fifth of the default's cost
+    # enough starting points to find the contacts of a body with a target, a fifth of the default's
+    # cost
     spec.option.sdf_initpoints = 8
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     # springy contacts (restitution about 0.5): a spring of 0.01 s at a damping ratio of 0.2
@@ -81,11 +91,17 @@ def drop_model(
     enough = V if len(V) >= 4 else np.vstack([V, V[:1]])
     # sheets may have no volume
     spec.add_mesh(
-        name="target", uservert=enough.ravel(), userface=F.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        name="target",
+        uservert=enough.ravel(),
+        userface=F.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
     )
     spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_SDF, meshname="target")
-    floor = spec.worldbody.add_geom(name="floor", type=_GEOM.mjGEOM_PLANE, size=[12, 12, 0.1], condim=6)
-    floor.rgba, floor.friction = [0.86, 0.87, 0.88, 1], [0.8, 0.01, 0.02]
+    floor = spec.worldbody.add_geom(
+        name="floor", type=_GEOM.mjGEOM_PLANE, size=[12, 12, 0.1], condim=6
+    )
+    floor.rgba = [0.86, 0.87, 0.88, 1]
+    floor.friction = [0.8, 0.01, 0.02]
     landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
     interval = 3.4 / max(len(shapes), 1)
     drops: list[DropEntry] = []
@@ -95,10 +111,20 @@ def drop_model(
         radius = scale * rng.uniform(*_RADII)
         name = f"body_{i}"
         # parked high above until it drops, out of sight and out of reach of the others
-        body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 20.0 + i], quat=rng.standard_normal(4))
+        body = spec.worldbody.add_body(
+            name=name, pos=[0.0, 0.0, 20.0 + i], quat=rng.standard_normal(4)
+        )
         body.add_freejoint()
-        color = colorsys.hsv_to_rgb(_HUES[i % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95))
-        body.add_geom(name=name, type=kind, size=[radius * p for p in proportions], density=_DENSITY, rgba=[*color, 1])
+        color = colorsys.hsv_to_rgb(
+            _HUES[i % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95)
+        )
+        body.add_geom(
+            name=name,
+            type=kind,
+            size=[radius * p for p in proportions],
+            density=_DENSITY,
+            rgba=[*color, 1],
+        )
         start = z + rng.uniform(*_HEIGHTS)
         # not into the one before, which has fallen for a while
         if np.hypot(last[0] - x, last[1] - y) < _CLEAR:
@@ -120,22 +146,30 @@ def _landing_points(
 
     First those that face upwards, have room about them [m], and are seen from the eye.
     """
-    scene, low, high = RayScene(V, F), V.min(axis=0), V.max(axis=0)
-    points, good = np.empty((0, 3)), np.empty(0)
+    scene = RayScene(V, F)
+    low = V.min(axis=0)
+    high = V.max(axis=0)
+    points = np.empty((0, 3))
+    good = np.empty(0)
     for _ in range(_MOST_ROUNDS):
         if (good == 3).sum() >= count or len(points) >= max(count, _TRIED):
             break
         xy = rng.uniform(low[:2], high[:2], size=(64, 2))
         face, z = downward_hits(scene, xy, high[2])
         hit = face >= 0
-        found, (a, b, c) = np.column_stack([xy, z])[hit], np.moveaxis(V[F[face[hit]]], 1, 0)
+        found = np.column_stack([xy, z])[hit]
+        (a, b, c) = np.moveaxis(V[F[face[hit]]], 1, 0)
         normals = np.cross(b - a, c - a)
         upward = np.abs(normals[:, 2]) > _UPWARD * np.linalg.norm(normals, axis=1)
-        around = [downward_hits(scene, found[:, :2] + step, high[2])[1] - found[:, 2] for step in room * _STEPS]
+        around = [
+            downward_hits(scene, found[:, :2] + step, high[2])[1] - found[:, 2]
+            for step in room * _STEPS
+        ]
         roomy = (np.abs(around) < room).all(axis=0)
         rays = np.zeros_like(found) if eye is None else eye - found
         seen = scene.distances(found + np.array([0.0, 0.0, 1e-3]), rays) > 1
-        points, good = np.vstack([points, found]), np.append(good, 1.0 * upward + roomy + seen)
+        points = np.vstack([points, found])
+        good = np.append(good, 1.0 * upward + roomy + seen)
     points = points[np.argsort(-good, kind="stable")[:count]]
     return np.vstack([points, V[rng.integers(len(V), size=count - len(points))]])
 
@@ -173,11 +207,16 @@ def randomize(spec: mujoco.MjSpec, entry: RandomEntry) -> dict[str, np.ndarray]:
         For an unknown body or shape, or an invalid range.
     """
     _check(entry)
-    free = {body.name: body for body in spec.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in body.joints)}
+    free = {
+        body.name: body
+        for body in spec.bodies
+        if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in body.joints)
+    }
     for name in entry.bodies or ():
         if name not in free:
             raise SceneError(
-                f"[random] names the body {name!r}; the model's free bodies are {', '.join(free) or 'none'}"
+                f"[random] names the body {name!r}; the model's free bodies are "
+                f"{', '.join(free) or 'none'}"
             )
     rng = np.random.default_rng(entry.seed)
     shifts = {}
@@ -210,7 +249,8 @@ def _check(entry: RandomEntry) -> None:
     for name, (low, high) in (("size", entry.size), ("mass", entry.mass)):
         if not 0 < low <= high < np.inf:
             raise SceneError(
-                f"[random] {name} is [{low!r}, {high!r}]; valid are two positive factors, the lower one first"
+                f"[random] {name} is [{low!r}, {high!r}]; valid are two positive factors, the "
+                f"lower one first"
             )
     if not 0 <= entry.position < np.inf:
         raise SceneError(f"[random] position is {entry.position!r} m; valid is 0 or greater")
@@ -218,4 +258,6 @@ def _check(entry: RandomEntry) -> None:
         raise SceneError(f"[random] seed is {entry.seed}; valid is 0 or greater")
     for shape in entry.shapes:
         if shape not in BODY_SHAPES:
-            raise SceneError(f"[random] names the shape {shape!r}; valid are {', '.join(BODY_SHAPES)}")
+            raise SceneError(
+                f"[random] names the shape {shape!r}; valid are {', '.join(BODY_SHAPES)}"
+            )

@@ -30,27 +30,53 @@ from .source import scene_path, shipped_scenes
 
 UP_AXES = ("y", "z")
 
-
-def usual_up(path: str | Path) -> str:
-    """Axis that usually points up in files of this format: "z" for STL, else "y"."""
-    return "z" if Path(path).suffix.lower() == ".stl" else "y"
-
-
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
 DURATION = 5.0
 
-# Depth of a typical hit, over half the usual thickness of the target, over the radius of a tube that is as slender, and
-# at most over its size, of a closed target and of one with rims, at which waves are twice as high.
-_THICK, _SLIM, _DEEPEST, _DEEPEST_OPEN = 5.6, 2.8, 0.2, 0.12
+# Depth of a typical hit, over half the usual thickness of the target, over the radius of a tube
+# that is as slender, and at most over its size, of a closed target and of one with rims, at which
+# waves are twice as high.
+_THICK = 5.6
+_SLIM = 2.8
+_DEEPEST = 0.2
+_DEEPEST_OPEN = 0.12
 
 # Stiff enough for crest behind crest [1/s^2].
 _STIFFNESS = 1000.0
 
-# Tubes of this radius, over the size, get bodies of the usual size, and more slender ones smaller bodies.
-_SLENDER, _SMALLEST = 0.05, 0.5
-
+# Tubes of this radius, over the size, get bodies of the usual size, and more slender ones smaller
+# bodies.
+_SLENDER = 0.05
+_SMALLEST = 0.5
 _FOOT = 0.02  # how high over the floor what touches it may be, over the size
-_FLAT, _LIFTED = 1e-6, 0.25  # thickness over size of what lies down; how high, so that waves have room below [m]
+
+# thickness over size of what lies down; how high, so that waves have room below [m]
+_FLAT = 1e-6
+_LIFTED = 0.25
+
+# Candidates of the camera: three-quarter views, first those of what faces -y, as most files have it
+# [degrees].
+_AZIMUTHS = (125.0, 55.0, 145.0, 35.0, 215.0, 325.0, 235.0, 305.0)
+
+# Elevation on what lies flat and on what is as high as it is wide, or higher; the lens, and the
+# orbit [degrees], [1/s].
+_FLAT_VIEW = -50.0
+_HIGH_VIEW = -26.0
+_FOVY = 28.0
+_ORBIT = 5.0
+
+# Of the frame: height and width that the target may fill, at an aspect of 16:9, and how far below
+# the middle it is, for the falls above it.
+_FILLED = (0.62, 0.8)
+_BELOW = 0.06
+_ASPECT = 16 / 9
+_SEEN_AT = 1500  # points of the surface
+_TOP = 0.4  # least upward part of the normal of what bodies fall on
+
+
+def usual_up(path: str | Path) -> str:
+    """Axis that usually points up in files of this format: "z" for STL, else "y"."""
+    return "z" if Path(path).suffix.lower() == ".stl" else "y"
 
 
 def drop_scene(
@@ -66,8 +92,8 @@ def drop_scene(
 ) -> Scene:
     """Scene in which bodies of several shapes drop on a mesh.
 
-    The mesh is scaled to a longest extent of 1 m and stands on a floor; bodies collide with its true surface, as a
-    signed distance if it is closed, as a sheet with two sides if it is open.
+    The mesh is scaled to a longest extent of 1 m and stands on a floor; bodies collide with its
+    true surface, as a signed distance if it is closed, as a sheet with two sides if it is open.
 
     Parameters
     ----------
@@ -77,8 +103,8 @@ def drop_scene(
     seed : int
         Of their sizes, places and colours.
     up : str, optional
-        Axis of the file that points up, "y" or "z". By default a flat sheet lies down; else see `usual_up`,
-        unless the mesh would fall over on that axis, and stands on the other.
+        Axis of the file that points up, "y" or "z". By default a flat sheet lies down; else see
+        `usual_up`, unless the mesh would fall over on that axis, and stands on the other.
     look : str
         Of the target.
     texture : path, optional
@@ -106,18 +132,30 @@ def drop_scene(
     shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape not in ("box", "cylinder")]
     extent = Extent.of(mesh)
     # a tube has as much surface a length as a strip, which is what a hit can set in motion
-    rim = sum(float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum()) for rim in mesh.rims)
+    rim = sum(
+        float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum())
+        for rim in mesh.rims
+    )
     slender = extent.area / (np.pi * max(rim, 2 * extent.size) * extent.size)
     scale = float(np.clip(slender / _SLENDER, _SMALLEST, 1.0))
     # waves slow and high enough to watch under typical bodies of that scale, crest behind crest
     mass, speed = TYPICAL_HIT
-    hit, radius = (mass * scale**3, speed), TYPICAL_FOOTPRINT * scale
-    amplitude = min(_THICK * extent.radius / extent.size, _SLIM * slender, _DEEPEST if mesh.closed else _DEEPEST_OPEN)
+    hit = (mass * scale**3, speed)
+    radius = TYPICAL_FOOTPRINT * scale
+    amplitude = min(
+        _THICK * extent.radius / extent.size,
+        _SLIM * slender,
+        _DEEPEST if mesh.closed else _DEEPEST_OPEN,
+    )
     suited = Material.suited(SIZE, hit, radius=radius, amplitude=amplitude, crossing=1.5, decay=2.5)
-    given = {name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))}
+    given = {
+        name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))
+    }
     material = MaterialEntry(**given | {"stiffness": max(_STIFFNESS, given["stiffness"])})
     rng = np.random.default_rng(seed)
-    spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], rng, eye, scale)
+    spec, drops = drop_model(
+        V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], rng, eye, scale
+    )
     if not mesh.closed:
         make_collidable(spec, "target", "flex")
     paint_target(spec, mesh, mesh_path, texture)
@@ -136,26 +174,15 @@ def drop_scene(
     )
 
 
-# Candidates of the camera: three-quarter views, first those of what faces -y, as most files have it [degrees].
-_AZIMUTHS = (125.0, 55.0, 145.0, 35.0, 215.0, 325.0, 235.0, 305.0)
-
-# Elevation on what lies flat and on what is as high as it is wide, or higher; the lens, and the orbit [degrees], [1/s].
-_FLAT_VIEW, _HIGH_VIEW, _FOVY, _ORBIT = -50.0, -26.0, 28.0, 5.0
-
-# Of the frame: height and width that the target may fill, at an aspect of 16:9, and how far below the middle it is, for
-# the falls above it.
-_FILLED, _BELOW, _ASPECT = (0.62, 0.8), 0.06, 16 / 9
-
-_SEEN_AT = 1500  # points of the surface
-_TOP = 0.4  # least upward part of the normal of what bodies fall on
-
-
-def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple[CameraEntry, NDArray[np.float64]]:
+def _camera(
+    V: NDArray[np.float64], F: NDArray[np.int64], closed: bool
+) -> tuple[CameraEntry, NDArray[np.float64]]:
     """The three-quarter view that shows most of a target, and the eye half-way of the orbit [m].
 
-    It fills the frame, shows the upper side, the head, which is what is uppermost where that is not over the middle,
-    or what leans out over the base, and the details: many vertices, and normals in many directions. Their variety is
-    the entropy of those that are seen (as in Page et al. 2003, "Shape analysis algorithm based on information theory").
+    It fills the frame, shows the upper side, the head, which is what is uppermost where that is not
+    over the middle, or what leans out over the base, and the details: many vertices, and normals in
+    many directions. Their variety is the entropy of those that are seen (as in Page et al. 2003,
+    "Shape analysis algorithm based on information theory").
     """
     width, depth, height = np.ptp(V, axis=0)
     elevation = _FLAT_VIEW + (_HIGH_VIEW - _FLAT_VIEW) * min(height / max(width, depth), 1.0)
@@ -165,13 +192,16 @@ def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple
     base = points[points[:, 2] <= np.quantile(points[:, 2], 0.1)]
     head = (upper.mean(axis=0) - base.mean(axis=0))[:2] / SIZE
     bins = np.rint(1.5 * normals).astype(int) @ [25, 5, 1] + 62
-    scene, views = RayScene(V, F), []
+    scene = RayScene(V, F)
+    views = []
     for azimuth in _AZIMUTHS:
         lookat, distance, eye = _fitted(V, azimuth, elevation)
         rays = eye - points
         cosine = np.einsum("ij,ij->i", rays, normals) / np.linalg.norm(rays, axis=1)
         outer = normals * np.sign(cosine)[:, None]
-        seen = (scene.distances(points + 1e-4 * SIZE * outer, rays) > 1) & ((cosine > 0) | (not closed))
+        seen = (scene.distances(points + 1e-4 * SIZE * outer, rays) > 1) & (
+            (cosine > 0) | (not closed)
+        )
         shown = np.where(seen, np.abs(cosine), 0.0) / distance**2
         shares = np.bincount(bins, weights=shown) / max(shown.sum(), 1e-300)
         variety = -(shares * np.log(np.maximum(shares, 1e-300))).sum()
@@ -179,15 +209,24 @@ def _camera(V: NDArray[np.float64], F: NDArray[np.int64], closed: bool) -> tuple
         towards = (eye - lookat)[:2] / distance
         detail = (scene.distances(corners + 1e-3 * (eye - corners), eye - corners) > 1).mean()
         score = variety + top + 2 * head @ towards + np.log(max(shown.sum() * detail, 1e-300))
-        views.append((score, azimuth - _ORBIT * DURATION / 2, tuple(lookat.tolist()), distance, eye))
+        views.append(
+            (score, azimuth - _ORBIT * DURATION / 2, tuple(lookat.tolist()), distance, eye)
+        )
     _, start, at, distance, eye = max(views, key=lambda view: view[0])
     entry = CameraEntry(
-        lookat=at, distance=distance, azimuth=start, elevation=float(elevation), fovy=_FOVY, orbit=_ORBIT
+        lookat=at,
+        distance=distance,
+        azimuth=start,
+        elevation=float(elevation),
+        fovy=_FOVY,
+        orbit=_ORBIT,
     )
     return entry, eye
 
 
-def _sampled(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _sampled(
+    V: NDArray[np.float64], F: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points spread evenly over a surface, [k, 3], and its unit normals there, [k, 3]."""
     a, b, c = np.moveaxis(V[F], 1, 0)
     normals = np.cross(b - a, c - a)
@@ -202,15 +241,20 @@ def _fitted(
     V: NDArray[np.float64], azimuth: float, elevation: float
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
     """Point to look at [m], distance from there [m] and eye [m] with which a target fills its share of the frame."""
-    lookat, distance = (V.min(axis=0) + V.max(axis=0)) / 2, 3 * SIZE
+    lookat = (V.min(axis=0) + V.max(axis=0)) / 2
+    distance = 3 * SIZE
     tangent = np.tan(np.radians(_FOVY) / 2)
     spans = 2 * tangent * np.array([_ASPECT * _FILLED[1], _FILLED[0]])
     for _ in range(8):  # by then it changes by less than a pixel
         pose = Camera(tuple(lookat.tolist()), distance, azimuth, elevation, _FOVY).pose()
         local = (V - pose.position) @ pose.rotation
         seen = local[:, :2] / -local[:, 2:]
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        lookat = lookat + pose.rotation[:, :2] @ ((low + high) / 2 + [0.0, 2 * tangent * _BELOW]) * distance
+        low = seen.min(axis=0)
+        high = seen.max(axis=0)
+        lookat = (
+            lookat
+            + pose.rotation[:, :2] @ ((low + high) / 2 + [0.0, 2 * tangent * _BELOW]) * distance
+        )
         distance *= float(((high - low) / spans).max())
     return lookat, distance, pose.position
 
@@ -221,7 +265,8 @@ def _up(mesh: Mesh, usual: str) -> str:
     if flat := [axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()]:
         return flat[0]
     falls = {}
-    for axis in UP_AXES:  # if the middle of the surface is not above what touches the floor, give or take
+    # if the middle of the surface is not above what touches the floor, give or take
+    for axis in UP_AXES:
         V = _standing(mesh, axis)
         below = V[V[:, 2] <= _FOOT * SIZE][:, :2] - _sampled(V, mesh.F)[0].mean(axis=0)[:2]
         angles = np.sort(np.arctan2(below[:, 1], below[:, 0]))
@@ -233,7 +278,8 @@ def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:
     """Vertices scaled, turned upright, standing on z = 0 over the origin, or hovering if they lie flat [m]."""
     V = mesh.V if up == "z" else mesh.V[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     V = V * (SIZE / np.ptp(V, axis=0).max())
-    low, high = V.min(axis=0), V.max(axis=0)
+    low = V.min(axis=0)
+    high = V.max(axis=0)
     clearance = _LIFTED if high[2] - low[2] <= _FLAT * SIZE else 0.0
     return V - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - clearance]
 
@@ -266,6 +312,7 @@ def is_scene(target: str | Path) -> bool:
     if path.is_file():
         return False
     raise SceneError(
-        f"there is no scene or mesh {str(target)!r}; shipped scenes are {', '.join(shipped_scenes())}, or give the "
+        f"there is no scene or mesh {str(target)!r}; shipped scenes are "
+        f"{', '.join(shipped_scenes())}, or give the "
         "path of a scene file (TOML) or of a mesh"
     )

@@ -1,6 +1,7 @@
 """A scene's script: timed events of bodies and surfaces.
 
-Free bodies are dropped (and held until then), thrown or placed; surfaces are poked, or get another material.
+Free bodies are dropped (and held until then), thrown or placed; surfaces are poked, or get another
+material.
 """
 
 from __future__ import annotations
@@ -70,23 +71,29 @@ class PlaceEntry(msgspec.Struct, forbid_unknown_fields=True):
     """Quaternion w x y z; by default unchanged."""
 
 
-def free_joint(model: mujoco.MjModel, entry: DropEntry | ThrowEntry | PlaceEntry) -> tuple[int, int]:
+def free_joint(
+    model: mujoco.MjModel, entry: DropEntry | ThrowEntry | PlaceEntry
+) -> tuple[int, int]:
     """Addresses of the body's free joint in qpos and qvel."""
     verb = type(entry).__name__.removesuffix("Entry").lower()
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, entry.body)
     if body < 0:
         names = [model.body(i).name for i in range(1, model.nbody)]
         raise SceneError(
-            f"[[{verb}]] names the body {entry.body!r}; the model's bodies are {', '.join(names) or 'none'}"
+            f"[[{verb}]] names the body {entry.body!r}; the model's bodies are "
+            f"{', '.join(names) or 'none'}"
         )
     joint = int(model.body_jntadr[body])
     if joint < 0 or model.jnt_type[joint] != int(mujoco.mjtJoint.mjJNT_FREE):
         valid = "only free bodies can drop" if verb == "drop" else "valid are free bodies"
-        raise SceneError(f"[[{verb}]] names the body {entry.body!r}, which has no <freejoint/>; {valid}")
+        raise SceneError(
+            f"[[{verb}]] names the body {entry.body!r}, which has no <freejoint/>; {valid}"
+        )
     check_time(verb, entry.body, entry.time)
     if entry.orientation is not None and not np.linalg.norm(entry.orientation) > 0:
         raise SceneError(
-            f"[[{verb}]] of body {entry.body!r} has orientation {entry.orientation}; valid is w x y z, not 0"
+            f"[[{verb}]] of body {entry.body!r} has orientation {entry.orientation}; valid is w x "
+            f"y z, not 0"
         )
     return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
 
@@ -153,13 +160,20 @@ class Script:
     Raises
     ------
     SceneError
-        If an event names a missing body or geom, a body without a free joint, or has an invalid time, orientation,
-        impulse or radius.
+        If an event names a missing body or geom, a body without a free joint, or has an invalid
+        time, orientation, impulse or radius.
     """
 
     def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
-        moved: list[DropEntry | ThrowEntry | PlaceEntry] = [*events.drop, *events.throw, *events.place]
-        self._moved = [(entry, *free_joint(model, entry)) for entry in sorted(moved, key=lambda entry: entry.time)]
+        moved: list[DropEntry | ThrowEntry | PlaceEntry] = [
+            *events.drop,
+            *events.throw,
+            *events.place,
+        ]
+        self._moved = [
+            (entry, *free_joint(model, entry))
+            for entry in sorted(moved, key=lambda entry: entry.time)
+        ]
         self._home: dict[str, NDArray[np.float64]] = {}
         surfaces: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
         for surface in surfaces:
@@ -167,15 +181,19 @@ class Script:
             check_time(verb, surface.geom, surface.time)
             if target_name(model, find_any(model, surface.geom)) not in targets:
                 raise SceneError(
-                    f"[[{verb}]] names the geom {surface.geom!r}, which does not ripple; the rippling geoms are "
+                    f"[[{verb}]] names the geom {surface.geom!r}, which does not ripple; the "
+                    f"rippling geoms are "
                     f"{', '.join(map(repr, targets))}"
                 )
             if isinstance(surface, PokeEntry) and not (
-                np.isfinite([surface.impulse, *surface.point]).all() and 0 <= surface.radius < np.inf
+                np.isfinite([surface.impulse, *surface.point]).all()
+                and 0 <= surface.radius < np.inf
             ):
                 raise SceneError(
-                    f"[[poke]] of {surface.geom!r} has point {surface.point} m, impulse {surface.impulse!r} N s, "
-                    f"radius {surface.radius!r} m; valid are finite numbers, the radius 0 or greater"
+                    f"[[poke]] of {surface.geom!r} has point {surface.point} m, impulse "
+                    f"{surface.impulse!r} N s, "
+                    f"radius {surface.radius!r} m; valid are finite numbers, the radius 0 or "
+                    f"greater"
                 )
         controls = sorted(events.control, key=lambda entry: entry.time)
         self._actuators = {entry.actuator: _actuator(model, entry) for entry in controls}
@@ -204,7 +222,9 @@ class Script:
                 # a free joint keeps its angular velocity in the body's own frame
                 back = np.zeros(4)
                 mujoco.mju_negQuat(back, quaternion)
-                mujoco.mju_rotVecQuat(data.qvel[velocity + 3 : velocity + 6], np.array(entry.angular_velocity), back)
+                mujoco.mju_rotVecQuat(
+                    data.qvel[velocity + 3 : velocity + 6], np.array(entry.angular_velocity), back
+                )
         # sorted by time: those that have begun are the first
         del self._moved[:begun]
         while self._sudden and self._sudden[0].time <= data.time + 1e-9:
@@ -223,8 +243,11 @@ def _actuator(model: mujoco.MjModel, entry: ControlEntry) -> int:
     if actuator < 0:
         names = [model.actuator(i).name for i in range(model.nu)]
         raise SceneError(
-            f"[[control]] names the actuator {entry.actuator!r}; the model's actuators are {', '.join(names) or 'none'}"
+            f"[[control]] names the actuator {entry.actuator!r}; the model's actuators are "
+            f"{', '.join(names) or 'none'}"
         )
     if not np.isfinite(entry.value):
-        raise SceneError(f"[[control]] of {entry.actuator!r} has value {entry.value!r}; valid is a finite number")
+        raise SceneError(
+            f"[[control]] of {entry.actuator!r} has value {entry.value!r}; valid is a finite number"
+        )
     return int(actuator)

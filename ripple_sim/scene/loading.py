@@ -1,7 +1,7 @@
 """Reading a scene: one MJCF, and one TOML file that names its targets, the camera, the duration and the script.
 
-Names and numbers are checked against the model before anything is simulated, and the files that an MJCF names are
-looked at before MuJoCo opens them: it would wait for ever for one that is a FIFO.
+Names and numbers are checked against the model before anything is simulated, and the files that an
+MJCF names are looked at before MuJoCo opens them: it would wait for ever for one that is a FIFO.
 """
 
 from __future__ import annotations
@@ -41,6 +41,31 @@ from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
 from .source import read_toml, scene_path
 from .target_maps import check_rim
 
+# Attributes of <compiler> that name folders, and those that name files.
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
+_FILES = (
+    "file",
+    "filename",
+    "fileright",
+    "fileleft",
+    "fileup",
+    "filedown",
+    "filefront",
+    "fileback",
+)
+_BAD_CHARACTER = expat.errors.codes[expat.errors.XML_ERROR_BAD_CHAR_REF]
+
+# Elements whose PNG files MuJoCo reads whole, however large.
+_IMAGES = ("texture", "hfield")
+
+# Time in which MuJoCo sets up a flexcomp of so many bodies [s], one for each point of its grid: it
+# grows with about their number to the power 2.6, since each one added has it list all again. A
+# shorter silence needs no words.
+_BODIES = 15_000
+_THEIR_SECONDS = 30.0
+_GROWTH = 2.6
+_LONG = 10.0
+
 
 def check_scene(scene: Scene) -> None:
     """Check a scene's names and numbers against its model.
@@ -51,7 +76,8 @@ def check_scene(scene: Scene) -> None:
     SolverError
         For an invalid material.
     """
-    from ripple_sim.render import LIGHTING  # brings OpenGL, which reading a scene file can do without until here
+    # brings OpenGL, which reading a scene file can do without until here
+    from ripple_sim.render import LIGHTING
 
     own_model(scene.model)
     if not scene.targets:
@@ -66,32 +92,45 @@ def check_scene(scene: Scene) -> None:
     named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
     _check_sensors(scene)
     if scene.lighting not in LIGHTING:
-        raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
+        raise SceneError(
+            f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}"
+        )
     Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
     for each in dataclasses.fields(scene.events):
-        if late := [event.time for event in getattr(scene.events, each.name) if event.time >= scene.duration]:
+        if late := [
+            event.time for event in getattr(scene.events, each.name) if event.time >= scene.duration
+        ]:
             warn_caller(
-                f"a [[{each.name}]] at {late[0]:g} s is not before the scene's end, {scene.duration:g} s; give the "
+                f"a [[{each.name}]] at {late[0]:g} s is not before the scene's end, "
+                f"{scene.duration:g} s; give the "
                 "scene a longer duration, or the event an earlier time"
             )
     check_camera(scene.model, scene.camera)
 
 
 def _check_sensors(scene: Scene) -> None:
-    targets, names = [entry.geom for entry in scene.targets], set()
+    targets = [entry.geom for entry in scene.targets]
+    names = set()
     for entry in scene.sensors:
         if entry.name in names:
             raise SceneError(f"two sensors are called {entry.name!r}; valid is one")
         names.add(entry.name)
         if entry.geom not in targets:
             valid = ", ".join(map(repr, targets))
-            raise SceneError(f"sensor {entry.name!r} is on {entry.geom!r}, which does not ripple; valid are {valid}")
-        if [entry.site is not None, entry.point is not None, len(entry.points) > 0].count(True) != 1:
+            raise SceneError(
+                f"sensor {entry.name!r} is on {entry.geom!r}, which does not ripple; valid are "
+                f"{valid}"
+            )
+        if [entry.site is not None, entry.point is not None, len(entry.points) > 0].count(
+            True
+        ) != 1:
             raise SceneError(f"sensor {entry.name!r} needs one of site, point and points")
         if entry.site is not None:
             site_on(scene.model, find_target(scene.model, entry.geom), entry.site)
     if parse_request(scene.overlay).sensors and not scene.sensors:
-        raise SceneError("the overlay sensors shows those of the scene, which has no [[sensor]]; add one")
+        raise SceneError(
+            "the overlay sensors shows those of the scene, which has no [[sensor]]; add one"
+        )
 
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
@@ -103,7 +142,10 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
             raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
     check_rim(entry.rim)
     if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
-        raise SceneError(f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)")
+        raise SceneError(
+            f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 "
+            f"(sRGB)"
+        )
     entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)
     for body in entry.inside:
         body.check()
@@ -112,19 +154,25 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     least, greatest = entry.thickness_limits
     if not 0 <= least <= greatest:
         raise SceneError(
-            f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are two numbers from 0 on, "
+            f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are "
+            f"two numbers from 0 on, "
             "the least first"
         )
     for coefficient, each in entry.material.maps().items():
         _check_image(
-            f"ripple.material.{coefficient}", each.map, "a number, or the path of an image relative to the scene file"
+            f"ripple.material.{coefficient}",
+            each.map,
+            "a number, or the path of an image relative to the scene file",
         )
     if entry.still_map is not None:
-        _check_image("ripple.still_map", entry.still_map, "the path of an image relative to the scene file")
+        _check_image(
+            "ripple.still_map", entry.still_map, "the path of an image relative to the scene file"
+        )
     for disc in entry.still:
         if not 0 < disc.radius < float("inf"):
             raise SceneError(
-                f"a [[ripple.still]] disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0"
+                f"a [[ripple.still]] disc of geom {entry.geom!r} has radius {disc.radius!r} m; "
+                f"valid is above 0"
             )
 
 
@@ -133,27 +181,14 @@ def _check_image(key: str, path: str, valid: str) -> None:
         raise SceneError(f"{key} names the image {path!r}, which does not exist; valid is {valid}")
 
 
-# Attributes of <compiler> that name folders, and those that name files.
-_FOLDERS = ("meshdir", "texturedir", "assetdir")
-_FILES = ("file", "filename", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
-
-_BAD_CHARACTER = expat.errors.codes[expat.errors.XML_ERROR_BAD_CHAR_REF]
-
-# Elements whose PNG files MuJoCo reads whole, however large.
-_IMAGES = ("texture", "hfield")
-
-# Time in which MuJoCo sets up a flexcomp of so many bodies [s], one for each point of its grid: it grows with about
-# their number to the power 2.6, since each one added has it list all again. A shorter silence needs no words.
-_BODIES, _THEIR_SECONDS, _GROWTH, _LONG = 15_000, 30.0, 2.6, 10.0
-
-
 def check_files(path: Path) -> None:
     """Make sure that an MJCF and all that it includes or names are regular files, as far as they exist.
 
-    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is warned of. Raises
-    `SceneError` naming the file.
+    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is
+    warned of. Raises `SceneError` naming the file.
     """
-    waiting, seen = [path], set()
+    waiting = [path]
+    seen = set()
     folders = {path.parent}
     while waiting:
         xml = waiting.pop()
@@ -166,18 +201,23 @@ def check_files(path: Path) -> None:
             if error.code == _BAD_CHARACTER:
                 line, column = error.position
                 raise SceneError(
-                    f"the model {str(xml)!r} refers to an unknown character, at line {line}, column {column}: "
+                    f"the model {str(xml)!r} refers to an unknown character, at line {line}, "
+                    f"column {column}: "
                     "MuJoCo would cut the text there; valid are names without a NUL"
                 ) from error
             continue  # MuJoCo says what is wrong
         except (OSError, ValueError, LookupError, RecursionError):
             continue  # likewise
-        folders |= {path.parent / each.get(name, "") for each in root.iter("compiler") for name in _FOLDERS}
+        folders |= {
+            path.parent / each.get(name, "") for each in root.iter("compiler") for name in _FOLDERS
+        }
         for element in root.iter():
             if element.tag == "flexcomp":
                 _warn_of_many_bodies(element)
             for name in filter(None, map(element.get, _FILES)):
-                found = [place for folder in {*folders, xml.parent} if _exists(place := folder / name)]
+                found = [
+                    place for folder in {*folders, xml.parent} if _exists(place := folder / name)
+                ]
                 if element.tag == "include":
                     waiting += found
                 elif element.tag in _IMAGES and name.lower().endswith(".png"):
@@ -187,7 +227,11 @@ def check_files(path: Path) -> None:
 
 def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
     """Say how long MuJoCo will be silent over a flexcomp's grid whose points are all bodies."""
-    if flex.get("type", "grid") != "grid" or flex.get("rigid") == "true" or flex.get("dof", "full") != "full":
+    if (
+        flex.get("type", "grid") != "grid"
+        or flex.get("rigid") == "true"
+        or flex.get("dof", "full") != "full"
+    ):
         return
     try:
         bodies = math.prod(int(count) for count in flex.get("count", "").split())
@@ -195,8 +239,10 @@ def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
         return  # MuJoCo says what is wrong
     if (seconds := _THEIR_SECONDS * (bodies / _BODIES) ** _GROWTH) > _LONG:
         warn_caller(
-            f"flexcomp {flex.get('name', '')!r} has {bodies} points, each a body of its own, which MuJoCo takes about "
-            f'{seconds:.0f} s to set up; dof="trilinear", or a count of at most 20 20 20, takes seconds'
+            f"flexcomp {flex.get('name', '')!r} has {bodies} points, each a body of its own, which "
+            f"MuJoCo takes about "
+            f'{seconds:.0f} s to set up; dof="trilinear", or a count of at most 20 20 20, takes '
+            f"seconds"
         )
 
 
@@ -207,7 +253,8 @@ def _exists(path: Path) -> bool:
         return False
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise SceneError(
-            f"the model names {str(path)!r}, which is not a regular file; a FIFO or a device cannot be read"
+            f"the model names {str(path)!r}, which is not a regular file; a FIFO or a device "
+            f"cannot be read"
         )
     return stat.S_ISREG(mode)
 
@@ -218,7 +265,10 @@ Change = Callable[[dict[str, Any]], None]
 
 @checked(SceneError, name_or_path=PATH, edit=FUNCTION, change=FUNCTION)
 def load_scene(
-    name_or_path: str | Path, edit: Edit | None = None, seed: int | None = None, change: Change | None = None
+    name_or_path: str | Path,
+    edit: Edit | None = None,
+    seed: int | None = None,
+    change: Change | None = None,
 ) -> Scene:
     """Load a shipped scene by its name, or any scene by the path of its TOML file.
 
@@ -226,17 +276,19 @@ def load_scene(
     ----------
     name_or_path : str or path
     edit : callable, optional
-        Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
+        Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it
+        in place.
     seed : int, optional
         In place of the one of the file's `[random]`.
     change : callable, optional
-        Called with the file's table, of dictionaries and lists, before it is checked, to change it in place.
+        Called with the file's table, of dictionaries and lists, before it is checked, to change it
+        in place.
 
     Raises
     ------
     SceneError
-        If there is no such scene or file, the TOML has an unknown key or a wrong value, MuJoCo refuses the MJCF, or a
-        geom or camera is not in it.
+        If there is no such scene or file, the TOML has an unknown key or a wrong value, MuJoCo
+        refuses the MJCF, or a geom or camera is not in it.
     """
     path = scene_path(name_or_path)
     table = read_toml(path, "scene file")
@@ -247,14 +299,17 @@ def load_scene(
     if seed is not None:
         if random is None:
             raise SceneError(
-                f"scene file {str(path)!r} has no [random], so nothing follows the seed {seed}; leave the seed out, or "
+                f"scene file {str(path)!r} has no [random], so nothing follows the seed {seed}; "
+                f"leave the seed out, or "
                 "write what is to vary under [random]"
             )
         random = msgspec.structs.replace(random, seed=seed)
     model, shifts = load_model(path.parent / content.model, random, edit)
     # every geom called as everybody calls it
     content.ripple = [
-        msgspec.structs.replace(entry.located(path.parent), geom=target_name(model, find_target(model, entry.geom)))
+        msgspec.structs.replace(
+            entry.located(path.parent), geom=target_name(model, find_target(model, entry.geom))
+        )
         for entry in content.ripple
     ]
     moved: list[DropEntry | ThrowEntry] = [*content.drop, *content.throw]
@@ -264,14 +319,19 @@ def load_scene(
     return scene_of(path.stem, model, content)
 
 
-def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[str, ...] = ()) -> Scene:
+def scene_of(
+    name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[str, ...] = ()
+) -> Scene:
     """The scene of a name and notes that the content of a scene file makes of a model, checked; raises as that does."""
-    events = Events(**{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)})
+    events = Events(
+        **{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)}
+    )
     targets = []
     for entry in content.ripple:
         preset = entry.material.preset
         preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
-        if preset is not None and preset.name == "suited":  # what it leaves out is found from the model
+        # what it leaves out is found from the model
+        if preset is not None and preset.name == "suited":
             given = given_fields(preset, without="name")
             can_ease = not content.two_way and entry.pulse == "contact"
             if not given and can_ease and entry.material.density is None:
@@ -280,11 +340,15 @@ def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[
                 if not {"size", "hit"} <= set(given):
                     given = typical_hit(model, entry.geom) | given
                 chosen = PresetEntry(name="suited", **given)
-            entry = msgspec.structs.replace(entry, material=msgspec.structs.replace(entry.material, preset=chosen))
+            entry = msgspec.structs.replace(
+                entry, material=msgspec.structs.replace(entry.material, preset=chosen)
+            )
         targets.append(entry)
     look = content.two_way, tuple(content.overlay), content.lighting
     sensors = tuple(content.sensor)
-    scene = Scene(name, model, tuple(targets), content.camera, content.duration, events, *look, notes, sensors)
+    scene = Scene(
+        name, model, tuple(targets), content.camera, content.duration, events, *look, notes, sensors
+    )
     check_scene(scene)
     return scene
 
@@ -294,18 +358,21 @@ def load_model(
 ) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
     """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
 
-    Raises `SceneError` if the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is
-    invalid.
+    Raises `SceneError` if the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the
+    randomisation is invalid.
     """
     if not path.is_file():
         problem = "is not a file" if path.exists() else "does not exist"
-        raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
+        raise SceneError(
+            f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file"
+        )
     check_files(path)
     # a NaN is told once: by the errors below, or by MuJoCo's warning where none of them sees it
     with warnings.catch_warnings(record=True) as told, refusal_of(repr(str(path))):
         warnings.simplefilter("always")
         spec = mujoco.MjSpec.from_file(str(path))
-        keys = [(key.name, len(key.qpos)) for key in spec.keys]  # the compiler fills up what is missing
+        # the compiler fills up what is missing
+        keys = [(key.name, len(key.qpos)) for key in spec.keys]
         shifts = {} if random is None else randomize(spec, random)
         if edit is not None:
             edit(spec)
@@ -313,13 +380,15 @@ def load_model(
     for number, (name, given) in enumerate(keys):
         if edit is None and given not in (0, model.nq):
             raise SceneError(
-                f"keyframe {name or number!r} of {str(path)!r} has {given} positions (qpos); valid are {model.nq}, "
+                f"keyframe {name or number!r} of {str(path)!r} has {given} positions (qpos); valid "
+                f"are {model.nq}, "
                 "as the model has"
             )
     for key, numbers in enumerate(np.hstack([model.key_qpos, model.key_qvel])):
         if not np.isfinite(numbers).all():
             raise SceneError(
-                f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid are finite numbers"
+                f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid "
+                f"are finite numbers"
             )
     for each in told:
         warn_caller(str(each.message), each.category)
@@ -334,6 +403,7 @@ def refusal_of(name: str) -> Iterator[None]:
         yield
     except ValueError as error:
         reason = " ".join(str(error).split())
-        if "allocate memory" in reason:  # by default it takes as much as all bodies in one heap would need
+        # by default it takes as much as all bodies in one heap would need
+        if "allocate memory" in reason:
             reason += '; name in the MJCF how much it may take, such as <size memory="4G"/>'
         raise SceneError(f"MuJoCo refuses {name}: {reason}") from error

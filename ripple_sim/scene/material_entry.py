@@ -1,6 +1,7 @@
 """`[ripple.material]` of a scene file: coefficients as numbers or images, alone or on top of a preset.
 
-The coefficients are the fields of `Material`, and the parameters of a preset those of its constructor.
+The coefficients are the fields of `Material`, and the parameters of a preset those of its
+constructor.
 """
 
 from __future__ import annotations
@@ -21,6 +22,10 @@ from ripple_sim.solver.operator.presets import PRESETS
 # Constructors of `Material`; the presets of a scene file are these and the real materials by name.
 LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water", "suited")
 
+_LAYER = (
+    "write preset = {name = 'layer', modulus = ...} or another of a layer under [ripple.material]"
+)
+
 
 class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
     """A coefficient from an image in the mesh's own texture coordinates, see `texture_map`."""
@@ -37,15 +42,14 @@ class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 Coefficient = float | str | MapEntry
 
-_LAYER = "write preset = {name = 'layer', modulus = ...} or another of a layer under [ripple.material]"
-
 
 class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     """A preset by name, with its parameters in their units.
 
-    The name is a constructor of `Material`, membrane, layer, jelly, plate, dent, water or suited, or that of a real
-    material, see `PRESETS`. The other fields are parameters of these constructors; each takes some of them. What is
-    left out of "suited", waves that are to be seen, is found from the target and from the bodies that can touch it.
+    The name is a constructor of `Material`, membrane, layer, jelly, plate, dent, water or suited,
+    or that of a real material, see `PRESETS`. The other fields are parameters of these
+    constructors; each takes some of them. What is left out of "suited", waves that are to be seen,
+    is found from the target and from the bodies that can touch it.
     """
 
     name: str
@@ -71,13 +75,15 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
         """The preset's material; its layer's thickness may be one at every texel [m], [C, n, n].
 
-        Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing one.
+        Raises `SceneError` for an unknown preset, a parameter that it does not take, or a missing
+        one.
         """
         given = given_fields(self, without="name")
         if thickness is not None:
             if _law(self.name) not in ("layer", "jelly"):
                 raise SceneError(
-                    f"[[ripple.inside]] needs a material with a layer, not the preset {self.name!r}; {_LAYER}"
+                    f"[[ripple.inside]] needs a material with a layer, not the preset "
+                    f"{self.name!r}; {_LAYER}"
                 )
             given["thickness"] = thickness
         return preset_material(self.name, given)
@@ -86,7 +92,9 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
 def _law(name: str) -> str:
     """Constructor of `Material` that makes a preset; raises `SceneError` for an unknown one."""
     if name not in (*LAWS, *PRESETS):
-        raise SceneError(f"the preset {name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}")
+        raise SceneError(
+            f"the preset {name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}"
+        )
     return PRESETS[name].law if name in PRESETS else name
 
 
@@ -98,7 +106,9 @@ def preset_material(name: str, given: dict[str, Any]) -> Material:
     parameters = inspect.signature(getattr(Material, _law(name))).parameters
     for key in given:
         if key not in parameters:
-            raise SceneError(f"the preset {name!r} has no parameter {key!r}; valid are {', '.join(parameters)}")
+            raise SceneError(
+                f"the preset {name!r} has no parameter {key!r}; valid are {', '.join(parameters)}"
+            )
     if name in PRESETS:
         return Material.preset(name, **given)
     for key, parameter in parameters.items():
@@ -113,8 +123,9 @@ def preset_material(name: str, given: dict[str, Any]) -> Material:
 class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
-    Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a preset, those that
-    are left out are those of `Material()`. The last three are the same everywhere: no map gives them.
+    Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a
+    preset, those that are left out are those of `Material()`. The last three are the same
+    everywhere: no map gives them.
     """
 
     speed: Coefficient | None = None
@@ -149,9 +160,13 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
         if preset is None and thickness is not None:
             raise SceneError(f"[[ripple.inside]] needs a layer; {_LAYER}")
         coefficients = given_fields(self, without="preset")
-        numbers = {name: value for name, value in coefficients.items() if isinstance(value, int | float)}
+        numbers = {
+            name: value for name, value in coefficients.items() if isinstance(value, int | float)
+        }
         white = {name: entry.high for name, entry in self.maps().items()}
-        return dataclasses.replace(Material() if preset is None else preset.material(thickness), **numbers, **white)
+        return dataclasses.replace(
+            Material() if preset is None else preset.material(thickness), **numbers, **white
+        )
 
     def maps(self) -> dict[str, MapEntry]:
         """The coefficients that are maps."""
@@ -163,8 +178,11 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
 
     def located(self, folder: Path) -> MaterialEntry:
         """The same with the images' paths made relative to a folder."""
-        replace, maps = msgspec.structs.replace, self.maps()
-        return replace(self, **{name: replace(each, map=str(folder / each.map)) for name, each in maps.items()})
+        replace = msgspec.structs.replace
+        maps = self.maps()
+        return replace(
+            self, **{name: replace(each, map=str(folder / each.map)) for name, each in maps.items()}
+        )
 
 
 class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):

@@ -26,8 +26,8 @@ class Request:
     limit : float or None
         End of the colours, in m or m/s; None: adapts to the waves during the video.
     contacts, grid, time, energy, sensors : bool
-        Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves' energy, with that of
-        bodies and both; the traces of the scene's sensors.
+        Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves'
+        energy, with that of bodies and both; the traces of the scene's sensors.
     """
 
     heatmap: str | None = None
@@ -42,8 +42,8 @@ class Request:
 def parse_request(words: Iterable[str]) -> Request:
     """Read names of overlays; "height" and "velocity" may have a range, such as "height=0.02" [m, m/s].
 
-    Raises `SceneError` for an unknown name, a range that is not a positive number or of an overlay without range, or
-    two heatmaps.
+    Raises `SceneError` for an unknown name, a range that is not a positive number or of an overlay
+    without range, or two heatmaps.
     """
     chosen: dict[str, float | None] = {}
     for word in words:
@@ -51,18 +51,26 @@ def parse_request(words: Iterable[str]) -> Request:
         if name not in NAMES:
             raise SceneError(f"there is no overlay {name!r}; valid are {', '.join(NAMES)}")
         if given and name not in HEATMAPS:
-            raise SceneError(f"overlay {word.strip()!r}: {name} has no range; only {' and '.join(HEATMAPS)} have one")
+            raise SceneError(
+                f"overlay {word.strip()!r}: {name} has no range; only {' and '.join(HEATMAPS)} "
+                f"have one"
+            )
         chosen[name] = None
         if given:
             limit = math.nan
             with contextlib.suppress(ValueError):
                 limit = float(value)
             if not 0 < limit < math.inf:
-                raise SceneError(f"overlay {word.strip()!r}: the range must be a positive number [{HEATMAPS[name]}]")
+                raise SceneError(
+                    f"overlay {word.strip()!r}: the range must be a positive number "
+                    f"[{HEATMAPS[name]}]"
+                )
             chosen[name] = limit
     heatmaps = [name for name in HEATMAPS if name in chosen]
     if len(heatmaps) > 1:
-        raise SceneError(f"overlays {' and '.join(heatmaps)} cannot both colour the surface; choose one")
+        raise SceneError(
+            f"overlays {' and '.join(heatmaps)} cannot both colour the surface; choose one"
+        )
     return Request(
         heatmap=heatmaps[0] if heatmaps else None,
         limit=chosen[heatmaps[0]] if heatmaps else None,

@@ -38,11 +38,15 @@ def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
         found: list[Any] = _embedded(mesh_path)
     else:
         named = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
-        beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in (".png", ".jpg", ".jpeg")]
+        beside = [
+            mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}")
+            for suffix in (".png", ".jpg", ".jpeg")
+        ]
         found = named or [path for path in beside if path.is_file()][:1]
     if len(found) > 1:
         warn_caller(
-            f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: none is used; join "
+            f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: "
+            f"none is used; join "
             "them into one image, or choose one with --texture"
         )
     return load_image(found[0]) if len(found) == 1 else None
@@ -58,7 +62,8 @@ def load_image(source: Any) -> NDArray[np.uint8]:
 
 def _of_materials(mesh_path: Path) -> list[Path]:
     """Existing images (map_Kd) of the materials that an OBJ file uses."""
-    libraries, used = [], set()
+    libraries = []
+    used = set()
     for words in _statements(mesh_path):
         if words[0] == "mtllib":
             libraries.append(mesh_path.parent / words[1])
@@ -89,7 +94,8 @@ def _statements(path: Path, skipped: str = "vf#") -> Iterator[tuple[str, str]]:
 def _embedded(mesh_path: Path) -> list[Image.Image]:
     """Base colour images in a GLB or glTF file."""
     # an image beyond pillow's limit is logged, at the lowest level, and left out
-    log, heard = logging.getLogger("trimesh"), logging.handlers.BufferingHandler(sys.maxsize)
+    log = logging.getLogger("trimesh")
+    heard = logging.handlers.BufferingHandler(sys.maxsize)
     level = log.level
     log.addHandler(heard)
     log.setLevel(logging.DEBUG)
@@ -114,7 +120,10 @@ def vertex_colors(mesh_path: str | Path) -> tuple[NDArray[np.float64], NDArray[n
     mesh_path = Path(mesh_path)
     if not _may_be_coloured(mesh_path):
         return None
-    scene, points, colors, coloured = trimesh.load_scene(mesh_path, process=False), [], [], False
+    scene = trimesh.load_scene(mesh_path, process=False)
+    points = []
+    colors = []
+    coloured = False
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         part = scene.geometry[name]
@@ -124,11 +133,14 @@ def vertex_colors(mesh_path: str | Path) -> tuple[NDArray[np.float64], NDArray[n
             found = visual.vertex_colors
         coloured |= found is not None
         points.append(trimesh.transform_points(part.vertices, transform))
-        colors.append(_bytes(np.ones((len(part.vertices), 3)) if found is None else np.asarray(found)[:, :3]))
+        colors.append(
+            _bytes(np.ones((len(part.vertices), 3)) if found is None else np.asarray(found)[:, :3])
+        )
     if not coloured:
         return None
     together = np.concatenate(colors)
-    if mesh_path.suffix.lower() in _SCENES:  # their colours are linear light (glTF 2.0, section 3.7.2.1)
+    # their colours are linear light (glTF 2.0, section 3.7.2.1)
+    if mesh_path.suffix.lower() in _SCENES:
         together = _bytes(linear_to_srgb(together / 255))
     return np.concatenate(points), together
 
@@ -149,10 +161,13 @@ def _may_be_coloured(mesh_path: Path) -> bool:
         return kind in _SCENES or (kind == ".ply" and b"red" in file.read(4096))
 
 
-def _baked(F: NDArray[np.int64], colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+def _baked(
+    F: NDArray[np.int64], colors: NDArray[np.uint8]
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
     """An image of colours at vertices [n, 3], and texture coordinates of the corners, [m, 3, 2].
 
-    Each triangle has four pixels, between whose middles it lies, so that the texture unit blends its corners.
+    Each triangle has four pixels, between whose middles it lies, so that the texture unit blends
+    its corners.
     """
     side = int(np.ceil(np.sqrt(len(F))))
     row, column = np.divmod(np.arange(len(F)), side)
@@ -165,16 +180,21 @@ def _baked(F: NDArray[np.int64], colors: NDArray[np.uint8]) -> tuple[NDArray[np.
     return image, corners / side * [1.0, -1.0] + [0.0, 1.0]
 
 
-def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None) -> None:
+def paint_target(
+    spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None
+) -> None:
     """Give the geom "target" the image that is asked for or that the mesh names, or else its vertices' colours.
 
-    Raises `SceneError` if an image that is asked for cannot be read, or the mesh has no texture coordinates.
+    Raises `SceneError` if an image that is asked for cannot be read, or the mesh has no texture
+    coordinates.
     """
-    pixels, corner_uv = None, mesh.corner_uv
+    pixels = None
+    corner_uv = mesh.corner_uv
     if texture is not None:
         if corner_uv is None:
             raise SceneError(
-                f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no texture coordinates: "
+                f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no "
+                f"texture coordinates: "
                 "choose a mesh that has them (a wrap has none)"
             )
         pixels = load_image(texture)
@@ -191,7 +211,11 @@ def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture
     asset.userfacetexcoord = np.arange(mesh.F.size)
     height, width, channels = pixels.shape
     image = spec.add_texture(
-        name="target", type=mujoco.mjtTexture.mjTEXTURE_2D, height=height, width=width, nchannel=channels
+        name="target",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        height=height,
+        width=width,
+        nchannel=channels,
     )
     image.data = pixels.tobytes()
     spec.add_material(name="target").textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "target"

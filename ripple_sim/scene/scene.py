@@ -22,9 +22,13 @@ MAX_SLOW_MOTION = 1000
 def check_duration(duration: float, slow_motion: float = 1.0) -> None:
     """Raise `SceneError` if the duration [s] of a run or its slow motion is out of range."""
     if not 0 < duration < MAX_DURATION:
-        raise SceneError(f"duration is {duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+        raise SceneError(
+            f"duration is {duration!r} s; valid is a positive number, less than {MAX_DURATION}"
+        )
     if not 0 < slow_motion <= MAX_SLOW_MOTION:
-        raise SceneError(f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
+        raise SceneError(
+            f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}"
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -86,10 +90,13 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
     camera = converted({**msgspec.structs.asdict(scene.camera), **given}, CameraEntry, "camera")
     check_camera(scene.model, camera)
     if "focus" in given and not camera.aperture:
-        raise SceneError("a focus needs a lens: give the camera an aperture of more than 0 m, such as 0.05")
+        raise SceneError(
+            "a focus needs a lens: give the camera an aperture of more than 0 m, such as 0.05"
+        )
     if given.get("exposures", 1) > 1 and not (camera.shutter or camera.aperture):
         raise SceneError(
-            f"all {camera.exposures} exposures would be the same: give the camera a shutter angle, such as 180 degrees,"
+            f"all {camera.exposures} exposures would be the same: give the camera a shutter angle, "
+            f"such as 180 degrees,"
             " an aperture, such as 0.05 m, or both"
         )
     return dataclasses.replace(scene, camera=camera)

@@ -1,7 +1,7 @@
 """The TOML file of a scene: its tables, read strictly.
 
-`[[ripple]]` makes maps of the material, the layer over what is inside, and parts without waves; of `[camera]` it is
-checked whether the model and the optics can do what it says.
+`[[ripple]]` makes maps of the material, the layer over what is inside, and parts without waves; of
+`[camera]` it is checked whether the model and the optics can do what it says.
 """
 
 from __future__ import annotations
@@ -31,6 +31,10 @@ from .target_maps import HeightEntry, InsideEntry, moved
 MAX_EXPOSURES = 1024
 
 Entry = typing.TypeVar("Entry")
+
+# Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not
+# overflow.
+_LARGEST = 1e12
 
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -70,12 +74,22 @@ def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
     """Make sure that the model has what the camera names, and that the exposure is possible; raises `SceneError`."""
     for name, kind, count, missing in (
         (entry.name, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam, "camera {!r}; its cameras are"),
-        (entry.track, mujoco.mjtObj.mjOBJ_BODY, model.nbody, "body {!r} for the camera to track; its bodies are"),
+        (
+            entry.track,
+            mujoco.mjtObj.mjOBJ_BODY,
+            model.nbody,
+            "body {!r} for the camera to track; its bodies are",
+        ),
     ):
         if name is not None and mujoco.mj_name2id(model, kind, name) < 0:
-            raise SceneError(f"the model has no {missing.format(name)} {_names(model, kind, count)}")
-    body, geom = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
-    if isinstance(entry.focus, str) and all(mujoco.mj_name2id(model, kind, entry.focus) < 0 for kind in (body, geom)):
+            raise SceneError(
+                f"the model has no {missing.format(name)} {_names(model, kind, count)}"
+            )
+    body = mujoco.mjtObj.mjOBJ_BODY
+    geom = mujoco.mjtObj.mjOBJ_GEOM
+    if isinstance(entry.focus, str) and all(
+        mujoco.mj_name2id(model, kind, entry.focus) < 0 for kind in (body, geom)
+    ):
         raise SceneError(
             f"the model has nothing {entry.focus!r} for the camera to focus on; its bodies are "
             f"{_names(model, body, model.nbody)}; its geoms are {_names(model, geom, model.ngeom)}"
@@ -83,15 +97,28 @@ def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
     for name, value, valid, right in (
         ("shutter angle", entry.shutter, "0 to 360 degrees", 0 <= entry.shutter <= 360),
         ("aperture", entry.aperture, "0 m or more", 0 <= entry.aperture < np.inf),
-        ("focus", entry.focus, "more than 0 m", not isinstance(entry.focus, float) or 0 < entry.focus < np.inf),
-        ("number of exposures", entry.exposures, f"1 to {MAX_EXPOSURES}", 1 <= entry.exposures <= MAX_EXPOSURES),
+        (
+            "focus",
+            entry.focus,
+            "more than 0 m",
+            not isinstance(entry.focus, float) or 0 < entry.focus < np.inf,
+        ),
+        (
+            "number of exposures",
+            entry.exposures,
+            f"1 to {MAX_EXPOSURES}",
+            1 <= entry.exposures <= MAX_EXPOSURES,
+        ),
     ):
         if not right:
             raise SceneError(f"the camera's {name} is {value!r}; valid is {valid}")
 
 
 def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> str:
-    return ", ".join(name for i in range(count) if (name := mujoco.mj_id2name(model, kind, i))) or "none"
+    return (
+        ", ".join(name for i in range(count) if (name := mujoco.mj_id2name(model, kind, i)))
+        or "none"
+    )
 
 
 Color = tuple[float, float, float]
@@ -164,8 +191,15 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     def files(self) -> list[str]:
         """Paths of what it reads, files or folders; its own paths are the same texts."""
         height = self.height or HeightEntry()
-        paths = [self.still_map, height.map, height.field, *(each.mesh or each.volume for each in self.inside)]
-        return [each.map for each in self.material.maps().values()] + [path for path in paths if path is not None]
+        paths = [
+            self.still_map,
+            height.map,
+            height.field,
+            *(each.mesh or each.volume for each in self.inside),
+        ]
+        return [each.map for each in self.material.maps().values()] + [
+            path for path in paths if path is not None
+        ]
 
 
 class SensorEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -240,7 +274,9 @@ def converted(table: Any, schema: type[Entry], what: str) -> Entry:
     except msgspec.ValidationError as error:
         message = str(error).replace("`$.", "`")
         words = _words_at(schema, message)
-        advice = f"; it must be {', '.join(map(repr, words[:-1]))} or {words[-1]!r}" if words else ""
+        advice = (
+            f"; it must be {', '.join(map(repr, words[:-1]))} or {words[-1]!r}" if words else ""
+        )
         raise SceneError(f"{what}: {message}{advice}") from error
 
 
@@ -250,13 +286,11 @@ def _words_at(schema: Any, message: str) -> tuple[str, ...]:
     kind = schema
     for name in re.findall(r"\w+", found[1] if found else ""):
         table = table_of(kind)
-        fields = {field.name: field.type for field in msgspec.structs.fields(table)} if table else {}
+        fields = (
+            {field.name: field.type for field in msgspec.structs.fields(table)} if table else {}
+        )
         kind = fields.get(name)
     return typing.get_args(kind) if typing.get_origin(kind) is typing.Literal else ()
-
-
-# Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not overflow.
-_LARGEST = 1e12
 
 
 def _check_values(value: Any, place: str, what: str) -> None:
@@ -267,7 +301,9 @@ def _check_values(value: Any, place: str, what: str) -> None:
     elif isinstance(value, list):
         for inner in value:
             _check_values(inner, place, what)
-    elif isinstance(value, str) and re.search("[\0\ud800-\udfff]", value):  # the latter are halves of pairs
+    elif isinstance(value, str) and re.search(
+        "[\0\ud800-\udfff]", value
+    ):  # the latter are halves of pairs
         raise SceneError(f"{what}: {place} is {shown(value)}; valid are names without a NUL")
     elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
         raise SceneError(f"{what}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
@@ -289,11 +325,13 @@ def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str =
         if key not in fields:
             where = f" in [{place}]" if place else ""
             raise SceneError(f"{what}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
-        inner, inner_place = table_of(fields[key]), f"{place}.{key}" if place else key
+        inner = table_of(fields[key])
+        inner_place = f"{place}.{key}" if place else key
         if inner is not None:
             if isinstance(value, dict) and typing.get_origin(fields[key]) is list:
                 raise SceneError(
-                    f"{what}: [{inner_place}] is one table, where there may be several; write [[{inner_place}]]"
+                    f"{what}: [{inner_place}] is one table, where there may be several; write "
+                    f"[[{inner_place}]]"
                 )
             for item in value if isinstance(value, list) else [value]:
                 check_keys(item, inner, what, inner_place)
@@ -310,9 +348,13 @@ def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
 
     Raises `RippleError` if a file cannot be read, or does not suit the target.
     """
-    atlas, coefficients = ripples[entry.geom].atlas, {}
+    atlas = ripples[entry.geom].atlas
+    coefficients = {}
     if entry.inside:
-        bodies = [moved(each.body(), functools.partial(ripples.to_geom, entry.geom)) for each in entry.inside]
+        bodies = [
+            moved(each.body(), functools.partial(ripples.to_geom, entry.geom))
+            for each in entry.inside
+        ]
         thickness = thickness_map(atlas, bodies, entry.thickness_limits)
         coefficients.update(vars(entry.material.material(thickness)))
     for name, each in entry.material.maps().items():

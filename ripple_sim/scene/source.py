@@ -13,18 +13,28 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 
 # By ending: what a file is that is taken for a scene file, and what to do with it.
-_A_MESH = "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may name a model with it"
+_A_MESH = (
+    "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may "
+    "name a model with it"
+)
 
 
 _NO_SCENES = dict.fromkeys((".obj", ".ply", ".stl", ".off", ".glb", ".gltf"), _A_MESH) | {
-    ".xml": "a model, not a scene; give the path of a scene file (TOML) that names it as its `model`"
+    ".xml": (
+        "a model, not a scene; give the path of a scene file (TOML) that names it as its `model`"
+    )
 }
+
+# Parts of one dotted key: tomllib's time grows with their square, and ours have four.
+_MOST_PARTS = 100
 
 
 def shipped_scenes() -> list[str]:
     """Names of the scenes that come with ripple-sim."""
     folder = importlib.resources.files("ripple_sim.scenes")
-    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+    return sorted(
+        item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")
+    )
 
 
 def scene_path(name_or_path: str | Path) -> Path:
@@ -32,7 +42,8 @@ def scene_path(name_or_path: str | Path) -> Path:
 
     Raises `SceneError` if there is no such scene or file.
     """
-    name, shipped = str(name_or_path), shipped_scenes()
+    name = str(name_or_path)
+    shipped = shipped_scenes()
     if name in shipped:
         return Path(str(importlib.resources.files("ripple_sim.scenes") / f"{name}.toml"))
     path = Path(name)
@@ -42,14 +53,13 @@ def scene_path(name_or_path: str | Path) -> Path:
                 raise SceneError(f"{shown(name)} is {kind}")
             return path
         if path.exists() and not path.is_dir():
-            raise SceneError(f"scene {shown(name)} is not a regular file; give the path of a TOML file")
+            raise SceneError(
+                f"scene {shown(name)} is not a regular file; give the path of a TOML file"
+            )
     raise SceneError(
-        f"there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML file"
+        f"there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, or give the "
+        f"path of a TOML file"
     )
-
-
-# Parts of one dotted key: tomllib's time grows with their square, and ours have four.
-_MOST_PARTS = 100
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
@@ -75,10 +85,15 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise SceneError(f"{name} cannot be read: {error}") from error
     parts = max(len(re.findall(r"[^.\s]\s*\.", line)) + 1 for line in re.split(r"[=,\n]", text))
     if parts > _MOST_PARTS:
-        raise SceneError(f"{name} has a key of {parts} parts with dots between them; valid are at most {_MOST_PARTS}")
+        raise SceneError(
+            f"{name} has a key of {parts} parts with dots between them; valid are at most "
+            f"{_MOST_PARTS}"
+        )
     try:
         return tomllib.loads(text)
     except RecursionError as error:
-        raise SceneError(f"{name} is nested too deeply; its tables have four levels at most") from error
+        raise SceneError(
+            f"{name} is nested too deeply; its tables have four levels at most"
+        ) from error
     except ValueError as error:  # also of a number with thousands of digits
         raise SceneError(f"{name} is not valid TOML: {error}") from error

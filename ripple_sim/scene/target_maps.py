@@ -1,8 +1,9 @@
 """What a scene file says of a target texel by texel, beside its material.
 
-`[ripple.height]` is the shape of the surface at the beginning, also as an expression of position such as
-"0.02 * exp(-(x**2 + y**2) / 0.1**2)"; `rim` may be by region, where such expressions hold; `[[ripple.inside]]` is what
-lies under a layer, as a bone under the skin, and so how thick the layer is.
+`[ripple.height]` is the shape of the surface at the beginning, also as an expression of position
+such as "0.02 * exp(-(x**2 + y**2) / 0.1**2)"; `rim` may be by region, where such expressions hold;
+`[[ripple.inside]]` is what lies under a layer, as a bone under the skin, and so how thick the layer
+is.
 """
 
 from __future__ import annotations
@@ -54,9 +55,9 @@ _LONGEST = 1000  # [characters]
 def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Value of an expression of some variables, arrays of one shape.
 
-    It may hold numbers, the variables, pi, + - * / % **, parentheses, the functions of `FUNCTIONS`, and one comparison
-    at a time as the condition of `where`. Nothing of Python is run. Raises `SceneError` if it holds anything else, or
-    its value is not finite everywhere.
+    It may hold numbers, the variables, pi, + - * / % **, parentheses, the functions of `FUNCTIONS`,
+    and one comparison at a time as the condition of `where`. Nothing of Python is run. Raises
+    `SceneError` if it holds anything else, or its value is not finite everywhere.
     """
     try:
         if len(text) > _LONGEST:
@@ -68,9 +69,13 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
     except SceneError as wrong:
         raise SceneError(f"the expression {shown(text)} cannot be used: {wrong}") from None
     except (SyntaxError, ValueError, RecursionError, MemoryError, TypeError) as error:
-        raise SceneError(f"the expression {shown(text)} is not valid: {str(error).splitlines()[0]}") from error
+        raise SceneError(
+            f"the expression {shown(text)} is not valid: {str(error).splitlines()[0]}"
+        ) from error
     if not np.isfinite(result).all():
-        raise SceneError(f"the expression {shown(text)} is not finite everywhere; valid are finite heights")
+        raise SceneError(
+            f"the expression {shown(text)} is not finite everywhere; valid are finite heights"
+        )
     return result
 
 
@@ -92,7 +97,8 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
             if len(arguments) != count:
                 raise SceneError(f"{name} has {len(arguments)} arguments, valid are {count}")
             return function(*[_value(argument, names) for argument in arguments])
-    what, valid = shown(ast.unparse(node)), f"numbers, {', '.join(names)}, + - * / % **, and {', '.join(FUNCTIONS)}"
+    what = shown(ast.unparse(node))
+    valid = f"numbers, {', '.join(names)}, + - * / % **, and {', '.join(FUNCTIONS)}"
     raise SceneError(f"{what} is unknown; valid are {valid}")
 
 
@@ -119,7 +125,9 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
 
     def located(self, folder: Path) -> HeightEntry:
         """The same with its paths made relative to a folder."""
-        image, field = (None if path is None else str(folder / path) for path in (self.map, self.field))
+        image, field = (
+            None if path is None else str(folder / path) for path in (self.map, self.field)
+        )
         return msgspec.structs.replace(self, map=image, field=field)
 
     def check(self) -> None:
@@ -127,32 +135,43 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
         given = [key for key in ("expression", "map", "field") if getattr(self, key) is not None]
         if len(given) != 1:
             raise SceneError(
-                f"[ripple.height] has {' and '.join(given) or 'no shape'}; valid is one of expression, map, field"
+                f"[ripple.height] has {' and '.join(given) or 'no shape'}; valid is one of "
+                f"expression, map, field"
             )
         for key in ("map", "field"):
             path = getattr(self, key)
             if path is not None and not Path(path).is_file():
-                raise SceneError(f"ripple.height.{key} names the file {path!r}, which does not exist")
+                raise SceneError(
+                    f"ripple.height.{key} names the file {path!r}, which does not exist"
+                )
         if self.expression is not None:
             evaluate(self.expression, dict.fromkeys("xyz", np.ones(0)))
 
     def heights(self, ripples: Ripples, geom: str) -> NDArray[np.float64]:
         """Height at every texel of a geom [m], [C, n, n].
 
-        Raises `RippleError` if a file cannot be read or does not suit the target, or an expression is not finite.
+        Raises `RippleError` if a file cannot be read or does not suit the target, or an expression
+        is not finite.
         """
         atlas = ripples[geom].atlas
         if self.expression is not None:
             places = to_body(ripples.model, find_target(ripples.model, geom), atlas.positions)
-            return evaluate(self.expression, dict(zip("xyz", np.moveaxis(places, -1, 0), strict=True)))
+            return evaluate(
+                self.expression, dict(zip("xyz", np.moveaxis(places, -1, 0), strict=True))
+            )
         if self.map is not None:
             return texture_map(atlas, self.map, self.low, self.high, self.channel)
-        path, shape = self.field or "", atlas.areas.shape
+        path = self.field or ""
+        shape = atlas.areas.shape
         try:
             field = np.load(path, allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
-        if not isinstance(field, np.ndarray) or field.shape != shape or field.dtype.kind not in "iuf":
+        if (
+            not isinstance(field, np.ndarray)
+            or field.shape != shape
+            or field.dtype.kind not in "iuf"
+        ):
             held = getattr(field, "shape", "no array")
             raise SceneError(f"saved field {path!r} holds {held}; valid are numbers {shape}")
         if not np.isfinite(field).all():
@@ -174,22 +193,29 @@ def check_rim(rim: str | dict[str, str]) -> None:
 def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
     """What the rims of a target do, as `Ripples` takes it: a name, or a function of the rims' points.
 
-    That function raises `SceneError` for a closed surface, and for a condition that holds nowhere on the rims.
+    That function raises `SceneError` for a closed surface, and for a condition that holds nowhere
+    on the rims.
     """
     if isinstance(rim, str):
         return rim
 
     def conditions(points: NDArray[np.float64]) -> NDArray[np.str_]:
         if not len(points):
-            raise SceneError(f"rim of geom {geom!r} names regions, and it has no rim: it is closed; leave rim out")
+            raise SceneError(
+                f"rim of geom {geom!r} names regions, and it has no rim: it is closed; leave rim "
+                f"out"
+            )
         places = to_body(model, find_target(model, geom), points).T
         found = np.full(len(points), "free", dtype="<U9")
         for name, where in reversed(rim.items()):
             there = evaluate(where, dict(zip("xyz", places, strict=True))) != 0
             if not there.any():
-                low, high = ([round(float(end(axis)), 4) for axis in places] for end in (np.min, np.max))
+                low, high = (
+                    [round(float(end(axis)), 4) for axis in places] for end in (np.min, np.max)
+                )
                 raise SceneError(
-                    f"rim {name!r} of geom {geom!r} is where {where!r}, which holds nowhere on its rims; they lie from "
+                    f"rim {name!r} of geom {geom!r} is where {where!r}, which holds nowhere on its "
+                    f"rims; they lie from "
                     f"{low} to {high} m in the frame of its body"
                 )
             found[there] = name
@@ -201,8 +227,9 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
 class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[[ripple.inside]]`: a body under the layer; the way to it from each texel inwards is the layer's thickness.
 
-    The material's preset is then one of a layer. Places are in the frame of the geom's body. Of several bodies the
-    nearest counts; where there is none below, the layer is as thick as at its thickest, or as its limits let it be.
+    The material's preset is then one of a layer. Places are in the frame of the geom's body. Of
+    several bodies the nearest counts; where there is none below, the layer is as thick as at its
+    thickest, or as its limits let it be.
     """
 
     mesh: str | None = None
@@ -221,30 +248,43 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
 
     def located(self, folder: Path) -> InsideEntry:
         """The same with its path made relative to a folder."""
-        mesh, volume = (None if path is None else str(folder / path) for path in (self.mesh, self.volume))
+        mesh, volume = (
+            None if path is None else str(folder / path) for path in (self.mesh, self.volume)
+        )
         return msgspec.structs.replace(self, mesh=mesh, volume=volume)
 
     def check(self) -> None:
         """Raise `SceneError` where keys are missing, too many, or out of range."""
         if (self.mesh is None) == (self.volume is None):
-            raise SceneError("a [[ripple.inside]] names neither or both of mesh and volume; valid is one of them")
+            raise SceneError(
+                "a [[ripple.inside]] names neither or both of mesh and volume; valid is one of them"
+            )
         _check_threshold(self.mesh or self.volume, self.mesh is None, self.threshold, self.spacing)
         for key, value in (("scale", self.scale), ("spacing", self.spacing)):
             if value is not None and not value > 0:
-                raise SceneError(f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater than 0")
+                raise SceneError(
+                    f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater "
+                    f"than 0"
+                )
 
     def body(self) -> Mesh | Volume:
         """What is inside, in the frame of the geom's body; raises `MeshError` if the file cannot be read."""
-        return load_inside(self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale)
+        return load_inside(
+            self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale
+        )
 
 
-def moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], NDArray[np.float64]]) -> Mesh | Volume:
+def moved(
+    body: Mesh | Volume, to_atlas: Callable[[ArrayLike], NDArray[np.float64]]
+) -> Mesh | Volume:
     """A body where a function that moves points [..., 3] [m] puts it."""
     if isinstance(body, Mesh):
         return dataclasses.replace(body, V=to_atlas(body.V))
     origin = np.asarray(body.origin, dtype=np.float64)
     ends = to_atlas(origin + np.asarray(body.directions, dtype=np.float64).T)
-    return dataclasses.replace(body, origin=to_atlas(origin), directions=(ends - to_atlas(origin)).T)
+    return dataclasses.replace(
+        body, origin=to_atlas(origin), directions=(ends - to_atlas(origin)).T
+    )
 
 
 def load_inside(
@@ -268,16 +308,22 @@ def load_inside(
         mesh = load_mesh(path)
         return dataclasses.replace(mesh, V=scale * mesh.V)
     volume = load_volume(path, threshold, spacing, origin)
-    place, between = scale * np.asarray(volume.origin), scale * np.asarray(volume.spacing)
+    place = scale * np.asarray(volume.origin)
+    between = scale * np.asarray(volume.spacing)
     return volume if scale == 1 else dataclasses.replace(volume, origin=place, spacing=between)
 
 
-def _check_threshold(path: Any, is_volume: bool, threshold: float | None, spacing: float | None) -> None:
+def _check_threshold(
+    path: Any, is_volume: bool, threshold: float | None, spacing: float | None
+) -> None:
     """Raise `SceneError` if a volume comes without a threshold, or a mesh with one."""
     if is_volume and threshold is None:
         raise SceneError(
-            f"{str(path)!r} is a volume, which needs a threshold: its value at the surface of what is inside, about "
+            f"{str(path)!r} is a volume, which needs a threshold: its value at the surface of what "
+            f"is inside, about "
             "300 for bone in Hounsfield units"
         )
     if not is_volume and (threshold is not None or spacing is not None):
-        raise SceneError(f"{str(path)!r} is a mesh, which takes no threshold and no spacing; leave them out")
+        raise SceneError(
+            f"{str(path)!r} is a mesh, which takes no threshold and no spacing; leave them out"
+        )

@@ -1,6 +1,7 @@
 """`VideoOptions`: every option of a video, listed once for Python and for the command line; exports share some.
 
-It imports nothing heavy, so that the help of a command comes at once; `settings` checks options and settles them.
+It imports nothing heavy, so that the help of a command comes at once; `settings` checks options and
+settles them.
 """
 
 from __future__ import annotations
@@ -14,9 +15,12 @@ from ripple_sim.solver.errors import POSITIVE, Valid, check_fields, is_finite, w
 
 Backend = Literal["auto", "gl", "cpu"]
 
-# What holds for every output; what an output or a scene allows beyond that is checked when it is known.
+# What holds for every output; what an output or a scene allows beyond that is checked when it is
+# known.
 IN_ANY_CASE = {
-    "size": Valid(lambda size: min(size) > 0, "(width, height) in pixels, two whole numbers greater than 0"),
+    "size": Valid(
+        lambda size: min(size) > 0, "(width, height) in pixels, two whole numbers greater than 0"
+    ),
     "fps": whole(1),
     "duration": POSITIVE,
     "slow_motion": POSITIVE,
@@ -59,7 +63,8 @@ class SceneOptions:
 class VideoOptions(SceneOptions):
     """How a scene is rendered to a video.
 
-    The docstring of a field is its help on the command line. None leaves an option to the scene or to the output.
+    The docstring of a field is its help on the command line. None leaves an option to the scene or
+    to the output.
     """
 
     supersample: int = 1

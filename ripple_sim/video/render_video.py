@@ -1,8 +1,8 @@
 """`render_video`: a scene rendered to a video. Simulation, rendering and encoding overlap.
 
-A `Film` is one simulation, or two side by side, rendered to frames with overlays, and with passes beside them; a `Shot`
-is everything that one exposure of it shows. The simulation runs in a thread of its own, a few frames ahead
-(`prefetched`); `Summary` is what it all took.
+A `Film` is one simulation, or two side by side, rendered to frames with overlays, and with passes
+beside them; a `Shot` is everything that one exposure of it shows. The simulation runs in a thread
+of its own, a few frames ahead (`prefetched`); `Summary` is what it all took.
 """
 
 from __future__ import annotations
@@ -27,8 +27,22 @@ from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.encode.part import Settings
 from ripple_sim.encode.passes import PassFiles
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay.notes import TITLES, Notebook, Notes, color_table, compared_operators, grid_spacing
-from ripple_sim.overlay.panels import Layout, Painter, PlacedMark, Projection, draw_marks, place_marks
+from ripple_sim.overlay.notes import (
+    TITLES,
+    Notebook,
+    Notes,
+    color_table,
+    compared_operators,
+    grid_spacing,
+)
+from ripple_sim.overlay.panels import (
+    Layout,
+    Painter,
+    PlacedMark,
+    Projection,
+    draw_marks,
+    place_marks,
+)
 from ripple_sim.render import Surface
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import Scene, with_exposure
@@ -40,6 +54,13 @@ from ripple_sim.sound import Microphone, gain
 
 from .options import VideoOptions
 from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
+
+_END: Any = object()
+_WAITING = 2  # shots that wait to be rendered; one would do if all frames took the same time
+
+# every so many frames the simulation's state is fingerprinted, to be compared when a render is
+# resumed
+_CHECKED = 16
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -84,7 +105,10 @@ class Film:
         frames: int,
         on_frame: Sequence[Callable[[Simulation], None]] = (),
     ) -> None:
-        self.simulations, self._options, self._frames, self._on_frame = simulations, options, frames, on_frame
+        self.simulations = simulations
+        self._options = options
+        self._frames = frames
+        self._on_frame = on_frame
         self._request = parse_request(options.overlay or ())
         self._layout = Layout(*options.size)
         self._notebook = Notebook(self._request, simulations, frames, options.rate)
@@ -92,7 +116,8 @@ class Film:
         self._submitted: deque[Shot] = deque()
         self._marks: list[list[PlacedMark]] = []
         self._pass_files: PassFiles | None = None
-        self._last_seen: tuple[int, Sighting] | None = None  # the number of a frame whose passes are not written yet
+        # the number of a frame whose passes are not written yet
+        self._last_seen: tuple[int, Sighting] | None = None
         self.seconds = 0.0  # spent on frames so far
         operators = compared_operators(options.compare)
         ripples = simulations[0].ripples
@@ -107,15 +132,26 @@ class Film:
 
     def write_passes(self, output: Path, frames: int = 0) -> None:
         """Write the passes that the options ask for beside an output, which has so many frames already."""
-        model, geoms = self.simulations[0].model, self.simulations[0].ripples.geom_ids
+        model = self.simulations[0].model
+        geoms = self.simulations[0].ripples.geom_ids
         soft = {target + 1: name for name, target in geoms.items() if target >= model.ngeom}
         # what each number of the segmentation stands for
-        segments = {0: "background", **{geom + 1: geom_name(model, geom) for geom in range(model.ngeom)}, **soft}
-        self._pass_files = PassFiles(output, self._options.pass_format, segments, frames, self._options.overwrite)
+        segments = {
+            0: "background",
+            **{geom + 1: geom_name(model, geom) for geom in range(model.ngeom)},
+            **soft,
+        }
+        self._pass_files = PassFiles(
+            output, self._options.pass_format, segments, frames, self._options.overwrite
+        )
 
     def see(self, shot: Shot) -> None:
         """Look at a shot whose frame is there already, for its passes, if they are not."""
-        if self._pass_files is not None and shot.exposure == 0 and shot.number >= self._pass_files.complete:
+        if (
+            self._pass_files is not None
+            and shot.exposure == 0
+            and shot.number >= self._pass_files.complete
+        ):
             self.prepare()
             start = work_clock()
             self._see((shot.number, self._sources[0].sighting(shot.snapshots[0])))
@@ -125,7 +161,8 @@ class Film:
         """Make the renderers, which takes a while, before the first frame; the simulations may run meanwhile."""
         if self._sources:
             return
-        count, options = len(self.simulations), self._options
+        count = len(self.simulations)
+        options = self._options
         ends = [round(self._layout.width * k / count) for k in range(count + 1)]
         self._sources = [
             FrameSource(
@@ -168,7 +205,9 @@ class Film:
         """
         self.prepare()
         start = work_clock()
-        for number, (source, snapshot) in enumerate(zip(self._sources, shot.snapshots, strict=True)):
+        for number, (source, snapshot) in enumerate(
+            zip(self._sources, shot.snapshots, strict=True)
+        ):
             if self._request.heatmap and shot.exposure == 0:
                 geoms = self.simulations[number].ripples.geom_ids
                 for name, heatmap in shot.notes.heatmaps[number].items():
@@ -190,11 +229,14 @@ class Film:
         """Write the passes of the last frame, whose pixels flow to what is seen now, if anything."""
         if self._pass_files is None:
             return
-        if self._last_seen is None:  # not before: a render that fails without a frame leaves all as it was
+        # not before: a render that fails without a frame leaves all as it was
+        if self._last_seen is None:
             self._pass_files.begin()
         else:
             number, sighting = self._last_seen
-            passes = passes_of(sighting, None if seen is None else seen[1], tuple(self._options.passes))
+            passes = passes_of(
+                sighting, None if seen is None else seen[1], tuple(self._options.passes)
+            )
             self._pass_files.write(number, passes)
         self._last_seen = seen
 
@@ -212,7 +254,8 @@ class Film:
             frame = halves[0]
             if len(halves) > 1:
                 frame = np.concatenate(halves, axis=1)
-                middle, seam = halves[0].shape[1], max(1, round(self._layout.em / 16))
+                middle = halves[0].shape[1]
+                seam = max(1, round(self._layout.em / 16))
                 frame[:, middle - seam : middle + seam] = 255
             self._painter.paint(frame, shot.notes)
         self.seconds += work_clock() - start
@@ -222,7 +265,9 @@ class Film:
         """Contact marks of a run, in pixels of its image."""
         if not self._request.contacts:
             return []
-        source, snapshot, notes = self._sources[run], shot.snapshots[run], shot.notes
+        source = self._sources[run]
+        snapshot = shot.snapshots[run]
+        notes = shot.notes
         projection = Projection(source.camera(snapshot).pose(), source.width, source.height)
         hiding = self.simulations[run].model, snapshot.data
         return place_marks(notes.marks[run], notes.mark_scale[0], self._layout, projection, *hiding)
@@ -236,7 +281,9 @@ class Film:
         )
 
 
-def open_video(output: Path, options: VideoOptions, settings: Settings | None = None) -> FrameWriter:
+def open_video(
+    output: Path, options: VideoOptions, settings: Settings | None = None
+) -> FrameWriter:
     """Writer of a video with settled options; see `open_writer`."""
     return open_writer(
         output,
@@ -253,15 +300,13 @@ def open_video(output: Path, options: VideoOptions, settings: Settings | None = 
 
 Item = TypeVar("Item")
 
-_END: Any = object()
-
 
 @contextlib.contextmanager
 def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
     """Run an iterable in a thread, at most `depth` items ahead; iterate over what this yields instead.
 
-    Items come in their order; the thread alone consumes them. An exception of the iterable is raised in place of its
-    next item. Leaving the block stops the thread at its current item.
+    Items come in their order; the thread alone consumes them. An exception of the iterable is
+    raised in place of its next item. Leaving the block stops the thread at its current item.
     """
     iterator = iter(items)
     pool = ThreadPoolExecutor(1, "simulation", initializer=work_for, initargs=(user_line(),))
@@ -283,9 +328,10 @@ def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
 class Summary:
     """What a rendered video took.
 
-    Of its `frames`, those before `resumed_at` were there already. `renderer` is the driver's GL_RENDERER, `backend` the
-    wave solver's. Times in seconds; the stages overlap, so they add up to more than `wall_seconds`. What was spent on
-    compiling kernels, at their first use on a machine, is told apart from the work of the stages.
+    Of its `frames`, those before `resumed_at` were there already. `renderer` is the driver's
+    GL_RENDERER, `backend` the wave solver's. Times in seconds; the stages overlap, so they add up
+    to more than `wall_seconds`. What was spent on compiling kernels, at their first use on a
+    machine, is told apart from the work of the stages.
     """
 
     output: Path
@@ -302,9 +348,6 @@ class Summary:
     encode_seconds: float
     wall_seconds: float
 
-
-_WAITING = 2  # shots that wait to be rendered; one would do if all frames took the same time
-_CHECKED = 16  # every so many frames the simulation's state is fingerprinted, to be compared when a render is resumed
 
 Progress = Callable[[int, int], None]
 
@@ -329,9 +372,10 @@ def render_video(
 ) -> Summary:
     """Simulate a scene and write its video.
 
-    The same scene and options give the same video on the same machine, bit for bit. Until it is complete, finished
-    frames are in a folder beside it, `output` with `.part` appended, and stay there if the render is interrupted.
-    Resumed, the simulation runs again up to there and is checked to be the same; the frames are not rendered again.
+    The same scene and options give the same video on the same machine, bit for bit. Until it is
+    complete, finished frames are in a folder beside it, `output` with `.part` appended, and stay
+    there if the render is interrupted. Resumed, the simulation runs again up to there and is
+    checked to be the same; the frames are not rendered again.
 
     Parameters
     ----------
@@ -340,28 +384,38 @@ def render_video(
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
     on_step : callable, optional
-        As for `Simulation`. It is called in a thread of its own, unless waves are computed by a software driver.
+        As for `Simulation`. It is called in a thread of its own, unless waves are computed by a
+        software driver.
     on_frame : callable, optional
-        Called with the simulation at the time of each frame, to record what it wants to; in the same thread.
+        Called with the simulation at the time of each frame, to record what it wants to; in the
+        same thread.
 
     Raises
     ------
     RippleError
-        Before anything is simulated if the output, an option, the scene or the render to resume is invalid; later if
-        the physics becomes unstable or the video cannot be written.
+        Before anything is simulated if the output, an option, the scene or the render to resume is
+        invalid; later if the physics becomes unstable or the video cannot be written.
     """
-    start, work_start, compiled = time.perf_counter(), work_clock(), sum(compile_times().values())
+    start = time.perf_counter()
+    work_start = work_clock()
+    compiled = sum(compile_times().values())
     adopt_warnings()
     output = Path(output)
     options = settled(options, scene, output)
     check_options(options, output)
     scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
-    frames, gl = frame_count(options), shared_context()
+    frames = frame_count(options)
+    gl = shared_context()
     with open_video(output, options, render_settings(scene, options, frames, gl)) as writer:
         resumed_at = writer.frames
         operators = compared_operators(options.compare)
-        simulations = [Simulation.of(scene, options, operator=operator, on_step=on_step) for operator in operators]
-        microphone = Microphone(simulations[0].ripples, options.slow_motion) if options.sound else None
+        simulations = [
+            Simulation.of(scene, options, operator=operator, on_step=on_step)
+            for operator in operators
+        ]
+        microphone = (
+            Microphone(simulations[0].ripples, options.slow_motion) if options.sound else None
+        )
         looks = [look for look in (on_frame, microphone and microphone.follow) if look]
         film = Film(simulations, options, frames, looks)
         if options.passes:
@@ -378,7 +432,8 @@ def render_video(
         resumed_at=resumed_at,
         renderer=gl.renderer,
         backend=simulations[0].backend,
-        substeps_per_frame=sum(each.substeps_taken for each in simulations) / max(writer.frames - 1, 1),
+        substeps_per_frame=sum(each.substeps_taken for each in simulations)
+        / max(writer.frames - 1, 1),
         compile_seconds=sum(compile_times().values()) - compiled,
         setup_seconds=ready - work_start,
         physics_seconds=sum(each.physics_seconds for each in simulations),
@@ -389,12 +444,15 @@ def render_video(
     )
 
 
-def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None) -> float:
+def _write_frames(
+    film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None
+) -> float:
     """Render and write the frames that the video still lacks; return the `work_clock` when the first could begin."""
     # a software driver renders on the processor, which is busy enough with one frame
     ahead = 0 if gl.software else 1
     shots = film.shots(alive=_WAITING + ahead + 2)
-    # waves on a GPU and the renderer take turns with the OpenGL context; a software driver computes during its turn
+    # waves on a GPU and the renderer take turns with the OpenGL context; a software driver computes
+    # during its turn
     own_thread = film.simulations[0].backend == "cpu" or not gl.software
     with prefetched(shots, _WAITING) if own_thread else contextlib.nullcontext(shots) as shots:
         film.prepare()

@@ -1,7 +1,7 @@
 """The options of a video checked and settled for one render.
 
-The settings of a render, with fingerprints of its scene, its files and the software, tell whether an interrupted one
-can continue.
+The settings of a render, with fingerprints of its scene, its files and the software, tell whether
+an interrupted one can continue.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ from ripple_sim.solver.backends.backend import auto_backend
 from ripple_sim.solver.gl import GLContext
 
 from .options import Backend, SceneOptions, VideoOptions
+
+# replace those of the scene's camera, by the same names
+EXPOSURE = ("shutter", "aperture", "focus", "exposures")
 
 
 def origin(scene: Scene, options: SceneOptions) -> dict[str, str | int]:
@@ -64,7 +67,9 @@ def scene_digest(scene: Scene) -> str:
     hasher = hashlib.blake2b(digest_size=8)
     _add_fields(hasher, scene.model)
     sensors = [scene.sensors] if scene.sensors else []
-    entries = msgspec.json.encode((scene.targets, scene.camera, scene.events, scene.two_way, *sensors))
+    entries = msgspec.json.encode(
+        (scene.targets, scene.camera, scene.events, scene.two_way, *sensors)
+    )
     for path in itertools.chain.from_iterable(entry.files() for entry in scene.targets):
         entries = entries.replace(msgspec.json.encode(path), b'""')
         for file in sorted(Path(path).rglob("*")) if Path(path).is_dir() else [Path(path)]:
@@ -77,23 +82,25 @@ def scene_digest(scene: Scene) -> str:
 def _add_fields(hasher: Any, struct: Any) -> None:
     """Add the fields of a struct of MuJoCo, but for the paths of its files, and its size, in which these count."""
     for name in dir(struct):
-        value = None if name.startswith("_") or "path" in name or name == "nbuffer" else getattr(struct, name)
+        value = (
+            None
+            if name.startswith("_") or "path" in name or name == "nbuffer"
+            else getattr(struct, name)
+        )
         if isinstance(value, int | float | bytes | np.ndarray):
             hasher.update(name.encode() + np.asarray(value).tobytes())
         elif type(value).__module__.startswith("mujoco") and not callable(value):
             _add_fields(hasher, value)
 
 
-EXPOSURE = ("shutter", "aperture", "focus", "exposures")  # replace those of the scene's camera, by the same names
-
-
 def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
     """The options with None and "auto" replaced by what the scene, the output and this machine say.
 
-    Shutter, aperture, focus and exposures stay as they are: see `with_exposure`. Raises `VideoError` for an output of
-    unknown format.
+    Shutter, aperture, focus and exposures stay as they are: see `with_exposure`. Raises
+    `VideoError` for an output of unknown format.
     """
-    fps = default_fps(output) if options.fps is None else options.fps  # first: it refuses an unknown format
+    # first: it refuses an unknown format
+    fps = default_fps(output) if options.fps is None else options.fps
     backend = options.backend
     if backend == "auto":  # the one that is meant for the largest target of known resolution
         sides = [options.resolution or entry.resolution for entry in scene.targets]
@@ -130,7 +137,11 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         "the operators": ",".join(compared_operators(options.compare)),
         **origin(scene, options),
         "the OpenGL driver": f"{gl.renderer}, {gl.version}",
-        **({"the passes": f"{','.join(options.passes)} in {options.pass_format}"} if options.passes else {}),
+        **(
+            {"the passes": f"{','.join(options.passes)} in {options.pass_format}"}
+            if options.passes
+            else {}
+        ),
         **({"the sound": "at the camera"} if options.sound else {}),
         **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
     }
@@ -153,7 +164,10 @@ def check_options(options: VideoOptions, output: Path) -> None:
         overwrite=options.overwrite,
     )
     if options.sound and video_format(output) not in (".mp4", ".webm"):
-        raise VideoError(f"{output} has no sound; valid are .mp4 and .webm, or `ripple-sim export SCENE -o FILE.wav`")
+        raise VideoError(
+            f"{output} has no sound; valid are .mp4 and .webm, or `ripple-sim export SCENE -o "
+            f"FILE.wav`"
+        )
     if options.sound and len(operators) > 1:
         raise VideoError("two runs side by side have no sound; leave out --sound or --compare")
     if options.passes:

@@ -1,4 +1,10 @@
-from .controls import CONTROLS as CONTROLS, MOUSE as MOUSE, Recorder as Recorder, help_text as help_text, level as level
+from .controls import (
+    CONTROLS as CONTROLS,
+    MOUSE as MOUSE,
+    Recorder as Recorder,
+    help_text as help_text,
+    level as level,
+)
 from .opening import (
     BALLS as BALLS,
     FLIGHT as FLIGHT,
@@ -10,6 +16,16 @@ from .opening import (
 )
 from .passive import RippleViewer as RippleViewer, launch_passive as launch_passive
 from .session import OPERATORS as OPERATORS, SLIDERS as SLIDERS, Session as Session
-from .stage import BACKGROUND as BACKGROUND, add_floor as add_floor, geom_mesh as geom_mesh, is_endless as is_endless
+from .stage import (
+    BACKGROUND as BACKGROUND,
+    add_floor as add_floor,
+    geom_mesh as geom_mesh,
+    is_endless as is_endless,
+)
 from .web import check_web as check_web, serve as serve
-from .window import Window as Window, benchmark as benchmark, check_display as check_display, run as run
+from .window import (
+    Window as Window,
+    benchmark as benchmark,
+    check_display as check_display,
+    run as run,
+)

@@ -36,15 +36,24 @@ CONTROLS = (
 
 MOUSE = (("click", "poke"), ("drag", "orbit"), ("shift + drag", "pan"), ("wheel", "zoom"))
 
+# Highest elevation, up or down [degrees].
+_STEEPEST = 88.0
+_POKE = {"poke": "N s"}
+
+# Left end, distance, width and height in the window, in shares of its size.
+_LEFT = 0.03
+_APART = 0.24
+_WIDTH = 0.2
+_HEIGHT = 0.07
+
+# A knob starts at this share of its track; one at 0 has a track from 0 to 1.
+_START = 1 / 3
+
 
 def help_text() -> str:
     """All controls, one per line."""
     rows = [*MOUSE, *((key, label) for key, _, label in CONTROLS)]
     return "\n".join(f"{what}: {does}" for what, does in rows)
-
-
-# Highest elevation, up or down [degrees].
-_STEEPEST = 88.0
 
 
 def level(camera: pv.Camera) -> None:
@@ -54,10 +63,13 @@ def level(camera: pv.Camera) -> None:
     if x == y == 0:  # straight above or below: what is up in the frame tells where to go
         up = np.array(camera.up[:2])
         x, y = -1e-9 * z * (up if up.any() else np.array([0.0, 1.0]))
-    across, most = math.hypot(x, y), math.tan(math.radians(_STEEPEST))
+    across = math.hypot(x, y)
+    most = math.tan(math.radians(_STEEPEST))
     if across > 0 and abs(z) > most * across:
-        distance, slant = math.hypot(across, z), math.hypot(1.0, most)
-        flat, high = distance / slant / across, math.copysign(distance * most / slant, z)
+        distance = math.hypot(across, z)
+        slant = math.hypot(1.0, most)
+        flat = distance / slant / across
+        high = math.copysign(distance * most / slant, z)
         camera.position = focus + np.array([x * flat, y * flat, high])
     camera.up = (0.0, 0.0, 1.0)
 
@@ -80,7 +92,9 @@ class Recorder:
     """Writes screenshots and one video at a time to a folder; files are called name-1.png, name-1.mp4 and so on."""
 
     def __init__(self, folder: Path, name: str, fps: int) -> None:
-        self.folder, self._name, self._fps = folder, name, fps
+        self.folder = folder
+        self._name = name
+        self._fps = fps
         self._writer: FrameWriter | None = None
 
     @property
@@ -113,7 +127,9 @@ class Recorder:
         return path
 
     def add(self, frame: NDArray[np.uint8]) -> bool:
-        """Add a frame, or end the video if the window has changed its size. Return whether it goes on.
+        """Add a frame, or end the video if the window has changed its size.
+
+        Return whether it goes on.
 
         Raises
         ------
@@ -134,7 +150,8 @@ class Recorder:
 
     def stop(self) -> Path | None:
         """End the video; return its path if one was being written."""
-        writer, self._writer = self._writer, None
+        writer = self._writer
+        self._writer = None
         if writer is None:
             return None
         if writer.frames:
@@ -155,16 +172,12 @@ def _even(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(frame[: height - height % 2, : width - width % 2])
 
 
-_POKE = {"poke": "N s"}
-# Left end, distance, width and height in the window, in shares of its size.
-_LEFT, _APART, _WIDTH, _HEIGHT = 0.03, 0.24, 0.2, 0.07
-# A knob starts at this share of its track; one at 0 has a track from 0 to 1.
-_START = 1 / 3
-
-
 def add_sliders(plotter: pv.Plotter, session: Session) -> list[Any]:
     """Add them, "poke" first and then those of `SLIDERS`; they act when a knob is released."""
-    return [_add(plotter, session, number, name, unit) for number, (name, unit) in enumerate((_POKE | SLIDERS).items())]
+    return [
+        _add(plotter, session, number, name, unit)
+        for number, (name, unit) in enumerate((_POKE | SLIDERS).items())
+    ]
 
 
 def _add(plotter: pv.Plotter, session: Session, number: int, name: str, unit: str) -> Any:

@@ -27,7 +27,20 @@ from ripple_sim.solver import Material
 
 _NAME = "thrown ball {}"
 # Parked this many radii above the origin, and this many apart, so that they do not touch.
-_AWAY, _APART = 2000.0, 4.0
+_AWAY = 2000.0
+_APART = 4.0
+
+BALLS = 6
+
+# Relative to a surface's size: a ball's radius, a poke's radius, and a poke's depth.
+_BALL = 0.06
+_POKE = 0.06
+_DEPTH = 0.025
+
+# Time of flight of a thrown ball [s], and the distance it covers, in sizes of the surface.
+FLIGHT = 0.5
+_THROW = 3.0
+SWINGING = ("speed", "stiffness", "density")  # coefficients by which what is pressed in swings back
 
 
 def add_balls(spec: mujoco.MjSpec, count: int, radius: float, mass: float) -> None:
@@ -56,13 +69,17 @@ def add_balls(spec: mujoco.MjSpec, count: int, radius: float, mass: float) -> No
 
 
 class Balls:
-    """The balls that `add_balls` gave a model, parked or thrown. When all are thrown, the oldest is thrown again."""
+    """The balls that `add_balls` gave a model, parked or thrown.
+
+    When all are thrown, the oldest is thrown again.
+    """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         bodies = [i for i in range(model.nbody) if model.body(i).name.startswith(_NAME.format(""))]
         joints = model.body_jntadr[bodies]
         self.geoms: list[int] = [int(model.body_geomadr[i]) for i in bodies]
-        self._positions, self._velocities = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._positions = model.jnt_qposadr[joints]
+        self._velocities = model.jnt_dofadr[joints]
         self._home = [model.qpos0[p : p + 7].copy() for p in self._positions]
         self._gravity = np.array(model.opt.gravity)
         self._thrown = 0
@@ -81,40 +98,38 @@ class Balls:
         for i in self.parked:
             self._set(data, i, self._home[i], np.zeros(3))
 
-    def throw(self, data: mujoco.MjData, origin: ArrayLike, through: ArrayLike, seconds: float) -> bool:
+    def throw(
+        self, data: mujoco.MjData, origin: ArrayLike, through: ArrayLike, seconds: float
+    ) -> bool:
         """Throw a ball from one point of the world to be at another after a time [s], on a parabola.
 
         Returns whether there was a ball to throw.
         """
         if not self.geoms:
             return False
-        start, end = np.asarray(origin, dtype=np.float64), np.asarray(through, dtype=np.float64)
+        start = np.asarray(origin, dtype=np.float64)
+        end = np.asarray(through, dtype=np.float64)
         velocity = (end - start) / seconds - self._gravity * seconds / 2
-        self._set(data, self._thrown % len(self.geoms), np.array([*start, 1.0, 0.0, 0.0, 0.0]), velocity)
+        self._set(
+            data, self._thrown % len(self.geoms), np.array([*start, 1.0, 0.0, 0.0, 0.0]), velocity
+        )
         self._thrown += 1
         return True
 
-    def _set(self, data: mujoco.MjData, i: int, pose: NDArray[np.float64], velocity: NDArray[np.float64]) -> None:
-        position, speed = self._positions[i], self._velocities[i]
+    def _set(
+        self, data: mujoco.MjData, i: int, pose: NDArray[np.float64], velocity: NDArray[np.float64]
+    ) -> None:
+        position = self._positions[i]
+        speed = self._velocities[i]
         data.qpos[position : position + 7] = pose
         data.qvel[speed : speed + 6] = [*velocity, 0.0, 0.0, 0.0]
-
-
-BALLS = 6
-
-# Relative to a surface's size: a ball's radius, a poke's radius, and a poke's depth.
-_BALL, _POKE, _DEPTH = 0.06, 0.06, 0.025
-# Time of flight of a thrown ball [s], and the distance it covers, in sizes of the surface.
-FLIGHT = 0.5
-_THROW = 3.0
-SWINGING = ("speed", "stiffness", "density")  # coefficients by which what is pressed in swings back
 
 
 def poke_strength(material: Material, size: float) -> tuple[float, float]:
     """Radius [m] and impulse [N s] of a poke that presses a surface of a size [m] in by a few per cent of that.
 
-    The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle moving at
-    4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
+    The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle
+    moving at 4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
     """
     radius = _POKE * size
     speed, stiffness, density = (float(np.max(getattr(material, name))) for name in SWINGING)
@@ -150,9 +165,12 @@ def open_scene(
     """
     load: Callable[..., Scene] = functools.partial(load_scene, target)
     if not is_scene(target):
-        load = functools.partial(drop_scene, target, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap)
+        load = functools.partial(
+            drop_scene, target, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap
+        )
     scene = load()
-    size, first = surface_size(scene), scene.targets[0]
+    size = surface_size(scene)
+    first = scene.targets[0]
     suited = suited_targets(scene.model, {first.geom: first.material.material()}, {first.geom: 1})
     _, impulse = poke_strength(suited.materials[first.geom], size)
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
@@ -160,7 +178,8 @@ def open_scene(
 
     def edit(spec: mujoco.MjSpec) -> None:
         # parked balls must not widen the camera's view
-        spec.stat.extent, spec.stat.center = scene.model.stat.extent, scene.model.stat.center
+        spec.stat.extent = scene.model.stat.extent
+        spec.stat.center = scene.model.stat.center
         add_balls(spec, BALLS, _BALL * size, mass)
 
     return load(edit=edit)
@@ -168,10 +187,15 @@ def open_scene(
 
 def surface_size(scene: Scene) -> float:
     """Longest extent of the smallest rippling surface [m]."""
-    model, extents = scene.model, []
+    model = scene.model
+    extents = []
     for target in (find_target(model, entry.geom) for entry in scene.targets):
         soft = is_soft(model, target)
-        extent = np.ptp(SoftSurface(model, target).mesh.V, axis=0) if soft else 2 * model.geom_aabb[target, 3:]
+        extent = (
+            np.ptp(SoftSurface(model, target).mesh.V, axis=0)
+            if soft
+            else 2 * model.geom_aabb[target, 3:]
+        )
         extents.append(float(extent.max()))
     return min(extents)
 

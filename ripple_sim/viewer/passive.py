@@ -44,10 +44,11 @@ def launch_passive(
 ) -> RippleViewer:
     """Open MuJoCo's viewer beside a loop of one's own, as `mujoco.viewer.launch_passive` does, and show the ripples.
 
-    Nothing has to be prepared in the model: targets are drawn as some thousand triangles of their colour, without
-    textures, in place of their still surfaces. Where the mouse pulls at a target's body (a double click, then control,
-    right button and drag), the surface follows it; bodies that can move are pulled along, as ever. Geoms of the world
-    body cannot be selected in MuJoCo's viewer.
+    Nothing has to be prepared in the model: targets are drawn as some thousand triangles of their
+    colour, without textures, in place of their still surfaces. Where the mouse pulls at a target's
+    body (a double click, then control, right button and drag), the surface follows it; bodies that
+    can move are pulled along, as ever. Geoms of the world body cannot be selected in MuJoCo's
+    viewer.
 
     Parameters
     ----------
@@ -74,16 +75,23 @@ def launch_passive(
     model = own_model(model)
     if not isinstance(ripples, Ripples) or ripples.model is not model:
         raise SceneError(
-            f"the viewer shows ripples of the model that it is given, not {ripples!r}: Ripples(model, ...)"
+            f"the viewer shows ripples of the model that it is given, not {ripples!r}: "
+            f"Ripples(model, ...)"
         )
     data = own_data(model, data)
     if problem := display_problem():
-        raise DisplayError(f"no window can be opened: {problem}; RippleRenderer renders frames without one")
+        raise DisplayError(
+            f"no window can be opened: {problem}; RippleRenderer renders frames without one"
+        )
     import mujoco.viewer  # opens GLFW
 
     before = set(threading.enumerate())
     handle = mujoco.viewer.launch_passive(
-        model, data, key_callback=key_callback, show_left_ui=show_left_ui, show_right_ui=show_right_ui
+        model,
+        data,
+        key_callback=key_callback,
+        show_left_ui=show_left_ui,
+        show_right_ui=show_right_ui,
     )
     return RippleViewer(handle, data, ripples, set(threading.enumerate()) - before)
 
@@ -91,13 +99,18 @@ def launch_passive(
 class RippleViewer:
     """MuJoCo's passive viewer with ripples. `launch_passive` makes it.
 
-    All of MuJoCo's handle is here: `is_running`, `lock`, `cam`, `opt`, `perturb` (also as `pert`), `user_scn`,
-    `set_texts`, `close` and so on. Leaving a `with` block closes it.
+    All of MuJoCo's handle is here: `is_running`, `lock`, `cam`, `opt`, `perturb` (also as `pert`),
+    `user_scn`, `set_texts`, `close` and so on. Leaving a `with` block closes it.
     """
 
-    def __init__(self, handle: Any, data: mujoco.MjData, ripples: Ripples, threads: set[threading.Thread]) -> None:
-        self._handle, self._threads = handle, threads
-        self._data, self._ripples, self._time = data, ripples, data.time
+    def __init__(
+        self, handle: Any, data: mujoco.MjData, ripples: Ripples, threads: set[threading.Thread]
+    ) -> None:
+        self._handle = handle
+        self._threads = threads
+        self._data = data
+        self._ripples = ripples
+        self._time = data.time
         self._skins = {name: _Skin(ripples[name], _TRIANGLES // len(ripples)) for name in ripples}
         self.sync()
 
@@ -112,14 +125,17 @@ class RippleViewer:
     def sync(self, state_only: bool = False) -> None:
         """Show the present state and the ripples, and take over what the user has done, to the surfaces too."""
         self._press()
-        scene, model, kept = self._handle.user_scn, self._ripples.model, []
+        scene = self._handle.user_scn
+        model = self._ripples.model
+        kept = []
         if scene is None or not self.is_running():
             return
         users = scene.ngeom
         try:
             for name, target in self._ripples.geom_ids.items():
                 materials, colors = _look(model, target)
-                material, rgba = materials[0], colors.copy()
+                material = materials[0]
+                rgba = colors.copy()
                 if material >= 0 and tuple(rgba) == _NO_COLOR:
                     rgba = model.mat_rgba[material]
                 triangles = self._skins[name].triangles(self._ripples, name, self._data)
@@ -128,9 +144,14 @@ class RippleViewer:
                 for geom, *place in zip(scene.geoms[first : scene.ngeom], *triangles, strict=False):
                     mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_TRIANGLE, *place, rgba)
                     geom.category = mujoco.mjtCatBit.mjCAT_DYNAMIC  # others cast no shadows
-                hidden = [colors, materials, *([] if is_soft(model, target) else [model.geom_size[target]])]
+                hidden = [
+                    colors,
+                    materials,
+                    *([] if is_soft(model, target) else [model.geom_size[target]]),
+                ]
                 kept += [(array, array.copy()) for array in hidden]
-                # The mouse does not find what has no material and no opacity; with some it casts shadows, but within.
+                # The mouse does not find what has no material and no opacity; with some it casts
+                # shadows, but within.
                 colors[:] = [*rgba[:3], 0.0 if model.nmat else _UNSEEN]
                 if model.nmat:
                     materials[:] = max(material, 0)
@@ -150,24 +171,30 @@ class RippleViewer:
 
     def _press(self) -> None:
         """The surface follows the mouse: a force as of a spring that pulls it to there, over the time since then."""
-        data, pull = self._data, self._handle.perturb
-        elapsed, self._time = data.time - self._time, data.time
+        data = self._data
+        pull = self._handle.perturb
+        elapsed = data.time - self._time
+        self._time = data.time
         if elapsed <= 0 or pull.select <= 0 or not pull.active & mujoco.mjtPertBit.mjPERT_TRANSLATE:
             return
-        model, body = data.model, pull.select
+        model = data.model
+        body = pull.select
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ pull.localpos
         for name, target in self._ripples.geom_ids.items():
             if is_soft(model, target) or model.geom_bodyid[target] != body:
                 continue
             waves = self._ripples[name]
             position, rotation = target_pose(data, target)
-            local, drag = (point - position) @ rotation, (pull.refselpos - point) @ rotation
+            local = (point - position) @ rotation
+            drag = (pull.refselpos - point) @ rotation
             texel = np.linalg.norm(waves.atlas.positions.reshape(-1, 3) - local, axis=1).argmin()
             inwards = -float(drag @ waves.atlas.normals.reshape(-1, 3)[texel])
             radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
-            speed, stiffness, density = (float(np.max(getattr(waves.material, name))) for name in SWINGING)
-            # force that presses the surface in by a metre [N/m], as in `poke_strength`: a mass of pi r^2 sigma / 4 that
-            # swings at omega^2 = (2 c / r)^2 + k
+            speed, stiffness, density = (
+                float(np.max(getattr(waves.material, name))) for name in SWINGING
+            )
+            # force that presses the surface in by a metre [N/m], as in `poke_strength`: a mass of
+            # pi r^2 sigma / 4 that swings at omega^2 = (2 c / r)^2 + k
             firmness = np.pi * density * (speed**2 + stiffness * radius**2 / 4)
             waves.add_impulse(local, firmness * inwards * elapsed, radius)
 
@@ -186,9 +213,11 @@ def _look(model: mujoco.MjModel, target: int) -> tuple[NDArray[np.int32], NDArra
     if skin >= 0:
         return model.skin_matid[skin : skin + 1], model.skin_rgba[skin]
     flex = target - first_flex(model)
-    first, count = flex, 1
+    first = flex
+    count = 1
     if len(model.flex_matid) != model.nflex:  # MuJoCo 4 has one for each element
-        first, count = model.flex_elemadr[flex], model.flex_elemnum[flex]
+        first = model.flex_elemadr[flex]
+        count = model.flex_elemnum[flex]
     return model.flex_matid[first : first + count], model.flex_rgba[flex]
 
 
@@ -196,7 +225,8 @@ class _Skin:
     """Some of the vertices of a target's mesh, and triangles between them."""
 
     def __init__(self, waves: WaveSolver, count: int) -> None:
-        V, F = waves.rest.mesh.V, waves.rest.mesh.F
+        V = waves.rest.mesh.V
+        F = waves.rest.mesh.F
         kept = np.arange(len(V))
         edge = np.sqrt(2 * waves.rest.areas.sum() / count)
         while len(F) > count:
@@ -211,21 +241,30 @@ class _Skin:
             F = F[(F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])]
             F = F[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]]
             edge *= 1.1
-        self._kept, self._F, self._rest = kept, F, V
+        self._kept = kept
+        self._F = F
+        self._rest = V
         self._normals = normalized(smooth_normals(V, waves.rest.mesh.F))[kept]
         self._sampling = waves.rest.sampling_matrix(V[kept])
 
-    def triangles(self, ripples: Ripples, name: str, data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:
+    def triangles(
+        self, ripples: Ripples, name: str, data: mujoco.MjData
+    ) -> tuple[NDArray[np.float64], ...]:
         """Sizes [m, 3], places [m, 3] and axes [m, 9] of triangles, as MuJoCo takes them."""
-        waves, moved = ripples[name], ripples.vertices(name, data)
-        V, normals = self._rest, self._normals
+        waves = ripples[name]
+        moved = ripples.vertices(name, data)
+        V = self._rest
+        normals = self._normals
         if moved is not None:
-            V, normals = moved, normalized(smooth_normals(moved, waves.rest.mesh.F))[self._kept]
+            V = moved
+            normals = normalized(smooth_normals(moved, waves.rest.mesh.F))[self._kept]
         position, rotation = target_pose(data, ripples.geom_ids[name])
         heights = self._sampling @ waves.height.ravel()
         points = position + (V[self._kept] + heights[:, None] * normals) @ rotation.T
         corner, *edges = points[self._F].swapaxes(0, 1)
         edges = [edge - corner for edge in edges]
         axes = np.stack([normalized(each) for each in (*edges, np.cross(*edges))], axis=2)
-        sizes = np.stack([*(np.linalg.norm(edge, axis=1) for edge in edges), np.zeros(len(corner))], axis=1)
+        sizes = np.stack(
+            [*(np.linalg.norm(edge, axis=1) for edge in edges), np.zeros(len(corner))], axis=1
+        )
         return sizes, corner, axes.reshape(-1, 9)

@@ -27,9 +27,11 @@ OPERATORS = ("fem", "uncorrected", "paper")
 # Coefficients of the material that the user can change, with their units.
 SLIDERS = {"speed": "m/s", "damping": "1/s", "stiffness": "1/s²"}
 
-# The range of the colours follows the waves: at once as they grow, by this factor per frame as they fade.
+# The range of the colours follows the waves: at once as they grow, by this factor per frame as they
+# fade.
 _FADE = 0.96
-# Colours end at this share of the greatest height: at a contact the surface is higher than its waves.
+# Colours end at this share of the greatest height: at a contact the surface is higher than its
+# waves.
 _FULL = 0.25
 # Least range of the colours over the surface's size, so that rounding noise is not shown.
 _FAINT = 1e-4
@@ -68,16 +70,23 @@ class Session:
         adopt_warnings()
         self.fps = fps
         self.simulation = Simulation(
-            scene, fps=fps, resolution=resolution, backend="cpu", on_step=lambda now: self._balls.hold(now.data)
+            scene,
+            fps=fps,
+            resolution=resolution,
+            backend="cpu",
+            on_step=lambda now: self._balls.hold(now.data),
         )
         self._balls = Balls(self.simulation.model)
         self._material: dict[str, float] = {}
-        ripples, limited = self.simulation.ripples, self.simulation.limited
+        ripples = self.simulation.ripples
+        limited = self.simulation.limited
         self.meshes = {
-            name: MovingMesh(ripples[name].rest, limit=limited[name], triangles=MAX_TRIANGLES) for name in ripples
+            name: MovingMesh(ripples[name].rest, limit=limited[name], triangles=MAX_TRIANGLES)
+            for name in ripples
         }
         self.skins: dict[str, Displaced] = {}
-        self._scenes: dict[str, tuple[NDArray[np.float64] | None, RayScene]] = {}  # for rays, with their vertices
+        # for rays, with their vertices
+        self._scenes: dict[str, tuple[NDArray[np.float64] | None, RayScene]] = {}
         self.size = surface_size(scene)
         material = ripples[scene.targets[0].geom].material
         self._poke_radius, self.poke_impulse = poke_strength(material, self.size)
@@ -124,7 +133,8 @@ class Session:
 
     def refresh(self) -> None:
         """Bring the skins and the range of the colours up to date."""
-        ripples, wanted = self.simulation.ripples, _FAINT * self.size
+        ripples = self.simulation.ripples
+        wanted = _FAINT * self.size
         for name, mesh in self.meshes.items():
             V = ripples.vertices(name, self.simulation.data)
             self.skins[name] = shape = mesh.shape(ripples[name].height, ripples[name].velocity, V)
@@ -157,16 +167,21 @@ class Session:
             self.simulation.ripples.change_material(name, **coefficients)
         self._material.update(coefficients)
 
-    def pick(self, origin: ArrayLike, direction: ArrayLike) -> tuple[str, NDArray[np.float64], float] | None:
+    def pick(
+        self, origin: ArrayLike, direction: ArrayLike
+    ) -> tuple[str, NDArray[np.float64], float] | None:
         """Where a ray from a point [m] of the world first meets an undisplaced rippling surface, or None.
 
-        Returns the name of the geom, the point in its frame [m], and the distance in lengths of the direction.
+        Returns the name of the geom, the point in its frame [m], and the distance in lengths of the
+        direction.
         """
-        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+        start = np.asarray(origin, dtype=np.float64)
+        along = np.asarray(direction, dtype=np.float64)
         hits = []
         for name in self.simulation.ripples:
             position, rotation = self._pose(name)
-            local, heading = (start - position) @ rotation, along @ rotation
+            local = (start - position) @ rotation
+            heading = along @ rotation
             waves = self.simulation.ripples[name]
             V, scene = self._scenes.get(name, (None, None))
             if scene is None or waves.vertices is not V:
@@ -189,13 +204,16 @@ class Session:
     def throw(self, origin: ArrayLike, direction: ArrayLike) -> bool:
         """Throw a ball from a point [m] of the world along a direction; it comes down where that meets a surface.
 
-        Beside the surface it flies through the point of the ray that is nearest to the first surface's middle. Returns
-        whether there was a ball.
+        Beside the surface it flies through the point of the ray that is nearest to the first
+        surface's middle. Returns whether there was a ball.
         """
-        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+        start = np.asarray(origin, dtype=np.float64)
+        along = np.asarray(direction, dtype=np.float64)
         hit = self.pick(start, along)
         middle, _ = self._pose(self.simulation.scene.targets[0].geom)
-        reach = max(float((middle - start) @ along / (along @ along)), 0.0) if hit is None else hit[2]
+        reach = (
+            max(float((middle - start) @ along / (along @ along)), 0.0) if hit is None else hit[2]
+        )
         return self._balls.throw(self.simulation.data, start, start + reach * along, FLIGHT)
 
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -26,7 +26,37 @@ from .session import Session
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 BACKGROUND = (0.74, 0.77, 0.81)
 _LEVEL = 0.999  # how far up a floor faces that shadows are on, which fall straight down
-_FADE_RINGS, _FADE_SIDES = 24, 72
+_FADE_RINGS = 24
+_FADE_SIDES = 72
+
+HEIGHT = "height [mm]"
+_PER_METRE = 1000.0
+
+# times a power of ten end the colours, so that these do not change with every frame
+_STEPS = (1.0, 2.0, 5.0)
+_SEGMENTS = 8  # of a geom, per right angle
+_SHADING: dict[str, Any] = {
+    "ambient": 0.32,
+    "diffuse": 0.75,
+    "specular": 0.3,
+    "specular_power": 30.0,
+}
+
+# Darkness under a geom that touches the floor, and the height above the floor, in radii, from which
+# it casts none.
+_DARKEST = 0.42
+_HIGHEST = 6.0
+
+# Radius of a shadow over that of the geom's bounding ball, and its height above the floor, in
+# radii.
+_WIDER = 1.15
+_ABOVE = 0.01
+_RINGS = 8
+_SIDES = 32
+
+# Bodies farther away than this many distances of the first camera wait for their turn, and are
+# hidden.
+_REACH = 4.0
 
 
 def is_endless(model: mujoco.MjModel, geom: int, reach: float) -> bool:
@@ -35,7 +65,9 @@ def is_endless(model: mujoco.MjModel, geom: int, reach: float) -> bool:
     return model.geom_type[geom] == _PLANE and bool(((size <= 0) | (size > reach / 2)).all())
 
 
-def add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float64]) -> pv.Actor:
+def add_floor(
+    plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float64]
+) -> pv.Actor:
     """Add a plane as a disc around a middle [m], unlit: software OpenGL is much slower with light, and it is large."""
     disc = pv.Disc(inner=0.0, outer=radius, normal=(0, 0, 1), r_res=_FADE_RINGS, c_res=_FADE_SIDES)
     away = np.linalg.norm(disc.points, axis=1) / radius
@@ -47,21 +79,18 @@ def add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, r
     return plotter.add_mesh(disc, scalars="color", rgb=True, lighting=False, reset_camera=False)
 
 
-HEIGHT = "height [mm]"
-_PER_METRE = 1000.0
-
-_STEPS = (1.0, 2.0, 5.0)  # times a power of ten end the colours, so that these do not change with every frame
-_SEGMENTS = 8  # of a geom, per right angle
-
-
 class BodyActors:
     """The geoms of a model that do not ripple, moved by MuJoCo's poses.
 
     Those farther than `reach` from the middle of the view [m] wait for their turn, and are hidden.
     """
 
-    def __init__(self, plotter: pv.Plotter, session: Session, middle: NDArray[np.float64], reach: float) -> None:
-        self._session, self._middle, self._reach = session, middle, reach
+    def __init__(
+        self, plotter: pv.Plotter, session: Session, middle: NDArray[np.float64], reach: float
+    ) -> None:
+        self._session = session
+        self._middle = middle
+        self._reach = reach
         model = session.simulation.model
         self._actors = {}
         for geom in visible_geoms(model):
@@ -86,7 +115,8 @@ class BodyActors:
 
     def update(self) -> None:
         """Take the poses from the session."""
-        parked, solid = self._session.parked, set(self.solid)
+        parked = self._session.parked
+        solid = set(self.solid)
         for geom, actor in self._actors.items():
             position, rotation = target_pose(self._session.simulation.data, geom)
             _place(actor, position, rotation)
@@ -97,7 +127,13 @@ class BodyActors:
 class SkinActor:
     """A rippling surface of an sRGB colour: points, normals and heights are written into the arrays that VTK reads."""
 
-    def __init__(self, plotter: pv.Plotter, F: NDArray[np.int64], shape: Displaced, color: NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        plotter: pv.Plotter,
+        F: NDArray[np.int64],
+        shape: Displaced,
+        color: NDArray[np.float64],
+    ) -> None:
         self._mesh = mesh = pv.PolyData.from_regular_faces(shape.points, F)
         mesh.point_data.active_normals = shape.normals
         mesh.point_data.set_array(_PER_METRE * shape.height, HEIGHT)
@@ -118,12 +154,17 @@ class SkinActor:
     def update(self, shape: Displaced, pose: tuple[NDArray, NDArray], limit: float | None) -> None:
         """Take the present points, normals and heights, and the pose in the world.
 
-        Heights are shown as colours from minus to plus a limit [m]; with None, the surface is in its own colour.
+        Heights are shown as colours from minus to plus a limit [m]; with None, the surface is in
+        its own colour.
         """
-        mesh, mapper = self._mesh, self.actor.mapper
+        mesh = self._mesh
+        mapper = self.actor.mapper
         mesh.points[:] = shape.points
         data = mesh.GetPointData()
-        for array, new in ((data.GetNormals(), shape.normals), (data.GetArray(HEIGHT), _PER_METRE * shape.height)):
+        for array, new in (
+            (data.GetNormals(), shape.normals),
+            (data.GetArray(HEIGHT), _PER_METRE * shape.height),
+        ):
             pv.convert_array(array)[:] = new
             array.Modified()
         mesh.GetPoints().Modified()
@@ -131,9 +172,6 @@ class SkinActor:
         mapper.scalar_visibility = limit is not None
         if limit is not None:
             mapper.scalar_range = (-_PER_METRE * limit, _PER_METRE * limit)
-
-
-_SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "specular_power": 30.0}
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
@@ -149,22 +187,17 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
 
 def _place(actor: pv.Actor, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), position
+    pose[:3, :3] = rotation.reshape(3, 3)
+    pose[:3, 3] = position
     actor.user_matrix = pose
-
-
-# Darkness under a geom that touches the floor, and the height above the floor, in radii, from which it casts none.
-_DARKEST, _HIGHEST = 0.42, 6.0
-# Radius of a shadow over that of the geom's bounding ball, and its height above the floor, in radii.
-_WIDER, _ABOVE = 1.15, 0.01
-_RINGS, _SIDES = 8, 32
 
 
 class Shadows:
     """A shadow for each of some geoms on a horizontal plane, the `floor`; all by their geom ids."""
 
     def __init__(self, plotter: pv.Plotter, session: Session, geoms: list[int], floor: int) -> None:
-        self._session, self._floor = session, floor
+        self._session = session
+        self._floor = floor
         disc = pv.Disc(inner=0.0, outer=1.0, normal=(0, 0, 1), r_res=_RINGS, c_res=_SIDES)
         dark = np.clip(1 - np.linalg.norm(disc.points, axis=1), 0, 1)
         shade = np.zeros((disc.n_points, 4), np.uint8)
@@ -176,7 +209,8 @@ class Shadows:
 
     def update(self) -> None:
         """Take the places from the session."""
-        data, model = self._session.simulation.data, self._session.simulation.model
+        data = self._session.simulation.data
+        model = self._session.simulation.model
         ground = data.geom_xpos[self._floor, 2]
         parked = self._session.parked
         for geom, actor in self._actors.items():
@@ -192,10 +226,6 @@ class Shadows:
             _place(actor, np.array([x, y, ground + _ABOVE * radius]), np.diag([wide, wide, 1.0]))
 
 
-# Bodies farther away than this many distances of the first camera wait for their turn, and are hidden.
-_REACH = 4.0
-
-
 class Stage:
     """Everything that a plotter shows of a session.
 
@@ -208,13 +238,18 @@ class Stage:
     """
 
     def __init__(self, plotter: pv.Plotter, session: Session) -> None:
-        self._session, self._heatmap = session, False
-        # shadows lie side by side on the floor: plain blending will do, without buffers of the window's size
+        self._session = session
+        self._heatmap = False
+        # shadows lie side by side on the floor: plain blending will do, without buffers of the
+        # window's size
         plotter.renderer.SetUseOIT(False)
         plotter.set_background(BACKGROUND)
-        # two lights that turn with the camera: each one more costs software OpenGL a tenth of its speed
+        # two lights that turn with the camera: each one more costs software OpenGL a tenth of its
+        # speed
         for position, intensity in (((-0.7, 1.0, 0.9), 0.85), ((1.0, 0.1, 0.5), 0.25)):
-            plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
+            plotter.add_light(
+                pv.Light(position=position, light_type="camera light", intensity=intensity)
+            )
         simulation = session.simulation
         pose = viewpoint(simulation.model, simulation.data, simulation.scene.camera, 0.0).pose()
         width, height = plotter.window_size
@@ -225,13 +260,22 @@ class Stage:
                 plotter,
                 session.meshes[entry.geom].F,
                 session.skins[entry.geom],
-                target_color(simulation.model, simulation.ripples.geom_ids[entry.geom], entry.look, entry.color),
+                target_color(
+                    simulation.model,
+                    simulation.ripples.geom_ids[entry.geom],
+                    entry.look,
+                    entry.color,
+                ),
             )
             for entry in simulation.scene.targets
         }
         self._bodies = BodyActors(plotter, session, pose.focus, _REACH * pose.distance)
         floor = find_floor(simulation.model, simulation.ripples.geom_ids.values())
-        rigid = [geom for geom in simulation.ripples.geom_ids.values() if not is_soft(simulation.model, geom)]
+        rigid = [
+            geom
+            for geom in simulation.ripples.geom_ids.values()
+            if not is_soft(simulation.model, geom)
+        ]
         self.shadows: Shadows | None = None
         if floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL:
             self.shadows = Shadows(plotter, session, [*rigid, *self._bodies.solid], floor)
@@ -243,7 +287,9 @@ class Stage:
         self._bar.SetVerticalTitleSeparation(10)
         self._bar.SetVisibility(self._heatmap)
         camera = plotter.camera
-        camera.position, camera.focal_point, camera.up = pose.position, pose.focus, (0.0, 0.0, 1.0)
+        camera.position = pose.position
+        camera.focal_point = pose.focus
+        camera.up = (0.0, 0.0, 1.0)
         if pose.orthographic:
             camera.parallel_projection = True
             camera.parallel_scale = pose.half_height
@@ -253,10 +299,13 @@ class Stage:
     def update(self) -> None:
         """Bring the actors up to date with the session."""
         session = self._session
-        data, limit = session.simulation.data, round_up(session.color_range, _STEPS)
+        data = session.simulation.data
+        limit = round_up(session.color_range, _STEPS)
         for name, skin in self.skins.items():
             geom = session.simulation.ripples.geom_ids[name]
-            skin.update(session.skins[name], target_pose(data, geom), limit if self._heatmap else None)
+            skin.update(
+                session.skins[name], target_pose(data, geom), limit if self._heatmap else None
+            )
         self._bodies.update()
         if self.shadows is not None:
             self.shadows.update()

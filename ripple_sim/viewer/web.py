@@ -1,9 +1,10 @@
 """The viewer in a browser on the same machine: trame sends frames of an off-screen window, and events come back.
 
-Who has the address of this run may use the viewer's page, and only from the page itself. Any page that is open in the
-user's browser can send requests to a port of this machine. So the address holds a secret that is new in every run, and
-requests are refused whose headers name another site: `Origin`, the page that asks, and `Host`, the name that the
-browser looked up, which another site's name server can point at this machine.
+Who has the address of this run may use the viewer's page, and only from the page itself. Any page
+that is open in the user's browser can send requests to a port of this machine. So the address holds
+a secret that is new in every run, and requests are refused whose headers name another site:
+`Origin`, the page that asks, and `Host`, the name that the browser looked up, which another site's
+name server can point at this machine.
 """
 
 from __future__ import annotations
@@ -36,6 +37,20 @@ _HEADERS = {"Content-Security-Policy": "frame-ancestors 'none'", "Referrer-Polic
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
+# Without an answer for this long [s] the browser may have been closed, or reopened.
+_PATIENCE = 1.0
+_QUALITY = 85  # of the JPEG frames, per cent
+_STYLE = """
+body { margin: 0; font: 14px sans-serif; background: #bdc4cf; color: #111; }
+main { outline: none; margin: 0 auto; padding: 12px 0; box-sizing: border-box; height: 100vh;
+  display: flex; flex-direction: column; }
+#picture { flex: 0 1 auto; min-height: 0; }
+nav { display: flex; flex-wrap: wrap; gap: 6px; margin-bottom: 8px; }
+button { font: inherit; padding: 4px 10px; border: 1px solid #667; border-radius: 4px; background: #eef0f3; }
+button:hover { background: #fff; }
+output { display: block; margin-top: 8px; white-space: pre; }
+"""
+
 
 def new_secret() -> str:
     """128 random bits; a letter comes first, since the page takes digits for a number."""
@@ -52,15 +67,19 @@ def is_local(host: str) -> bool:
 
 def address(host: str, port: int, secret: str) -> str:
     """What to open in a browser."""
-    name = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+    name = (
+        socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+    )
     return f"http://{name}:{port}/?secret={secret}"
 
 
 def exposure(host: str, folder: Path) -> str:
     """What is open to others where a host is not local, in one line."""
     return (
-        f"ripple-sim: --host {host} lets other machines connect: whoever has the address sees and drives this scene, "
-        f"and writes screenshots and videos to {folder.absolute()}; nothing is encrypted, so the address can be read "
+        f"ripple-sim: --host {host} lets other machines connect: whoever has the address sees and "
+        f"drives this scene, "
+        f"and writes screenshots and videos to {folder.absolute()}; nothing is encrypted, so the "
+        f"address can be read "
         "on its way"
     )
 
@@ -81,9 +100,22 @@ def restrict(server: Any, *, host: str, port: int, secret: str) -> None:
     server.options["ws_max_msg_size"] = LARGEST_MESSAGE
     for name, value in _HEADERS.items():
         server.http_headers.set_header(name, value)
-    words = ["--host", host, "--port", str(port), "--authKey", secret, "--timeout", "0", "--nosignalhandlers"]
-    options: tuple[argparse.Namespace, list[str]] = server.cli.parse_known_args([*words, "--no-ws-compress"])
-    server.cli.parse_known_args = lambda: options  # trame would read this program's own command line
+    words = [
+        "--host",
+        host,
+        "--port",
+        str(port),
+        "--authKey",
+        secret,
+        "--timeout",
+        "0",
+        "--nosignalhandlers",
+    ]
+    options: tuple[argparse.Namespace, list[str]] = server.cli.parse_known_args(
+        [*words, "--no-ws-compress"]
+    )
+    # trame would read this program's own command line
+    server.cli.parse_known_args = lambda: options
     server.controller.on_server_bind.add(lambda served: served.app.middlewares.append(guard(host)))
 
 
@@ -93,10 +125,14 @@ def guard(host: str) -> Callable[[web.Request, Handler], Awaitable[web.StreamRes
     @web.middleware
     async def refuse_strangers(request: web.Request, handler: Handler) -> web.StreamResponse:
         if not _is_own(request.host, host):
-            raise web.HTTPForbidden(text=f"Host is {request.host[:80]!r}, which is not a name of this server\n")
+            raise web.HTTPForbidden(
+                text=f"Host is {request.host[:80]!r}, which is not a name of this server\n"
+            )
         origin = request.headers.get("Origin")
         if origin is not None and urlsplit(origin).netloc != request.host:
-            raise web.HTTPForbidden(text=f"Origin is {origin[:80]!r}: this page answers only itself\n")
+            raise web.HTTPForbidden(
+                text=f"Origin is {origin[:80]!r}: this page answers only itself\n"
+            )
         return await handler(request)
 
     return refuse_strangers
@@ -105,34 +141,20 @@ def guard(host: str) -> Callable[[web.Request, Handler], Awaitable[web.StreamRes
 def _is_own(netloc: str, host: str) -> bool:
     """Whether a Host header names this server, at any port: a tunnel may lead to it.
 
-    A number is no name that another site's name server could give; where this machine alone is served it must be one
-    of the machine's own.
+    A number is no name that another site's name server could give; where this machine alone is
+    served it must be one of the machine's own.
     """
     local = is_local(host)
     try:
         name = urlsplit(f"//{netloc}").hostname or ""
-        if name == "localhost" or (not local and name in (host.lower(), socket.gethostname().lower())):
+        if name == "localhost" or (
+            not local and name in (host.lower(), socket.gethostname().lower())
+        ):
             return True
         number = ipaddress.ip_address(name)
     except ValueError:
         return False
     return number.is_loopback or not local
-
-
-# Without an answer for this long [s] the browser may have been closed, or reopened.
-_PATIENCE = 1.0
-_QUALITY = 85  # of the JPEG frames, per cent
-
-_STYLE = """
-body { margin: 0; font: 14px sans-serif; background: #bdc4cf; color: #111; }
-main { outline: none; margin: 0 auto; padding: 12px 0; box-sizing: border-box; height: 100vh;
-  display: flex; flex-direction: column; }
-#picture { flex: 0 1 auto; min-height: 0; }
-nav { display: flex; flex-wrap: wrap; gap: 6px; margin-bottom: 8px; }
-button { font: inherit; padding: 4px 10px; border: 1px solid #667; border-radius: 4px; background: #eef0f3; }
-button:hover { background: #fff; }
-output { display: block; margin-top: 8px; white-space: pre; }
-"""
 
 
 def check_web(port: int, host: str) -> None:
@@ -143,7 +165,9 @@ def check_web(port: int, host: str) -> None:
     DisplayError
         If trame is not installed, the port is not free, or the host is not of this machine.
     """
-    if missing := [name for name in ("trame", "trame_vtk") if importlib.util.find_spec(name) is None]:
+    if missing := [
+        name for name in ("trame", "trame_vtk") if importlib.util.find_spec(name) is None
+    ]:
         raise DisplayError(
             f"--web needs {' and '.join(missing)}, which is not installed; install it with: "
             "pip install 'ripple-sim[web]'"
@@ -155,7 +179,8 @@ def check_web(port: int, host: str) -> None:
             trial.bind(found[0][4])
     except (OSError, OverflowError, UnicodeError) as error:
         raise DisplayError(
-            f"cannot serve on port {port} of {host}: {error}; name another one with --port, or one of this machine's "
+            f"cannot serve on port {port} of {host}: {error}; name another one with --port, or one "
+            f"of this machine's "
             "addresses with --host"
         ) from error
 
@@ -164,7 +189,8 @@ def serve(window: Window, port: int, host: str) -> None:
     """Serve an off-screen window at a host's name or address until it is closed or the program is interrupted."""
     from trame.app import get_server
 
-    server, secret = get_server("ripple-sim"), new_secret()
+    server = get_server("ripple-sim")
+    secret = new_secret()
     restrict(server, host=host, port=port, secret=secret)
     window.open()
     page = _Page(server, window)
@@ -176,7 +202,11 @@ def serve(window: Window, port: int, host: str) -> None:
         serving = asyncio.ensure_future(
             server.start(exec_mode="coroutine", open_browser=False, show_connection_info=False)
         )
-        shown = f"shows {window.plotter.title}, which starts when the page is opened; press Ctrl+C to stop"
+        shown = (
+            f"shows {window.plotter.title}, which starts when the page is opened; press "
+            f"Ctrl+C "
+            f"to stop"
+        )
         print(f"{address(host, port, secret)} {shown}", flush=True)
         await page.animate()
         await server.stop()
@@ -204,12 +234,15 @@ class _Page:
         from trame.ui.html import DivLayout
         from trame.widgets import client, html, vtk
 
-        self._server, self._window = server, window
+        self._server = server
+        self._window = window
         window.hide_texts()
         # numbers of the latest frames sent, and acknowledged by the browser
         self._sent = self._received = 0
         self._heard = 0.0
-        server.state.update({"status": "", "sent": 0, "trame__title": f"{window.plotter.title} - ripple-sim"})
+        server.state.update(
+            {"status": "", "sent": 0, "trame__title": f"{window.plotter.title} - ripple-sim"}
+        )
         self._opened = asyncio.Event()
         server.controller.on_client_connected.add(self._opened.set)
         width, height = window.plotter.window_size
@@ -217,14 +250,20 @@ class _Page:
             layout.root.style = ""
             client.Style(_STYLE)
             client.ClientStateChange(value="sent", change=(self._acknowledge, "[sent]"))
-            with html.Main(tabindex=0, style=f"max-width: {width}px", keydown=(self._key, "[$event.key]")):
+            with html.Main(
+                tabindex=0, style=f"max-width: {width}px", keydown=(self._key, "[$event.key]")
+            ):
                 with html.Nav():
                     for key, action, label in CONTROLS:
                         if action != "help":
-                            html.Button(f"{label} ({key})", id=action, click=getattr(window, action))
+                            html.Button(
+                                f"{label} ({key})", id=action, click=getattr(window, action)
+                            )
                 with html.Div(id="picture", style=f"height: {height}px"):
                     self._view = vtk.VtkRemoteView(
-                        window.plotter.render_window, interactive_ratio=1, interactive_quality=_QUALITY
+                        window.plotter.render_window,
+                        interactive_ratio=1,
+                        interactive_quality=_QUALITY,
                     )
                 html.Output("{{ status }}", id="status")
         # while an animation runs, this only marks the frame as changed
@@ -233,8 +272,9 @@ class _Page:
     async def animate(self) -> None:
         """Run the session frame by frame, from when the page is first opened until the window is closed.
 
-        Trame's own animation draws and sends the frames: without one it would draw at every movement of the pointer.
-        The next frame is drawn once the browser has the last one, or they would queue up, and clicks with them.
+        Trame's own animation draws and sends the frames: without one it would draw at every
+        movement of the pointer. The next frame is drawn once the browser has the last one, or they
+        would queue up, and clicks with them.
         """
         await self._server.ready
         await self._opened.wait()
@@ -245,7 +285,8 @@ class _Page:
         while not window.closed:
             now = time.perf_counter()
             if window.tick(draw=self._received == self._sent or now - self._heard > _PATIENCE):
-                self._sent, self._heard = self._sent + 1, now
+                self._sent = self._sent + 1
+                self._heard = now
             with self._server.state as state:
                 state.update({"status": window.status(), "sent": self._sent})
             due = max(due + frame, time.perf_counter() - frame)

@@ -83,17 +83,23 @@ class Window:
         self.message = ""
         self.seconds_drawing = 0.0
         self.drawn = False
-        self._updates, self._since, self._rate = 0, time.perf_counter(), math.nan
+        self._updates = 0
+        self._since = time.perf_counter()
+        self._rate = math.nan
         scene = session.simulation.scene
         self.recorder = Recorder(Path(folder), scene.name, session.fps)
         # where there is no display VTK warns of that, and then does without one
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-        self.plotter = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none", title=scene.name)
+        self.plotter = pv.Plotter(
+            off_screen=off_screen, window_size=list(size), lighting="none", title=scene.name
+        )
         # smooth edges cost software OpenGL four fifths of its speed
         self.plotter.render_window.SetMultiSamples(0)
         self.stage = Stage(self.plotter, session)
         self._text, self._help = (
-            self.plotter.add_text(text, position=corner, font_size=size, color="black", shadow=False)
+            self.plotter.add_text(
+                text, position=corner, font_size=size, color="black", shadow=False
+            )
             for text, corner, size in (("", "upper_left", 9), (help_text(), "upper_right", 8))
         )
         self.render: Callable[[], object] = self.plotter.render_window.Render
@@ -105,9 +111,12 @@ class Window:
         iren.clear_key_event_callbacks()
         # keys are ours: the style's own ones end the program, draw wire frames and the like
         iren.style.AddObserver("CharEvent", lambda *_: None)
-        # weakly, for PyVista keeps each plotter until it is closed: so the plotter of a dropped window is closed
+        # weakly, for PyVista keeps each plotter until it is closed: so the plotter of a dropped
+        # window is closed
         me = weakref.proxy(self)
-        iren.add_observer("KeyPressEvent", lambda *_: me.key(me.plotter.iren.interactor.GetKeySym()))
+        iren.add_observer(
+            "KeyPressEvent", lambda *_: me.key(me.plotter.iren.interactor.GetKeySym())
+        )
         iren.add_observer("LeftButtonPressEvent", lambda *_: me._press())
         iren.add_observer("LeftButtonReleaseEvent", lambda *_: me._release())
         iren.add_observer("RenderEvent", lambda *_: me.mark_stale())
@@ -186,7 +195,8 @@ class Window:
 
     def pixels(self) -> NDArray[np.uint8]:
         """The latest frame, uint8 [height, width, 3]."""
-        pixels, (width, height) = vtkUnsignedCharArray(), self.size()
+        pixels = vtkUnsignedCharArray()
+        (width, height) = self.size()
         self.plotter.render_window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
         return vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
 
@@ -197,9 +207,14 @@ class Window:
     def status(self) -> str:
         """Time, operator and state; in a second line the latest message."""
         session = self.session
-        state = "paused" if session.paused else f"{self._rate:.0f} updates/s" if self._rate > 0 else ""
+        state = (
+            "paused" if session.paused else f"{self._rate:.0f} updates/s" if self._rate > 0 else ""
+        )
         recording = "   recording" if self.recorder.recording else ""
-        return f"{session.time:.2f} s   operator {session.operator}   {state}{recording}\n{self.message}"
+        return (
+            f"{session.time:.2f} s   operator {session.operator}   "
+            f"{state}{recording}\n{self.message}"
+        )
 
     def say(self, message: str) -> None:
         """Show a message in the status line."""
@@ -226,7 +241,8 @@ class Window:
         self._updates += 1
         if now - self._since > _STATUS_EVERY:
             self._rate = self._updates / (now - self._since)
-            self._updates, self._since = 0, now
+            self._updates = 0
+            self._since = now
             self._show_status()
         level(self.plotter.camera)
         self.plotter.renderer.ResetCameraClippingRange()
@@ -250,7 +266,8 @@ class Window:
         self.plotter.show(interactive_update=True, auto_close=False, interactive=False)
         if not is_software(self.gl_renderer):
             self.plotter.render_window.SetMultiSamples(_MULTISAMPLES)
-        # the loop draws, once a frame; sliders and the camera would draw at every movement of the pointer
+        # the loop draws, once a frame; sliders and the camera would draw at every movement of the
+        # pointer
         self.plotter.iren.interactor.EnableRenderOff()
         self.mark_stale()
 
@@ -280,7 +297,10 @@ class Window:
     def gl_renderer(self) -> str:
         """OpenGL driver of an open window, by its own name."""
         lines = self.plotter.render_window.ReportCapabilities().splitlines()
-        return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("OpenGL renderer")), "none")
+        return next(
+            (line.split(":", 1)[1].strip() for line in lines if line.startswith("OpenGL renderer")),
+            "none",
+        )
 
     def pointer(self) -> tuple[int, int] | None:
         """Pixel under the pointer, from the lower left; None if it has never been over the window."""
@@ -292,7 +312,8 @@ class Window:
 
     def _release(self) -> None:
         """Poke where the pointer is, if it was pressed there."""
-        pressed, self._pressed = self._pressed, None
+        pressed = self._pressed
+        self._pressed = None
         x, y = self.plotter.iren.get_event_position()
         if pressed is not None and max(abs(x - pressed[0]), abs(y - pressed[1])) <= _STILL:
             self.poke_at(x, y)
@@ -322,8 +343,8 @@ def run(window: Window) -> None:
 def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
     """Highest update rate of a window, and where the time goes: simulation, drawing, and processor time.
 
-    The best of several runs of some updates without waiting, each with a poke and a ball at the start. Processor time
-    is that of all threads, which other programs hardly change.
+    The best of several runs of some updates without waiting, each with a poke and a ball at the
+    start. Processor time is that of all threads, which other programs hardly change.
     """
     window.open()
     width, height = window.size()
@@ -332,15 +353,20 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
         window.reset()
         window.poke_at(width // 2, height // 2)
         window.throw()
-        start, processor, drawing = time.perf_counter(), time.process_time(), window.seconds_drawing
+        start = time.perf_counter()
+        processor = time.process_time()
+        drawing = window.seconds_drawing
         for _ in range(updates):
             window.tick()
-        seconds, processor = time.perf_counter() - start, time.process_time() - processor
+        seconds = time.perf_counter() - start
+        processor = time.process_time() - processor
         trials.append((seconds, window.seconds_drawing - drawing, processor))
     renderer = window.gl_renderer
     window.close()
     seconds, drawing, processor = min(trials)
-    simulate, draw, processor = (1e3 / updates * each for each in (seconds - drawing, drawing, processor))
+    simulate, draw, processor = (
+        1e3 / updates * each for each in (seconds - drawing, drawing, processor)
+    )
     return (
         f"{updates / seconds:.1f} updates/s: simulation {simulate:.1f} ms, drawing {draw:.1f} ms; "
         f"{processor:.1f} ms of processor time ({renderer})"
@@ -351,6 +377,7 @@ def check_display() -> None:
     """Make sure that a window can be opened; raises `DisplayError` with what is missing, and the alternatives."""
     if problem := display_problem():
         raise DisplayError(
-            f"no window can be opened: {problem}; add --web to use a browser instead, or render a video with "
+            f"no window can be opened: {problem}; add --web to use a browser instead, or render a "
+            f"video with "
             "`ripple-sim render` or `ripple-sim drop`"
         )

@@ -1,7 +1,8 @@
 """`Backend`: what holds height and velocity as float32, kicks texels, and takes leapfrog substeps; which is the faster.
 
-Where one keeps the volume, forces inside a surface of uneven density do not change it either; see `volume_rate`. Which
-is the faster on this machine is measured once, and remembered in the user's cache folder.
+Where one keeps the volume, forces inside a surface of uneven density do not change it either; see
+`volume_rate`. Which is the faster on this machine is measured once, and remembered in the user's
+cache folder.
 """
 
 from __future__ import annotations
@@ -35,6 +36,14 @@ BACKENDS = ("auto", "gl", "cpu")
 
 _TYPICAL = 6 * 128**2  # texels of a video's target
 
+# Texels along a chart's side of the two sizes that are measured, and substeps of a frame.
+_SIZES = (64, 192)
+_SUBSTEPS = 9
+
+# How long each backend is measured at each size [s], and how often at least.
+_SPELL = 0.03
+_LEAST = 3
+
 
 class FluidBackend(FieldBackend):
     """Surfaces with deep fluid below: shifted sparse solves on the CPU, whatever draws the frames; see `Backend`.
@@ -46,16 +55,20 @@ class FluidBackend(FieldBackend):
     _operator: FluidOperator
 
     def __init__(self, operator: FluidOperator, *, keeps_volume: bool | None = False) -> None:
-        self._operator, self.keeps_volume = operator, keeps_volume
+        self._operator = operator
+        self.keeps_volume = keeps_volume
         self._fields = RowLayout(operator.topology)
-        self._h, self._v = self._fields.zeros(), self._fields.zeros()
+        self._h = self._fields.zeros()
+        self._v = self._fields.zeros()
         self._forces = np.zeros(operator.mass.size)
 
     def move(self, operator: WaveOperator) -> None:
         """Refuse: this backend cannot move; see `MovingOperator`."""
         raise NotImplementedError
 
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
+    def kick(
+        self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude
+    ) -> None:
         """Add momenta to some texels, given as the velocities [m/s] that their own mass would have.
 
         The fluid hands them on, and lets none of their mean through.
@@ -65,18 +78,25 @@ class FluidBackend(FieldBackend):
         change = self._operator.acceleration(momentum.reshape(self._operator.mass.shape))
         self._fields.write(self._v, self.velocity() + change)
 
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
+    def load(
+        self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
+    ) -> None:
         """Hold forces [N] on some texels until the next call."""
         self._forces[:] = 0.0
         self._forces[texels] = forces
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
-        operator, loads = self._operator, self._forces.reshape(self._operator.mass.shape)
+        operator = self._operator
+        loads = self._forces.reshape(self._operator.mass.shape)
         decay, span = damped_step(operator, dt)
-        h, v, dent = self.elastic().astype(np.float64), self.velocity().astype(np.float64), self.dent()
+        h = self.elastic().astype(np.float64)
+        v = self.velocity().astype(np.float64)
+        dent = self.dent()
         h += dt / 2 * v
-        self._sums = np.zeros((substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32)
+        self._sums = np.zeros(
+            (substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32
+        )
         for step in range(substeps):
             change = operator.acceleration(operator.elastic_force(h) + loads)
             if operator.viscosity_stencil is not None:
@@ -98,8 +118,12 @@ class FluidBackend(FieldBackend):
 Backend: TypeAlias = CPUBackend | GLBackend | FluidBackend
 
 
-def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool | None = False) -> Backend:
-    """Backend by name; "auto" takes the faster one, see `auto_backend`. Deep fluid is always on the CPU.
+def make_backend(
+    name: str, operator: WaveOperator, *, keeps_volume: bool | None = False
+) -> Backend:
+    """Backend by name; "auto" takes the faster one, see `auto_backend`.
+
+    Deep fluid is always on the CPU.
 
     Raises
     ------
@@ -109,7 +133,9 @@ def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool | None
         If "gl" is asked for and no context can be made.
     """
     if name not in BACKENDS:
-        raise SolverError(f"backend {name!r} does not exist; valid are {', '.join(map(repr, BACKENDS))}")
+        raise SolverError(
+            f"backend {name!r} does not exist; valid are {', '.join(map(repr, BACKENDS))}"
+        )
     if isinstance(operator, FluidOperator):
         return FluidBackend(operator, keeps_volume=keeps_volume)
     if name == "auto":
@@ -120,8 +146,8 @@ def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool | None
 def auto_backend(texels: int = _TYPICAL) -> str:
     """Backend that "auto" stands for on this machine for so many texels: "gl" or "cpu".
 
-    On a hardware driver with compute shaders the faster one, measured once; a software driver runs on the processor's
-    own cores, where the CPU's loops are many times faster.
+    On a hardware driver with compute shaders the faster one, measured once; a software driver runs
+    on the processor's own cores, where the CPU's loops are many times faster.
     """
     try:
         gl = shared_context()
@@ -130,13 +156,6 @@ def auto_backend(texels: int = _TYPICAL) -> str:
         return measured(gl).faster(texels)
     except GLError:
         return "cpu"
-
-
-# Texels along a chart's side of the two sizes that are measured, and substeps of a frame.
-_SIZES, _SUBSTEPS = (64, 192), 9
-
-# How long each backend is measured at each size [s], and how often at least.
-_SPELL, _LEAST = 0.03, 3
 
 
 class Measured(NamedTuple):
@@ -154,14 +173,18 @@ class Measured(NamedTuple):
 
     def __str__(self) -> str:
         rows = zip(self.texels, self.gl, self.cpu, strict=True)
-        return "; ".join(f"{n:,.0f} texels: {1e3 * gl:.2f} ms GL, {1e3 * cpu:.2f} ms CPU" for n, gl, cpu in rows)
+        return "; ".join(
+            f"{n:,.0f} texels: {1e3 * gl:.2f} ms GL, {1e3 * cpu:.2f} ms CPU" for n, gl, cpu in rows
+        )
 
 
 @functools.cache
 def measured(gl: GLContext) -> Measured:
     """The measurement of a device and its driver on this machine, taken now if there is none in the cache."""
     program = importlib.metadata.version("ripple-sim")
-    path = cache_path(f"backends {gl.renderer} {gl.version} {platform.machine()} {os.cpu_count()} {program}", [])
+    path = cache_path(
+        f"backends {gl.renderer} {gl.version} {platform.machine()} {os.cpu_count()} {program}", []
+    )
     with contextlib.suppress(OSError, ValueError, KeyError):
         with np.load(path, allow_pickle=False) as kept:
             known = Measured(*(tuple(kept[name].tolist()) for name in Measured._fields))
@@ -170,7 +193,11 @@ def measured(gl: GLContext) -> Measured:
     found = measure(gl)
     if cache_limit():
         # one that cannot be written is measured again by the next process
-        with contextlib.suppress(OSError), atomic_write(path) as unfinished, unfinished.open("wb") as file:
+        with (
+            contextlib.suppress(OSError),
+            atomic_write(path) as unfinished,
+            unfinished.open("wb") as file,
+        ):
             np.savez(file, allow_pickle=False, **found._asdict())
     return found
 
@@ -182,7 +209,9 @@ def measure(gl: GLContext) -> Measured:
         # on a cube, without links: the time does not depend on the numbers
         topology = cube_topology(n)
         ones = np.ones(topology.shape)
-        operator = WaveOperator(Stencil(topology, np.zeros((6, 4, n + 1, n + 1))), ones, 0 * ones, 0 * ones)
+        operator = WaveOperator(
+            Stencil(topology, np.zeros((6, 4, n + 1, n + 1))), ones, 0 * ones, 0 * ones
+        )
         for backend in (GLBackend(operator, gl), CPUBackend(operator)):
             times[backend.name].append(_seconds(backend))
     texels = [6.0 * n * n for n in _SIZES]

@@ -1,7 +1,8 @@
 """CPU backend: the leapfrog update as one pass over the texels, compiled by numba.
 
-One thread: a substep takes 0.07 ms at N = 128 and 0.3 ms at N = 256, less than a helper may wait for its core while
-other threads render and encode. Waiting for it then costs more than two threads gain.
+One thread: a substep takes 0.07 ms at N = 128 and 0.3 ms at N = 256, less than a helper may wait
+for its core while other threads render and encode. Waiting for it then costs more than two threads
+gain.
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..operator.curvatures import STEPS, Curvatures
 from ..operator.volume import volume_rate
-from ..operator.wave_operator import Bending, StepCoefficients, WaveOperator, number_or_field, step_coefficients
+from ..operator.wave_operator import (
+    Bending,
+    StepCoefficients,
+    WaveOperator,
+    number_or_field,
+    step_coefficients,
+)
 from ..texels.stencil import Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
@@ -32,19 +39,21 @@ from .kernels import (
     Weights,
 )
 
-# Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of them. On charts of
-# 12 columns, loops that begin anew for each take four times as long.
+# Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of
+# them. On charts of 12 columns, loops that begin anew for each take four times as long.
 SMALL = 64
 
 # Floats of a cache line, and of a page of memory.
-LINE, PAGE = 16, 1024
+LINE = 16
+PAGE = 1024
 
 
 class RowLayout:
     """Charts [C, n + 2, pitch] float32, the texels from row 1 and column 1 on.
 
-    Side by side, all charts with their halo are one, [1, n + 2, (C + 1)(n + 2)]: loops run over the halo between them
-    too, where coefficients are 0, and what they leave there is filled again. The last n + 2 columns stay 0.
+    Side by side, all charts with their halo are one, [1, n + 2, (C + 1)(n + 2)]: loops run over the
+    halo between them too, where coefficients are 0, and what they leave there is filled again. The
+    last n + 2 columns stay 0.
 
     Attributes
     ----------
@@ -63,9 +72,11 @@ class RowLayout:
         self._alone = self.n >= SMALL or self._charts == 1
         width = self.n + 2
         if self._alone:
-            self.columns, self._pitch = self.n, -(-width // LINE) * LINE
+            self.columns = self.n
+            self._pitch = -(-width // LINE) * LINE
         else:
-            self.columns, self._pitch = self._charts * width - 2, (self._charts + 1) * width
+            self.columns = self._charts * width - 2
+            self._pitch = (self._charts + 1) * width
         texels, ghosts, sources = topology.addresses
         self.addresses = self._address(texels)
         self.halo = np.stack([self._address(ghosts), self._address(sources)])
@@ -73,7 +84,9 @@ class RowLayout:
             # loops run over these: they are set to 0 again
             beside = np.flatnonzero(topology.rim)
             beside = self._address(beside[(beside // width % width % (width - 1)) > 0])
-            self.halo = np.append(self.halo, [beside, np.full(len(beside), self._pitch - 1)], axis=1)
+            self.halo = np.append(
+                self.halo, [beside, np.full(len(beside), self._pitch - 1)], axis=1
+            )
 
     def zeros(self, shift: int = 0) -> NDArray[np.float32]:
         """A field with halo; its first texel, or that of every row of a chart alone, begins a cache line."""
@@ -84,7 +97,9 @@ class RowLayout:
         if np.ndim(field) == 0:
             return field
         field = np.asarray(field)
-        laid = aligned(field.shape if self._alone else (1, self.n, self.columns), 0, dtype=field.dtype)
+        laid = aligned(
+            field.shape if self._alone else (1, self.n, self.columns), 0, dtype=field.dtype
+        )
         if not self._alone:
             beside = np.zeros((self.n, self._charts, self.n + 2), field.dtype)
             beside[:, :, 1:-1] = field.transpose(1, 0, 2)
@@ -109,19 +124,34 @@ class RowLayout:
         else:
             beside = rows.reshape(4, self.n + 1, count + 1, self.n + 2)
             beside[:, :, :count, : self.n + 1] = stencil.weights.transpose(1, 2, 0, 3)
-        links, addresses = stencil.irregular, self.addresses
-        texels, weights = links.texels, links.weights.astype(np.float32)
-        irregular = Links(self.places[texels], addresses[texels], links.begins, addresses[links.others], weights)
+        links = stencil.irregular
+        addresses = self.addresses
+        texels = links.texels
+        weights = links.weights.astype(np.float32)
+        irregular = Links(
+            self.places[texels], addresses[texels], links.begins, addresses[links.others], weights
+        )
         return Weights(rows, self.columns, irregular)
 
     def squares(self, bending: Curvatures) -> Squares:
         """Weights of curvatures laid out like coefficients, and room for their forces."""
         by_neighbour = bending.weights.astype(np.float32).swapaxes(0, 1)
-        weights = np.stack([[self.coefficients(weight) for weight in kinds] for kinds in by_neighbour])
+        weights = np.stack(
+            [[self.coefficients(weight) for weight in kinds] for kinds in by_neighbour]
+        )
         steps = np.array([row * self._pitch + column for row, column in STEPS])
         rows = weights.shape[-1] // self.columns
         scratch = np.zeros((4, kernels.BLOCK), np.float32)
-        return Squares(weights, steps, rows, self.n, self.columns, self._pitch, self.zeros().reshape(-1), scratch)
+        return Squares(
+            weights,
+            steps,
+            rows,
+            self.n,
+            self.columns,
+            self._pitch,
+            self.zeros().reshape(-1),
+            scratch,
+        )
 
     def texels(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texels of a field, without halo: a view [C, n, n]."""
@@ -148,7 +178,9 @@ class RowLayout:
         return row * self._pitch + chart * (self.n + 2) + column
 
 
-def aligned(shape: tuple[int, ...], column: int, shift: int = 0, dtype: DTypeLike = np.float32) -> NDArray:
+def aligned(
+    shape: tuple[int, ...], column: int, shift: int = 0, dtype: DTypeLike = np.float32
+) -> NDArray:
     """Zeros, of four bytes each, whose first row has the given column `shift` of them into a page."""
     size = int(np.prod(shape))
     memory = np.zeros(size + PAGE, dtype)
@@ -156,7 +188,9 @@ def aligned(shape: tuple[int, ...], column: int, shift: int = 0, dtype: DTypeLik
     return memory[start : start + size].reshape(shape)
 
 
-def part_runs(operator: WaveOperator, fields: RowLayout) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def part_runs(
+    operator: WaveOperator, fields: RowLayout
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Runs of texels in coefficients that belong to one part: where each begins, [k + 1], and its part, [k]."""
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
     beside = fields.coefficients(parts)
@@ -164,7 +198,9 @@ def part_runs(operator: WaveOperator, fields: RowLayout) -> tuple[NDArray[np.int
     return np.append(begins, beside.size), beside[begins].astype(np.int64)
 
 
-def volume_balance(operator: WaveOperator, dt: float, conserve: bool | None, fields: RowLayout) -> Balance | None:
+def volume_balance(
+    operator: WaveOperator, dt: float, conserve: bool | None, fields: RowLayout
+) -> Balance | None:
     """What keeps the volume over a substep of dt [s], if anything needs to; see `volume_rate`."""
     rate = volume_rate(operator, dt, conserve)
     if rate is None:
@@ -177,7 +213,9 @@ def volume_balance(operator: WaveOperator, dt: float, conserve: bool | None, fie
     runs = np.searchsorted(starts, begins), addresses[starts], np.append(starts, len(addresses))
     loaded, total = np.zeros((2, len(begins) - 1), np.float32)
     pressure = fields.coefficients(np.zeros(operator.mass.shape, np.float32))
-    return Balance(*runs, heights, velocities, loaded, total, pressure, *part_runs(operator, fields))
+    return Balance(
+        *runs, heights, velocities, loaded, total, pressure, *part_runs(operator, fields)
+    )
 
 
 class CPUBackend(FieldBackend):
@@ -188,10 +226,13 @@ class CPUBackend(FieldBackend):
     def __init__(self, operator: WaveOperator, *, keeps_volume: bool | None = False) -> None:
         self.keeps_volume = keeps_volume
         self._fields = fields = RowLayout(operator.topology)
-        # the processor takes a store to one field and a load from another at the same place of a page for a conflict:
-        # each field begins elsewhere in its page
-        self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
-        self._stencil, self._features = NO_WEIGHTS, NO_FEATURES
+        # the processor takes a store to one field and a load from another at the same place of a
+        # page for a conflict: each field begins elsewhere in its page
+        self._h, self._h_next, self._v = (
+            fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3)
+        )
+        self._stencil = NO_WEIGHTS
+        self._features = NO_FEATURES
         if isinstance(operator.bending, Bending):
             self._features = self._features._replace(moment=fields.zeros().reshape(-1))
         elif operator.bending is not None:
@@ -200,7 +241,9 @@ class CPUBackend(FieldBackend):
             self._dent = fields.zeros()
             limit = np.full_like(self._dent, np.inf)
             fields.texels(limit)[:] = operator.yield_height
-            self._features = self._features._replace(limit=limit.reshape(-1), dent=self._dent.reshape(-1))
+            self._features = self._features._replace(
+                limit=limit.reshape(-1), dent=self._dent.reshape(-1)
+            )
         self.move(operator)
         self._response = fields.coefficients(number_or_field(operator.response))
         self._part_runs = None if operator.parts is None else part_runs(operator, fields)
@@ -211,7 +254,9 @@ class CPUBackend(FieldBackend):
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
+    def kick(
+        self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude
+    ) -> None:
         """Add velocities [m/s] to some texels (each named once), and one to all, as they respond.
 
         The latter is only noted: the next step adds all at once.
@@ -219,24 +264,45 @@ class CPUBackend(FieldBackend):
         self._v.reshape(-1)[self._fields.addresses[texels]] += velocities
         self._shift = everywhere if self._shift is None else self._shift + everywhere
 
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
+    def load(
+        self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
+    ) -> None:
         """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
-        self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
+        self._loaded = texels
+        self._load_forces = forces
+        self._acceleration = everywhere
         self._load_is_new = True
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
-        k, balance = self._prepare(dt), self._balance
+        k = self._prepare(dt)
+        balance = self._balance
         acceleration = self._pressure(self._acceleration) if balance is None else balance.pressure
         kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
         self._apply_kicks()
         features = self._features
         drags = self._plain and len(features.viscosity.rows) > 0
-        self._sums = np.zeros((substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32)
+        self._sums = np.zeros(
+            (substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32
+        )
         fields = (field.reshape(-1) for field in (self._h, self._v, self._h_next))
         dent = NO_WEIGHTS.irregular.weights if self._dent is None else self._dent.reshape(-1)
-        acting = features.viscosity if drags else None, None if self._plain else features, self._probes, dent
-        kernels.advance(substeps, np.float32(dt), *fields, self._fields.halo, kick, *self._kicks, *acting, self._sums)
+        acting = (
+            features.viscosity if drags else None,
+            None if self._plain else features,
+            self._probes,
+            dent,
+        )
+        kernels.advance(
+            substeps,
+            np.float32(dt),
+            *fields,
+            self._fields.halo,
+            kick,
+            *self._kicks,
+            *acting,
+            self._sums,
+        )
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
         if self._crests is not None:
@@ -248,11 +314,14 @@ class CPUBackend(FieldBackend):
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
-        self._operator, fields = operator, self._fields
+        self._operator = operator
+        fields = self._fields
         self._stencil = fields.weights(operator.stencil, self._stencil.rows)
         features = self._features
         if operator.viscosity_stencil is not None:
-            features = features._replace(viscosity=fields.weights(operator.viscosity_stencil, features.viscosity.rows))
+            features = features._replace(
+                viscosity=fields.weights(operator.viscosity_stencil, features.viscosity.rows)
+            )
         if isinstance(operator.bending, Bending):
             rigidity = fields.coefficients(operator.bending.rigidity.astype(np.float32))
             laplace = fields.weights(operator.bending.laplace, features.laplace.rows)
@@ -281,7 +350,9 @@ class CPUBackend(FieldBackend):
         if self._part_runs is None:
             return np.float32(amplitude)
         begins, parts = self._part_runs
-        return np.repeat(np.broadcast_to(np.float32(amplitude), self._part_count)[parts], np.diff(begins))
+        return np.repeat(
+            np.broadcast_to(np.float32(amplitude), self._part_count)[parts], np.diff(begins)
+        )
 
     def _prepare(self, dt: float) -> StepCoefficients:
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
@@ -294,10 +365,14 @@ class CPUBackend(FieldBackend):
             varied = varied or self._part_runs is not None or self._balance is not None
             # beside the gain all of them are fields, or none
             each = (k.gain, k.decay, k.spring, k.span)
-            laid_out = map(self._fields.coefficients, np.broadcast_arrays(*each) if varied else each)
+            laid_out = map(
+                self._fields.coefficients, np.broadcast_arrays(*each) if varied else each
+            )
             self._coefficients = StepCoefficients(*laid_out)
             features = self._features
-            self._plain = not (varied or len(features.moment) or len(features.squares.force) or len(features.dent))
+            self._plain = not (
+                varied or len(features.moment) or len(features.squares.force) or len(features.dent)
+            )
             # a field where forces are added up, or the number 0
             drags = len(features.viscosity.rows) > 0 or not self._plain
             if drags != bool(np.ndim(self._extra)):

@@ -41,7 +41,11 @@ class FieldBackend:
 
     def dent(self) -> NDArray[np.float32]:
         """The part of the height that stays [m], [C, n, n]."""
-        return np.zeros(self._operator.mass.shape, np.float32) if self._dent is None else self._fields.read(self._dent)
+        return (
+            np.zeros(self._operator.mass.shape, np.float32)
+            if self._dent is None
+            else self._fields.read(self._dent)
+        )
 
     def velocity(self) -> NDArray[np.float32]:
         """Copy of the velocity [m/s], [C, n, n]."""
@@ -57,7 +61,9 @@ class FieldBackend:
         self._fields.write(self._crests, np.float32(0))
         return crests
 
-    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
+    def set_height(
+        self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None
+    ) -> None:
         """Replace the elastic height, and the permanent one: 0 unless given."""
         self._fields.write(self._h, height)
         if self._dent is None and dent is not None and dent.any():
@@ -91,4 +97,6 @@ class FieldBackend:
 
     def _raise_crests(self) -> None:
         """Raise the crests to the height where that is greater."""
-        self._fields.write(self._crests, np.maximum(self._fields.read(self._crests), np.abs(self.height())))
+        self._fields.write(
+            self._crests, np.maximum(self._fields.read(self._crests), np.abs(self.height()))
+        )

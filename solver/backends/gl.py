@@ -20,7 +20,15 @@ from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_li
 from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
-from .gl_fields import DeviceField, DeviceProbes, FieldLayout, Pressure, TexelList, bind_buffers, to_buffer
+from .gl_fields import (
+    DeviceField,
+    DeviceProbes,
+    FieldLayout,
+    Pressure,
+    TexelList,
+    bind_buffers,
+    to_buffer,
+)
 from .kernels import Amplitude, Probes
 
 # What the law of a quad asks for
@@ -30,31 +38,57 @@ _LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "FADED", "TINY", "PER_TI
 class DeviceStiffness:
     """Makes stencils such as `stencil`, of one set of cells for one coefficient, wherever the vertices are.
 
-    The quads are the GPU's; the few other cells are worked out on the CPU, and what they give is uploaded. `mass`
-    [C, n, n] is in kg.
+    The quads are the GPU's; the few other cells are worked out on the CPU, and what they give is
+    uploaded. `mass` [C, n, n] is in kg.
     """
 
-    def __init__(self, fields: FieldLayout, stencil: MovedStencil, mass: NDArray[np.float64]) -> None:
-        self._fields, self._mass, gl = fields, mass, fields.gl
-        topology, texels, ride = stencil.topology, stencil.cells, stencil.places.ride
-        self._width, self._count = topology.halo.shape[1], topology.halo.size
+    def __init__(
+        self, fields: FieldLayout, stencil: MovedStencil, mass: NDArray[np.float64]
+    ) -> None:
+        self._fields = fields
+        self._mass = mass
+        gl = fields.gl
+        topology = stencil.topology
+        texels = stencil.cells
+        ride = stencil.places.ride
+        self._width = topology.halo.shape[1]
+        self._count = topology.halo.size
         at = texels.special_places
         self._special = ride.corners[at], ride.weights[at], np.empty((3, len(at)))
         self._around = np.zeros((3, self._count))
-        added, crossing, missing = texels.special_links, crossing_links(topology), missing_links(topology)
+        added = texels.special_links
+        crossing = crossing_links(topology)
+        missing = missing_links(topology)
         self._added = _link_groups(gl, topology, added, np.arange(len(added) + 1))
         self._copies = _link_groups(gl, topology, crossing.copies, crossing.begins)
         self._missing = _link_groups(gl, topology, missing, np.arange(len(missing) + 1))
         shares = np.where(topology.rim, 0.5, 1.0) if topology.fixed_rim else np.ones(self._count)
         with gl as ctx:
             self._vertices = ctx.buffer(reserve=stencil.places.V.nbytes)
-            self._places, self._sides = ctx.buffer(reserve=24 * self._count), ctx.buffer(reserve=24 * self._count)
-            self._values, self._peak = ctx.buffer(reserve=4 * (1 + len(added))), ctx.buffer(bytes(4))
-        self._corners, quads = to_buffer(gl, ride.corners, np.int32), stencil.coefficient[0]
+            self._places = ctx.buffer(reserve=24 * self._count)
+            self._sides = ctx.buffer(reserve=24 * self._count)
+            self._values = ctx.buffer(reserve=4 * (1 + len(added)))
+            self._peak = ctx.buffer(bytes(4))
+        self._corners = to_buffer(gl, ride.corners, np.int32)
+        quads = stencil.coefficient[0]
         self._weights = to_buffer(gl, np.nan_to_num(ride.weights), np.float64)
-        self._conductance, self._per_area, self._detours, self._shares, self._masses, self._beside = (
+        (
+            self._conductance,
+            self._per_area,
+            self._detours,
+            self._shares,
+            self._masses,
+            self._beside,
+        ) = (
             to_buffer(gl, each, np.float32)
-            for each in (quads.conductance, quads.per_area, quads.detours, shares, mass, np.zeros(mass.size))
+            for each in (
+                quads.conductance,
+                quads.per_area,
+                quads.detours,
+                shares,
+                mass,
+                np.zeros(mass.size),
+            )
         )
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
         self._shaders = {name: fields.shader(name) for name in names}
@@ -63,7 +97,8 @@ class DeviceStiffness:
 
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
         """Write the nine-point stencil into a buffer of `FieldLayout.links`; return the irregular links."""
-        V, (quads, _) = stencil.places.V, stencil.coefficient
+        V = stencil.places.V
+        (quads, _) = stencil.coefficient
         interpolate(V, *self._special)
         self._around[:, stencil.cells.special_places] = self._special[-1]
         values, of_cells = stencil.cells.special(self._around, stencil.coefficient)
@@ -71,7 +106,9 @@ class DeviceStiffness:
         with self._fields.gl:
             self._vertices.write(V.tobytes())
             self._values.write(values.astype(np.float32).tobytes() or bytes(4))
-            self._run("ride", self._count, self._vertices, self._corners, self._weights, self._places)
+            self._run(
+                "ride", self._count, self._vertices, self._corners, self._weights, self._places
+            )
             shape = {"width": self._width, "scale": quads.scale, "power": quads.power}
             given = self._places, self._conductance, self._per_area, self._detours
             self._run("quads", self._count, *given, self._sides, **shape)
@@ -82,10 +119,19 @@ class DeviceStiffness:
             # Gershgorin's bound
             if len(irregular.texels):
                 beside = np.zeros(self._mass.size, np.float32)
-                beside[irregular.texels] = np.add.reduceat(np.abs(irregular.weights), irregular.begins[:-1])
+                beside[irregular.texels] = np.add.reduceat(
+                    np.abs(irregular.weights), irregular.begins[:-1]
+                )
                 self._beside.write(beside.tobytes())
             self._peak.write(bytes(4))
-            buffers = buffer, self._peak, self._fields.texel_addresses, self._shares, self._beside, self._masses
+            buffers = (
+                buffer,
+                self._peak,
+                self._fields.texel_addresses,
+                self._shares,
+                self._beside,
+                self._masses,
+            )
             self._run("link_rates", self._mass.size, *buffers, width=self._width)
             stencil.known_fastest = float(np.frombuffer(self._peak.read(), np.float32)[0])
         return irregular
@@ -109,7 +155,11 @@ def _link_groups(
     charts, n, _ = topology.shape
     chart, link, r, c = np.unravel_index(links, (charts, 4, n + 1, n + 1))
     places = to_buffer(gl, 4 * ((chart * (n + 2) + r) * (n + 2) + c) + link, np.int32)
-    return len(begins) - 1, places, to_buffer(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32)
+    return (
+        len(begins) - 1,
+        places,
+        to_buffer(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32),
+    )
 
 
 class StencilBuffer:
@@ -117,16 +167,19 @@ class StencilBuffer:
 
     def __init__(self, fields: FieldLayout, stencil: Stencil) -> None:
         self._fields = fields
-        self.buffer, self.irregular = to_buffer(fields.gl, fields.links(stencil), np.float32), stencil.irregular
+        self.buffer = to_buffer(fields.gl, fields.links(stencil), np.float32)
+        self.irregular = stencil.irregular
         self._device: DeviceStiffness | None = None
 
     def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
         """Take over another stencil of the same topology: made on the GPU where that can be, else uploaded.
 
-        It can be where texels lie on their triangles, and none of them twice. A software driver's shaders run on the
-        processor's own cores, where the CPU's loops take a fifth of the time.
+        It can be where texels lie on their triangles, and none of them twice. A software driver's
+        shaders run on the processor's own cores, where the CPU's loops take a fifth of the time.
         """
-        moved = stencil if isinstance(stencil, MovedStencil) and not self._fields.gl.software else None
+        moved = (
+            stencil if isinstance(stencil, MovedStencil) and not self._fields.gl.software else None
+        )
         if moved and moved.places.ride.on_triangles:
             if self._device is None:
                 self._device = DeviceStiffness(self._fields, moved, mass)
@@ -143,9 +196,11 @@ class Squares:
     def __init__(self, fields: FieldLayout, bending: Curvatures, *, add: bool) -> None:
         self._fields = fields
         self._weights, self._transposed = (
-            fields.upload(*each.reshape(-1, *bending.topology.shape)) for each in (bending.weights, bending.transposed)
+            fields.upload(*each.reshape(-1, *bending.topology.shape))
+            for each in (bending.weights, bending.transposed)
         )
-        self._curvatures, self._halo = fields.upload(*np.zeros(KINDS, np.float32)), fields.halo_pairs(KINDS)
+        self._curvatures = fields.upload(*np.zeros(KINDS, np.float32))
+        self._halo = fields.halo_pairs(KINDS)
         self._take = fields.texel_shader("curvatures")
         self._bend = fields.texel_shader("bend", **({"ADD": 1} if add else {}))
 
@@ -176,7 +231,8 @@ class ExtraForces:
             self._squares = Squares(fields, operator.bending, add=self._viscosity is not None)
         if isinstance(operator.bending, Bending):
             self._laplace = StencilBuffer(fields, operator.bending.laplace)
-            self._rigidity, self._moment = fields.upload(operator.bending.rigidity), fields.zeros()
+            self._rigidity = fields.upload(operator.bending.rigidity)
+            self._moment = fields.zeros()
             self._apply_rigidity = fields.texel_shader("apply", FACTOR=1)
             added = {"ADD": 1} if self._viscosity else {}
             self._subtract_laplace = fields.texel_shader("apply", SUBTRACT=1, **added)
@@ -199,11 +255,22 @@ class ExtraForces:
             return
         if self._viscosity:
             self._fields.fill_halo(velocity)
-            self._apply(self._apply_viscosity, self._viscosity, self._viscosity_links, velocity, self.field)
+            self._apply(
+                self._apply_viscosity, self._viscosity, self._viscosity_links, velocity, self.field
+            )
         if self._laplace:
-            self._apply(self._apply_rigidity, self._laplace, self._moment_links, height, self._moment, self._rigidity)
+            self._apply(
+                self._apply_rigidity,
+                self._laplace,
+                self._moment_links,
+                height,
+                self._moment,
+                self._rigidity,
+            )
             self._fields.fill_halo(self._moment)
-            self._apply(self._subtract_laplace, self._laplace, self._bending_links, self._moment, self.field)
+            self._apply(
+                self._subtract_laplace, self._laplace, self._bending_links, self._moment, self.field
+            )
         if self._squares:
             self._squares.gather(height, self.field)
 
@@ -241,7 +308,11 @@ class GLBackend(FieldBackend):
     name = "gl"
 
     def __init__(
-        self, operator: WaveOperator, gl: GLContext | None = None, *, keeps_volume: bool | None = False
+        self,
+        operator: WaveOperator,
+        gl: GLContext | None = None,
+        *,
+        keeps_volume: bool | None = False,
     ) -> None:
         self.keeps_volume = keeps_volume
         self._gl = gl if gl is not None else shared_context()
@@ -254,12 +325,15 @@ class GLBackend(FieldBackend):
         # a number for each part, where there are several: given at once, and held by the load
         self._given = None if operator.parts is None else Pressure(fields, operator)
         self._held: Pressure | None = None
-        self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
+        self._kicks = TexelList(self._gl)
+        self._forces = TexelList(self._gl)
         self._extra = ExtraForces(fields, operator)
         if operator.yield_height is not None:
-            self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
+            self._dent = fields.zeros()
+            self._yield = fields.upload(operator.yield_height)
             self._yielding = fields.texel_shader("flow")
-        self._kick, self._irregular_kick = fields.shader("kick"), fields.shader("irregular", KICK=1)
+        self._kick = fields.shader("kick")
+        self._irregular_kick = fields.shader("irregular", KICK=1)
         self._drift = fields.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
         self._shift: Amplitude = 0.0
         self._prepared = (0.0, keeps_volume)
@@ -271,9 +345,13 @@ class GLBackend(FieldBackend):
         if self._gl.software:
             return self.height()
         fields = [self._h, *([] if self._dent is None else [self._dent])]
-        return DeviceField.gathered(self._gl, self._operator.mass.shape, self._fields.texel_addresses, *fields)
+        return DeviceField.gathered(
+            self._gl, self._operator.mass.shape, self._fields.texel_addresses, *fields
+        )
 
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
+    def kick(
+        self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude
+    ) -> None:
         """Add velocities [m/s] to some texels, and one to all, as they respond.
 
         They are collected, and uploaded together before the next step or read of the velocity.
@@ -281,9 +359,13 @@ class GLBackend(FieldBackend):
         self._waiting.append((texels, velocities))
         self._shift = self._shift + everywhere
 
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
+    def load(
+        self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
+    ) -> None:
         """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
-        self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
+        self._loaded = texels
+        self._load_forces = forces
+        self._acceleration = everywhere
         self._load_is_new = True
 
     def advance(self, substeps: int, dt: float) -> None:
@@ -301,7 +383,9 @@ class GLBackend(FieldBackend):
                 if self._held is not None and self._held.follow is not None:
                     self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
-                pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
+                pressure = (
+                    (self._held.parts, self._held.amplitudes) if self._held is not None else ()
+                )
                 operator = self._stencil.buffer, self._coefficients, self._extra.field
                 bind_buffers(self._h, self._v, self._h_next, *operator, *pressure)
                 self._fields.run_texels(kick_drift)
@@ -347,7 +431,9 @@ class GLBackend(FieldBackend):
     def _start(self, dt: float) -> None:
         """Apply the kicks that wait, and drift."""
         if self._waiting:
-            texels, where = np.unique(np.concatenate([each[0] for each in self._waiting]), return_inverse=True)
+            texels, where = np.unique(
+                np.concatenate([each[0] for each in self._waiting]), return_inverse=True
+            )
             kicks = np.bincount(where, np.concatenate([each[1] for each in self._waiting]))
             self._kicks.set(self._fields.texels[texels], kicks)
             self._waiting = []
@@ -359,7 +445,9 @@ class GLBackend(FieldBackend):
                 bind_buffers(self._h, self._v, self._response)
             else:
                 self._given.set(self._shift)
-                bind_buffers(self._h, self._v, self._response, self._given.parts, self._given.amplitudes)
+                bind_buffers(
+                    self._h, self._v, self._response, self._given.parts, self._given.amplitudes
+                )
             self._fields.run_texels(self._drift)
         self._shift = 0.0
 
@@ -370,7 +458,9 @@ class GLBackend(FieldBackend):
 
     def _raise_crests(self) -> None:
         with self._gl:
-            shader = self._fields.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
+            shader = self._fields.texel_shader(
+                "crests", **({} if self._dent is None else {"DENT": 1})
+            )
             bind_buffers(self._h, self._crests, self._dent)
             self._fields.run_texels(shader)
 
@@ -379,7 +469,8 @@ class GLBackend(FieldBackend):
             self._start(0.0)
 
     def _drop_kicks(self) -> None:
-        self._waiting, self._shift = [], 0.0
+        self._waiting = []
+        self._shift = 0.0
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
         """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
@@ -387,7 +478,9 @@ class GLBackend(FieldBackend):
         if new_length:
             self._step = k = step_coefficients(self._operator, dt)
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
-            self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
+            self._coefficients = self._fields.upload(
+                k.gain, *((k.decay, k.spring, k.span) if self._maps else ())
+            )
             self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
             rate = volume_rate(self._operator, dt, self.keeps_volume)
             several = rate is not None or self._operator.parts is not None
@@ -401,11 +494,15 @@ class GLBackend(FieldBackend):
                 self._held.set(self._acceleration)
             self._load_is_new = False
         defines = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
-        kick_drift = self._fields.texel_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
+        kick_drift = self._fields.texel_shader(
+            "kick_drift", **{name: 1 for name, used in defines.items() if used}
+        )
         if self._held is None:
             kick_drift["acceleration"] = self._acceleration
         if not self._maps:
-            kick_drift["decay"], kick_drift["spring"], kick_drift["span"] = k.decay, k.spring, k.span
+            kick_drift["decay"] = k.decay
+            kick_drift["spring"] = k.spring
+            kick_drift["span"] = k.span
         return kick_drift
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:

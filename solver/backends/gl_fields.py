@@ -1,8 +1,9 @@
 """Fields in storage buffers, and the compute shaders that run over them.
 
-Charts with their halo, links of stencils, lists of texels. A `DeviceField` stays on the GPU: nothing is read back
-unless it is asked for. Shaders are compiled for a layout of fields, and run over texels or lists. `Pressure` holds the
-pressure on each part of the surface in storage buffers; see `volume_rate`.
+Charts with their halo, links of stencils, lists of texels. A `DeviceField` stays on the GPU:
+nothing is read back unless it is asked for. Shaders are compiled for a layout of fields, and run
+over texels or lists. `Pressure` holds the pressure on each part of the surface in storage buffers;
+see `volume_rate`.
 """
 
 from __future__ import annotations
@@ -26,6 +27,12 @@ from .kernels import Amplitude, Probes
 _GROUP = 256
 _SHADERS = "ripple_sim.solver"
 
+# Threads of a group that works through a list.
+_LISTED = 64
+
+# Entries of a list that one group of threads adds up.
+_CHUNK = 2048
+
 
 def bind_buffers(*buffers: moderngl.Buffer | None) -> None:
     """Bind storage buffers to 0, 1, 2 ..., in the order in which a shader declares them; None leaves out a binding."""
@@ -47,15 +54,24 @@ class DeviceField:
     """
 
     def __init__(
-        self, gl: GLContext, shape: tuple[int, ...], share: float, *sources: moderngl.Buffer, **defines: int
+        self,
+        gl: GLContext,
+        shape: tuple[int, ...],
+        share: float,
+        *sources: moderngl.Buffer,
+        **defines: int,
     ) -> None:
-        self.gl, self.shape = gl, shape
+        self.gl = gl
+        self.shape = shape
         count = int(np.prod(shape))
         with gl as ctx:
             self.buffer: moderngl.Buffer = ctx.buffer(reserve=4 * count)
             self._peak = ctx.buffer(bytes(4))
-            program = gl.compute_shader(_SHADERS, "backends/shaders/device_field", GROUP=_GROUP, **defines)
-            program["count"], program["share"] = count, share
+            program = gl.compute_shader(
+                _SHADERS, "backends/shaders/device_field", GROUP=_GROUP, **defines
+            )
+            program["count"] = count
+            program["share"] = share
             bind_buffers(self.buffer, self._peak, *sources)
             program.run(-(-count // _GROUP))
             ctx.memory_barrier()
@@ -63,10 +79,15 @@ class DeviceField:
 
     @classmethod
     def gathered(
-        cls, gl: GLContext, shape: tuple[int, ...], addresses: moderngl.Buffer, *fields: moderngl.Buffer
+        cls,
+        gl: GLContext,
+        shape: tuple[int, ...],
+        addresses: moderngl.Buffer,
+        *fields: moderngl.Buffer,
     ) -> DeviceField:
         """One field, or the sum of two, by the address of every texel in them."""
-        first, second = fields[0], fields[-1]
+        first = fields[0]
+        second = fields[-1]
         return cls(gl, shape, float(len(fields) - 1), first, second, addresses)
 
     def blend(self, other: DeviceField, share: float) -> DeviceField:
@@ -75,7 +96,10 @@ class DeviceField:
 
     @functools.cached_property
     def peak(self) -> float:
-        """The largest size of a value; NaN if one is not a number. Waits until the field is there, for nothing else."""
+        """The largest size of a value; NaN if one is not a number.
+
+        Waits until the field is there, for nothing else.
+        """
         self.gl.wait_for(self._fence)
         with self.gl:
             return float(np.frombuffer(self._peak.read(), np.float32)[0])
@@ -90,10 +114,6 @@ class DeviceField:
         return self.read().astype(np.float32 if dtype is None else dtype, copy=False)
 
 
-# Threads of a group that works through a list.
-_LISTED = 64
-
-
 class FieldLayout:
     """Charts with their halo, [C, n + 2, n + 2] float32, and the shaders in `shaders/` that run over them.
 
@@ -105,7 +125,9 @@ class FieldLayout:
     """
 
     def __init__(self, gl: GLContext, topology: TexelTopology) -> None:
-        self.gl, self._places, self._n = gl, topology.halo.shape, topology.shape[1]
+        self.gl = gl
+        self._places = topology.halo.shape
+        self._n = topology.shape[1]
         self.texels, *halo = topology.addresses
         # places in the halo, and the texels that they show
         self._pairs = np.stack(halo, axis=1)
@@ -114,7 +136,9 @@ class FieldLayout:
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
-        return self.gl.compute_shader("ripple_sim.solver.backends.shaders", name, GROUP=_LISTED, **defines)
+        return self.gl.compute_shader(
+            "ripple_sim.solver.backends.shaders", name, GROUP=_LISTED, **defines
+        )
 
     def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over all texels, see charts.glsl."""
@@ -137,7 +161,9 @@ class FieldLayout:
         pairs = (starts[:, None, None] + self._pairs).reshape(-1, 2)
         return len(pairs), to_buffer(self.gl, pairs, np.int32)
 
-    def fill_halo(self, field: moderngl.Buffer, halo: tuple[int, moderngl.Buffer] | None = None) -> None:
+    def fill_halo(
+        self, field: moderngl.Buffer, halo: tuple[int, moderngl.Buffer] | None = None
+    ) -> None:
         """Fill the halo of a field, or of several with the `halo_pairs` of so many."""
         count, pairs = self._halo if halo is None else halo
         bind_buffers(field, pairs)
@@ -163,7 +189,9 @@ class FieldLayout:
         links[:, :-1, :-1] = np.moveaxis(stencil.weights, 1, -1)
         return links
 
-    def upload_links(self, links: IrregularLinks, factors: NDArray) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
+    def upload_links(
+        self, links: IrregularLinks, factors: NDArray
+    ) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
         """The irregular links of a stencil, with the addresses of their ends, as shaders read them.
 
         `factors` [C, n, n] are those by which the forces on each texel are multiplied.
@@ -173,14 +201,18 @@ class FieldLayout:
         int
             Texels that have any.
         texels, links : moderngl.Buffer
-            (address, first link, one after its last) of each such texel, and the address of each link's other end with
-            the bits of its weight.
+            (address, first link, one after its last) of each such texel, and the address of each
+            link's other end with the bits of its weight.
         """
         scale = np.repeat(factors.reshape(-1)[links.texels], np.diff(links.begins))
         texels = np.stack([self.texels[links.texels], links.begins[:-1], links.begins[1:]], axis=1)
         bits = (scale * links.weights).astype(np.float32).view(np.int32)
         others = np.stack([self.texels[links.others], bits], axis=1)
-        return len(links.texels), to_buffer(self.gl, texels, np.int32), to_buffer(self.gl, others, np.int32)
+        return (
+            len(links.texels),
+            to_buffer(self.gl, texels, np.int32),
+            to_buffer(self.gl, others, np.int32),
+        )
 
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [C, n, n]."""
@@ -205,7 +237,9 @@ class TexelList:
     """Places in a field and a number for each, in buffers that grow when they must."""
 
     def __init__(self, gl: GLContext) -> None:
-        self._gl, self._room, self.count = gl, 0, 0
+        self._gl = gl
+        self._room = 0
+        self.count = 0
 
     def set(self, places: NDArray[np.int64], values: NDArray) -> None:
         """Replace the list."""
@@ -213,14 +247,11 @@ class TexelList:
         with self._gl as ctx:
             if self.count > self._room:
                 self._room = max(2 * self.count, 1024)
-                self.places, self.values = ctx.buffer(reserve=4 * self._room), ctx.buffer(reserve=4 * self._room)
+                self.places = ctx.buffer(reserve=4 * self._room)
+                self.values = ctx.buffer(reserve=4 * self._room)
             if self.count:
                 self.places.write(places.astype(np.int32).tobytes())
                 self.values.write(values.astype(np.float32).tobytes())
-
-
-# Entries of a list that one group of threads adds up.
-_CHUNK = 2048
 
 
 class Pressure:
@@ -229,12 +260,18 @@ class Pressure:
     Attributes
     ----------
     follow : callable or None
-        With a `rate`: sets the amplitudes of the coming substep by its height and velocity, so that the volume stays.
+        With a `rate`: sets the amplitudes of the coming substep by its height and velocity, so that
+        the volume stays.
     """
 
-    def __init__(self, fields: FieldLayout, operator: WaveOperator, rate: VolumeRate | None = None) -> None:
-        numbers = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
-        self._gl, self._count = fields.gl, int(numbers.max()) + 1
+    def __init__(
+        self, fields: FieldLayout, operator: WaveOperator, rate: VolumeRate | None = None
+    ) -> None:
+        numbers = (
+            np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
+        )
+        self._gl = fields.gl
+        self._count = int(numbers.max()) + 1
         self.parts = fields.upload(numbers)
         with fields.gl as ctx:
             self._asked = ctx.buffer(reserve=4 * self._count)
@@ -243,17 +280,32 @@ class Pressure:
         if rate is None:
             return
         begins, texels, heights, velocities = rate
-        # the entries of each part in chunks: first and one after the last of each; where those of a part begin
-        cuts = [np.append(np.arange(first, last, _CHUNK), last) for first, last in itertools.pairwise(begins)]
+        # the entries of each part in chunks: first and one after the last of each; where those of a
+        # part begin
+        cuts = [
+            np.append(np.arange(first, last, _CHUNK), last)
+            for first, last in itertools.pairwise(begins)
+        ]
         chunks = np.concatenate([np.stack([each[:-1], each[1:]], axis=1) for each in cuts])
         bounds = np.cumsum([0, *(len(each) - 1 for each in cuts)])
-        factors = np.stack([heights, velocities if len(velocities) else np.zeros_like(heights)], axis=1)
-        tables = ((fields.texels[texels], np.int32), (factors, np.float32), (chunks, np.int32), (bounds, np.int32))
+        factors = np.stack(
+            [heights, velocities if len(velocities) else np.zeros_like(heights)], axis=1
+        )
+        tables = (
+            (fields.texels[texels], np.int32),
+            (factors, np.float32),
+            (chunks, np.int32),
+            (bounds, np.int32),
+        )
         *entries, first = (to_buffer(self._gl, *each) for each in tables)
         sums = to_buffer(self._gl, np.zeros(len(chunks)), np.float32)
-        weigh, balance = fields.shader("volume"), fields.shader("volume", PARTS=1)
+        weigh = fields.shader("volume")
+        balance = fields.shader("volume", PARTS=1)
         # by themselves: a circle with `self` would keep buffers until Python looks for garbage
-        gl, asked, amplitudes, count = self._gl, self._asked, self.amplitudes, self._count
+        gl = self._gl
+        asked = self._asked
+        amplitudes = self.amplitudes
+        count = self._count
 
         def follow(height: moderngl.Buffer, velocity: moderngl.Buffer) -> None:
             bind_buffers(height, velocity, *entries, sums)
@@ -274,12 +326,17 @@ class DeviceProbes:
     """The sums of `Probes`, one group of threads each; those of all substeps of a step are read back together."""
 
     def __init__(self, fields: FieldLayout, probes: Probes) -> None:
-        self._gl, self._count, self._steps, self._room = fields.gl, len(probes.heights), 0, 0
+        self._gl = fields.gl
+        self._count = len(probes.heights)
+        self._steps = 0
+        self._room = 0
         self._shaders = fields.shader("probe"), fields.shader("probe", DENT=1)
         weights = probes.weights.astype(np.float32).view(np.int32)
         entries = np.stack([fields.texels[probes.texels], weights], axis=1)
         rows = np.stack([probes.begins[:-1], probes.begins[1:], probes.heights], axis=1)
-        self._rows, self._entries = (to_buffer(fields.gl, each, np.int32) for each in (rows, entries))
+        self._rows, self._entries = (
+            to_buffer(fields.gl, each, np.int32) for each in (rows, entries)
+        )
 
     def begin(self, substeps: int) -> None:
         """Make room for the sums of so many substeps."""
@@ -295,7 +352,8 @@ class DeviceProbes:
     ) -> None:  # fmt: skip
         """The sums of a substep, whose heights have drifted beyond its velocities [s]."""
         shader = self._shaders[dent is not None]
-        shader["first"], shader["drifted"] = step * self._count, drifted
+        shader["first"] = step * self._count
+        shader["drifted"] = drifted
         bind_buffers(height, velocity, self._rows, self._entries, self._sums, dent)
         shader.run(self._count)
         self._gl.barrier()  # later substeps write what is read here

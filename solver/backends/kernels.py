@@ -1,12 +1,12 @@
 """Compiled loops of a wave step on the CPU: the nine-point stencil's force on a texel, and the step that it drives.
 
-Nothing is contracted or reordered: every loop over texels gives the same numbers, and the two ends of a link see the
-same force, so that momentum is kept. Rows are cut out of the fields before the loop over columns: the compiler then
-makes better vector code of that loop.
+Nothing is contracted or reordered: every loop over texels gives the same numbers, and the two ends
+of a link see the same force, so that momentum is kept. Rows are cut out of the fields before the
+loop over columns: the compiler then makes better vector code of that loop.
 
-Fields are float32 charts with halo, see `RowLayout`, and all of them are flat here: indices of several axes take twice
-as long to compile. A coefficient is a number or a flat field [C n columns]; a number costs no read. Arrays that belong
-together are one argument.
+Fields are float32 charts with halo, see `RowLayout`, and all of them are flat here: indices of
+several axes take twice as long to compile. A coefficient is a number or a flat field [C n columns];
+a number costs no read. Arrays that belong together are one argument.
 """
 
 from __future__ import annotations
@@ -29,12 +29,15 @@ BLOCK = 512
 # Of the operator's `response`: a number, or one for each of its parts.
 Amplitude: TypeAlias = float | Floats
 
+_NO_INTS = np.zeros(0, np.int64)
+_NO_FLOATS = np.zeros(0, np.float32)
+
 
 class Links(NamedTuple):
     """The irregular links of a stencil; see `IrregularLinks`. Often none.
 
-    Flat indices of the texels in coefficients, their addresses in a field with halo, where the links of each begin, the
-    addresses of their other ends, their weights.
+    Flat indices of the texels in coefficients, their addresses in a field with halo, where the
+    links of each begin, the addresses of their other ends, their weights.
     """
 
     texels: Ints
@@ -85,8 +88,9 @@ def force_at(
 ) -> np.float32:  # fmt: skip
     """Sum over the eight links of weight (h_j - h_i) at column c.
 
-    The first three are rows of the field below, at and above the texel; the others rows of its links, and of those of
-    the places below. They are arguments of their own, since tuples take longer to compile.
+    The first three are rows of the field below, at and above the texel; the others rows of its
+    links, and of those of the places below. They are arguments of their own, since tuples take
+    longer to compile.
     """
     x = row[c]
     return (
@@ -100,7 +104,8 @@ def force_at(
 @kernel(no_cpython_wrapper=True)
 def irregular_force(links: Links, i: int, h: Floats32) -> np.float32:
     """Sum of weight (h_j - h_i) over the irregular links of texel i of the list."""
-    here, force = h[links.addresses[i]], np.float32(0)
+    here = h[links.addresses[i]]
+    force = np.float32(0)
     for k in range(links.begins[i], links.begins[i + 1]):
         force += links.weights[k] * (h[links.others[k]] - here)
     return force
@@ -109,17 +114,30 @@ def irregular_force(links: Links, i: int, h: Floats32) -> np.float32:
 @kernel(no_cpython_wrapper=True)
 def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Floats32) -> None:
     """The stencil on a field times a factor, written into `out` or added to it."""
-    w, columns = stencil.rows, stencil.columns
-    n, pitch = w.shape[2] - 1, w.shape[3]
+    w = stencil.rows
+    columns = stencil.columns
+    n = w.shape[2] - 1
+    pitch = w.shape[3]
     for i in range(len(w) * n):
-        chart, r = i // n, i % n + 1
+        chart = i // n
+        r = i % n + 1
         at = (chart * (n + 2) + r) * pitch
-        below, row, above = h[at - pitch : at], h[at : at + pitch], h[at + pitch : at + 2 * pitch]
-        east, north, south = w[chart, 0, r], w[chart, 1, r], w[chart, 1, r - 1]
-        rising, risen, falling, fallen = w[chart, 2, r], w[chart, 2, r - 1], w[chart, 3, r], w[chart, 3, r - 1]
-        factors, result = row_of(factor, i * columns, columns), out[at : at + pitch]
+        below = h[at - pitch : at]
+        row = h[at : at + pitch]
+        above = h[at + pitch : at + 2 * pitch]
+        east = w[chart, 0, r]
+        north = w[chart, 1, r]
+        south = w[chart, 1, r - 1]
+        rising = w[chart, 2, r]
+        risen = w[chart, 2, r - 1]
+        falling = w[chart, 3, r]
+        fallen = w[chart, 3, r - 1]
+        factors = row_of(factor, i * columns, columns)
+        result = out[at : at + pitch]
         for c in range(1, columns + 1):
-            force = force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
+            force = force_at(
+                below, row, above, east, north, south, rising, risen, falling, fallen, c
+            )
             force *= value_in(factors, c - 1)
             result[c] = result[c] + force if add else force
     irregular = stencil.irregular
@@ -143,8 +161,9 @@ class Kick(NamedTuple):
 class Balance(NamedTuple):
     """What keeps the volume, see `volume_rate`: factors of texels that lie side by side in runs.
 
-    Where the runs of each part begin, [p + 1], the address of each run, [r], and where its factors begin, [r + 1]; what
-    the load asks for and the sum, each [p]; the pressure, a coefficient, and the `part_runs` of its texels.
+    Where the runs of each part begin, [p + 1], the address of each run, [r], and where its factors
+    begin, [r + 1]; what the load asks for and the sum, each [p]; the pressure, a coefficient, and
+    the `part_runs` of its texels.
     """
 
     begins: Ints
@@ -162,9 +181,10 @@ class Balance(NamedTuple):
 class Squares(NamedTuple):
     """Bending by the squares of three curvatures; see `Curvatures`.
 
-    Weights of the eight neighbours in each curvature, [8, 3, size] as coefficients; steps from an address to those of
-    the neighbours, [8]; rows of texels in all, and in a chart; their columns, and addresses from one row to the next; a
-    field for the forces, none without curvatures; room for a block of texels.
+    Weights of the eight neighbours in each curvature, [8, 3, size] as coefficients; steps from an
+    address to those of the neighbours, [8]; rows of texels in all, and in a chart; their columns,
+    and addresses from one row to the next; a field for the forces, none without curvatures; room
+    for a block of texels.
     """
 
     weights: Floats32
@@ -180,10 +200,10 @@ class Squares(NamedTuple):
 class Features(NamedTuple):
     """What few materials have, each empty where this one lacks it.
 
-    Stencil of the viscosity; stencil of the Laplacian, rigidity, and a field for the moments of bending; the squares of
-    a plate with rims; yield height, a field that is infinite in the halo, and the field of what stays; what keeps the
-    volume. Lengths tell which are empty, not types: with one of them for every set of features, dozens would be
-    compiled.
+    Stencil of the viscosity; stencil of the Laplacian, rigidity, and a field for the moments of
+    bending; the squares of a plate with rims; yield height, a field that is infinite in the halo,
+    and the field of what stays; what keeps the volume. Lengths tell which are empty, not types:
+    with one of them for every set of features, dozens would be compiled.
     """
 
     viscosity: Weights
@@ -196,23 +216,38 @@ class Features(NamedTuple):
     balance: Balance
 
 
-_NO_INTS, _NO_FLOATS = np.zeros(0, np.int64), np.zeros(0, np.float32)
-NO_WEIGHTS = Weights(np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS))
-NO_BALANCE = Balance(
-    _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_INTS, _NO_INTS
+NO_WEIGHTS = Weights(
+    np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS)
 )
-NO_SQUARES = Squares(np.zeros((0, 0, 0), np.float32), _NO_INTS, 0, 1, 0, 0, _NO_FLOATS, np.zeros((4, 0), np.float32))
-NO_FEATURES = Features(NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, NO_SQUARES, _NO_FLOATS, _NO_FLOATS, NO_BALANCE)
+NO_BALANCE = Balance(
+    _NO_INTS,
+    _NO_INTS,
+    _NO_INTS,
+    _NO_FLOATS,
+    _NO_FLOATS,
+    _NO_FLOATS,
+    _NO_FLOATS,
+    _NO_FLOATS,
+    _NO_INTS,
+    _NO_INTS,
+)
+NO_SQUARES = Squares(
+    np.zeros((0, 0, 0), np.float32), _NO_INTS, 0, 1, 0, 0, _NO_FLOATS, np.zeros((4, 0), np.float32)
+)
+NO_FEATURES = Features(
+    NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, NO_SQUARES, _NO_FLOATS, _NO_FLOATS, NO_BALANCE
+)
 
 
 @kernel(no_cpython_wrapper=True)
 def bend(squares: Squares, h: Floats32, halo: Ints, add: bool, out: Floats32) -> None:
     """Force of the curvatures at each texel, written into `out` or added to it.
 
-    Every curvature pulls at the texels from which it was taken, also at those that are the halo of another chart: what
-    gathers there is handed to the texel that it shows.
+    Every curvature pulls at the texels from which it was taken, also at those that are the halo of
+    another chart: what gathers there is handed to the texel that it shows.
     """
-    columns, force = squares.columns, squares.force
+    columns = squares.columns
+    force = squares.force
     force[:] = np.float32(0)
     for i in range(squares.rows):
         at = _first_of_row(squares, i)
@@ -223,7 +258,8 @@ def bend(squares: Squares, h: Floats32, halo: Ints, add: bool, out: Floats32) ->
         force[halo[1, i]] += force[halo[0, i]]
     for i in range(squares.rows):
         at = _first_of_row(squares, i)
-        pull, result = force[at : at + columns], out[at : at + columns]
+        pull = force[at : at + columns]
+        result = out[at : at + columns]
         for c in range(columns):
             result[c] = result[c] + pull[c] if add else pull[c]
 
@@ -231,25 +267,30 @@ def bend(squares: Squares, h: Floats32, halo: Ints, add: bool, out: Floats32) ->
 @kernel(no_cpython_wrapper=True)
 def _first_of_row(squares: Squares, i: int) -> int:
     """Address of the first texel of row i, of all charts."""
-    chart, row = i // squares.chart_rows, i % squares.chart_rows
+    chart = i // squares.chart_rows
+    row = i % squares.chart_rows
     return (chart * (squares.chart_rows + 2) + row + 1) * squares.pitch + 1
 
 
 @kernel(no_cpython_wrapper=True)
-def _pull_neighbours(squares: Squares, first: int, at: int, count: int, h: Floats32, force: Floats32) -> None:
+def _pull_neighbours(
+    squares: Squares, first: int, at: int, count: int, h: Floats32, force: Floats32
+) -> None:
     """Forces of the curvatures of texels side by side: their coefficients begin at `first`, they themselves at `at`."""
-    own, uu, vv, uv = squares.scratch[0], squares.scratch[1], squares.scratch[2], squares.scratch[3]
+    own = squares.scratch[0]
+    uu = squares.scratch[1]
+    vv = squares.scratch[2]
+    uv = squares.scratch[3]
     row = h[at : at + count]
     for c in range(count):
         own[c] = uu[c] = vv[c] = uv[c] = np.float32(0)
     for k in range(len(squares.steps)):
         start = at + squares.steps[k]
-        beside, weights = h[start : start + count], squares.weights[k]
-        to_uu, to_vv, to_uv = (
-            weights[0, first : first + count],
-            weights[1, first : first + count],
-            weights[2, first : first + count],
-        )
+        beside = h[start : start + count]
+        weights = squares.weights[k]
+        to_uu = weights[0, first : first + count]
+        to_vv = weights[1, first : first + count]
+        to_uv = weights[2, first : first + count]
         for c in range(count):
             difference = beside[c] - row[c]
             uu[c] += to_uu[c] * difference
@@ -257,12 +298,11 @@ def _pull_neighbours(squares: Squares, first: int, at: int, count: int, h: Float
             uv[c] += to_uv[c] * difference
     for k in range(len(squares.steps)):
         start = at + squares.steps[k]
-        pulled, weights = force[start : start + count], squares.weights[k]
-        to_uu, to_vv, to_uv = (
-            weights[0, first : first + count],
-            weights[1, first : first + count],
-            weights[2, first : first + count],
-        )
+        pulled = force[start : start + count]
+        weights = squares.weights[k]
+        to_uu = weights[0, first : first + count]
+        to_vv = weights[1, first : first + count]
+        to_uv = weights[2, first : first + count]
         for c in range(count):
             pull = to_uu[c] * uu[c] + to_vv[c] * vv[c] + to_uv[c] * uv[c]
             pulled[c] -= pull
@@ -275,8 +315,9 @@ def _pull_neighbours(squares: Squares, first: int, at: int, count: int, h: Float
 class Probes(NamedTuple):
     """Weighted sums of heights or velocities that are taken after every substep: a sensor's points, or a sound.
 
-    Sum i has the texels and weights from begins[i] to begins[i + 1]; those of `heights` are of heights, the others of
-    velocities. `texels` are flat indices of texels, and addresses in a field where a backend holds them.
+    Sum i has the texels and weights from begins[i] to begins[i + 1]; those of `heights` are of
+    heights, the others of velocities. `texels` are flat indices of texels, and addresses in a field
+    where a backend holds them.
     """
 
     begins: Ints
@@ -294,13 +335,16 @@ class Probes(NamedTuple):
     def of(self, height: NDArray, velocity: NDArray) -> NDArray[np.float64]:
         """The sums [k] of fields [C, n, n]; every sum has a texel."""
         both = (
-            np.add.reduceat(self.weights * x.reshape(-1)[self.texels], self.begins[:-1]) for x in (height, velocity)
+            np.add.reduceat(self.weights * x.reshape(-1)[self.texels], self.begins[:-1])
+            for x in (height, velocity)
         )
         return np.where(self.heights, *both)
 
 
 @kernel(no_cpython_wrapper=True)
-def _probe(probes: Probes, h: Floats32, v: Floats32, dent: Floats32, drifted: np.float32, sums: Floats32) -> None:
+def _probe(
+    probes: Probes, h: Floats32, v: Floats32, dent: Floats32, drifted: np.float32, sums: Floats32
+) -> None:
     """Fill in the sums [k] of a substep, whose heights have drifted beyond its velocities [s]."""
     for i in range(len(sums)):
         total = 0.0
@@ -319,30 +363,53 @@ def _probe(probes: Probes, h: Floats32, v: Floats32, dent: Floats32, drifted: np
 def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.float32) -> None:
     """One substep: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v.
 
-    The small terms are added up first: one rounding at the size of the velocity, which else would gather over many
-    substeps.
+    The small terms are added up first: one rounding at the size of the velocity, which else would
+    gather over many substeps.
     """
-    w, columns = kick.stencil.rows, kick.stencil.columns
-    n, pitch = w.shape[2] - 1, w.shape[3]
+    w = kick.stencil.rows
+    columns = kick.stencil.columns
+    n = w.shape[2] - 1
+    pitch = w.shape[3]
     for i in range(len(w) * n):
-        chart, r, first = i // n, i % n + 1, i * columns
+        chart = i // n
+        r = i % n + 1
+        first = i * columns
         at = (chart * (n + 2) + r) * pitch
-        below, row, above = h[at - pitch : at], h[at : at + pitch], h[at + pitch : at + 2 * pitch]
-        velocity, result = v[at : at + pitch], h_next[at : at + pitch]
-        east, north, south = w[chart, 0, r], w[chart, 1, r], w[chart, 1, r - 1]
-        rising, risen, falling, fallen = w[chart, 2, r], w[chart, 2, r - 1], w[chart, 3, r], w[chart, 3, r - 1]
-        gain, decay = kick.gain[first : first + columns], row_of(kick.decay, first, columns)
-        spring, span = row_of(kick.spring, first, columns), row_of(kick.span, first, columns)
-        extra, acceleration = row_of(kick.extra, at, pitch), row_of(kick.acceleration, first, columns)
+        below = h[at - pitch : at]
+        row = h[at : at + pitch]
+        above = h[at + pitch : at + 2 * pitch]
+        velocity = v[at : at + pitch]
+        result = h_next[at : at + pitch]
+        east = w[chart, 0, r]
+        north = w[chart, 1, r]
+        south = w[chart, 1, r - 1]
+        rising = w[chart, 2, r]
+        risen = w[chart, 2, r - 1]
+        falling = w[chart, 3, r]
+        fallen = w[chart, 3, r - 1]
+        gain = kick.gain[first : first + columns]
+        decay = row_of(kick.decay, first, columns)
+        spring = row_of(kick.spring, first, columns)
+        span = row_of(kick.span, first, columns)
+        extra = row_of(kick.extra, at, pitch)
+        acceleration = row_of(kick.acceleration, first, columns)
         for c in range(1, columns + 1):
-            held = value_in(span, c - 1) * value_in(acceleration, c - 1) - value_in(spring, c - 1) * row[c]
-            force = force_at(below, row, above, east, north, south, rising, risen, falling, fallen, c)
-            new = value_in(decay, c - 1) * velocity[c] + (gain[c - 1] * (force + value_in(extra, c)) + held)
+            held = (
+                value_in(span, c - 1) * value_in(acceleration, c - 1)
+                - value_in(spring, c - 1) * row[c]
+            )
+            force = force_at(
+                below, row, above, east, north, south, rising, risen, falling, fallen, c
+            )
+            new = value_in(decay, c - 1) * velocity[c] + (
+                gain[c - 1] * (force + value_in(extra, c)) + held
+            )
             velocity[c] = new
             result[c] = row[c] + dt * new
     irregular = kick.stencil.irregular
     for i in range(len(irregular.texels)):
-        kicked, address = kick.gain[irregular.texels[i]] * irregular_force(irregular, i, h), irregular.addresses[i]
+        kicked = kick.gain[irregular.texels[i]] * irregular_force(irregular, i, h)
+        address = irregular.addresses[i]
         v[address] += kicked
         h_next[address] += dt * kicked
 
@@ -384,9 +451,11 @@ def advance(
 
     The height ends in `h_next` where their number is odd.
 
-    `sums` [substeps, k] are filled with those of the probes; `dent` is what stays of the height, or empty.
+    `sums` [substeps, k] are filled with those of the probes; `dent` is what stays of the height, or
+    empty.
 
-    What is None is compiled away: `features` where a material has no more than viscosity, which then is `viscosity`.
+    What is None is compiled away: `features` where a material has no more than viscosity, which
+    then is `viscosity`.
     """
     half = dt / np.float32(2)
     for i in range(len(h)):  # what that leaves in the halo is filled again
@@ -426,16 +495,21 @@ def _act(h: Floats32, v: Floats32, halo: Ints, features: Features, extra: Floats
     if len(features.squares.force):
         bend(features.squares, h, halo, drags, extra)
     balance = features.balance
-    for part in range(len(balance.loaded)):  # of which there are none where the density does not vary
+    # of which there are none where the density does not vary
+    for part in range(len(balance.loaded)):
         total = 0.0
         for run in range(balance.begins[part], balance.begins[part + 1]):
-            first, last, address = balance.runs[run], balance.runs[run + 1], balance.addresses[run]
+            first = balance.runs[run]
+            last = balance.runs[run + 1]
+            address = balance.addresses[run]
             total += _weighed(balance.heights[first:last], h[address:])
             if len(balance.velocities):
                 total += _weighed(balance.velocities[first:last], v[address:])
         balance.total[part] = balance.loaded[part] + np.float32(total)
     for i in range(len(balance.parts)):
-        balance.pressure[balance.part_begins[i] : balance.part_begins[i + 1]] = balance.total[balance.parts[i]]
+        balance.pressure[balance.part_begins[i] : balance.part_begins[i + 1]] = balance.total[
+            balance.parts[i]
+        ]
 
 
 @kernel(fastmath={"contract", "reassoc"}, no_cpython_wrapper=True)

@@ -1,10 +1,12 @@
 """The OpenGL context: created here, entered here, checked here, and nowhere else.
 
-`shared_context` gives the one context of a device that all in the process share. Beside it: software drivers, to which
-EGL falls back without saying so; fences, which moderngl lacks, to wait for the GPU without blocking other Python
-threads; and a pool of programs that nobody uses at the time, for compiling one takes as long as a frame.
+`shared_context` gives the one context of a device that all in the process share. Beside it:
+software drivers, to which EGL falls back without saying so; fences, which moderngl lacks, to wait
+for the GPU without blocking other Python threads; and a pool of programs that nobody uses at the
+time, for compiling one takes as long as a frame.
 
-`load_shader` reads GLSL sources from packages, resolves their includes, and defines the constants that Python gives.
+`load_shader` reads GLSL sources from packages, resolves their includes, and defines the constants
+that Python gives.
 """
 
 from __future__ import annotations
@@ -31,6 +33,43 @@ import moderngl
 from ..errors import GLError
 from .current import EGLCurrent, Restore, current_kept, leave_current, load_egl, release_current
 
+# The number that a shader gives to a sampler or uniform block, and its name; and what is to be left
+# out of it.
+_BOUND = re.compile(r"layout\((?:std140, )?binding = (\w+)\) uniform (?:\w+ )?(\w+)")
+_BINDING = re.compile(r"layout\(binding = \w+\) |, binding = \w+")
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
+
+# The plain sonames first; the versioned ones are what runtime packages without -dev symlinks
+# install.
+_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
+
+# Versions of OpenGL that compute shaders need, and that rendering needs.
+COMPUTE = 430
+RENDERING = 410
+
+# Environment variable: how many threads Mesa's llvmpipe draws with; 0: none.
+DRAWING_THREADS = "LP_NUM_THREADS"
+
+# Environment variable of MuJoCo's: number of the EGL device to draw on, where the program names
+# none.
+_MUJOCO_DEVICE = "MUJOCO_EGL_DEVICE_ID"
+
+# What Mesa's shader cache may come to need while a process runs [bytes].
+_SHADER_CACHE = 64e6
+_COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
+_FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
+_TIMEOUT_EXPIRED = 0x911B
+_FAILED = 0x911D
+_MOST = 64  # idle programs at a time
+
+# How long a thread waits for another to leave the context [s]: longer than any frame takes.
+_PATIENCE = 120.0
+
+# How long a thread that waits for the driver keeps others from the context [s], and how long it
+# leaves it to them: a lock that is let go and taken at once is not handed on.
+_TURN = 1e-3
+_PAUSE = 1e-4
+
 
 def load_shader(package: str, name: str, stage: str = "", **defines: object) -> str:
     """Read a shader, resolve its includes, and put the defines behind `#version`.
@@ -40,15 +79,16 @@ def load_shader(package: str, name: str, stage: str = "", **defines: object) -> 
     package : str
         The package below which the shader and whatever it includes lie.
     name : str
-        Path of the file below the package, without `.glsl`: "passes/classify". A line `#include "glsl/frame.glsl"` is
-        replaced by that file, its path likewise relative to the package; a file that was included before is not
-        included again.
+        Path of the file below the package, without `.glsl`: "passes/classify". A line `#include
+        "glsl/frame.glsl"` is replaced by that file, its path likewise relative to the package; a
+        file that was included before is not included again.
     stage : str
-        Which of the shaders in the file, if there are several: lines behind `#stage vertex` belong to the stage
-        "vertex" alone, up to the next such line; those before the first belong to all. So it is in files included.
+        Which of the shaders in the file, if there are several: lines behind `#stage vertex` belong
+        to the stage "vertex" alone, up to the next such line; those before the first belong to all.
+        So it is in files included.
     **defines
-        Constants, written as `#define NAME value` where the text has the name. GROUP is how many threads a group of a
-        compute shader has, which is declared too.
+        Constants, written as `#define NAME value` where the text has the name. GROUP is how many
+        threads a group of a compute shader has, which is declared too.
 
     Raises
     ------
@@ -74,12 +114,17 @@ def _read(folder: Traversable, path: str, stage: str, seen: set[str]) -> str:
     file = folder.joinpath(path)
     if not file.is_file():
         raise GLError(f"package {folder.name} has no shader {path}")
-    lines, belongs = [], True
+    lines = []
+    belongs = True
     for line in _lines(file):  # type: ignore[arg-type]  # a path can be hashed
         if line.startswith("#stage"):
             belongs = line.split()[1] == stage
         elif belongs:
-            lines.append(_read(folder, line.split('"')[1], stage, seen) if line.startswith("#include") else line)
+            lines.append(
+                _read(folder, line.split('"')[1], stage, seen)
+                if line.startswith("#include")
+                else line
+            )
     return "\n".join(lines) + "\n"
 
 
@@ -88,32 +133,9 @@ def _lines(file: Traversable) -> list[str]:
     return file.read_text().splitlines()
 
 
-# The number that a shader gives to a sampler or uniform block, and its name; and what is to be left out of it.
-_BOUND = re.compile(r"layout\((?:std140, )?binding = (\w+)\) uniform (?:\w+ )?(\w+)")
-_BINDING = re.compile(r"layout\(binding = \w+\) |, binding = \w+")
-
-_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
-
-
 def is_software(renderer: str) -> bool:
     """Whether a driver renders on the processor, by its GL_RENDERER."""
     return any(word in renderer.lower() for word in _SOFTWARE)
-
-
-# The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
-_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
-
-# Versions of OpenGL that compute shaders need, and that rendering needs.
-COMPUTE, RENDERING = 430, 410
-
-# Environment variable: how many threads Mesa's llvmpipe draws with; 0: none.
-DRAWING_THREADS = "LP_NUM_THREADS"
-
-# Environment variable of MuJoCo's: number of the EGL device to draw on, where the program names none.
-_MUJOCO_DEVICE = "MUJOCO_EGL_DEVICE_ID"
-
-# What Mesa's shader cache may come to need while a process runs [bytes].
-_SHADER_CACHE = 64e6
 
 
 def _spare_full_disks() -> None:
@@ -132,21 +154,26 @@ def _spare_full_disks() -> None:
 def _draw_without_threads() -> None:
     """Have Mesa's llvmpipe draw in the thread that calls it, unless the user has said how many threads it is to have.
 
-    It reads the variable when its first context is made. One of its threads may still unlock a fence that another has
-    freed: it writes into the program's memory, and glibc ends the program ("corrupted unsorted chunks"). See
-    docs/stability.md. Other drivers know no such variable.
+    It reads the variable when its first context is made. One of its threads may still unlock a
+    fence that another has freed: it writes into the program's memory, and glibc ends the program
+    ("corrupted unsorted chunks"). See docs/stability.md. Other drivers know no such variable.
     """
     os.environ.setdefault(DRAWING_THREADS, "0")
 
 
 def create_context(device: int | None) -> moderngl.Context:
-    """Create a headless context: OpenGL 4.3, or else 4.1; raises GLError. What is current in this thread stays so.
+    """Create a headless context: OpenGL 4.3, or else 4.1; raises GLError.
 
-    Without a `device` it is on the one that the environment variable MUJOCO_EGL_DEVICE_ID names, as MuJoCo's own
-    renderer is, and where that is not set either on the first that yields a context.
+    What is current in this thread stays so.
+
+    Without a `device` it is on the one that the environment variable MUJOCO_EGL_DEVICE_ID names, as
+    MuJoCo's own renderer is, and where that is not set either on the first that yields a context.
     """
     if not sys.platform.startswith("linux"):
-        raise GLError(f"no OpenGL over EGL on {sys.platform}, as rendering and 'gl' need; waves run with backend 'cpu'")
+        raise GLError(
+            f"no OpenGL over EGL on {sys.platform}, as rendering and 'gl' need; waves run with "
+            f"backend 'cpu'"
+        )
     with current_kept():
         return _create_current(device)
 
@@ -179,7 +206,8 @@ def _create_current(device: int | None) -> moderngl.Context:
     for version in (COMPUTE, RENDERING, 330):  # drivers may give the very version that is asked for
         for libraries in _LIBRARIES:
             for index in devices:
-                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}  # not in its hints
+                # not in its hints
+                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
                 try:
                     ctx = moderngl.create_context(require=version, standalone=True, **settings)
                 except Exception as error:  # moderngl raises bare Exception here
@@ -190,8 +218,10 @@ def _create_current(device: int | None) -> moderngl.Context:
                 if version >= RENDERING:
                     return ctx
                 raise GLError(
-                    f"{ctx.info['GL_RENDERER']} has OpenGL {ctx.version_code / 100:.1f}; rendering needs 4.1 or later, "
-                    "backend 'gl' 4.3: update the driver, or take Mesa's llvmpipe (LIBGL_ALWAYS_SOFTWARE=1); waves "
+                    f"{ctx.info['GL_RENDERER']} has OpenGL {ctx.version_code / 100:.1f}; rendering "
+                    f"needs 4.1 or later, "
+                    "backend 'gl' 4.3: update the driver, or take Mesa's llvmpipe "
+                    "(LIBGL_ALWAYS_SOFTWARE=1); waves "
                     "alone run with backend 'cpu'"
                 )
     if device is not None:
@@ -200,41 +230,29 @@ def _create_current(device: int | None) -> moderngl.Context:
     raise GLError(f"no OpenGL 4.1 context on any EGL device ({reason}); {advice}")
 
 
-_COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
-_FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
-_TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
-
-_MOST = 64  # idle programs at a time
-
-# How long a thread waits for another to leave the context [s]: longer than any frame takes.
-_PATIENCE = 120.0
-
-# How long a thread that waits for the driver keeps others from the context [s], and how long it leaves it to them: a
-# lock that is let go and taken at once is not handed on.
-_TURN, _PAUSE = 1e-3, 1e-4
-
-
 class GLContext:
     """One headless OpenGL context on EGL, shared by the GPU wave solver and the renderer.
 
-    Use it as a context manager: entering makes the context current, frees the objects that nobody needs any more, and
-    returns the `moderngl.Context`; leaving the outermost block restores what the program had current, and raises
-    `GLError` if the driver recorded an error meanwhile. Any thread may enter: one at a time, the others wait.
+    Use it as a context manager: entering makes the context current, frees the objects that nobody
+    needs any more, and returns the `moderngl.Context`; leaving the outermost block restores what
+    the program had current, and raises `GLError` if the driver recorded an error meanwhile. Any
+    thread may enter: one at a time, the others wait.
 
-    Python collects objects at any time, in any thread, also in the middle of somebody's frame. So finalizers call no
-    OpenGL: they `discard` objects, which are freed when the context is next entered from outside.
+    Python collects objects at any time, in any thread, also in the middle of somebody's frame. So
+    finalizers call no OpenGL: they `discard` objects, which are freed when the context is next
+    entered from outside.
 
     Parameters
     ----------
     device : int, optional
-        EGL device index. By default that of the environment variable MUJOCO_EGL_DEVICE_ID, or the first device that
-        yields a context.
+        EGL device index. By default that of the environment variable MUJOCO_EGL_DEVICE_ID, or the
+        first device that yields a context.
 
     Raises
     ------
     GLError
-        If no EGL device gives an OpenGL 4.1 core context; at entering, if the context was lost, if another thread does
-        not leave it, or in a process that was forked.
+        If no EGL device gives an OpenGL 4.1 core context; at entering, if the context was lost, if
+        another thread does not leave it, or in a process that was forked.
     """
 
     def __init__(self, device: int | None = None) -> None:
@@ -247,8 +265,8 @@ class GLContext:
         # batches of objects to free
         self._discarded: deque[list[Any]] = deque()
         self._shaders: dict[str, moderngl.ComputeShader] = {}
-        # programs that nobody uses, by their number in OpenGL, the longest idle first; of all, the sources and the
-        # uniforms that they began with
+        # programs that nobody uses, by their number in OpenGL, the longest idle first; of all, the
+        # sources and the uniforms that they began with
         self._idle: dict[int, Any] = {}
         self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
         with current_kept():
@@ -260,7 +278,9 @@ class GLContext:
         """Take in what the new context, which is current, says of itself."""
         own = EGLCurrent.of_thread()
         if own is None:
-            raise GLError("a new OpenGL context does not become current in this thread; see `ripple-sim info`")
+            raise GLError(
+                "a new OpenGL context does not become current in this thread; see `ripple-sim info`"
+            )
         self._current = own
         # moderngl's objects wait in `objects` once they are collected
         self._ctx.gc_mode = "context_gc"
@@ -270,10 +290,15 @@ class GLContext:
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self.computes = self._ctx.version_code >= COMPUTE
-        # fences, which moderngl lacks; ctypes lets go of the interpreter's lock while they are waited for
-        pointer, number, address = ctypes.c_void_p, ctypes.c_uint, load_egl().eglGetProcAddress
+        # fences, which moderngl lacks; ctypes lets go of the interpreter's lock while they are
+        # waited for
+        pointer = ctypes.c_void_p
+        number = ctypes.c_uint
+        address = load_egl().eglGetProcAddress
         self._create_fence = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
-        self._client_wait = ctypes.CFUNCTYPE(number, pointer, number, ctypes.c_uint64)(address(b"glClientWaitSync"))
+        self._client_wait = ctypes.CFUNCTYPE(number, pointer, number, ctypes.c_uint64)(
+            address(b"glClientWaitSync")
+        )
         self._flush = ctypes.CFUNCTYPE(None)(address(b"glFlush"))
         self._delete_fence = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
 
@@ -286,8 +311,10 @@ class GLContext:
         self.check_process()
         if not self._lock.acquire(timeout=_PATIENCE):
             raise GLError(
-                f"thread {self._owner!r} has held the OpenGL context on {self.renderer} for {_PATIENCE:g} s, and "
-                f"thread {threading.current_thread().name!r} cannot enter it; leave the context's `with` block before "
+                f"thread {self._owner!r} has held the OpenGL context on {self.renderer} for "
+                f"{_PATIENCE:g} s, and "
+                f"thread {threading.current_thread().name!r} cannot enter it; leave the context's "
+                f"`with` block before "
                 "waiting for another thread that needs it"
             )
         try:
@@ -299,7 +326,9 @@ class GLContext:
         self._depth += 1
         return self._ctx
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: Any) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: Any
+    ) -> None:
         self._depth -= 1
         try:
             if self._depth:
@@ -309,18 +338,25 @@ class GLContext:
             self._leave()
             if taken and error is None:
                 raise GLError(
-                    f"the OpenGL context on {self.renderer} was left while it drew: something else, such as the "
-                    "finalizer of a mujoco.Renderer, made another context current; what was drawn is incomplete. "
+                    f"the OpenGL context on {self.renderer} was left while it drew: something "
+                    f"else, such as the "
+                    "finalizer of a mujoco.Renderer, made another context current; what was drawn "
+                    "is incomplete. "
                     "Close other renderers instead of leaving them to be collected"
                 )
             if recorded == "GL_OUT_OF_MEMORY":
                 raise GLError(
-                    f"{self.renderer} is out of memory: take a lower resolution or smaller frames, or backend 'cpu'"
+                    f"{self.renderer} is out of memory: take a lower resolution or smaller frames, "
+                    f"or backend 'cpu'"
                 ) from error
             if isinstance(error, moderngl.Error):
-                raise GLError(f"OpenGL failed on {self.renderer}: {error}; see `ripple-sim info`") from error
+                raise GLError(
+                    f"OpenGL failed on {self.renderer}: {error}; see `ripple-sim info`"
+                ) from error
             if recorded != "GL_NO_ERROR" and error is None:
-                raise GLError(f"OpenGL reported {recorded} on {self.renderer}; see `ripple-sim info`")
+                raise GLError(
+                    f"OpenGL reported {recorded} on {self.renderer}; see `ripple-sim info`"
+                )
         finally:
             self._lock.release()
 
@@ -328,7 +364,8 @@ class GLContext:
         """Raise `GLError` in a process that was forked: a context does not survive that."""
         if os.getpid() != self._process:
             raise GLError(
-                f"the OpenGL context belongs to process {self._process}, of which this one ({os.getpid()}) is a fork; "
+                f"the OpenGL context belongs to process {self._process}, of which this one "
+                f"({os.getpid()}) is a fork; "
                 "start processes with multiprocessing's method 'spawn', or take backend 'cpu'"
             )
 
@@ -338,14 +375,17 @@ class GLContext:
         if self._current.is_current():  # left so by Ctrl-C: other threads could not enter
             release_current()
         self._restore = leave_current()
-        # finalizers of others leave the context under our feet, in any line: MuJoCo's call eglReleaseThread
+        # finalizers of others leave the context under our feet, in any line: MuJoCo's call
+        # eglReleaseThread
         self._collects = gc.isenabled()
         gc.disable()
         try:
             if not self._current.make_current():
                 raise GLError(
-                    f"the OpenGL context on {self.renderer} is lost; something else in this process has shut EGL "
-                    "down (a pyvista or VTK window does): run one of the two in a process of its own"
+                    f"the OpenGL context on {self.renderer} is lost; something else in this "
+                    f"process has shut EGL "
+                    "down (a pyvista or VTK window does): run one of the two in a process of its "
+                    "own"
                 )
             self._free_discarded()
         except BaseException:
@@ -362,7 +402,8 @@ class GLContext:
     def discard(self, objects: list[Any]) -> None:
         """Have objects of moderngl's freed when the context is next entered from outside.
 
-        It calls no OpenGL and waits for nobody: finalizers may call it, in any thread and in the middle of a frame.
+        It calls no OpenGL and waits for nobody: finalizers may call it, in any thread and in the
+        middle of a frame.
         """
         self._discarded.append(objects)
 
@@ -398,8 +439,8 @@ class GLContext:
     def flush(self) -> None:
         """Have a software driver draw all commands so far, here and now, without blocking other Python threads.
 
-        Else it draws a pass when another one begins, in a call of moderngl's, which holds the interpreter's lock. Other
-        drivers begin when they like.
+        Else it draws a pass when another one begins, in a call of moderngl's, which holds the
+        interpreter's lock. Other drivers begin when they like.
         """
         if self.software:
             self._flush()
@@ -407,7 +448,8 @@ class GLContext:
     def wait(self) -> None:
         """Wait until the driver has finished all commands, without blocking other Python threads.
 
-        moderngl holds the interpreter's lock while it waits, in `finish` as well as in reading back.
+        moderngl holds the interpreter's lock while it waits, in `finish` as well as in reading
+        back.
         """
         self.wait_for(self.put_fence())
 
@@ -419,8 +461,8 @@ class GLContext:
     def wait_for(self, fence: int) -> None:
         """Wait until the driver has reached a fence, as `wait` does for all commands; the fence is then deleted.
 
-        Outside of the context's `with` block other threads may enter meanwhile. Raises `GLError` if the driver reports
-        a failure.
+        Outside of the context's `with` block other threads may enter meanwhile. Raises `GLError` if
+        the driver reports a failure.
         """
         while True:
             with self:
@@ -442,7 +484,8 @@ class GLContext:
         """Compile a stage of `{name}.glsl` below `package` once and share it: set all uniforms before each use."""
         if not self.computes:
             raise GLError(
-                f"{self.renderer} has OpenGL {self.version.split()[0]}; backend 'gl' needs 4.3: take backend 'cpu'"
+                f"{self.renderer} has OpenGL {self.version.split()[0]}; backend 'gl' needs 4.3: "
+                f"take backend 'cpu'"
             )
         source = load_shader(package, name, stage, **defines)
         if source not in self._shaders:
@@ -450,35 +493,52 @@ class GLContext:
                 self._shaders[source] = _compiled(name, lambda: ctx.compute_shader(source))
         return self._shaders[source]
 
-    def program(self, package: str, name: str, *captured: str, **defines: object) -> moderngl.Program:
+    def program(
+        self, package: str, name: str, *captured: str, **defines: object
+    ) -> moderngl.Program:
         """Compile and link the stages "vertex" and "fragment" of `{name}.glsl` below `package`; see `load_shader`.
 
         An idle program of the same text is taken instead, its uniforms as after compilation.
 
-        `VARYING` is what the one hands to the other: `out` and `in`. With `captured`, names of outputs of the
-        vertex stage, there is no other, and transform feedback captures these. A shader may say `binding = N` of its
-        samplers and uniform blocks, each by a name of its own: GLSL has that from 4.2 on, and here it is done.
+        `VARYING` is what the one hands to the other: `out` and `in`. With `captured`, names of
+        outputs of the vertex stage, there is no other, and transform feedback captures these. A
+        shader may say `binding = N` of its samplers and uniform blocks, each by a name of its own:
+        GLSL has that from 4.2 on, and here it is done.
         """
         stages = {"vertex": "out"} if captured else {"vertex": "out", "fragment": "in"}
-        texts = [load_shader(package, name, stage, VARYING=way, **defines) for stage, way in stages.items()]
+        texts = [
+            load_shader(package, name, stage, VARYING=way, **defines)
+            for stage, way in stages.items()
+        ]
         found = [each for text in texts for each in _BOUND.findall(text)]
         bindings = {bound: int(str(defines.get(number, number))) for number, bound in found}
         vertex, *fragment = (_BINDING.sub("", text) for text in texts)
 
         def linked() -> moderngl.Program:
-            program = ctx.program(vertex_shader=vertex, fragment_shader=next(iter(fragment), None), varyings=captured)
+            program = ctx.program(
+                vertex_shader=vertex, fragment_shader=next(iter(fragment), None), varyings=captured
+            )
             for each in bindings.keys() & set(program):
                 member = program[each]
-                setattr(member, "value" if isinstance(member, moderngl.Uniform) else "binding", bindings[each])
+                setattr(
+                    member,
+                    "value" if isinstance(member, moderngl.Uniform) else "binding",
+                    bindings[each],
+                )
             return program
 
         sources = vertex, *fragment, *captured
         with self as ctx:
-            number = next((each for each in reversed(self._idle) if self._begun[each][0] == sources), None)
+            number = next(
+                (each for each in reversed(self._idle) if self._begun[each][0] == sources), None
+            )
             if number is None:
                 program = _compiled(name, linked)
                 uniforms = [each for each in program if isinstance(program[each], moderngl.Uniform)]
-                self._begun[program.glo] = sources, {each: program[each].read() for each in uniforms}
+                self._begun[program.glo] = (
+                    sources,
+                    {each: program[each].read() for each in uniforms},
+                )
                 return program
             for each, value in self._begun[number][1].items():
                 self._idle[number][each].write(value)

@@ -1,7 +1,8 @@
 """What is current in a thread: a program's own OpenGL context is left for ours, and made current again afterwards.
 
-OpenGL draws with the one context that is current in a thread, whichever window system made it: EGL, GLX (windows on
-X11), or OSMesa (pictures in memory). Programs make theirs current once and rely on that, as robosuite and Gymnasium do.
+OpenGL draws with the one context that is current in a thread, whichever window system made it: EGL,
+GLX (windows on X11), or OSMesa (pictures in memory). Programs make theirs current once and rely on
+that, as robosuite and Gymnasium do.
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ from ..errors import GLError
 
 Restore: TypeAlias = Callable[[], object]
 
-# Names that runtime packages install, and moderngl loads. A name that loads another file would hide a damaged library.
+# Names that runtime packages install, and moderngl loads. A name that loads another file would hide
+# a damaged library.
 _EGL_LIBRARY = "libEGL.so.1"
 _GLX_LIBRARY = "libGL.so.1"
 _OSMESA_LIBRARIES = "libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6"
 
-_EGL_DRAW, _EGL_READ = 0x3059, 0x305A
+_EGL_DRAW = 0x3059
+_EGL_READ = 0x305A
 _OSMESA_TYPE = 0x23
 
 _pointer = ctypes.c_void_p
@@ -35,7 +38,9 @@ def load_egl() -> ctypes.CDLL:
     try:
         egl = ctypes.CDLL(_EGL_LIBRARY)
     except OSError as error:
-        raise GLError(f"the library {_EGL_LIBRARY} cannot be loaded ({error}); see `ripple-sim info`") from error
+        raise GLError(
+            f"the library {_EGL_LIBRARY} cannot be loaded ({error}); see `ripple-sim info`"
+        ) from error
     egl.eglGetCurrentContext.restype = egl.eglGetCurrentDisplay.restype = _pointer
     egl.eglGetCurrentSurface.restype = egl.eglGetProcAddress.restype = _pointer
     egl.eglGetCurrentSurface.argtypes = [ctypes.c_int]
@@ -135,7 +140,8 @@ def _leave_glx() -> Restore | None:
     if glx is None or not (context := glx.glXGetCurrentContext()):
         return None
     display = glx.glXGetCurrentDisplay()
-    draw, read = glx.glXGetCurrentDrawable(), glx.glXGetCurrentReadDrawable()
+    draw = glx.glXGetCurrentDrawable()
+    read = glx.glXGetCurrentReadDrawable()
     glx.glXMakeContextCurrent(display, 0, 0, None)
 
     def restore() -> None:
@@ -153,13 +159,22 @@ def _load_osmesa() -> ctypes.CDLL | None:
             osmesa = ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
             osmesa.OSMesaGetCurrentContext.restype = _pointer
             osmesa.OSMesaGetColorBuffer.argtypes = [_pointer] * 5
-            osmesa.OSMesaMakeCurrent.argtypes = [_pointer, _pointer, ctypes.c_uint, ctypes.c_int, ctypes.c_int]
+            osmesa.OSMesaMakeCurrent.argtypes = [
+                _pointer,
+                _pointer,
+                ctypes.c_uint,
+                ctypes.c_int,
+                ctypes.c_int,
+            ]
             return osmesa
     return None
 
 
 def _leave_osmesa() -> Restore | None:
-    """Leave a context that draws into memory; None if none is current. Python programs have these from PyOpenGL."""
+    """Leave a context that draws into memory; None if none is current.
+
+    Python programs have these from PyOpenGL.
+    """
     osmesa = _load_osmesa() if "OpenGL.osmesa" in sys.modules else None
     if osmesa is None or not (context := osmesa.OSMesaGetCurrentContext()):
         return None

@@ -38,8 +38,17 @@ Arrays = dict[str, NDArray]
 
 _CHART_MAPS: dict[str, Callable[[Arrays], ChartMap]] = {
     "cube": lambda arrays: CubeChartMap(arrays["sphere"]),
-    "patches": lambda arrays: PatchChartMap(Pieces(*(arrays[f"piece_{name}"] for name in Pieces._fields))),
-    "given": lambda arrays: LinearChartMap(arrays["charts"], arrays["corners"], arrays["positions"].shape[1]),
+    "patches": lambda arrays: PatchChartMap(
+        Pieces(*(arrays[f"piece_{name}"] for name in Pieces._fields))
+    ),
+    "given": lambda arrays: LinearChartMap(
+        arrays["charts"], arrays["corners"], arrays["positions"].shape[1]
+    ),
+}
+
+SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
+    "progressive": progressive_sphere_map,
+    "conformal": conformal_sphere_map,
 }
 
 
@@ -57,7 +66,9 @@ def load_atlas(path: str | Path) -> Atlas:
     try:
         chart_map = _CHART_MAPS[layout](arrays)
     except KeyError as error:
-        raise AtlasError(f"atlas file {str(path)!r} lacks {error} or is of another layout; {ADVICE}") from error
+        raise AtlasError(
+            f"atlas file {str(path)!r} lacks {error} or is of another layout; {ADVICE}"
+        ) from error
     topology = glue(arrays["glued"], arrays["positions"].shape[1])
     return (SphereAtlas if kind == SphereAtlas.__name__ else Atlas)(
         mesh=Mesh(arrays["V"], arrays["F"], arrays.get("uv"), arrays.get("corner_uv")),
@@ -71,12 +82,6 @@ def load_atlas(path: str | Path) -> Atlas:
         barycentrics=arrays["barycentrics"],
         notes=tuple(arrays["notes"].tolist()) if "notes" in arrays else (),
     )
-
-
-SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
-    "progressive": progressive_sphere_map,
-    "conformal": conformal_sphere_map,
-}
 
 
 @checked(AtlasError, mesh=instance(Mesh, ", from load_mesh or Mesh.from_arrays"))
@@ -95,34 +100,43 @@ def build_atlas(
     mesh : Mesh
         From `load_mesh` or `Mesh.from_arrays`.
     resolution : int
-        Texels along a chart's side of the cube layout, N; 6 N^2 texels in all, and about as many in every layout,
-        or more where charts would have less than 4 x 4.
+        Texels along a chart's side of the cube layout, N; 6 N^2 texels in all, and about as many in
+        every layout, or more where charts would have less than 4 x 4.
     method : str
-        Sphere map of the cube layout: "progressive" (fold-free, spreads area evenly) or "conformal" (keeps angles but
-        starves limbs; the choice of the paper).
+        Sphere map of the cube layout: "progressive" (fold-free, spreads area evenly) or "conformal"
+        (keeps angles but starves limbs; the choice of the paper).
     cache : bool
-        Keep the result in the user's cache folder and take it from there the next time; see `cache_limit`.
+        Keep the result in the user's cache folder and take it from there the next time; see
+        `cache_limit`.
     layout : str
-        "cube": six charts of N x N texels, for a closed mesh of genus 0 in one part. "patches": many small charts, for
-        any mesh. "auto": the cube for round meshes, patches for all that have long limbs, handles, rims or several
-        parts. The choice depends on the mesh alone, and `Atlas.notes` says why limbs get patches.
+        "cube": six charts of N x N texels, for a closed mesh of genus 0 in one part. "patches":
+        many small charts, for any mesh. "auto": the cube for round meshes, patches for all that
+        have long limbs, handles, rims or several parts. The choice depends on the mesh alone, and
+        `Atlas.notes` says why limbs get patches.
     sphere : float64 [vertex_count, 3], optional
-        Sphere map of the cube layout, where it is known already; `method` is not asked then, and "auto" takes the cube.
+        Sphere map of the cube layout, where it is known already; `method` is not asked then, and
+        "auto" takes the cube.
 
     Raises
     ------
     AtlasError
-        For an invalid resolution, method or layout, a mesh of which the patch layout finds no charts, or an atlas that
-        cannot fit into memory.
+        For an invalid resolution, method or layout, a mesh of which the patch layout finds no
+        charts, or an atlas that cannot fit into memory.
     MeshError
         For the cube layout, if the mesh is not a closed surface of genus 0 in one part.
     SphereMapError
-        For the cube layout, if no certified sphere map is found, or the given one is none of this mesh.
+        For the cube layout, if no certified sphere map is found, or the given one is none of this
+        mesh.
     """
     resolution = check_resolution(resolution)
-    for kind, name, valid in (("sphere map method", method, tuple(SPHERE_MAPS)), ("layout", layout, LAYOUTS)):
+    for kind, name, valid in (
+        ("sphere map method", method, tuple(SPHERE_MAPS)),
+        ("layout", layout, LAYOUTS),
+    ):
         if name not in valid:
-            raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
+            raise AtlasError(
+                f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}"
+            )
     check_memory(resolution)
     builder = _Builder(mesh, resolution, method, cache, sphere)
     cube_fits = layout != "patches"
@@ -171,7 +185,8 @@ class _Builder:
         """Atlas in the layout that suits a closed mesh of genus 0, as its sphere map tells."""
         start = time.perf_counter()
         # files of their own, which say that the choice is made
-        round_path, limbed_path = self._path(f"auto {self.method}"), self._path(f"auto {self.method} {self.resolution}")
+        round_path = self._path(f"auto {self.method}")
+        limbed_path = self._path(f"auto {self.method} {self.resolution}")
         stored = self._stored(round_path, start, "cube")
         if stored is not None:
             return self._at_resolution(stored, round_path, start)
@@ -195,10 +210,16 @@ class _Builder:
         mapped = time.perf_counter()
         try:
             atlas = _patches(self.mesh, self.resolution)
-            note = f"layout patches: texels of the cube would be up to {length:.0f} times as long as wide, on limbs"
+            note = (
+                f"layout patches: texels of the cube would be up to {length:.0f} times as long "
+                f"as wide, on limbs"
+            )
         except AtlasError as error:
             atlas = self._six_charts(sphere, mapped)
-            note = f"layout cube, with texels up to {length:.0f} times as long as wide, since patches fail: {error}"
+            note = (
+                f"layout cube, with texels up to {length:.0f} times as long as wide, since "
+                f"patches fail: {error}"
+            )
         timings = {"sphere_map": mapped - start, **atlas.timings}
         return dataclasses.replace(atlas, timings=timings, notes=(note,))
 
@@ -207,9 +228,14 @@ class _Builder:
         if known is None:
             return SPHERE_MAPS[self.method](self.mesh.V, self.mesh.F)
         sphere = np.ascontiguousarray(known, dtype=np.float64)
-        if sphere.shape != self.mesh.V.shape or not np.isfinite(sphere).all() or not certify(self.mesh.F, sphere).valid:
+        if (
+            sphere.shape != self.mesh.V.shape
+            or not np.isfinite(sphere).all()
+            or not certify(self.mesh.F, sphere).valid
+        ):
             raise SphereMapError(
-                f"sphere has the shape {sphere.shape} and is no fold-free sphere map of the mesh, which has "
+                f"sphere has the shape {sphere.shape} and is no fold-free sphere map of the mesh, "
+                f"which has "
                 f"{len(self.mesh.V)} vertices; leave it out to have one computed"
             )
         return sphere
@@ -223,7 +249,11 @@ class _Builder:
 
     def _path(self, kind: str, *arrays: NDArray) -> Path | None:
         """Where the cache keeps an atlas of this mesh; None without a cache."""
-        return cache_path(f"{FORMAT} {kind}", (self.mesh.V, self.mesh.F, *arrays)) if self.cache else None
+        return (
+            cache_path(f"{FORMAT} {kind}", (self.mesh.V, self.mesh.F, *arrays))
+            if self.cache
+            else None
+        )
 
     def _stored(self, path: Path | None, start: float, *layouts: str) -> Atlas | None:
         """The atlas of this very mesh in one of some layouts; None if there is no file, or a damaged or another one."""
@@ -233,11 +263,15 @@ class _Builder:
             stored = load_atlas(path)
         except AtlasError:
             return None
-        same = np.array_equal(stored.mesh.V, self.mesh.V) and np.array_equal(stored.mesh.F, self.mesh.F)
+        same = np.array_equal(stored.mesh.V, self.mesh.V) and np.array_equal(
+            stored.mesh.F, self.mesh.F
+        )
         if not same or stored.layout not in layouts:
             return None
         mark_used(path)
-        return dataclasses.replace(stored, mesh=self.mesh, timings={"cache": time.perf_counter() - start})
+        return dataclasses.replace(
+            stored, mesh=self.mesh, timings={"cache": time.perf_counter() - start}
+        )
 
     def _kept(self, path: Path | None, atlas: Atlas) -> Atlas:
         """Put an atlas into the cache."""
@@ -267,7 +301,8 @@ def _told_if_long(mesh: Mesh) -> Iterator[None]:
         while not done.wait(_TOLD_EVERY):
             waited += _TOLD_EVERY
             log.warning(
-                "laying charts on a mesh of %s in %s: %.0f s so far; later runs load what is made, and a lower "
+                "laying charts on a mesh of %s in %s: %.0f s so far; later runs load what is made, "
+                "and a lower "
                 "resolution takes less",
                 counted(len(mesh.F), "triangle"),
                 counted(mesh.component_count, "part"),

@@ -2,15 +2,16 @@
 
 For the map from a reference triangle (area A) with singular values s1 >= s2, let
 
-    D = s1^2 + s2^2  = sum of cotangent times squared side over 2 A,   J = s1 s2 = (a x b . c) / 2 A.
+    D = s1^2 + s2^2  = sum of cotangent times squared side over 2 A,   J = s1 s2 = (a x b . c) / 2
+    A.
 
-On the unit sphere J takes the triple product of the triangle's three unit vectors in place of its area: it vanishes
-exactly where the triangle folds over. Charts are the plane z = 1, where the triple product is twice the area. A finite
-energy thus means that nothing is folded.
+On the unit sphere J takes the triple product of the triangle's three unit vectors in place of its
+area: it vanishes exactly where the triangle folds over. Charts are the plane z = 1, where the
+triple product is twice the area. A finite energy thus means that nothing is folded.
 
-The star of a vertex: let the vertex move from p to p + dx x + dy y + dz p with tangents x, y. Of each triangle round
-it, J is linear in the move and D quadratic: a few numbers a triangle say all, and a trial position costs next to
-nothing.
+The star of a vertex: let the vertex move from p to p + dx x + dy y + dz p with tangents x, y. Of
+each triangle round it, J is linear in the move and D quadratic: a few numbers a triangle say all,
+and a trial position costs next to nothing.
 """
 
 from __future__ import annotations
@@ -22,13 +23,19 @@ import numpy as np
 from ..kernel import Floats, kernel
 from ..mesh.vectors import Vector, combine, cross, dot, row, subtract
 
+FOLDED = 1e-16  # a triple product must exceed this
+REACH = 0.3  # longest step of a vertex: radians on the sphere, or charts
+MOST_TRIALS = 14
+ARMIJO = 1e-4  # share of the fall that the slope promises
+TERMS = 9
+
 
 class Density(NamedTuple):
     """Energy per reference area, W = (D / 2)^p (even + long J^-2p + small J^-4p).
 
-    The first term punishes a large singular value, hence short texel edges on the real surface, which set the wave
-    solver's time step. D / J^2 is D of the inverse map: the second term punishes long texel edges. The third is a wall
-    for areas that get too small.
+    The first term punishes a large singular value, hence short texel edges on the real surface,
+    which set the wave solver's time step. D / J^2 is D of the inverse map: the second term punishes
+    long texel edges. The third is a wall for areas that get too small.
     """
 
     power: int  # p: 2 or 4
@@ -45,8 +52,8 @@ class Reference(NamedTuple):
     density: Density
 
 
-# W_D and W_J; then the Hessian is the second of D, the second of J, and gD gD^T, gD gJ^T + gJ gD^T and gJ gJ^T with the
-# gradients gD and gJ, in these shares
+# W_D and W_J; then the Hessian is the second of D, the second of J, and gD gD^T, gD gJ^T + gJ gD^T
+# and gJ gJ^T with the gradients gD and gJ, in these shares
 Shares: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
@@ -54,9 +61,11 @@ Shares: TypeAlias = tuple[float, float, float, float, float, float, float]
 def energy_density(dirichlet: float, inverse: float, density: Density) -> float:
     """W of D and of `inverse` = 1 / J; see `Density`."""
     square = inverse * inverse
-    wall, scale = square * square, (0.5 * dirichlet) * (0.5 * dirichlet)
+    wall = square * square
+    scale = (0.5 * dirichlet) * (0.5 * dirichlet)
     if density.power == 4:
-        wall, scale = wall * wall, scale * scale
+        wall = wall * wall
+        scale = scale * scale
     return scale * (density.even + wall * (density.long + density.small * wall))
 
 
@@ -65,86 +74,125 @@ def density_derivatives(
     dirichlet: float, jacobian: float, density: Density
 ) -> tuple[float, float, float, float, float, float]:
     """W and its derivatives W_D, W_J, W_DD, W_DJ, W_JJ."""
-    inverse, inverse_d, p = 1.0 / jacobian, 1.0 / dirichlet, float(density.power)
+    inverse = 1.0 / jacobian
+    inverse_d = 1.0 / dirichlet
+    p = float(density.power)
     square = inverse * inverse
-    wall, scale = square * square, (0.5 * dirichlet) * (0.5 * dirichlet)
+    wall = square * square
+    scale = (0.5 * dirichlet) * (0.5 * dirichlet)
     if density.power == 4:
-        wall, scale = wall * wall, scale * scale
-    long, small = density.long * wall, density.small * wall * wall
+        wall = wall * wall
+        scale = scale * scale
+    long = density.long * wall
+    small = density.small * wall * wall
     w = scale * (density.even + long + small)
-    slope_d, slope_j = p * w * inverse_d, -scale * (2.0 * p * long + 4.0 * p * small) * inverse
-    bend_d, bend_mixed = (p - 1.0) * slope_d * inverse_d, p * slope_j * inverse_d
+    slope_d = p * w * inverse_d
+    slope_j = -scale * (2.0 * p * long + 4.0 * p * small) * inverse
+    bend_d = (p - 1.0) * slope_d * inverse_d
+    bend_mixed = p * slope_j * inverse_d
     bend_j = scale * (2.0 * p * (2.0 * p + 1.0) * long + 4.0 * p * (4.0 * p + 1.0) * small) * square
     return w, slope_d, slope_j, bend_d, bend_mixed, bend_j
 
 
 @kernel
-def projected_hessian(area: float, dirichlet: float, jacobian: float, density: Density) -> tuple[float, Shares]:
+def projected_hessian(
+    area: float, dirichlet: float, jacobian: float, density: Density
+) -> tuple[float, Shares]:
     """Energy of a triangle of the given area, and the shares that make up its Hessian's positive part.
 
-    With a = (s1 + s2)/2 and b = (s1 - s2)/2, W is a function of a^2 = D/4 + J/2 and b^2 = D/4 - J/2, and its Hessian
-    splits into a twist (slope along a over a), a flip (slope along b over b), and a 2 x 2 block in (a, b) (Smith, de
-    Goes, Kim 2019). Each of them loses its negative part in closed form.
+    With a = (s1 + s2)/2 and b = (s1 - s2)/2, W is a function of a^2 = D/4 + J/2 and b^2 = D/4 -
+    J/2, and its Hessian splits into a twist (slope along a over a), a flip (slope along b over b),
+    and a 2 x 2 block in (a, b) (Smith, de Goes, Kim 2019). Each of them loses its negative part in
+    closed form.
     """
     w, wd, wj, wdd, wdj, wjj = density_derivatives(dirichlet, jacobian, density)
-    aa, bb = 0.25 * dirichlet + 0.5 * jacobian, max(0.25 * dirichlet - 0.5 * jacobian, 0.0)
-    twist, flip = 4.0 * wd + 2.0 * wj, 4.0 * wd - 2.0 * wj
+    aa = 0.25 * dirichlet + 0.5 * jacobian
+    bb = max(0.25 * dirichlet - 0.5 * jacobian, 0.0)
+    twist = 4.0 * wd + 2.0 * wj
+    flip = 4.0 * wd - 2.0 * wj
     haa = aa * (16.0 * (wdd + wdj) + 4.0 * wjj) + twist
     hbb = bb * (16.0 * (wdd - wdj) + 4.0 * wjj) + flip
     root = np.sqrt(aa * bb)
     hab = root * (16.0 * wdd - 4.0 * wjj)
     if haa < 0.0 or hbb < 0.0 or haa * hbb < hab * hab:
         # keep the upper eigenvalue alone: its projector is (1 + (H - mean) / radius) / 2
-        mean, half = 0.5 * (haa + hbb), 0.5 * (haa - hbb)
+        mean = 0.5 * (haa + hbb)
+        half = 0.5 * (haa - hbb)
         radius = np.sqrt(half * half + hab * hab)
         upper = max(mean + radius, 0.0)
         turn = half / radius if radius > 0.0 else 0.0
-        haa, hbb = 0.5 * upper * (1.0 + turn), 0.5 * upper * (1.0 - turn)
+        haa = 0.5 * upper * (1.0 + turn)
+        hbb = 0.5 * upper * (1.0 - turn)
         hab = 0.5 * upper * hab / radius if radius > 0.0 else 0.0
-    twist, flip = max(twist, 0.0), max(flip, 0.0)
+    twist = max(twist, 0.0)
+    flip = max(flip, 0.0)
     along_aa = 0.25 * (haa - twist) / aa
     along_bb = along_ab = 0.0
     if bb > 1e-10 * aa:  # else b has no direction
-        along_bb, along_ab = 0.25 * (hbb - flip) / bb, 0.25 * hab / root
+        along_bb = 0.25 * (hbb - flip) / bb
+        along_ab = 0.25 * hab / root
     dd = (along_aa + 2.0 * along_ab + along_bb) / 16.0
     dj = (along_aa - along_bb) / 8.0
     jj = (along_aa - 2.0 * along_ab + along_bb) / 4.0
-    bend_d, bend_j = 0.125 * (twist + flip), 0.25 * (twist - flip)
-    return area * w, (area * wd, area * wj, area * bend_d, area * bend_j, area * dd, area * dj, area * jj)
+    bend_d = 0.125 * (twist + flip)
+    bend_j = 0.25 * (twist - flip)
+    return area * w, (
+        area * wd,
+        area * wj,
+        area * bend_d,
+        area * bend_j,
+        area * dd,
+        area * dj,
+        area * jj,
+    )
 
-
-FOLDED = 1e-16  # a triple product must exceed this
-REACH = 0.3  # longest step of a vertex: radians on the sphere, or charts
-MOST_TRIALS = 14
-ARMIJO = 1e-4  # share of the fall that the slope promises
 
 FIXED, COLUMN, ROW, FREE = range(4)  # in which directions a vertex may move: none, x, y, both
 
-# what is known of a triangle: J and D at rest, their slopes (that of J along p is J itself), half of D's second
-# derivative, and the reference area
+# what is known of a triangle: J and D at rest, their slopes (that of J along p is J itself), half
+# of D's second derivative, and the reference area
 J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(9)
-TERMS = 9
 
 
 @kernel
 def expand_star(
-    p: Vector, x: Vector, y: Vector, first: Floats, second: Floats, shapes: Floats, degree: int, terms: Floats
+    p: Vector,
+    x: Vector,
+    y: Vector,
+    first: Floats,
+    second: Floats,
+    shapes: Floats,
+    degree: int,
+    terms: Floats,
 ) -> None:
     """Fill `terms` [degree, 9] for a vertex at p with tangents x, y.
 
-    Triangle i has the corners p, first[i] and second[i], each [degree, 3], counterclockwise. Row i of `shapes`
-    [degree, 4] is its reference: area, and cotangents of the angles at p, first[i] and second[i] over twice the area.
+    Triangle i has the corners p, first[i] and second[i], each [degree, 3], counterclockwise. Row i
+    of `shapes` [degree, 4] is its reference: area, and cotangents of the angles at p, first[i] and
+    second[i] over twice the area.
     """
     for i in range(degree):
-        e, g = subtract(row(first, i), p), subtract(row(second, i), p)
-        a, b = (dot(e, x), dot(e, y), dot(e, p)), (dot(g, x), dot(g, y), dot(g, p))
-        c, normal = subtract(b, a), cross(a, b)
-        area, opposite, left, right = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
-        half, pull = 0.5 / area, combine(left, b, right, a)
-        terms[i, J], terms[i, JX], terms[i, JY] = half * normal[2], half * (normal[0] - c[1]), half * (normal[1] + c[0])
+        e = subtract(row(first, i), p)
+        g = subtract(row(second, i), p)
+        a = (dot(e, x), dot(e, y), dot(e, p))
+        b = (dot(g, x), dot(g, y), dot(g, p))
+        c = subtract(b, a)
+        normal = cross(a, b)
+        area = shapes[i, 0]
+        opposite = shapes[i, 1]
+        left = shapes[i, 2]
+        right = shapes[i, 3]
+        half = 0.5 / area
+        pull = combine(left, b, right, a)
+        terms[i, J] = half * normal[2]
+        terms[i, JX] = half * (normal[0] - c[1])
+        terms[i, JY] = half * (normal[1] + c[0])
         terms[i, D] = opposite * dot(c, c) + left * dot(b, b) + right * dot(a, a)
-        terms[i, DX], terms[i, DY], terms[i, DZ] = -2.0 * pull[0], -2.0 * pull[1], -2.0 * pull[2]
-        terms[i, BEND], terms[i, AREA] = left + right, area
+        terms[i, DX] = -2.0 * pull[0]
+        terms[i, DY] = -2.0 * pull[1]
+        terms[i, DZ] = -2.0 * pull[2]
+        terms[i, BEND] = left + right
+        terms[i, AREA] = area
 
 
 @kernel
@@ -158,7 +206,13 @@ def star_energy(terms: Floats, degree: int, density: Density, move: Vector) -> f
         jacobian = terms[i, J] * (1.0 + dz) + terms[i, JX] * dx + terms[i, JY] * dy
         if not 2.0 * area * jacobian > FOLDED:
             return np.inf
-        dirichlet = terms[i, D] + terms[i, DX] * dx + terms[i, DY] * dy + terms[i, DZ] * dz + terms[i, BEND] * square
+        dirichlet = (
+            terms[i, D]
+            + terms[i, DX] * dx
+            + terms[i, DY] * dy
+            + terms[i, DZ] * dz
+            + terms[i, BEND] * square
+        )
         total += area * energy_density(dirichlet, 1.0 / jacobian, density)
     return total
 
@@ -169,22 +223,29 @@ def star_slopes(
 ) -> tuple[float, float, float, float, float, float]:
     """Energy, gradient x, y and Hessian xx, xy, yy at rest; the energy is infinite if a triangle is folded.
 
-    With a curvature of 1, on the sphere, a tangent step also falls towards the centre, and the Hessian loses the radial
-    slope; charts have 0.
+    With a curvature of 1, on the sphere, a tangent step also falls towards the centre, and the
+    Hessian loses the radial slope; charts have 0.
     """
     energy = gx = gy = radial = hxx = hxy = hyy = 0.0
     for i in range(degree):
-        area, jacobian = terms[i, AREA], terms[i, J]
+        area = terms[i, AREA]
+        jacobian = terms[i, J]
         if not 2.0 * area * jacobian > FOLDED:
             return np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
         w, wd, wj, wdd, wdj, wjj = density_derivatives(terms[i, D], jacobian, density)
-        dx, dy, jx, jy = terms[i, DX], terms[i, DY], terms[i, JX], terms[i, JY]
+        dx = terms[i, DX]
+        dy = terms[i, DY]
+        jx = terms[i, JX]
+        jy = terms[i, JY]
         energy += area * w
         gx += area * (wd * dx + wj * jx)
         gy += area * (wd * dy + wj * jy)
         radial += area * (wd * terms[i, DZ] + wj * jacobian)
         flat = 2.0 * wd * terms[i, BEND]
-        ddx, ddy, jjx, jjy = wdd * dx + wdj * jx, wdd * dy + wdj * jy, wdj * dx + wjj * jx, wdj * dy + wjj * jy
+        ddx = wdd * dx + wdj * jx
+        ddy = wdd * dy + wdj * jy
+        jjx = wdj * dx + wjj * jx
+        jjy = wdj * dy + wjj * jy
         hxx += area * (flat + dx * ddx + jx * jjx)
         hyy += area * (flat + dy * ddy + jy * jjy)
         hxy += area * (dx * ddy + jx * jjy)
@@ -193,9 +254,12 @@ def star_slopes(
 
 
 @kernel
-def newton_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -> tuple[float, float]:
+def newton_direction(
+    gx: float, gy: float, hxx: float, hxy: float, hyy: float
+) -> tuple[float, float]:
     """Newton step -|H|^-1 g of a 2 x 2 Hessian, its eigenvalues taken by their absolute value."""
-    mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
+    mean = 0.5 * (hxx + hyy)
+    half = 0.5 * (hxx - hyy)
     determinant = hxx * hyy - hxy * hxy
     if mean > 0.0 and determinant > 1e-3 * mean * mean:
         return (hxy * gy - hyy * gx) / determinant, (hxy * gx - hxx * gy) / determinant
@@ -204,10 +268,13 @@ def newton_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -
         # eigenvector of mean + radius, from the better conditioned of two formulas
         ux, uy = (half + radius, hxy) if half > 0.0 else (hxy, radius - half)
         length = np.sqrt(ux * ux + uy * uy)
-        ux, uy = ux / length, uy / length
+        ux = ux / length
+        uy = uy / length
     else:
-        ux, uy = 1.0, 0.0
-    first, second = abs(mean + radius), abs(mean - radius)
+        ux = 1.0
+        uy = 0.0
+    first = abs(mean + radius)
+    second = abs(mean - radius)
     floor = 1e-4 * max(first, second)
     along = -(gx * ux + gy * uy) / max(first, floor)
     across = -(gy * ux - gx * uy) / max(second, floor)
@@ -223,7 +290,9 @@ def tangent_move(a: float, b: float, curvature: float) -> Vector:
 
 
 @kernel
-def descend(terms: Floats, degree: int, density: Density, curvature: float, freedom: int) -> tuple[float, Vector]:
+def descend(
+    terms: Floats, degree: int, density: Density, curvature: float, freedom: int
+) -> tuple[float, Vector]:
     """How far the energy of a star falls by a Newton step of its vertex that folds nothing, and the move."""
     stay = (0.0, 0.0, 0.0)
     energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, density, curvature)
@@ -232,9 +301,11 @@ def descend(terms: Floats, degree: int, density: Density, curvature: float, free
     if freedom == FREE:
         sx, sy = newton_direction(gx, gy, hxx, hxy, hyy)
     elif freedom == COLUMN:
-        sx, sy = -gx / max(abs(hxx), 1e-300), 0.0
+        sx = -gx / max(abs(hxx), 1e-300)
+        sy = 0.0
     else:
-        sx, sy = 0.0, -gy / max(abs(hyy), 1e-300)
+        sx = 0.0
+        sy = -gy / max(abs(hyy), 1e-300)
     descent = -(gx * sx + gy * sy)
     if not descent > 1e-13 * energy:
         return 0.0, stay
@@ -250,7 +321,8 @@ def descend(terms: Floats, degree: int, density: Density, curvature: float, free
                 least = star_energy(terms, degree, density, ahead)
                 further = 2.0 * least < lower
                 if least < lower:
-                    move, lower = ahead, least
+                    move = ahead
+                    lower = least
             return energy - lower, move
         step *= 0.35
     return 0.0, stay

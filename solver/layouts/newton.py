@@ -1,10 +1,11 @@
 """Newton's method for maps of triangles: all vertices move at once, each in the two directions that its surface has.
 
-The Hessian of the energy (see `energy`) is made positive semidefinite triangle by triangle, the step comes from
-conjugate gradients, and it ends short of the first fold. Far from the minimum a step is cut short by the steepest of
-the energy's walls, wherever it stands, and an exact direction is wasted. So conjugate gradients start with few steps,
-and get more once whole Newton steps succeed, and after a step cut short a sweep over single vertices clears the spots
-that were in the way.
+The Hessian of the energy (see `energy`) is made positive semidefinite triangle by triangle, the
+step comes from conjugate gradients, and it ends short of the first fold. Far from the minimum a
+step is cut short by the steepest of the energy's walls, wherever it stands, and an exact direction
+is wasted. So conjugate gradients start with few steps, and get more once whole Newton steps
+succeed, and after a step cut short a sweep over single vertices clears the spots that were in the
+way.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from ..kernel import Floats, Ints32, kernel
 from ..mesh.vectors import Vector, combine, cross, dot, subtract
 from .energy import MOST_TRIALS, Reference, Shares, projected_hessian
 
-FURTHER, SHORTER = 1.6, 0.6  # factors from one trial step to the next
+# factors from one trial step to the next
+FURTHER = 1.6
+SHORTER = 0.6
 CG_TOLERANCE = 0.03
 SHORT_STEP = 0.3  # a Newton step cut to less than this asks for fewer steps of conjugate gradients
 
@@ -35,19 +38,21 @@ def descend_by_newton(
     Parameters
     ----------
     newton_step : function
-        One step with up to so many steps of conjugate gradients; returns by how much the energy fell, and how long the
-        step was: 1 for a whole one.
+        One step with up to so many steps of conjugate gradients; returns by how much the energy
+        fell, and how long the step was: 1 for a whole one.
     sweep : function
         Moves the vertices one by one, backwards or not, and returns by how much the energy fell.
     energy : function
         Energy of the map as it is.
     stop : float, int, int
-        Share of the energy that a step must gain, how many in a row may fail to, and the most steps.
+        Share of the energy that a step must gain, how many in a row may fail to, and the most
+        steps.
     cg_range : int, int
         Steps of conjugate gradients, fewest and most.
     """
     least_gain, patience, most = stop
-    cg_steps, failed = cg_range[0], 0
+    cg_steps = cg_range[0]
+    failed = 0
     for i in range(most):
         fall, step = newton_step(cg_steps)
         if step < 1.0:
@@ -61,11 +66,13 @@ def descend_by_newton(
             cg_steps = max(cg_steps // 2, cg_range[0])
 
 
-def line_search(energy: float, slope: float, bound: float, energy_at: Callable[[float], float]) -> tuple[float, float]:
+def line_search(
+    energy: float, slope: float, bound: float, energy_at: Callable[[float], float]
+) -> tuple[float, float]:
     """Step of at most `bound` to about the least energy, and that energy; 0 where no step lowers it.
 
-    A whole step that falls further than half of what the slope promises is lengthened, another shortened, for as long
-    as that helps.
+    A whole step that falls further than half of what the slope promises is lengthened, another
+    shortened, for as long as that helps.
     """
     t = min(1.0, bound)
     lower = energy_at(t)
@@ -76,7 +83,8 @@ def line_search(energy: float, slope: float, bound: float, energy_at: Callable[[
         trial = energy_at(factor * t)
         if lower < energy and not trial < lower:
             break
-        t, lower = factor * t, trial
+        t = factor * t
+        lower = trial
     return (t, lower) if lower < energy else (0.0, energy)
 
 
@@ -93,9 +101,11 @@ class System(NamedTuple):
         return cls(np.zeros((vertices, 2)), np.zeros((vertices, 3)), np.zeros((edges, 4)))
 
 
-# of D and J along the two directions of a vertex, D_x, D_y, J_x, J_y; or what these are multiplied with
+# of D and J along the two directions of a vertex, D_x, D_y, J_x, J_y; or what these are multiplied
+# with
 Slopes: TypeAlias = tuple[float, float, float, float]
-# a corner of a triangle: the directions of its vertex, its slopes, and these combined as in the outer products
+# a corner of a triangle: the directions of its vertex, its slopes, and these combined as in the
+# outer products
 Corner: TypeAlias = tuple[Vector, Vector, Slopes, Slopes]
 
 
@@ -113,29 +123,47 @@ def add_triangle(
 ) -> tuple[float, Vector]:
     """Add triangle f to the system; return its energy, and its slopes along the three points themselves.
 
-    `edges` are the numbers of the sides ab, bc, ca, and whether they run from an edge's first vertex to its second;
-    x and y the directions in which the vertices a, b, c, at `points`, may move.
+    `edges` are the numbers of the sides ab, bc, ca, and whether they run from an edge's first
+    vertex to its second; x and y the directions in which the vertices a, b, c, at `points`, may
+    move.
     """
     a, b, c = points
-    area, h = reference.area[f], 3 * f
+    area = reference.area[f]
+    h = 3 * f
     half = 0.5 / area
-    cot_a, cot_b, cot_c = reference.cotangent[h], reference.cotangent[h + 1], reference.cotangent[h + 2]
-    ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+    cot_a = reference.cotangent[h]
+    cot_b = reference.cotangent[h + 1]
+    cot_c = reference.cotangent[h + 2]
+    ab = subtract(b, a)
+    ac = subtract(c, a)
+    bc = subtract(c, b)
     dirichlet = cot_a * dot(bc, bc) + cot_b * dot(ac, ac) + cot_c * dot(ab, ab)
     jacobian = half * dot(a, cross(ab, ac))
     energy, shares = projected_hessian(area, dirichlet, jacobian, reference.density)
     grad_a = combine(-2.0 * cot_c, ab, -2.0 * cot_b, ac)
     grad_b = combine(-2.0 * cot_a, bc, 2.0 * cot_c, ab)
     grad_c = combine(2.0 * cot_b, ac, 2.0 * cot_a, bc)
-    at_a = _add_vertex(vertices[0], grad_a, cross(b, c), half, x[0], y[0], cot_b + cot_c, shares, system)
-    at_b = _add_vertex(vertices[1], grad_b, cross(c, a), half, x[1], y[1], cot_c + cot_a, shares, system)
-    at_c = _add_vertex(vertices[2], grad_c, cross(a, b), half, x[2], y[2], cot_a + cot_b, shares, system)
-    flat, twist = -2.0 * shares[2], shares[3] * half
+    at_a = _add_vertex(
+        vertices[0], grad_a, cross(b, c), half, x[0], y[0], cot_b + cot_c, shares, system
+    )
+    at_b = _add_vertex(
+        vertices[1], grad_b, cross(c, a), half, x[1], y[1], cot_c + cot_a, shares, system
+    )
+    at_c = _add_vertex(
+        vertices[2], grad_c, cross(a, b), half, x[2], y[2], cot_a + cot_b, shares, system
+    )
+    flat = -2.0 * shares[2]
+    twist = shares[3] * half
     _add_edge(edges[0], at_a, at_b, c, flat * cot_c, twist, system)
     _add_edge(edges[1], at_b, at_c, a, flat * cot_a, twist, system)
     _add_edge(edges[2], at_c, at_a, b, flat * cot_b, twist, system)
-    along_d, along_j = shares[0], shares[1] * jacobian
-    radial = along_d * dot(grad_a, a) + along_j, along_d * dot(grad_b, b) + along_j, along_d * dot(grad_c, c) + along_j
+    along_d = shares[0]
+    along_j = shares[1] * jacobian
+    radial = (
+        along_d * dot(grad_a, a) + along_j,
+        along_d * dot(grad_b, b) + along_j,
+        along_d * dot(grad_c, c) + along_j,
+    )
     return energy, radial
 
 
@@ -152,9 +180,17 @@ def _add_vertex(
     system: System,
 ) -> Corner:
     """Add what a triangle says about its vertex v, given the gradients of D and of J / `half` there."""
-    dx, dy, jx, jy = dot(grad_d, x), dot(grad_d, y), half * dot(grad_j, x), half * dot(grad_j, y)
-    dd, dj, jj = shares[4], shares[5], shares[6]
-    px, py, qx, qy = dd * dx + dj * jx, dd * dy + dj * jy, dj * dx + jj * jx, dj * dy + jj * jy
+    dx = dot(grad_d, x)
+    dy = dot(grad_d, y)
+    jx = half * dot(grad_j, x)
+    jy = half * dot(grad_j, y)
+    dd = shares[4]
+    dj = shares[5]
+    jj = shares[6]
+    px = dd * dx + dj * jx
+    py = dd * dy + dj * jy
+    qx = dj * dx + jj * jx
+    qy = dj * dy + jj * jy
     system.gradient[v, 0] += shares[0] * dx + shares[1] * jx
     system.gradient[v, 1] += shares[0] * dy + shares[1] * jy
     flat = 2.0 * shares[2] * bend
@@ -166,14 +202,23 @@ def _add_vertex(
 
 @kernel
 def _add_edge(
-    edge: tuple[int, bool], u: Corner, v: Corner, apex: Vector, flat: float, twist: float, system: System
+    edge: tuple[int, bool],
+    u: Corner,
+    v: Corner,
+    apex: Vector,
+    flat: float,
+    twist: float,
+    system: System,
 ) -> None:
     """Add what the triangle u, v, apex says about its edge from u to v.
 
     `flat` and `twist` are the shares of the second derivatives of D and J along it.
     """
-    (e, forwards), (ux, uy, _, (px, py, qx, qy)), (vx, vy, (dx, dy, jx, jy), _) = edge, u, v
-    bent_x, bent_y = combine(flat, ux, twist, cross(apex, ux)), combine(flat, uy, twist, cross(apex, uy))
+    (e, forwards) = edge
+    (ux, uy, _, (px, py, qx, qy)) = u
+    (vx, vy, (dx, dy, jx, jy), _) = v
+    bent_x = combine(flat, ux, twist, cross(apex, ux))
+    bent_y = combine(flat, uy, twist, cross(apex, uy))
     xy = dot(bent_x, vy) + px * dy + qx * jy
     yx = dot(bent_y, vx) + py * dx + qy * jx
     system.blocks[e, 0] += dot(bent_x, vx) + px * dx + qx * jx
@@ -186,35 +231,53 @@ def _add_edge(
 def conjugate_gradients(ends: Ints32, system: System, steps: int, tolerance: float) -> Floats:
     """Solve H x = -gradient roughly, preconditioned by the inverse diagonal blocks; x has shape [n, 2].
 
-    `ends` [e, 2] are the vertices of the edges. Stops after `steps` iterations, or when the residual has fallen to
-    `tolerance` of the first one.
+    `ends` [e, 2] are the vertices of the edges. Stops after `steps` iterations, or when the
+    residual has fallen to `tolerance` of the first one.
     """
     gradient, diagonal, blocks = system
     n = len(gradient)
     x = np.zeros((n, 2))
     inverse = np.empty((n, 3))
-    residual, image, direction = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2))
+    residual = np.empty((n, 2))
+    image = np.empty((n, 2))
+    direction = np.empty((n, 2))
     norm = 0.0
     for v in range(n):
-        a, b, c = diagonal[v, 0], diagonal[v, 1], diagonal[v, 2]
+        a = diagonal[v, 0]
+        b = diagonal[v, 1]
+        c = diagonal[v, 2]
         det = a * c - b * b
         if not det > 1e-14 * a * c:
-            b, det = 0.0, a * c
-        inverse[v, 0], inverse[v, 1], inverse[v, 2] = c / det, -b / det, a / det
-        r, s = -gradient[v, 0], -gradient[v, 1]
-        residual[v, 0], residual[v, 1] = r, s
-        direction[v, 0], direction[v, 1] = inverse[v, 0] * r + inverse[v, 1] * s, inverse[v, 1] * r + inverse[v, 2] * s
+            b = 0.0
+            det = a * c
+        inverse[v, 0] = c / det
+        inverse[v, 1] = -b / det
+        inverse[v, 2] = a / det
+        r = -gradient[v, 0]
+        s = -gradient[v, 1]
+        residual[v, 0] = r
+        residual[v, 1] = s
+        direction[v, 0] = inverse[v, 0] * r + inverse[v, 1] * s
+        direction[v, 1] = inverse[v, 1] * r + inverse[v, 2] * s
         norm += r * direction[v, 0] + s * direction[v, 1]
     first_norm = norm
     for _ in range(steps):
         for v in range(n):
-            p, q = direction[v, 0], direction[v, 1]
+            p = direction[v, 0]
+            q = direction[v, 1]
             image[v, 0] = diagonal[v, 0] * p + diagonal[v, 1] * q
             image[v, 1] = diagonal[v, 1] * p + diagonal[v, 2] * q
         for e in range(len(ends)):
-            u, v = ends[e, 0], ends[e, 1]
-            xx, xy, yx, yy = blocks[e, 0], blocks[e, 1], blocks[e, 2], blocks[e, 3]
-            p, q, r, s = direction[u, 0], direction[u, 1], direction[v, 0], direction[v, 1]
+            u = ends[e, 0]
+            v = ends[e, 1]
+            xx = blocks[e, 0]
+            xy = blocks[e, 1]
+            yx = blocks[e, 2]
+            yy = blocks[e, 3]
+            p = direction[u, 0]
+            q = direction[u, 1]
+            r = direction[v, 0]
+            s = direction[v, 1]
             image[u, 0] += xx * r + xy * s
             image[u, 1] += yx * r + yy * s
             image[v, 0] += xx * p + yx * q
@@ -224,14 +287,18 @@ def conjugate_gradients(ends: Ints32, system: System, steps: int, tolerance: flo
             curvature += direction[v, 0] * image[v, 0] + direction[v, 1] * image[v, 1]
         if not curvature > 0.0:
             break
-        alpha, previous, norm = norm / curvature, norm, 0.0
+        alpha = norm / curvature
+        previous = norm
+        norm = 0.0
         for v in range(n):
             x[v, 0] += alpha * direction[v, 0]
             x[v, 1] += alpha * direction[v, 1]
             residual[v, 0] -= alpha * image[v, 0]
             residual[v, 1] -= alpha * image[v, 1]
-            r, s = residual[v, 0], residual[v, 1]
-            image[v, 0], image[v, 1] = inverse[v, 0] * r + inverse[v, 1] * s, inverse[v, 1] * r + inverse[v, 2] * s
+            r = residual[v, 0]
+            s = residual[v, 1]
+            image[v, 0] = inverse[v, 0] * r + inverse[v, 1] * s
+            image[v, 1] = inverse[v, 1] * r + inverse[v, 2] * s
             norm += r * image[v, 0] + s * image[v, 1]
         if norm < tolerance * tolerance * first_norm:
             break

@@ -1,5 +1,9 @@
 from .files import check_mesh_file as check_mesh_file, load_mesh as load_mesh, repaired as repaired
-from .mesh import Mesh as Mesh, check_genus_zero as check_genus_zero, vertex_normals as vertex_normals
+from .mesh import (
+    Mesh as Mesh,
+    check_genus_zero as check_genus_zero,
+    vertex_normals as vertex_normals,
+)
 from .ply import (
     Element as Element,
     Soup as Soup,
@@ -7,7 +11,11 @@ from .ply import (
     read_text as read_text,
     triangulate as triangulate,
 )
-from .queries import ClosestPoints as ClosestPoints, RayScene as RayScene, downward_hits as downward_hits
+from .queries import (
+    ClosestPoints as ClosestPoints,
+    RayScene as RayScene,
+    downward_hits as downward_hits,
+)
 from .topology import (
     SPLITS as SPLITS,
     Edges as Edges,

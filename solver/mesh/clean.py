@@ -1,8 +1,8 @@
 """Triangles on their way through cleaning, with what belongs to each of their corners; and the steps of that.
 
-Nothing is done that could be seen: equal vertices are merged, hairline cracks closed, and triangles dropped that
-collapse or repeat. Triangles without area, whose corners lie on a line, are taken out without opening the surface.
-Then all are wound alike.
+Nothing is done that could be seen: equal vertices are merged, hairline cracks closed, and triangles
+dropped that collapse or repeat. Triangles without area, whose corners lie on a line, are taken out
+without opening the surface. Then all are wound alike.
 """
 
 from __future__ import annotations
@@ -15,6 +15,23 @@ from scipy.spatial import cKDTree
 
 from .topology import SPLITS, distinct, edges_of, labels, sides_of, turned
 
+_PLURALS = {"vertex": "vertices"}
+
+# Relative to the size of the mesh: above the round-off of a file in float32, far below any gap that
+# is meant.
+_CRACK = 1e-6
+
+# In widths of a crack: a triangle that is longer does not vanish with it.
+_NEEDLE = 10
+
+# Height over longest side below which three corners lie on a line: a little above the round-off of
+# float64.
+_FLAT = 1e-12
+_ROUNDS = 64
+
+# A part that encloses less, relative to its area, has no inside.
+_NO_INSIDE = 1e-12
+
 
 @dataclasses.dataclass(frozen=True)
 class Corners:
@@ -25,7 +42,8 @@ class Corners:
     F : int64 [triangle_count, 3]
         Vertex, equal positions being one vertex.
     given : int64 [triangle_count, 3]
-        Vertex as it was given: at places where surfaces touch, it tells which triangles were joined.
+        Vertex as it was given: at places where surfaces touch, it tells which triangles were
+        joined.
     uv : float64 [triangle_count, 3, 2] or None
         Texture coordinates.
     """
@@ -41,10 +59,18 @@ class Corners:
     def reversed(self, which: NDArray[np.bool_]) -> Corners:
         """The same triangles, those chosen wound the other way."""
         F, given = (np.where(which[:, None], x[:, ::-1], x) for x in (self.F, self.given))
-        return Corners(F, given, None if self.uv is None else np.where(which[:, None, None], self.uv[:, ::-1], self.uv))
+        return Corners(
+            F,
+            given,
+            None if self.uv is None else np.where(which[:, None, None], self.uv[:, ::-1], self.uv),
+        )
 
-    def split(self, point: NDArray[np.int64], given: NDArray[np.int64], share: NDArray[np.float64]) -> Corners:
-        """Insert vertices into sides, and cut the triangles there. They keep their order, area and winding.
+    def split(
+        self, point: NDArray[np.int64], given: NDArray[np.int64], share: NDArray[np.float64]
+    ) -> Corners:
+        """Insert vertices into sides, and cut the triangles there.
+
+        They keep their order, area and winding.
 
         Parameters
         ----------
@@ -53,15 +79,20 @@ class Corners:
         share : [triangle_count, 3]
             Where it lies, from 0 at the side's first corner to 1 at the other.
         """
-        sets, parents, patterns = (point >= 0) @ [1, 2, 4], [], []
+        sets = (point >= 0) @ [1, 2, 4]
+        parents = []
+        patterns = []
         for number, pattern in {0: [[0, 1, 2]], **SPLITS}.items():
             chosen = np.flatnonzero(sets == number)
             parents.append(np.repeat(chosen, len(pattern)))
             patterns.append(np.tile(pattern, (len(chosen), 1)))
-        # of each piece, the triangle of which it is a part, and its corners, as `SPLITS` numbers them
+        # of each piece, the triangle of which it is a part, and its corners, as `SPLITS` numbers
+        # them
         order = np.argsort(np.concatenate(parents), kind="stable")
-        parent, corner = np.concatenate(parents)[order], np.concatenate(patterns)[order]
-        F, numbers = np.hstack([self.F, point]), np.hstack([self.given, given])
+        parent = np.concatenate(parents)[order]
+        corner = np.concatenate(patterns)[order]
+        F = np.hstack([self.F, point])
+        numbers = np.hstack([self.given, given])
         uv = None
         if self.uv is not None:
             along = self.uv + share[..., None] * (np.roll(self.uv, -1, axis=1) - self.uv)
@@ -69,13 +100,12 @@ class Corners:
         return Corners(F[parent[:, None], corner], numbers[parent[:, None], corner], uv)
 
 
-_PLURALS = {"vertex": "vertices"}
-
-
 def counted(number: int, thing: str) -> str:
     """A number and its noun: 1 edge, 2 edges, 1,000 vertices."""
     *words, noun = thing.split()
-    return " ".join([f"{number:,}", *words, noun if number == 1 else _PLURALS.get(noun, noun + "s")])
+    return " ".join(
+        [f"{number:,}", *words, noun if number == 1 else _PLURALS.get(noun, noun + "s")]
+    )
 
 
 def place(point: NDArray[np.float64]) -> str:
@@ -83,16 +113,11 @@ def place(point: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
 
 
-# Relative to the size of the mesh: above the round-off of a file in float32, far below any gap that is meant.
-_CRACK = 1e-6
-# In widths of a crack: a triangle that is longer does not vanish with it.
-_NEEDLE = 10
-
-
 def merged_vertices(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     """Triangles [m, 3] in which equal positions are one vertex, the first of them; and how many cracks' ends joined.
 
-    Those are boundary vertices that lie within round-off of each other. Inside of a surface none is joined.
+    Those are boundary vertices that lie within round-off of each other. Inside of a surface none is
+    joined.
     """
     used = distinct(F)
     first = np.arange(len(V))
@@ -136,11 +161,6 @@ def _first_equal(rows: NDArray) -> NDArray[np.int64]:
     return first
 
 
-# Height over longest side below which three corners lie on a line: a little above the round-off of float64.
-_FLAT = 1e-12
-_ROUNDS = 64
-
-
 def without_slivers(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, int]:
     """Drop triangles whose corners lie on a line, and say how many; unchanged where there are none.
 
@@ -156,7 +176,9 @@ def without_slivers(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, 
     return corners.kept(~flat), before
 
 
-def _flat(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def _flat(
+    V: NDArray[np.float64], F: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Mask of the triangles without area, and the lengths of all sides [m, 3]."""
     sides = V[np.roll(F, -1, axis=1)] - V[F]
     length = np.linalg.norm(sides, axis=-1)
@@ -168,7 +190,8 @@ def _without_longest(
     V: NDArray[np.float64], corners: Corners, flat: NDArray[np.bool_], length: NDArray[np.float64]
 ) -> Corners:
     """Take out slivers of which no two are neighbours, the longest first; of the two arrays see `_flat`."""
-    F, longest = corners.F, length.argmax(axis=1)
+    F = corners.F
+    longest = length.argmax(axis=1)
     rank = np.full(len(F), -1)
     rank[np.lexsort((length.max(axis=1), flat))] = np.arange(len(F))
     rank[~flat] = -1
@@ -187,14 +210,11 @@ def _without_longest(
     return split.kept(distinct_triangles(split.F))
 
 
-# A part that encloses less, relative to its area, has no inside.
-_NO_INSIDE = 1e-12
-
-
 def oriented(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, list[str]]:
     """Wind the triangles of a manifold, orientable surface alike, part by part, and say what was turned.
 
-    A closed part faces outwards, wherever it lies; an open one, and one without volume, as most of its triangles did.
+    A closed part faces outwards, wherever it lies; an open one, and one without volume, as most of
+    its triangles did.
     """
     F = corners.F
     pairs, rim = sides_of(F)
@@ -204,7 +224,8 @@ def oriented(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, list[st
     flip = turned(pairs // 3, start[pairs[:, 0]] == start[pairs[:, 1]], len(F))
     volume, area = part_volumes(V, np.where(flip[:, None], F[:, ::-1], F), part)
     closed = np.bincount(part[rim // 3], minlength=count) == 0
-    sizes, turns = np.bincount(part), np.bincount(part, weights=flip)
+    sizes = np.bincount(part)
+    turns = np.bincount(part, weights=flip)
     solid = closed & (np.abs(volume) > _NO_INSIDE * area**1.5)
     over = np.where(solid, volume < 0, 2 * turns > sizes)
     flip ^= over[part]
@@ -226,10 +247,16 @@ def part_volumes(
 
     `part` [triangle_count] is the part of every triangle, numbered from 0.
     """
-    count, size = int(part.max()) + 1, np.bincount(part)
+    count = int(part.max()) + 1
+    size = np.bincount(part)
     corners = V[F]
     middle = np.stack([np.bincount(part, weights=x) / size for x in corners.mean(axis=1).T], axis=1)
     a, b, c = np.moveaxis(corners - middle[part][:, None], 1, 0)
-    volume = np.bincount(part, weights=np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count) / 6
-    area = np.bincount(part, weights=np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count) / 2
+    volume = (
+        np.bincount(part, weights=np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count) / 6
+    )
+    area = (
+        np.bincount(part, weights=np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
+        / 2
+    )
     return volume, area

@@ -1,6 +1,7 @@
 """Triangle meshes: manifold and oriented surfaces of any kind, made from any triangle soup, and their normals.
 
-The cube layout asks more of a surface: closed, one part, no handles. Refusals come with numbers and places.
+The cube layout asks more of a surface: closed, one part, no handles. Refusals come with numbers and
+places.
 """
 
 from __future__ import annotations
@@ -35,29 +36,47 @@ from .topology import (
     triangles_beside,
 )
 
-_STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
+# cosine between a vertex's normal and a triangle's below which another direction is looked for
+_STEEP = 0.1
 _STEPS = 300
+
+# Lengths whose squares and cubes are far from the limits of float64, in either direction.
+_SMALLEST = 1e-12
+_LARGEST = 1e12
+
+# A surface that encloses less, relative to the cube of its size, has no inside.
+_FLAT = 1e-12
+
+# Parts beyond which a surface round all of them serves better than each by itself.
+_MANY_PARTS = 100
 
 
 def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
     """Unit normals weighted by corner angle, shape [n, 3] (Thuermer and Wuethrich 1998).
 
-    At tips and knife edges that mean may point into a triangle. There the direction is taken that is nearest to the
-    farthest of the triangles' normals (Aubry and Loehner 2008), if it is better.
+    At tips and knife edges that mean may point into a triangle. There the direction is taken that
+    is nearest to the farthest of the triangles' normals (Aubry and Loehner 2008), if it is better.
     """
     normal = triangle_normals(V, F)
     total = np.zeros_like(V)
     for k, angle in enumerate(corner_angles(V, F).T):
         for axis in range(3):
-            total[:, axis] += np.bincount(F[:, k], weights=angle * normal[:, axis], minlength=len(V))
-    mean = np.where(np.linalg.norm(total, axis=1, keepdims=True) > 0, normalized(total), [0.0, 0.0, 1.0])
-    vertex, triangle = F.ravel(), np.repeat(np.arange(len(F)), 3)
+            total[:, axis] += np.bincount(
+                F[:, k], weights=angle * normal[:, axis], minlength=len(V)
+            )
+    mean = np.where(
+        np.linalg.norm(total, axis=1, keepdims=True) > 0, normalized(total), [0.0, 0.0, 1.0]
+    )
+    vertex = F.ravel()
+    triangle = np.repeat(np.arange(len(F)), 3)
     steep = np.flatnonzero(_worst(mean, vertex, normal[triangle]) < _STEEP)
     if not len(steep):
         return mean
     chosen = np.isin(vertex, steep)
-    vertex, beside = np.searchsorted(steep, vertex[chosen]), normal[triangle[chosen]]
-    # middles of the smallest caps that hold the normals at each of these vertices (Badoiu and Clarkson 2003)
+    vertex = np.searchsorted(steep, vertex[chosen])
+    beside = normal[triangle[chosen]]
+    # middles of the smallest caps that hold the normals at each of these vertices (Badoiu and
+    # Clarkson 2003)
     middle = mean[steep]
     for i in range(1, _STEPS):
         order = np.lexsort((np.einsum("ij,ij->i", middle[vertex], beside), vertex))
@@ -69,33 +88,33 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     return mean
 
 
-def _worst(normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
+def _worst(
+    normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Least cosine between the normal of each vertex [k, 3] and those of its triangles."""
     worst = np.full(len(normal), np.inf)
     np.minimum.at(worst, vertex, np.einsum("ij,ij->i", normal[vertex], beside))
     return worst
 
 
-# Lengths whose squares and cubes are far from the limits of float64, in either direction.
-_SMALLEST, _LARGEST = 1e-12, 1e12
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh:
     """A manifold, oriented triangle mesh: closed or open, of any genus, in one part or several.
 
-    Make one with `load_mesh` or `Mesh.from_arrays`, which mend what they are given. Every edge belongs to two
-    triangles or, on a rim, to one; the triangles at a vertex form one fan; every triangle has an area. Where surfaces
-    touch, each has vertices of its own at the same place.
+    Make one with `load_mesh` or `Mesh.from_arrays`, which mend what they are given. Every edge
+    belongs to two triangles or, on a rim, to one; the triangles at a vertex form one fan; every
+    triangle has an area. Where surfaces touch, each has vertices of its own at the same place.
 
     Attributes
     ----------
     V : float64 [vertex_count, 3]
         Vertices [m].
     F : int64 [triangle_count, 3]
-        Triangles, counter-clockwise seen from outside, or, on an open part, from the side from which most were.
+        Triangles, counter-clockwise seen from outside, or, on an open part, from the side from
+        which most were.
     uv : float64 [vertex_count, 2] or None
-        The object's own texture coordinates, one pair a vertex (at a UV seam, one of the pairs that meet there).
+        The object's own texture coordinates, one pair a vertex (at a UV seam, one of the pairs that
+        meet there).
     corner_uv : float64 [triangle_count, 3, 2] or None
         The object's own texture coordinates at every corner of every triangle: exact at seams.
     notes : tuple of str
@@ -112,14 +131,17 @@ class Mesh:
     name: str = "mesh"
 
     @classmethod
-    def from_arrays(cls, V: ArrayLike, F: ArrayLike, uv: ArrayLike | None = None, name: str = "mesh") -> Mesh:
+    def from_arrays(
+        cls, V: ArrayLike, F: ArrayLike, uv: ArrayLike | None = None, name: str = "mesh"
+    ) -> Mesh:
         """Make a mesh of any triangle soup.
 
-        Equal positions are merged, hairline cracks closed, and triangles that repeat or have no area dropped. Where
-        more than two triangles meet along an edge, or fans of them at a vertex, the sheets are cut apart. A one-sided
-        surface, such as a Moebius band, is cut open along a path. Then each part is wound alike: outwards if it is
-        closed, as most of its triangles were if it is open. Nothing is filled. A mesh made from the arrays of another
-        is the same mesh, without notes.
+        Equal positions are merged, hairline cracks closed, and triangles that repeat or have no
+        area dropped. Where more than two triangles meet along an edge, or fans of them at a vertex,
+        the sheets are cut apart. A one-sided surface, such as a Moebius band, is cut open along a
+        path. Then each part is wound alike: outwards if it is closed, as most of its triangles were
+        if it is open. Nothing is filled. A mesh made from the arrays of another is the same mesh,
+        without notes.
 
         Parameters
         ----------
@@ -168,7 +190,8 @@ class Mesh:
         Each begins at its lowest vertex; they are sorted by it.
         """
         alone = sides_of(self.F)[1]
-        starts, ends = self.F.ravel()[alone], np.roll(self.F, -1, axis=1).ravel()[alone]
+        starts = self.F.ravel()[alone]
+        ends = np.roll(self.F, -1, axis=1).ravel()[alone]
         following = dict(zip(starts.tolist(), ends.tolist(), strict=True))
         rims = []
         for start in sorted(following):
@@ -188,9 +211,12 @@ class Mesh:
     @functools.cached_property
     def genus(self) -> NDArray[np.int64]:
         """Number of handles of every part, shape [component_count]; an open part has those that it has with lids."""
-        count, part_of = self.component_count, np.full(self.F.max() + 1, -1)  # the part of each vertex
+        # the part of each vertex
+        count = self.component_count
+        part_of = np.full(self.F.max() + 1, -1)
         part_of[self.F] = self.components[:, None]
-        vertices, triangles = np.bincount(part_of[part_of >= 0], minlength=count), np.bincount(self.components)
+        vertices = np.bincount(part_of[part_of >= 0], minlength=count)
+        triangles = np.bincount(self.components)
         # every triangle has three sides; each inner edge has two of them, each edge of a rim one
         on_rims, loops = np.zeros((2, count), dtype=np.int64)
         for rim in self.rims:
@@ -227,25 +253,42 @@ def _checked(
     V: ArrayLike, F: ArrayLike, uv: ArrayLike | None, name: str
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]:
     try:
-        points, triangles = np.asarray(V, dtype=np.float64), np.asarray(F)
+        points = np.asarray(V, dtype=np.float64)
+        triangles = np.asarray(F)
         if triangles.dtype.kind not in "iu":
             raise TypeError(f"F holds {triangles.dtype}, valid are integers")
         triangles = triangles.astype(np.int64)
     except (TypeError, ValueError) as error:
         raise MeshError(f"{name}: V and F must be arrays of numbers: {error}") from error
-    if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
-        raise MeshError(f"{name}: V must be [n, 3] and F [m, 3] with m > 0, got {points.shape} and {triangles.shape}")
-    low, high = triangles.min(), triangles.max()
+    if (
+        points.ndim != 2
+        or points.shape[1] != 3
+        or triangles.ndim != 2
+        or triangles.shape[1] != 3
+        or not len(triangles)
+    ):
+        raise MeshError(
+            f"{name}: V must be [n, 3] and F [m, 3] with m > 0, got {points.shape} and "
+            f"{triangles.shape}"
+        )
+    low = triangles.min()
+    high = triangles.max()
     if low < 0 or high >= len(points):
-        raise MeshError(f"{name}: triangle indices run from {low} to {high}, valid is 0 to {len(points) - 1}")
+        raise MeshError(
+            f"{name}: triangle indices run from {low} to {high}, valid is 0 to {len(points) - 1}"
+        )
     used = distinct(triangles)
     bad = used[~np.isfinite(points[used]).all(axis=1)]
     if len(bad):
-        raise MeshError(f"{name}: {len(bad)} vertices are NaN or infinite (the first is vertex {bad[0]})")
+        raise MeshError(
+            f"{name}: {len(bad)} vertices are NaN or infinite (the first is vertex {bad[0]})"
+        )
     with np.errstate(over="ignore"):
         extent = np.ptp(points[used], axis=0).max()
     if not _SMALLEST <= extent <= _LARGEST:
-        raise MeshError(f"{name}: its size is {extent:.3g} m; valid is {_SMALLEST:g} to {_LARGEST:g} m")
+        raise MeshError(
+            f"{name}: its size is {extent:.3g} m; valid is {_SMALLEST:g} to {_LARGEST:g} m"
+        )
     if uv is None:
         return points, triangles, None
     pairs = np.asarray(uv, dtype=np.float64)
@@ -265,56 +308,69 @@ def _cleaned(
     unused = len(V) - len(distinct(F))
     notes = [f"{counted(unused, 'unreferenced vertex')} dropped"] if unused else []
     merged, joined = merged_vertices(V, F)
-    empty, keep = collapsed(merged), distinct_triangles(merged)
+    empty = collapsed(merged)
+    keep = distinct_triangles(merged)
     corners, slivers = without_slivers(V, Corners(merged, F, uv).kept(keep))
     if len(corners.F) == 0:
-        raise MeshError(f"{name} has no triangle with an area: none has three different corners that lie on no line")
+        raise MeshError(
+            f"{name} has no triangle with an area: none has three different corners that lie on no "
+            f"line"
+        )
     first_given = distinct(corners.F)
     compact = np.searchsorted(first_given, corners.F)
-    points, corners, cuts = cut_apart(V[first_given], Corners(compact, corners.given, corners.uv), first_given)
+    points, corners, cuts = cut_apart(
+        V[first_given], Corners(compact, corners.given, corners.uv), first_given
+    )
     # how many vertices became one with others, and how many came to be by cutting
-    vertices, given = corners.F.max() + 1, corners.given.ravel()
+    vertices = corners.F.max() + 1
+    given = corners.given.ravel()
     old = given >= 0
     pairs = distinct(given[old] * vertices + corners.F.ravel()[old])
     kept = len(distinct(pairs % vertices))
-    merges, splits = len(pairs) - kept, len(pairs) - len(distinct(given[old])) + int(vertices) - kept
+    merges = len(pairs) - kept
+    splits = len(pairs) - len(distinct(given[old])) + int(vertices) - kept
     turned, turns = oriented(points, corners)
     said = {
         f"{counted(merges - joined, 'duplicate vertex')} merged": merges > joined,
         f"cracks closed: {counted(joined, 'boundary vertex')} joined": joined,
         f"{counted(int(empty.sum()), 'triangle')} with a repeated vertex dropped": empty.any(),
-        f"{counted(int((~keep & ~empty).sum()), 'repeated triangle')} dropped": (~keep & ~empty).any(),
+        f"{counted(int((~keep & ~empty).sum()), 'repeated triangle')} dropped": (
+            ~keep & ~empty
+        ).any(),
         f"{counted(slivers, 'triangle')} without area dropped": slivers,
     }
     notes += [note for note, true in said.items() if true]
-    # of a surface that was cut before, equal positions are merged and cut again, which nobody needs to know
+    # of a surface that was cut before, equal positions are merged and cut again, which nobody needs
+    # to know
     notes += cuts if merges or splits else []
     return points, turned, (*notes, *turns)
-
-
-# A surface that encloses less, relative to the cube of its size, has no inside.
-_FLAT = 1e-12
-# Parts beyond which a surface round all of them serves better than each by itself.
-_MANY_PARTS = 100
 
 
 def many_parts(mesh: Mesh) -> str:
     """Advice for a mesh of very many parts; none, "", for others."""
     parts = mesh.component_count
-    return f"wrap (--wrap) would put one closed surface round its {parts:,} parts" if parts > _MANY_PARTS else ""
+    return (
+        f"wrap (--wrap) would put one closed surface round its {parts:,} parts"
+        if parts > _MANY_PARTS
+        else ""
+    )
 
 
 def check_genus_zero(mesh: Mesh) -> None:
     """Raise `MeshError`, naming every defect, unless the mesh is a closed surface of genus 0 in one part."""
-    defects, advice = [], ""
+    defects = []
+    advice = ""
     parts = mesh.component_count
     if parts > 1:
-        defects.append(f"in {parts:,} separate parts (valid is one; keep the part you want, or join them)")
+        defects.append(
+            f"in {parts:,} separate parts (valid is one; keep the part you want, or join them)"
+        )
     if not mesh.closed:
         edges = sum(len(rim) for rim in mesh.rims)
         near = place(mesh.V[mesh.rims[0][:2]].mean(axis=0))
         defects.append(
-            f"open: {counted(edges, 'boundary edge')} round {counted(len(mesh.rims), 'hole')} (one near {near})"
+            f"open: {counted(edges, 'boundary edge')} round {counted(len(mesh.rims), 'hole')} (one "
+            f"near {near})"
         )
         advice = "; repair (--repair) closes holes"
     handles = int(mesh.genus.sum())
@@ -324,9 +380,13 @@ def check_genus_zero(mesh: Mesh) -> None:
         advice = f"; {many_parts(mesh)}"
     if defects:
         cuts = "".join(f"; {note}" for note in mesh.notes if note.startswith("cut "))
-        raise MeshError(f"{mesh.name} is not a closed genus-0 surface: it is {', and '.join(defects)}{cuts}{advice}")
+        raise MeshError(
+            f"{mesh.name} is not a closed genus-0 surface: it is "
+            f"{', and '.join(defects)}{cuts}{advice}"
+        )
     extent = np.ptp(mesh.V, axis=0).max()
     if not abs(mesh.volume) > _FLAT * extent**3:
         raise MeshError(
-            f"{mesh.name} is degenerate: it encloses no volume ({mesh.volume:.3g} m^3 at a size of {extent:.3g} m)"
+            f"{mesh.name} is degenerate: it encloses no volume ({mesh.volume:.3g} m^3 at a size of "
+            f"{extent:.3g} m)"
         )

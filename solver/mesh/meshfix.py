@@ -1,6 +1,7 @@
 """Runs pymeshfix on the arrays of one file and leaves the result in another.
 
-A program of its own, which `repair` starts: on some surfaces pymeshfix ends the process that it runs in.
+A program of its own, which `repair` starts: on some surfaces pymeshfix ends the process that it
+runs in.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ def main(source: str, target: str) -> None:
     from pymeshfix import PyTMesh
 
     with np.load(source) as arrays:
-        V, F = arrays["V"], arrays["F"]
+        V = arrays["V"]
+        F = arrays["F"]
     surface = PyTMesh()
     surface.set_quiet(True)
     surface.load_array(V, F.astype(np.int32))

@@ -14,6 +14,19 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from .clean import counted
 
+_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+
 
 @dataclasses.dataclass
 class Element:
@@ -31,7 +44,9 @@ def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any]
     Raises `MeshError` if the data end early, or a row has something other than numbers.
     """
     parts = data.split(b"\n", element.rows) if element.rows <= len(data) else []
-    if len(parts) < element.rows or (len(parts) == element.rows and element.rows and not parts[-1].strip()):
+    if len(parts) < element.rows or (
+        len(parts) == element.rows and element.rows and not parts[-1].strip()
+    ):
         raise _ends_early(element)
     rest = parts[element.rows] if len(parts) > element.rows else b""
     rows = [part.split() for part in parts[: element.rows]]
@@ -39,16 +54,25 @@ def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any]
     try:
         if not any(length for _, _, length in element.columns):
             width = len(element.columns)
-            table = np.array([row[:width] for row in rows], dtype=np.float64).reshape(element.rows, width)
+            table = np.array([row[:width] for row in rows], dtype=np.float64).reshape(
+                element.rows, width
+            )
             return {name: table[:, k] for k, (name, _, _) in enumerate(element.columns)}, rest
         at = [0] * len(rows)
         for name, _, length in element.columns:
-            sizes = [1] * len(rows) if length is None else [int(row[i]) for row, i in zip(rows, at, strict=True)]
+            sizes = (
+                [1] * len(rows)
+                if length is None
+                else [int(row[i]) for row, i in zip(rows, at, strict=True)]
+            )
             first = [i + (length is not None) for i in at]
             at = [i + size for i, size in zip(first, sizes, strict=True)]
             if any(not i <= j <= len(row) for i, j, row in zip(first, at, rows, strict=True)):
                 raise _ends_early(element)
-            columns[name] = [np.array(row[i:j], dtype=np.float64) for row, i, j in zip(rows, first, at, strict=True)]
+            columns[name] = [
+                np.array(row[i:j], dtype=np.float64)
+                for row, i, j in zip(rows, first, at, strict=True)
+            ]
     except (ValueError, IndexError) as error:
         raise MeshError(f"a row of its element {element.name} is not understood") from error
     return columns, rest
@@ -83,13 +107,19 @@ def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, An
     table = np.frombuffer(data, row, element.rows)
     if any((table[f"{name} length"] != size).any() for name, size in sizes.items()):
         return _read_rows(element, data, order)
-    return {name: table[name] for name, _, _ in element.columns}, data[element.rows * row.itemsize :]
+    return {name: table[name] for name, _, _ in element.columns}, data[
+        element.rows * row.itemsize :
+    ]
 
 
 def _read_rows(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
     columns: dict[str, list[NDArray]] = {name: [] for name, _, _ in element.columns}
     given = [
-        (columns[name], np.dtype(order + kind), None if length is None else np.dtype(order + length))
+        (
+            columns[name],
+            np.dtype(order + kind),
+            None if length is None else np.dtype(order + length),
+        )
         for name, kind, length in element.columns
     ]
     at = 0
@@ -162,10 +192,13 @@ def triangulate(points: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArra
     # polygons that are not convex: a triangle of their fan faces against the sum of all
     many = np.flatnonzero(sizes[owner] > 3)
     a, b, c = (points[triangles[many, k]] for k in range(3))
-    with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused later, by name
+    # values that are not finite are refused later, by name
+    with np.errstate(over="ignore", invalid="ignore"):
         normals = np.cross(b - a, c - a)
     of = owner[many]
-    total = np.stack([np.bincount(of, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1)
+    total = np.stack(
+        [np.bincount(of, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1
+    )
     for polygon in np.unique(of[np.einsum("ij,ij->i", normals, total[of]) < 0]):
         corners = points[first[polygon] : first[polygon] + sizes[polygon]]
         triangles[owner == polygon] = first[polygon] + _clip_ears(corners)
@@ -190,37 +223,30 @@ def _clip_ears(corners: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _is_ear(flat: NDArray[np.float64], left: list[int], at: int) -> bool:
-    a, b, c = flat[left[at - 1]], flat[left[at]], flat[left[(at + 1) % len(left)]]
+    a = flat[left[at - 1]]
+    b = flat[left[at]]
+    c = flat[left[(at + 1) % len(left)]]
     if _turn(a, b, c[None])[0] <= 0:
         return False
-    others = flat[[k for k in left if k not in (left[at - 1], left[at], left[(at + 1) % len(left)])]]
+    others = flat[
+        [k for k in left if k not in (left[at - 1], left[at], left[(at + 1) % len(left)])]
+    ]
     inside = (_turn(a, b, others) >= 0) & (_turn(b, c, others) >= 0) & (_turn(c, a, others) >= 0)
     return not inside.any()
 
 
-def _turn(a: NDArray[np.float64], b: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turn(
+    a: NDArray[np.float64], b: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Twice the signed area of the triangles a, b, point."""
     return (b[0] - a[0]) * (points[:, 1] - a[1]) - (b[1] - a[1]) * (points[:, 0] - a[0])
-
-
-_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
-_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 
 
 def read_ply(content: bytes) -> Soup:
     """Triangles of a PLY file.
 
-    Raises `MeshError` if the file is not a PLY file, ends early, or refers to a vertex that does not exist.
+    Raises `MeshError` if the file is not a PLY file, ends early, or refers to a vertex that does
+    not exist.
     """
     order, elements, data = _header(content)
     columns: dict[str, dict[str, Any]] = {}
@@ -228,7 +254,8 @@ def read_ply(content: bytes) -> Soup:
         columns[element.name], data = (read_binary if order else read_text)(element, data, order)
         if "face" in columns and "vertex" in columns:
             break
-    vertex, faces = columns.get("vertex", {}), columns.get("face", {})
+    vertex = columns.get("vertex", {})
+    faces = columns.get("face", {})
     if any(name not in vertex for name in "xyz"):
         raise MeshError("it has no vertices with x, y and z")
     V = np.stack([np.asarray(vertex[name], dtype=np.float64) for name in "xyz"], axis=1)
@@ -237,13 +264,17 @@ def read_ply(content: bytes) -> Soup:
     corners = np.concatenate([np.empty(0), *polygons])
     if len(corners) and not (corners.min() >= 0 and corners.max() < len(V)):
         raise MeshError(
-            f"its faces refer to vertices {corners.min():g} to {corners.max():g}; valid is 0 to {len(V) - 1}"
+            f"its faces refer to vertices {corners.min():g} to {corners.max():g}; valid is 0 to "
+            f"{len(V) - 1}"
         )
     index = corners.astype(np.int64)
     triangles = triangulate(V[index], sizes)
-    uv, pairs = None, faces.get("texcoord")
+    uv = None
+    pairs = faces.get("texcoord")
     names = next((both for both in _UV_NAMES if vertex.keys() >= set(both)), None)
-    if pairs is not None and all(len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)):
+    if pairs is not None and all(
+        len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)
+    ):
         uv = np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
     elif names is not None:
         uv = np.stack([vertex[name] for name in names], axis=1).astype(np.float64)[index]
@@ -255,7 +286,8 @@ def _header(content: bytes) -> tuple[str, list[Element], bytes]:
     lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
     if not found or not lines or lines[0] != ["ply"]:
         raise MeshError("it has no header from ply to end_header, as a PLY file does")
-    order, elements = None, []
+    order = None
+    elements = []
     try:
         for words in lines[1:]:
             match words:
@@ -268,7 +300,9 @@ def _header(content: bytes) -> tuple[str, list[Element], bytes]:
                 case ["property", kind, name]:
                     elements[-1].columns.append((name, _TYPES[kind], None))
     except (KeyError, ValueError, IndexError) as error:
-        raise MeshError(f"the line {' '.join(words)[:60]!r} of its header is not understood") from error
+        raise MeshError(
+            f"the line {' '.join(words)[:60]!r} of its header is not understood"
+        ) from error
     if order is None or any(element.rows < 0 for element in elements):
         raise MeshError("its header gives no format or a negative number of rows")
     return order, elements, data[2:] if data.startswith(b"\r\n") else data[1:]

@@ -23,7 +23,9 @@ class ClosestPoints:
     """
 
     def __init__(self, V: Floats, F: Ints) -> None:
-        self._V, self._F, self._tree = np.ascontiguousarray(V), np.ascontiguousarray(F), igl.AABB()
+        self._V = np.ascontiguousarray(V)
+        self._F = np.ascontiguousarray(F)
+        self._tree = igl.AABB()
         self._tree.init(self._V, self._F)
 
     def __call__(self, points: Floats) -> tuple[Ints, Floats]:
@@ -50,15 +52,22 @@ class RayScene:
         indices = () if F is None else (np.ascontiguousarray(F, dtype=np.int32),)
         TriangleMesh(self._scene, np.ascontiguousarray(V, dtype=np.float32), *indices)
 
-    def cast(self, origins: NDArray, directions: NDArray) -> tuple[Ints, Floats32, Floats32, Floats32]:
+    def cast(
+        self, origins: NDArray, directions: NDArray
+    ) -> tuple[Ints, Floats32, Floats32, Floats32]:
         """What rays from origins [k, 3] along directions [k, 3] meet first.
 
-        The triangle of each, -1 for none; the distance, in lengths of the direction, infinite for none; and barycentric
-        coordinates of the triangle's second and third corner; each [k].
+        The triangle of each, -1 for none; the distance, in lengths of the direction, infinite for
+        none; and barycentric coordinates of the triangle's second and third corner; each [k].
         """
         found = self._scene.run(_float32(origins), _float32(directions), output=1)
         triangle = np.asarray(found["primID"], dtype=np.int64)
-        return triangle, np.where(triangle >= 0, found["tfar"], np.float32(np.inf)), found["u"], found["v"]
+        return (
+            triangle,
+            np.where(triangle >= 0, found["tfar"], np.float32(np.inf)),
+            found["u"],
+            found["v"],
+        )
 
     def distances(self, origins: NDArray, directions: NDArray) -> Floats32:
         """How far rays go, as `cast` says, in less time."""
@@ -70,12 +79,15 @@ def _float32(vectors: NDArray) -> Floats32:
     return np.ascontiguousarray(vectors, dtype=np.float32)
 
 
-def downward_hits(scene: RayScene, xy: NDArray[np.float64], top: float) -> tuple[Ints, NDArray[np.float64]]:
+def downward_hits(
+    scene: RayScene, xy: NDArray[np.float64], top: float
+) -> tuple[Ints, NDArray[np.float64]]:
     """What vertical rays from above at xy [k, 2] first meet, each [k]: the triangle, and its height [m]; -1 and NaN.
 
     Nothing is higher than `top` [m].
     """
     start = top + 0.1 * (1 + abs(top))
-    starts, down = np.column_stack([xy, np.full(len(xy), start)]), np.tile([0.0, 0.0, -1.0], (len(xy), 1))
+    starts = np.column_stack([xy, np.full(len(xy), start)])
+    down = np.tile([0.0, 0.0, -1.0], (len(xy), 1))
     triangle, distance, _, _ = scene.cast(starts, down)
     return triangle, np.where(triangle >= 0, start - distance, np.nan)

@@ -16,6 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import PATH, MeshError, checked, is_finite, shown
 from .wrap import zero_surface
 
+VOLUME_ENDINGS = (".npy", ".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm")
+_MILLIMETRE = 1e-3  # the unit of scans
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Volume:
@@ -53,27 +56,25 @@ class Volume:
         spacing = np.broadcast_to(np.asarray(self.spacing, dtype=np.float64), 3)
         if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
             raise MeshError(
-                f"a volume has shape {values.shape}; valid are finite numbers [i, j, k], two or more along each side"
+                f"a volume has shape {values.shape}; valid are finite numbers [i, j, k], two or "
+                f"more along each side"
             )
         if not (spacing > 0).all() or not is_finite(self.threshold):
             raise MeshError(
-                f"a volume has spacing {shown(self.spacing)} m and threshold {shown(self.threshold)}; valid are finite "
+                f"a volume has spacing {shown(self.spacing)} m and threshold "
+                f"{shown(self.threshold)}; valid are finite "
                 "numbers, the spacing greater than 0"
             )
         if not values.min() < self.threshold < values.max():
             raise MeshError(
-                f"the volume's values are from {values.min():g} to {values.max():g}; valid is a threshold between, not "
+                f"the volume's values are from {values.min():g} to {values.max():g}; valid is a "
+                f"threshold between, not "
                 f"{self.threshold:g}"
             )
         V, F = zero_surface(self.threshold - values, np.zeros(3), spacing)
         directions = np.asarray(self.directions, dtype=np.float64)
         turned = V @ directions.T + np.asarray(self.origin, dtype=np.float64)
         return turned, F if np.linalg.det(directions) > 0 else F[:, ::-1]
-
-
-VOLUME_ENDINGS = (".npy", ".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm")
-
-_MILLIMETRE = 1e-3  # the unit of scans
 
 
 def is_volume(path: str | Path) -> bool:
@@ -83,20 +84,26 @@ def is_volume(path: str | Path) -> bool:
 
 @checked(MeshError, path=PATH)
 def load_volume(
-    path: str | Path, threshold: float, spacing: float | ArrayLike | None = None, origin: ArrayLike = (0.0, 0.0, 0.0)
+    path: str | Path,
+    threshold: float,
+    spacing: float | ArrayLike | None = None,
+    origin: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Volume:
     """Read a volume: a NIfTI or NRRD file, the folder of a DICOM series, or a .npy with its spacing.
 
-    A scan's own millimetres, places and directions are kept, in metres: x, y and z go to the patient's left, back and
-    head, in DICOM, NRRD and NIfTI alike. All but .npy need the package SimpleITK (extra `medical`).
+    A scan's own millimetres, places and directions are kept, in metres: x, y and z go to the
+    patient's left, back and head, in DICOM, NRRD and NIfTI alike. All but .npy need the package
+    SimpleITK (extra `medical`).
 
     Parameters
     ----------
     path : path
     threshold : float
-        Value at the body's surface, in the file's units: about 300 Hounsfield units for bone, -300 for skin.
+        Value at the body's surface, in the file's units: about 300 Hounsfield units for bone, -300
+        for skin.
     spacing : float or [3], optional
-        Between the nodes of a .npy, whose array is [i, j, k] along x, y and z [m]; a scan has its own.
+        Between the nodes of a .npy, whose array is [i, j, k] along x, y and z [m]; a scan has its
+        own.
     origin : [3]
         Where the first node of a .npy is [m].
 
@@ -107,15 +114,24 @@ def load_volume(
     """
     path = Path(path)
     if not path.exists():
-        raise MeshError(f"volume {str(path)!r} does not exist; valid are {', '.join(VOLUME_ENDINGS)}, or a folder")
+        raise MeshError(
+            f"volume {str(path)!r} does not exist; valid are {', '.join(VOLUME_ENDINGS)}, or a "
+            f"folder"
+        )
     if not is_volume(path):
-        raise MeshError(f"volume {str(path)!r} has an unknown ending; valid are {', '.join(VOLUME_ENDINGS)}")
+        raise MeshError(
+            f"volume {str(path)!r} has an unknown ending; valid are {', '.join(VOLUME_ENDINGS)}"
+        )
     if path.suffix.lower() != ".npy":
         if spacing is not None:
-            raise MeshError(f"volume {str(path)!r} has a spacing of its own; leave it out, it is for .npy files")
+            raise MeshError(
+                f"volume {str(path)!r} has a spacing of its own; leave it out, it is for .npy files"
+            )
         return _scan(path, threshold)
     if spacing is None:
-        raise MeshError(f"volume {str(path)!r} needs a spacing: the way between voxels in metres, such as 0.001")
+        raise MeshError(
+            f"volume {str(path)!r} needs a spacing: the way between voxels in metres, such as 0.001"
+        )
     try:
         values = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
@@ -130,23 +146,29 @@ def _scan(path: Path, threshold: float) -> Volume:
         itk: Any = importlib.import_module("SimpleITK")
     except ImportError as error:
         raise MeshError(
-            f"volume {str(path)!r} needs the package SimpleITK: pip install 'ripple-sim[medical]', or save the voxels "
+            f"volume {str(path)!r} needs the package SimpleITK: pip install 'ripple-sim[medical]', "
+            f"or save the voxels "
             "as .npy"
         ) from error
-    itk.ProcessObject.SetGlobalWarningDisplay(False)  # its readers write to stderr beside what they raise
+    # its readers write to stderr beside what they raise
+    itk.ProcessObject.SetGlobalWarningDisplay(False)
     try:
         names: Any = str(path)
         if path.is_dir():
             names = itk.ImageSeriesReader.GetGDCMSeriesFileNames(str(path))
             if not names:
-                raise MeshError(f"folder {str(path)!r} holds no DICOM series; give one that does, or a volume's file")
+                raise MeshError(
+                    f"folder {str(path)!r} holds no DICOM series; give one that does, or a "
+                    f"volume's file"
+                )
         image = itk.ReadImage(names)
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1].removeprefix("sitk::ERROR: ")
         raise MeshError(f"volume {str(path)!r} cannot be read: {reason}") from error
     if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
         raise MeshError(
-            f"volume {str(path)!r} has {image.GetDimension()} dimensions and {image.GetNumberOfComponentsPerPixel()} "
+            f"volume {str(path)!r} has {image.GetDimension()} dimensions and "
+            f"{image.GetNumberOfComponentsPerPixel()} "
             "values a voxel; valid are 3 and 1"
         )
     return Volume(

@@ -1,8 +1,8 @@
 """A closed surface round an object that is no surface itself: parts that pass through each other, scans in pieces.
 
-All points at a given distance from the object, by marching cubes (Lorensen and Cline 1987). What cannot be reached from
-far away without coming closer than that counts as inside, as in alpha wrapping (Portaneri et al. 2022). Distances on
-the grid are computed where they matter.
+All points at a given distance from the object, by marching cubes (Lorensen and Cline 1987). What
+cannot be reached from far away without coming closer than that counts as inside, as in alpha
+wrapping (Portaneri et al. 2022). Distances on the grid are computed where they matter.
 """
 
 from __future__ import annotations
@@ -21,6 +21,19 @@ from .queries import ClosestPoints
 _COARSEST = 16  # spacings along the side of the largest blocks
 _MARGIN = 2  # layers of nodes beyond the surface, on all sides
 
+# Corners of a grid cell as `igl.marching_cubes` counts them: along x, y, z.
+_CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+)
+
+# Below, the grid has more than some 20 million nodes; above, little of the object's shape is left.
+_SMALLEST = 0.004
+_LARGEST = 0.2
+
+# Nodes nearer to the surface than this share of the spacing are moved off it: they would make
+# slivers.
+_CLEAR = 0.05
+
 
 def distance_grid(
     V: NDArray[np.float64], F: NDArray[np.int64], distance: float
@@ -31,8 +44,8 @@ def distance_grid(
     ----------
     V, F : [vertex_count, 3], [triangle_count, 3]
     distance : float
-        Where the distance has to be known exactly [m]. Farther than two spacings from there, a node may have the
-        distance of its block's middle, which is on the same side.
+        Where the distance has to be known exactly [m]. Farther than two spacings from there, a node
+        may have the distance of its block's middle, which is on the same side.
 
     Returns
     -------
@@ -42,7 +55,8 @@ def distance_grid(
         Place of the first node [m]; the outermost ones are farther from the mesh than `distance`.
     """
     closest_points = ClosestPoints(V, F)
-    low, high = V.min(axis=0), V.max(axis=0)
+    low = V.min(axis=0)
+    high = V.max(axis=0)
     origin = low - (1 + _MARGIN) * distance
     shape = np.ceil((high - low) / distance).astype(int) + 3 + 2 * _MARGIN
     blocks = -(-shape // _COARSEST)
@@ -50,18 +64,17 @@ def distance_grid(
     corners = _COARSEST * np.indices(blocks).reshape(3, -1).T
     size = _COARSEST
     while True:
-        found = closest_points.distances(origin + distance * (corners + (size - 1) / 2))  # of the blocks' middles
+        # of the blocks' middles
+        found = closest_points.distances(origin + distance * (corners + (size - 1) / 2))
         places = corners[:, None] + np.indices([size] * 3).reshape(3, -1).T
         values[tuple(np.moveaxis(places, -1, 0))] = found[:, None]
         if size == 1:
             return values, origin
         near = np.abs(found - distance) <= (2 + (size - 1) / 2 * np.sqrt(3)) * distance
         size //= 2
-        corners = (corners[near][:, None] + size * np.indices([2, 2, 2]).reshape(3, -1).T).reshape(-1, 3)
-
-
-# Corners of a grid cell as `igl.marching_cubes` counts them: along x, y, z.
-_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+        corners = (corners[near][:, None] + size * np.indices([2, 2, 2]).reshape(3, -1).T).reshape(
+            -1, 3
+        )
 
 
 def zero_surface(
@@ -69,19 +82,18 @@ def zero_surface(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Triangles where values on a grid [x, y, z] change their sign, from those cells alone in which they do."""
     inside = values < 0
-    corners = [inside[tuple(slice(d, n - 1 + d) for d, n in zip(c, values.shape, strict=True))] for c in _CORNERS]
+    corners = [
+        inside[tuple(slice(d, n - 1 + d) for d, n in zip(c, values.shape, strict=True))]
+        for c in _CORNERS
+    ]
     count = np.sum(corners, axis=0)
     cells = np.argwhere((count > 0) & (count < 8))
     nodes = (cells[:, None] + _CORNERS).reshape(-1, 3)
     used, index = np.unique(np.ravel_multi_index(tuple(nodes.T), values.shape), return_inverse=True)
-    points = np.asarray(origin) + np.asarray(spacing) * np.stack(np.unravel_index(used, values.shape), axis=1)
+    points = np.asarray(origin) + np.asarray(spacing) * np.stack(
+        np.unravel_index(used, values.shape), axis=1
+    )
     return igl.marching_cubes(values.ravel()[used], points, index.reshape(-1, 8), 0.0)[:2]
-
-
-# Below, the grid has more than some 20 million nodes; above, little of the object's shape is left.
-_SMALLEST, _LARGEST = 0.004, 0.2
-# Nodes nearer to the surface than this share of the spacing are moved off it: they would make slivers.
-_CLEAR = 0.05
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -116,15 +128,17 @@ class Wrap:
 def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
     """Put a closed surface round a mesh.
 
-    Gaps and holes narrower than two offsets are bridged: pieces so near share one surface, and what lies behind them
-    counts as inside. From four offsets on pieces get a surface each, and holes stay open.
+    Gaps and holes narrower than two offsets are bridged: pieces so near share one surface, and what
+    lies behind them counts as inside. From four offsets on pieces get a surface each, and holes
+    stay open.
 
     Parameters
     ----------
     mesh : Mesh
     offset : float
-        Distance of the surface from the object, relative to the object's longest extent. It is also the spacing of the
-        grid on which the surface is found: half the offset has about four times the triangles.
+        Distance of the surface from the object, relative to the object's longest extent. It is also
+        the spacing of the grid on which the surface is found: half the offset has about four times
+        the triangles.
 
     Raises
     ------
@@ -134,19 +148,25 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
     from scipy.ndimage import label  # takes long to import, for what few meshes need
 
     if not _SMALLEST <= offset <= _LARGEST:
-        raise MeshError(f"the offset of the wrap is {offset}; valid is {_SMALLEST} to {_LARGEST} of the object's size")
+        raise MeshError(
+            f"the offset of the wrap is {offset}; valid is {_SMALLEST} to {_LARGEST} of the "
+            f"object's size"
+        )
     distance = float(offset * np.ptp(mesh.V, axis=0).max())
     values, origin = distance_grid(mesh.V, mesh.F, distance)
     values -= distance
     # what is positive, but shut off from the first node, is inside
     region, _ = label(values > 0)
     values = np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
-    values = np.where(values < 0, np.minimum(values, -_CLEAR * distance), np.maximum(values, _CLEAR * distance))
+    values = np.where(
+        values < 0, np.minimum(values, -_CLEAR * distance), np.maximum(values, _CLEAR * distance)
+    )
     V, F = zero_surface(values, origin, distance)
     found = Mesh.from_arrays(V, F, name=mesh.name)
     note = (
         f"wrapped, {distance:.3g} m off: {counted(mesh.component_count, 'part')} in "
-        f"{counted(found.component_count, 'closed surface')} with {counted(int(found.genus.sum()), 'handle')}, "
+        f"{counted(found.component_count, 'closed surface')} with "
+        f"{counted(int(found.genus.sum()), 'handle')}, "
         f"{counted(len(found.F), 'triangle')}"
     )
     surface = dataclasses.replace(found, notes=(*mesh.notes, note))

@@ -13,7 +13,11 @@ from .coefficients import (
     require_positive as require_positive,
 )
 from .curvatures import STEPS as STEPS, Curvatures as Curvatures
-from .deep_water import FluidOperator as FluidOperator, HalfLaplacian as HalfLaplacian, factorised as factorised
+from .deep_water import (
+    FluidOperator as FluidOperator,
+    HalfLaplacian as HalfLaplacian,
+    factorised as factorised,
+)
 from .material import (
     SHORTEST_TEXELS as SHORTEST_TEXELS,
     STIFF as STIFF,
@@ -35,7 +39,11 @@ from .presets import (
     narrow_stiffness as narrow_stiffness,
     stiffness_under as stiffness_under,
 )
-from .volume import VolumeBalance as VolumeBalance, VolumeRate as VolumeRate, volume_rate as volume_rate
+from .volume import (
+    VolumeBalance as VolumeBalance,
+    VolumeRate as VolumeRate,
+    volume_rate as volume_rate,
+)
 from .wave_operator import (
     SAFETY as SAFETY,
     StepCoefficients as StepCoefficients,

@@ -28,12 +28,15 @@ def check_numbers(name: str, value: ArrayLike) -> None:
     unit, strict, endless = LIMITS[name]
     numbers = _numbers(name, value)
     # NaN is not at least anything
-    wrong = ~(numbers >= (1 / _HIGHEST if strict else 0)) | ((numbers > _HIGHEST) & ~(np.isinf(numbers) & endless))
+    wrong = ~(numbers >= (1 / _HIGHEST if strict else 0)) | (
+        (numbers > _HIGHEST) & ~(np.isinf(numbers) & endless)
+    )
     if wrong.any():
         worst = numbers.flat[np.argmax(wrong)]
         bound = f"greater than 0 and at least {1 / _HIGHEST:g}" if strict else "0 or greater"
         raise SolverError(
-            f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to {_HIGHEST:g}"
+            f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to "
+            f"{_HIGHEST:g}"
             f"{', or infinity' if endless else ''}"
         )
     _check_shape(name, numbers)
@@ -43,7 +46,9 @@ def check_mask(name: str, value: ArrayLike) -> None:
     """Raise `SolverError` unless a value is one bool, or one a texel."""
     mask = np.asarray(value)
     if mask.dtype != bool:
-        raise SolverError(f"material {name} has type {mask.dtype}; valid is bool: a mask [C, n, n], or False")
+        raise SolverError(
+            f"material {name} has type {mask.dtype}; valid is bool: a mask [C, n, n], or False"
+        )
     _check_shape(name, mask)
 
 
@@ -52,7 +57,8 @@ def check_wavelengths(value: ArrayLike) -> None:
     numbers = _numbers("wavelengths", value)
     if numbers.shape != (2,) or not 0 <= numbers[0] <= numbers[1]:
         raise SolverError(
-            f"material wavelengths is {shown(value)} m; valid are two numbers: the shortest, 0 or greater, and the "
+            f"material wavelengths is {shown(value)} m; valid are two numbers: the shortest, 0 or "
+            f"greater, and the "
             "longest"
         )
 
@@ -61,12 +67,17 @@ def _numbers(name: str, value: object) -> NDArray[np.float64]:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise SolverError(f"material {name} is {shown(value)}; valid is a number or an array of numbers") from error
+        raise SolverError(
+            f"material {name} is {shown(value)}; valid is a number or an array of numbers"
+        ) from error
 
 
 def _check_shape(name: str, value: NDArray) -> None:
     if value.ndim != 0 and not (value.ndim == 3 and value.shape[1] == value.shape[2]):
-        raise SolverError(f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a texel")
+        raise SolverError(
+            f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a "
+            f"texel"
+        )
 
 
 def require_positive(**values: tuple[float, str]) -> None:

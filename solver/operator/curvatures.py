@@ -1,7 +1,8 @@
 """Bending as a sum of squares: three weighed curvatures at each texel, each a nine-point difference of the heights.
 
-Half the sum of their squares is the energy, which can therefore never be negative. With R the matrix of differences,
-the force is -R^T R h: one pass takes the curvatures, and a second one sums them up with the transposed weights.
+Half the sum of their squares is the energy, which can therefore never be negative. With R the
+matrix of differences, the force is -R^T R h: one pass takes the curvatures, and a second one sums
+them up with the transposed weights.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from ..kernel import Bools, Floats, Ints
 from ..texels.topology import TexelTopology
 
 # Curvatures of a texel, and neighbours of which each is a difference.
-KINDS, NEIGHBOURS = 3, 8
+KINDS = 3
+NEIGHBOURS = 8
 
 # Row and column of the neighbours, from the texel.
 STEPS = tuple((r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c)
@@ -51,8 +53,8 @@ class Curvatures:
     ----------
     topology : TexelTopology
     weights : float64 [3, 8, C, n, n]
-        Of curvature k of a texel, the sum over its neighbours of weight (h_neighbour - h) [sqrt(N / m)]; 0 where the
-        texel is not one of `regular_texels`.
+        Of curvature k of a texel, the sum over its neighbours of weight (h_neighbour - h) [sqrt(N /
+        m)]; 0 where the texel is not one of `regular_texels`.
     rigidity : float64 [C, n, n]
         D [N m].
     """
@@ -72,7 +74,9 @@ class Curvatures:
         row = kind * count + texel
         rows = np.concatenate([row, row])
         columns = np.concatenate([around[step, texel], texel])
-        return csr_array((np.concatenate([weight, -weight]), (rows, columns)), shape=(KINDS * count, count))
+        return csr_array(
+            (np.concatenate([weight, -weight]), (rows, columns)), shape=(KINDS * count, count)
+        )
 
     @functools.cached_property
     def transposed(self) -> Floats:
@@ -83,7 +87,8 @@ class Curvatures:
         back = np.zeros((KINDS, NEIGHBOURS + 1, count))
         for step in range(NEIGHBOURS):
             for opposite in range(NEIGHBOURS):
-                # the neighbour in this step may see the texel in any other: charts are turned against each other
+                # the neighbour in this step may see the texel in any other: charts are turned
+                # against each other
                 other = around[step]
                 meets = (other >= 0) & (around[opposite][other] == np.arange(count))
                 back[:, step, meets] += weights[:, opposite, other[meets]]

@@ -19,24 +19,29 @@ from ..kernel import Bools, Floats
 from ..texels.stencil import Stencil, largest_eigenvalue, stiffness_matrix
 from .wave_operator import WaveOperator
 
-# Shifted solves for each root: with 5 the error is below 0.1 % over the 10,000 by which the eigenvalues of 6 x 64 x 64
-# texels differ.
+# Shifted solves for each root: with 5 the error is below 0.1 % over the 10,000 by which the
+# eigenvalues of 6 x 64 x 64 texels differ.
 _POLES = 5
 
 
 def factorised(matrix: sparray) -> Callable[[Floats], Floats]:
     """Solves with a matrix that is symmetric and positive, so that no pivots are needed."""
-    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    options = {
+        "permc_spec": "MMD_AT_PLUS_A",
+        "diag_pivot_thresh": 0.0,
+        "options": {"SymmetricMode": True},
+    }
     return splu(matrix.tocsc(), **options).solve
 
 
 class HalfLaplacian:
     """sqrt(A^-1 K) of the stiffness K and the areas A of the texels, of second order in their size.
 
-    The rational approximation of Hale, Higham and Trefethen (2008, SIAM Journal on Numerical Analysis 46, 2505, method
-    3): L sum w_i (L + s_i)^-1 with L = A^-1 K and weights and shifts from elliptic functions. Its error falls by
-    exp(-2 pi^2 / (3 + log(most / least))) with each pole. A field without waves, a constant, gives exactly 0, and the
-    operator is symmetric with areas as weights. Each shifted matrix is factorised once.
+    The rational approximation of Hale, Higham and Trefethen (2008, SIAM Journal on Numerical
+    Analysis 46, 2505, method 3): L sum w_i (L + s_i)^-1 with L = A^-1 K and weights and shifts from
+    elliptic functions. Its error falls by exp(-2 pi^2 / (3 + log(most / least))) with each pole. A
+    field without waves, a constant, gives exactly 0, and the operator is symmetric with areas as
+    weights. Each shifted matrix is factorised once.
 
     Parameters
     ----------
@@ -54,7 +59,9 @@ class HalfLaplacian:
     def __init__(self, stencil: Stencil, areas: Floats) -> None:
         self._areas = areas.ravel()
         self._matrix = stiffness_matrix(stencil)
-        square = largest_eigenvalue(stencil, areas, np.ones(areas.shape, np.bool_), stencil.fastest(areas))
+        square = largest_eigenvalue(
+            stencil, areas, np.ones(areas.shape, np.bool_), stencil.fastest(areas)
+        )
         self.most = float(np.sqrt(square))
         # few waves on a surface are longer than twice the way round a sphere of its area
         least = min(np.pi / areas.sum(), square / 4)
@@ -63,7 +70,9 @@ class HalfLaplacian:
         sn, cn, dn, _ = ellipj((np.arange(_POLES) + 0.5) / _POLES * quarter, complement)
         self._weights = 2 * quarter * np.sqrt(least) / (np.pi * _POLES) * dn / cn**2
         shifts = least * (sn / cn) ** 2
-        self._solvers = [factorised(self._matrix + diags_array(shift * self._areas)) for shift in shifts]
+        self._solvers = [
+            factorised(self._matrix + diags_array(shift * self._areas)) for shift in shifts
+        ]
 
     def __call__(self, field: Floats) -> Floats:
         """Apply it to a field [C, n, n]: the unit times 1/m."""
@@ -80,7 +89,9 @@ class HalfLaplacian:
     def _inverse(self, field: Floats) -> Floats:
         """Approximate inverse root: sum w_i (L + s_i)^-1."""
         load = self._areas * field
-        return sum(weight * solve(load) for weight, solve in zip(self._weights, self._solvers, strict=True))
+        return sum(
+            weight * solve(load) for weight, solve in zip(self._weights, self._solvers, strict=True)
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -118,7 +129,9 @@ class FluidOperator(WaveOperator):
 
     def acceleration(self, momentum: Floats) -> Floats:
         """What forces [N] make of the height [m/s^2], or momenta [N s] of the velocity [m/s], [C, n, n]."""
-        return np.where(self.free, self.root(np.where(self.free, momentum / self.mass, 0.0)) / self.deep, 0.0)
+        return np.where(
+            self.free, self.root(np.where(self.free, momentum / self.mass, 0.0)) / self.deep, 0.0
+        )
 
     def momenta(self, velocity: Floats) -> Floats:
         """Momentum of the fluid that moves with the surface [N s], float64 [C, n, n]."""
@@ -129,13 +142,17 @@ class FluidOperator(WaveOperator):
         return rate * self.root.most / self.deep
 
 
-def over_fluid(operator: WaveOperator, deep: float, geometry: Stencil, areas: Floats) -> FluidOperator:
+def over_fluid(
+    operator: WaveOperator, deep: float, geometry: Stencil, areas: Floats
+) -> FluidOperator:
     """The operator of a surface with deep fluid below; see `FluidOperator`.
 
     Raises `SolverError` if the density varies, or the surface bends or yields.
     """
     excluded = operator.density, operator.bending, operator.yield_height
-    for field, what in zip(excluded, ("a density that varies", "bending", "a yield height"), strict=True):
+    for field, what in zip(
+        excluded, ("a density that varies", "bending", "a yield height"), strict=True
+    ):
         if field is not None:
             raise SolverError(f"a material with deep fluid has {what}; valid is one density alone")
     given = {each.name: getattr(operator, each.name) for each in dataclasses.fields(operator)}

@@ -1,7 +1,7 @@
 """Materials: the coefficients of the wave equation, from laws, from what is seen, and as presets.
 
-With them theory of plane waves on a flat surface of a uniform material, and whether an atlas has room for the waves
-that a material's coefficients stand for.
+With them theory of plane waves on a flat surface of a uniform material, and whether an atlas has
+room for the waves that a material's coefficients stand for.
 """
 
 from __future__ import annotations
@@ -18,53 +18,66 @@ from ..texels.atlas import Atlas
 from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, require_positive
 from .presets import PRESETS, suited_coefficients
 
-# omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the lowest normal mode of an
-# incompressible layer bonded to a rigid base: its frequency is within 3.0 % of the root of the mode's determinant. The
-# group speed is not: it is 0.36 c_T instead of 0.93 at q d = 1.3, 0.53 for 0.38 at 2.2, and 0.82 for 0.93 at 8.
-STIFF, FAST = 6.527, 0.7668
+# omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the
+# lowest normal mode of an incompressible layer bonded to a rigid base: its frequency is within 3.0
+# % of the root of the mode's determinant. The group speed is not: it is 0.36 c_T instead of 0.93 at
+# q d = 1.3, 0.53 for 0.38 at 2.2, and 0.82 for 0.93 at 8.
+STIFF = 6.527
+FAST = 0.7668
 
-# The mode's kinetic energy is that of MASS rho d moving as the surface does: 0.56 to 0.95 in that range, the least at
-# its short end; this is the geometric mean.
+# The mode's kinetic energy is that of MASS rho d moving as the surface does: 0.56 to 0.95 in that
+# range, the least at its short end; this is the geometric mean.
 MASS = 0.665
 
 # Shortest and longest wave, over the thickness, for which the fit holds.
-SHORTEST, LONGEST = 2 * np.pi / 8, 2 * np.pi / 1.3
+SHORTEST = 2 * np.pi / 8
+LONGEST = 2 * np.pi / 1.3
 
-# The same for q d >= 5, where group speeds are even as well: phase within 2.6 %, group within 3.5 %. The mass is the
-# mean for 5 <= q d <= 16, where it falls from 0.68 to 0.31.
-_SHORT_STIFF, _SHORT_FAST, _SHORT_MASS, _SHORT_LONGEST = 4.263, 0.8781, 0.517, 2 * np.pi / 5
+# The same for q d >= 5, where group speeds are even as well: phase within 2.6 %, group within 3.5
+# %. The mass is the mean for 5 <= q d <= 16, where it falls from 0.68 to 0.31.
+_SHORT_STIFF = 4.263
+_SHORT_FAST = 0.8781
+_SHORT_MASS = 0.517
+_SHORT_LONGEST = 2 * np.pi / 5
 
 _MOST = 8.0  # power with which tension may follow the area
-_LEAST_POISSON = -0.9  # at -1 a sheet would resist only what changes its shape, and its rigidity be infinite
+# at -1 a sheet would resist only what changes its shape, and its rigidity be infinite
+_LEAST_POISSON = -0.9
+
+# A wave of fewer texels is slower than it should be by more than a twentieth.
+SHORTEST_TEXELS = 6.0
 
 
 class Default(float):
     """A coefficient that nobody gave: it counts as the number that it is, until someone who knows better replaces it.
 
-    `WaveSolver` takes it as it stands. `Ripples` knows the model, and puts in what suits its target.
+    `WaveSolver` takes it as it stands. `Ripples` knows the model, and puts in what suits its
+    target.
     """
 
     __slots__ = ()
 
 
-_ZERO, _ONE = Default(0.0), Default(1.0)
+_ZERO = Default(0.0)
+_ONE = Default(1.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Material:
     """Coefficients of the wave equation; each is a number or one value a texel, shape [C, n, n].
 
-    sigma h_tt = div(sigma c^2 grad h) - lap(sigma b lap h) - sigma zeta h_t - sigma k h + div(sigma nu grad h_t) - p,
-    with p the pressure from outside. A wave of wave number q has omega^2 = c^2 q^2 + b q^4 + k - (zeta + nu q^2)^2 / 4
-    and dies as exp(-(zeta + nu q^2) t / 2).
+    sigma h_tt = div(sigma c^2 grad h) - lap(sigma b lap h) - sigma zeta h_t - sigma k h + div(sigma
+    nu grad h_t) - p, with p the pressure from outside. A wave of wave number q has omega^2 = c^2
+    q^2 + b q^4 + k - (zeta + nu q^2)^2 / 4 and dies as exp(-(zeta + nu q^2) t / 2).
 
     Attributes
     ----------
     speed : c [m/s]
-        Wave speed of tension. Where it is 0 nothing propagates: waves reflect as from a free rim, and a region
-        without tension, bending and stiffness is rigid, so that sources do not move it. Where it fades below 3 % of the
-        greatest, with the other two, so does the share of a source that moves the surface; what lies below takes the
-        rest, and loads do not sink in for ever.
+        Wave speed of tension. Where it is 0 nothing propagates: waves reflect as from a free rim,
+        and a region without tension, bending and stiffness is rigid, so that sources do not move
+        it. Where it fades below 3 % of the greatest, with the other two, so does the share of a
+        source that moves the surface; what lies below takes the rest, and loads do not sink in for
+        ever.
     damping : zeta [1/s]
         The amplitude of every wave falls as exp(-zeta t / 2).
     stiffness : k [1/s^2]
@@ -72,28 +85,33 @@ class Material:
     viscosity : nu [m^2/s]
         Damps a wave of wave number q as exp(-nu q^2 t / 2): short ripples first.
     density : sigma [kg/m^2]
-        Mass that takes part in the motion, for each area. An impulse J raises the momentum of the surface by J.
+        Mass that takes part in the motion, for each area. An impulse J raises the momentum of the
+        surface by J.
     bending : b [m^4/s^2]
-        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are faster.
+        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short
+        ripples are faster.
     yield_height : [m]
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
     poisson : nu
-        Poisson's ratio, which counts at the rims of a surface that bends: one number from -0.9 to 0.5.
+        Poisson's ratio, which counts at the rims of a surface that bends: one number from -0.9 to
+        0.5.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
     deep : [1/m]
-        With deep fluid below, whose flow makes long waves heavier: the wave number q_0 at which it weighs sigma. Of
-        another wave number q it weighs sigma q_0 / q, so that omega^2 is q / q_0 times the one above. 0: no fluid. One
-        number, with one density; see `water`.
+        With deep fluid below, whose flow makes long waves heavier: the wave number q_0 at which it
+        weighs sigma. Of another wave number q it weighs sigma q_0 / q, so that omega^2 is q / q_0
+        times the one above. 0: no fluid. One number, with one density; see `water`.
     tightening : float
-        On a surface that moves, see `WaveSolver.move`: c^2 grows as this power of the area over that at rest. 0: waves
-        stay as fast as they are; 1: the tension stays, as of a soap film; more: the tension grows, as of rubber.
+        On a surface that moves, see `WaveSolver.move`: c^2 grows as this power of the area over
+        that at rest. 0: waves stay as fast as they are; 1: the tension stays, as of a soap film;
+        more: the tension grows, as of rubber.
     wavelengths : (float, float)
-        Shortest and longest wave for which the coefficients stand for the real material [m]. `WaveSolver` warns where
-        an atlas has room for none of them.
+        Shortest and longest wave for which the coefficients stand for the real material [m].
+        `WaveSolver` warns where an atlas has room for none of them.
 
-    A density that is not given is 1 to `WaveSolver`, which knows nothing of a scale. `Ripples` takes it from the model,
-    and with it those of speed, damping and stiffness that are not given; see `suited_material`.
+    A density that is not given is 1 to `WaveSolver`, which knows nothing of a scale. `Ripples`
+    takes it from the model, and with it those of speed, damping and stiffness that are not given;
+    see `suited_material`.
     """
 
     speed: float | ArrayLike = _ONE
@@ -114,10 +132,14 @@ class Material:
             check_numbers(name, getattr(self, name))
         check_mask("fixed", self.fixed)
         if not (is_finite(self.tightening) and -_MOST <= self.tightening <= _MOST):
-            raise SolverError(f"material tightening is {shown(self.tightening)}; valid is from {-_MOST:g} to {_MOST:g}")
+            raise SolverError(
+                f"material tightening is {shown(self.tightening)}; valid is from {-_MOST:g} to "
+                f"{_MOST:g}"
+            )
         if not (is_finite(self.poisson) and _LEAST_POISSON <= self.poisson <= 0.5):
             raise SolverError(
-                f"material poisson is {shown(self.poisson)}; valid is a number from {_LEAST_POISSON} to 0.5"
+                f"material poisson is {shown(self.poisson)}; valid is a number from "
+                f"{_LEAST_POISSON} to 0.5"
             )
         if np.ndim(self.deep):
             raise SolverError(f"material deep has shape {np.shape(self.deep)}; valid is one number")
@@ -140,7 +162,9 @@ class Material:
         """
         value = np.asarray(getattr(self, name), dtype=bool if name == "fixed" else np.float64)
         if value.ndim and value.shape != shape:
-            raise SolverError(f"material {name} has shape {value.shape}, the atlas needs a number or {shape}")
+            raise SolverError(
+                f"material {name} has shape {value.shape}, the atlas needs a number or {shape}"
+            )
         return np.array(np.broadcast_to(value, shape))
 
     @classmethod
@@ -167,13 +191,15 @@ class Material:
     ) -> Self:
         """Soft layer bonded to a rigid core: where it is thin it is stiff and soon still, where thick soft and slow.
 
-        The waves that normal impacts drive: the lowest normal mode of an incompressible Kelvin-Voigt layer on a rigid
-        base, whose modulus is G + eta d/dt. With c_T^2 = G / rho its frequency is, within 3.0 % for 1.3 <= q d <= 8,
-        omega^2 = 6.527 (c_T / d)^2 + 0.7668 c_T^2 q^2, a fit to the zeros of the mode's determinant (Achenbach 1973,
-        chapter 6, for the waves in a layer); waves shorter than 0.8 d or longer than 4.8 d are outside of it.
-        A ring, which travels with the group speed, needs `short` unless the layer is thin for it.
-        All forces in the layer go with the modulus, so that eta gives damping and viscosity in the same two terms.
-        The density is the mode's share of the layer's mass, 0.665 rho d, within a quarter for 1.6 <= q d <= 8.
+        The waves that normal impacts drive: the lowest normal mode of an incompressible
+        Kelvin-Voigt layer on a rigid base, whose modulus is G + eta d/dt. With c_T^2 = G / rho its
+        frequency is, within 3.0 % for 1.3 <= q d <= 8, omega^2 = 6.527 (c_T / d)^2 + 0.7668 c_T^2
+        q^2, a fit to the zeros of the mode's determinant (Achenbach 1973, chapter 6, for the waves
+        in a layer); waves shorter than 0.8 d or longer than 4.8 d are outside of it. A ring, which
+        travels with the group speed, needs `short` unless the layer is thin for it. All forces in
+        the layer go with the modulus, so that eta gives damping and viscosity in the same two
+        terms. The density is the mode's share of the layer's mass, 0.665 rho d, within a quarter
+        for 1.6 <= q d <= 8.
 
         Parameters
         ----------
@@ -184,9 +210,9 @@ class Material:
         thickness : d [m]
             A number, or one at every texel, [C, n, n].
         short : bool
-            Fitted to waves shorter than 1.26 d, as a small drop sends over a thick layer: 4.263 and 0.8781 are then the
-            two factors, for q d >= 5, with the phase speed within 2.6 % and the group speed within 3.5 %, and the mass
-            is 0.517 rho d.
+            Fitted to waves shorter than 1.26 d, as a small drop sends over a thick layer: 4.263 and
+            0.8781 are then the two factors, for q d >= 5, with the phase speed within 2.6 % and the
+            group speed within 3.5 %, and the mass is 0.517 rho d.
 
         Raises
         ------
@@ -195,10 +221,15 @@ class Material:
         """
         require_positive(modulus=(modulus, "Pa"), density=(density, "kg/m^3"))
         if not (is_finite(viscosity) and viscosity >= 0):
-            raise SolverError(f"viscosity is {shown(viscosity)} Pa s; valid is a finite number, 0 or greater")
+            raise SolverError(
+                f"viscosity is {shown(viscosity)} Pa s; valid is a finite number, 0 or greater"
+            )
         depth = _thickness(thickness)
-        square, kinematic = modulus / density, viscosity / density
-        stiff, fast, mass = (_SHORT_STIFF, _SHORT_FAST, _SHORT_MASS) if short else (STIFF, FAST, MASS)
+        square = modulus / density
+        kinematic = viscosity / density
+        stiff, fast, mass = (
+            (_SHORT_STIFF, _SHORT_FAST, _SHORT_MASS) if short else (STIFF, FAST, MASS)
+        )
         least, most = (0.0, _SHORT_LONGEST) if short else (SHORTEST, LONGEST)
         return cls(
             speed=(fast * square) ** 0.5,
@@ -212,15 +243,20 @@ class Material:
 
     @classmethod
     def water(
-        cls, density: float = 1000.0, tension: float = 0.072, gravity: float = 9.81, viscosity: float = 1e-6
+        cls,
+        density: float = 1000.0,
+        tension: float = 0.072,
+        gravity: float = 9.81,
+        viscosity: float = 1e-6,
     ) -> Self:
         """Deep liquid under gravity and surface tension: omega^2 = g q + (gamma / rho) q^3.
 
-        Long waves run faster than those of about the crossing length 2 pi sqrt(gamma / (rho g)), 17 mm for water, and
-        so do short ones. Gravity pulls along the inward normal everywhere, and the liquid is deeper than half a wave
-        and flat: the flow below takes the square root of the surface's Laplacian, by a rational approximation, see
-        `HalfLaplacian`. It always runs on the CPU, and a substep takes as long as some 500 of other materials.
-        Volume is kept in any case, and a push moves the liquid around it as well: J is not the sum of sigma A dv.
+        Long waves run faster than those of about the crossing length 2 pi sqrt(gamma / (rho g)), 17
+        mm for water, and so do short ones. Gravity pulls along the inward normal everywhere, and
+        the liquid is deeper than half a wave and flat: the flow below takes the square root of the
+        surface's Laplacian, by a rational approximation, see `HalfLaplacian`. It always runs on the
+        CPU, and a substep takes as long as some 500 of other materials. Volume is kept in any case,
+        and a push moves the liquid around it as well: J is not the sum of sigma A dv.
 
         Parameters
         ----------
@@ -235,7 +271,9 @@ class Material:
         SolverError
             If a number is not finite and greater than 0; the viscosity may be 0.
         """
-        require_positive(density=(density, "kg/m^3"), tension=(tension, "N/m"), gravity=(gravity, "m/s^2"))
+        require_positive(
+            density=(density, "kg/m^3"), tension=(tension, "N/m"), gravity=(gravity, "m/s^2")
+        )
         crossover = (density * gravity / tension) ** 0.5
         return cls(
             speed=(gravity / crossover) ** 0.5,
@@ -256,7 +294,8 @@ class Material:
     ) -> Self:
         """Thin elastic shell that resists bending only: omega = sqrt(D / sigma) q^2, dispersive.
 
-        Kirchhoff's plate: rigidity D = E d^3 / 12 (1 - nu^2), sigma = rho d. The surface's own curvature is left out.
+        Kirchhoff's plate: rigidity D = E d^3 / 12 (1 - nu^2), sigma = rho d. The surface's own
+        curvature is left out.
 
         Parameters
         ----------
@@ -267,11 +306,15 @@ class Material:
             From -0.9 to 0.5.
         damping : [1/s]
         """
-        require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
+        require_positive(
+            modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3")
+        )
         plate = cls(speed=0.0, poisson=poisson, damping=damping)  # which looks at them
         rigidity = modulus * thickness**3 / (12 * (1 - poisson**2))
         surface_density = density * thickness
-        return dataclasses.replace(plate, bending=rigidity / surface_density, density=surface_density)
+        return dataclasses.replace(
+            plate, bending=rigidity / surface_density, density=surface_density
+        )
 
     @classmethod
     def dent(
@@ -284,9 +327,10 @@ class Material:
     ) -> Self:
         """Ideally plastic ground: deformation beyond the yield height is permanent.
 
-        Height is elastic plus permanent. Waves act on the elastic part, which never exceeds the yield height: while it
-        stands at the limit the ground flows under the constant resistance sigma k yield_height, and the flow is
-        permanent. A uniform push at velocity v leaves (v^2 / k - yield_height^2) / (2 yield_height).
+        Height is elastic plus permanent. Waves act on the elastic part, which never exceeds the
+        yield height: while it stands at the limit the ground flows under the constant resistance
+        sigma k yield_height, and the flow is permanent. A uniform push at velocity v leaves (v^2 /
+        k - yield_height^2) / (2 yield_height).
 
         Parameters
         ----------
@@ -296,7 +340,13 @@ class Material:
         damping : zeta [1/s]
         density : sigma [kg/m^2]
         """
-        return cls(speed=speed, damping=damping, stiffness=stiffness, density=density, yield_height=yield_height)
+        return cls(
+            speed=speed,
+            damping=damping,
+            stiffness=stiffness,
+            density=density,
+            yield_height=yield_height,
+        )
 
     @classmethod
     def suited(
@@ -311,26 +361,30 @@ class Material:
     ) -> Self:
         """Ripples that look right on an object of any size, from a marble to a building.
 
-        The time that waves take is what the eye sees, so speed and the like follow from times, and the density from how
-        hard the object is hit:
+        The time that waves take is what the eye sees, so speed and the like follow from times, and
+        the density from how hard the object is hit:
 
         - speed c = size / crossing;
-        - density: a short hit J on a footprint of radius r makes a dent of amplitude times size at most, see
+        - density: a short hit J on a footprint of radius r makes a dent of amplitude times size at
+          most, see
           `density_for`: sigma = 0.385 J / (c r amplitude size);
-        - stiffness k = (16 c / size)^2, so that a dent is narrow, and crest follows crest; more where the body of the
+        - stiffness k = (16 c / size)^2, so that a dent is narrow, and crest follows crest; more
+          where the body of the
           hit would otherwise sink by more than half of that amplitude when it rests;
         - damping zeta = 2 ln(10) / decay: waves fall to a tenth in that time;
-        - viscosity nu = 0.001 c size: ripples shorter than a tenth of the size die on their way across it.
+        - viscosity nu = 0.001 c size: ripples shorter than a tenth of the size die on their way
+          across it.
 
         Parameters
         ----------
         size : float
             Of the object, its longest extent [m].
         hit : float or (float, float)
-            A typical hit: its impulse [N s], or the mass [kg] and the speed [m/s] of a body, which then gives 1.5 m v.
+            A typical hit: its impulse [N s], or the mass [kg] and the speed [m/s] of a body, which
+            then gives 1.5 m v.
         radius : float, optional
-            Of a typical footprint [m], about half the radius of what hits; by default a twentieth of the size, and a
-            fortieth at least.
+            Of a typical footprint [m], about half the radius of what hits; by default a twentieth
+            of the size, and a fortieth at least.
         amplitude : float
             Deepest dent of a typical hit, over the size.
         crossing : float
@@ -347,7 +401,11 @@ class Material:
 
     @classmethod
     def jelly(
-        cls, modulus: float = 500.0, viscosity: float = 2.0, thickness: float = 0.1, density: float = 1000.0
+        cls,
+        modulus: float = 500.0,
+        viscosity: float = 2.0,
+        thickness: float = 0.1,
+        density: float = 1000.0,
     ) -> Self:
         """Soft jelly on a rigid core: a `layer` that wobbles at its own frequency and settles.
 
@@ -371,12 +429,16 @@ class Material:
             For an unknown name or parameter.
         """
         if not isinstance(name, str) or name not in PRESETS:
-            raise SolverError(f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}")
+            raise SolverError(
+                f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}"
+            )
         chosen = PRESETS[name]
         law = getattr(cls, chosen.law)
         valid = inspect.signature(law).parameters
         if unknown := [key for key in parameters if key not in valid]:
-            raise SolverError(f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {', '.join(valid)}")
+            raise SolverError(
+                f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {', '.join(valid)}"
+            )
         return law(**{**chosen.parameters, **parameters})
 
 
@@ -389,13 +451,16 @@ def _thickness(value: Any) -> float | NDArray[np.float64]:
     wrong = ~(np.isfinite(depth) & (depth > 0)) if numbers else np.ones(1, np.bool_)
     if wrong.any():
         worst = depth.tolist() if depth.size == 0 else depth.flat[np.argmax(wrong)].item()
-        raise SolverError(f"thickness is {shown(worst)} m; valid is {POSITIVE.words}, or one at every texel")
+        raise SolverError(
+            f"thickness is {shown(worst)} m; valid is {POSITIVE.words}, or one at every texel"
+        )
     return depth.astype(np.float64)
 
 
 def frequency(material: Material, wave_number: float) -> float:
     """Angular frequency of a wave [1/s], 0 where it creeps back without swinging; of a wave number [1/m]."""
-    q2, rate = wave_number**2, 1 / decay_time(material, wave_number)
+    q2 = wave_number**2
+    rate = 1 / decay_time(material, wave_number)
     square = _number(material, "speed") ** 2 * q2 + _number(material, "bending") * q2**2
     square += _number(material, "stiffness")
     if material.deep:
@@ -418,25 +483,24 @@ def _number(material: Material, name: str) -> float:
     return float(np.asarray(getattr(material, name)))
 
 
-# A wave of fewer texels is slower than it should be by more than a twentieth.
-SHORTEST_TEXELS = 6.0
-
-
 def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
     """Warn where no wave that fits on an atlas is one that the material's coefficients hold for."""
     shortest, longest = np.asarray(material.wavelengths, dtype=np.float64)
     areas = atlas.areas
-    texel, whole = float(np.sqrt(np.mean(areas))), float(np.sqrt(np.pi * areas.sum()))
+    texel = float(np.sqrt(np.mean(areas)))
+    whole = float(np.sqrt(np.pi * areas.sum()))
     finest = SHORTEST_TEXELS * texel
     if longest < finest:
         resolution = int(np.ceil(np.sqrt(areas.size / 6) * finest / longest))
         message = (
-            f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m carry none "
+            f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m "
+            f"carry none "
             f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer"
         )
     elif shortest > whole:
         message = (
-            f"the material holds for waves from {shortest:.3g} m on, and the surface is {whole:.3g} m round; take a "
+            f"the material holds for waves from {shortest:.3g} m on, and the surface is "
+            f"{whole:.3g} m round; take a "
             "thinner layer"
         )
     else:

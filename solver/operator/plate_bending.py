@@ -1,16 +1,18 @@
 """The bending of a plate with rims, as a sum of squares: its energy is never negative, whatever its shape and rims.
 
-A plate's energy is D / 2 times the integral of (1 - nu) |H|^2 + nu (tr H)^2, with the rigidity D, Poisson's ratio nu
-and the second derivatives H of its height in the surface. Where neither the height nor its slope is held at a rim, that
-alone makes the rim's natural conditions: no moment, no shear force. In terms of three curvatures it is a sum of squares
+A plate's energy is D / 2 times the integral of (1 - nu) |H|^2 + nu (tr H)^2, with the rigidity D,
+Poisson's ratio nu and the second derivatives H of its height in the surface. Where neither the
+height nor its slope is held at a rim, that alone makes the rim's natural conditions: no moment, no
+shear force. In terms of three curvatures it is a sum of squares
 
     D / 2 (1 + nu) / 2 (H_uu + H_vv)^2 + D / 2 (1 - nu) / 2 ((H_uu - H_vv)^2 + (2 H_uv)^2)
 
-for any -1 < nu < 1. Each texel has its own three: those of a quadratic fitted to the heights around it. Inside, a fit
-takes the texels that share a cell with it, and leaves heights that are linear in space without any energy. Beside rims
-that are free or supported, and round softened texels, it takes two rings and the supports, and a stiffness against what
-it misses keeps the rest from moving freely. Beside a clamp the Laplacian of the membrane's elements takes its place,
-which knows that the slope is 0 there.
+for any -1 < nu < 1. Each texel has its own three: those of a quadratic fitted to the heights around
+it. Inside, a fit takes the texels that share a cell with it, and leaves heights that are linear in
+space without any energy. Beside rims that are free or supported, and round softened texels, it
+takes two rings and the supports, and a stiffness against what it misses keeps the rest from moving
+freely. Beside a clamp the Laplacian of the membrane's elements takes its place, which knows that
+the slope is 0 there.
 """
 
 from __future__ import annotations
@@ -28,13 +30,16 @@ from ..texels.topology import TRIANGLE
 from .curvatures import KINDS, STEPS, Curvatures, neighbours, regular_texels
 from .plate_rim import CLAMPED, FREE, RimPlaces
 
-# Weights of a fit inside: of a texel beside another one, and of one across a corner. Less for the latter brings H_uu
-# close to the difference of three texels in a row, which sees the pattern + - + - of a chessboard.
-_BESIDE, _ACROSS = np.exp(-1.0), np.exp(-2.0)
+# Weights of a fit inside: of a texel beside another one, and of one across a corner. Less for the
+# latter brings H_uu close to the difference of three texels in a row, which sees the pattern + - +
+# - of a chessboard.
+_BESIDE = np.exp(-1.0)
+_ACROSS = np.exp(-2.0)
 
-# Weight with which second derivatives are 0; all of a fit's texels have about 0.5. It decides what degenerate fits
-# leave open.
-_RIDGE_INSIDE, _RIDGE_OUTSIDE = 0.003, 0.01
+# Weight with which second derivatives are 0; all of a fit's texels have about 0.5. It decides what
+# degenerate fits leave open.
+_RIDGE_INSIDE = 0.003
+_RIDGE_OUTSIDE = 0.01
 
 # The same of slopes: texels in one line tell none across it.
 _RIDGE_SLOPE = 1e-7
@@ -45,13 +50,15 @@ _REACH = 1.5  # spacings up to which supports count
 _TINY = 1e-9
 _BLOCK = 2**14  # fits that are solved at once
 
-# Texels whose bending is faster than that of nearly all others, by this factor of Gershgorin's bound, are softened: no
-# more than this share of the surface.
-_FASTER, _BULK = 1.2, 0.95
+# Texels whose bending is faster than that of nearly all others, by this factor of Gershgorin's
+# bound, are softened: no more than this share of the surface.
+_FASTER = 1.2
+_BULK = 0.95
 
-# A texel whose curvatures lose more than this by ridges or for the sake of the time step, and the share of the surface
-# that such texels may have before the solver warns.
-_LOSS, _UNTRUSTED = 0.25, 0.05
+# A texel whose curvatures lose more than this by ridges or for the sake of the time step, and the
+# share of the surface that such texels may have before the solver warns.
+_LOSS = 0.25
+_UNTRUSTED = 0.05
 
 
 class Fits(NamedTuple):
@@ -103,7 +110,12 @@ class Rows(NamedTuple):
 
 
 def plate_bending(
-    texels: TexelMesh, places: RimPlaces, softening: Floats, rigidity: Floats, poisson: float, laplace: Stencil
+    texels: TexelMesh,
+    places: RimPlaces,
+    softening: Floats,
+    rigidity: Floats,
+    poisson: float,
+    laplace: Stencil,
 ) -> tuple[Curvatures, IrregularLinks, Floats]:
     """Bending of a plate with rims.
 
@@ -132,8 +144,10 @@ def plate_bending(
     RippleWarning
         If the bending of more than a small part of the surface is softer than it should be.
     """
-    topology, count = texels.topology, texels.topology.texel_count
-    areas, rigidities = texels.areas.reshape(-1), rigidity.reshape(-1)
+    topology = texels.topology
+    count = texels.topology.texel_count
+    areas = texels.areas.reshape(-1)
+    rigidities = rigidity.reshape(-1)
     stiff = rigidities * areas
     laplacian = -stiffness_matrix(laplace)
     near = shared_cells(texels)
@@ -162,11 +176,15 @@ def plate_bending(
 
 def shared_cells(texels: TexelMesh) -> csr_array:
     """How many cells two texels share, [T, T]; those of a texel itself count."""
-    topology, count = texels.topology, texels.topology.texel_count
+    topology = texels.topology
+    count = texels.topology.texel_count
     halo = np.where(topology.rim, -1, topology.halo)
-    quads = np.stack([halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1)
+    quads = np.stack(
+        [halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1
+    )
     corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
-    triangles = quads[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]  # a place of theirs shows nothing
+    # a place of theirs shows nothing
+    triangles = quads[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]
     kinds = [quads[(quads >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
     sizes = sorted({len(each) for each in topology.polygons})
     kinds += [np.array([each for each in topology.polygons if len(each) == size]) for size in sizes]
@@ -189,15 +207,21 @@ def _outer_texels(places: RimPlaces, soft: Bools, near: csr_array) -> Bools:
     return outer | ((near @ soft.astype(np.float64)) > 0)
 
 
-def _regular_weights(texels: TexelMesh, regular: Bools, stiff: Floats, poisson: float) -> tuple[Floats, Floats]:
+def _regular_weights(
+    texels: TexelMesh, regular: Bools, stiff: Floats, poisson: float
+) -> tuple[Floats, Floats]:
     """Weights of `Curvatures`, and what ridges keep of them, [T]: 1 but at the regular texels."""
-    n, count = texels.resolution, texels.topology.texel_count
+    n = texels.resolution
+    count = texels.topology.texel_count
     around = neighbours(texels.topology).reshape(len(STEPS), count)
     middles = texels.positions.reshape(-1, 3)
-    ends = np.stack([texels.halo_positions[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c] for r, c in STEPS])
+    ends = np.stack(
+        [texels.halo_positions[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c] for r, c in STEPS]
+    )
     ends = ends.reshape(len(STEPS), count, 3)
     importance = np.array([_BESIDE if r == 0 or c == 0 else _ACROSS for r, c in STEPS] + [1.0])
-    weights, kept = np.zeros((KINDS, len(STEPS), count)), np.ones(count)
+    weights = np.zeros((KINDS, len(STEPS), count))
+    kept = np.ones(count)
     at = np.flatnonzero(regular)
     for begin in range(0, len(at), _BLOCK):
         block = at[begin : begin + _BLOCK]
@@ -229,7 +253,8 @@ def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -
 
     Texels count by their areas, so that needles do not stiffen.
     """
-    count, areas = texels.topology.texel_count, texels.areas.reshape(-1)
+    count = texels.topology.texel_count
+    areas = texels.areas.reshape(-1)
     points = texels.positions.reshape(-1, 3)
     rings = near[at] @ near
     spacings = _mean_spacings(rings, texels)
@@ -239,7 +264,9 @@ def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -
     texels_around = owner, column, points[column], weights
 
     held = np.flatnonzero(places.conditions != FREE)
-    beside = csr_array((np.ones(len(held)), (places.texels[held], held)), shape=(count, len(places.points)))
+    beside = csr_array(
+        (np.ones(len(held)), (places.texels[held], held)), shape=(count, len(places.points))
+    )
     owner, place = (rings @ beside).nonzero()
     distance = np.linalg.norm(places.points[place] - points[at[owner]], axis=1) / spacings[owner]
     weights = np.where(distance <= _REACH, _HEAVY, 0.0)
@@ -253,11 +280,16 @@ def _mean_spacings(rings: csr_array, texels: TexelMesh) -> Floats:
     return np.sqrt((members @ texels.areas.reshape(-1)) / np.maximum(members.sum(axis=1), 1))
 
 
-def _fits(texels: TexelMesh, at: Ints, spacings: Floats, *groups: tuple[Ints, Ints, Floats, Floats]) -> Fits:
+def _fits(
+    texels: TexelMesh, at: Ints, spacings: Floats, *groups: tuple[Ints, Ints, Floats, Floats]
+) -> Fits:
     """Fits round texels at [o], to groups of places: the fit of each, its texel, where it is [m], and its weight."""
     owner, column, ends, weight = (np.concatenate(each) for each in zip(*groups, strict=True))
     order = np.argsort(owner, kind="stable")
-    owner, column, ends, weight = owner[order], column[order], ends[order], weight[order]
+    owner = owner[order]
+    column = column[order]
+    ends = ends[order]
+    weight = weight[order]
     ways = (ends - texels.positions.reshape(-1, 3)[at[owner]]) / spacings[owner, None]
     flat = _in_tangent_plane(texels.normals.reshape(-1, 3)[at[owner]], ways)
     # as many places for each fit as the largest has
@@ -282,7 +314,8 @@ def _in_tangent_plane(normals: Floats, ways: Floats) -> Floats:
 
 def _solved(fits: Fits, ridge: float) -> tuple[Floats, Floats]:
     """Weighted quadratics at their places [o, w, 6], and from weighted heights to coefficients [o, 6, w]."""
-    u, v = fits.ways[..., 0], fits.ways[..., 1]
+    u = fits.ways[..., 0]
+    v = fits.ways[..., 1]
     terms = np.stack([np.ones_like(u), u, v, u * u / 2, u * v, v * v / 2], axis=-1)
     weighed = fits.weights[..., None] * terms
     ridges = np.diag(np.array([0.0, _RIDGE_SLOPE, _RIDGE_SLOPE, ridge, ridge, ridge]) ** 2)
@@ -291,7 +324,9 @@ def _solved(fits: Fits, ridge: float) -> tuple[Floats, Floats]:
     return weighed, inverse.astype(np.float64, copy=False)
 
 
-def _curvature_weights(fits: Fits, stiff: Floats, poisson: float, ridge: float) -> tuple[Floats, Floats]:
+def _curvature_weights(
+    fits: Fits, stiff: Floats, poisson: float, ridge: float
+) -> tuple[Floats, Floats]:
     """Weights of places in the three curvatures [o, 3, w], and the least share that ridges leave of one, [o].
 
     `stiff` [T] is D A, by texels [N m^3].
@@ -300,9 +335,12 @@ def _curvature_weights(fits: Fits, stiff: Floats, poisson: float, ridge: float) 
     second = inverse[:, 3:]
     kept: Floats = np.einsum("okw,owk->ok", second, weighed[:, :, 3:]).min(axis=1)
     uu, uv, vv = np.moveaxis(second * fits.weights[:, None], 1, 0)
-    mean, difference = np.sqrt((1 + poisson) / 2), np.sqrt((1 - poisson) / 2)
+    mean = np.sqrt((1 + poisson) / 2)
+    difference = np.sqrt((1 - poisson) / 2)
     scale: Floats = np.sqrt(stiff[fits.texels]) / fits.spacings**2
-    curved: Floats = np.stack([mean * (uu + vv), difference * (uu - vv), 2 * difference * uv], axis=1)
+    curved: Floats = np.stack(
+        [mean * (uu + vv), difference * (uu - vv), 2 * difference * uv], axis=1
+    )
     return curved * scale[:, None, None], kept
 
 
@@ -331,7 +369,9 @@ def _row_matrix(weights: Floats, columns: Ints, count: int) -> csr_array:
     return csr_array((weights[fit, row, place], (number, columns[fit, place])), shape=shape)
 
 
-def _clamp_rows(texels: TexelMesh, places: RimPlaces, rigidity: Floats, laplacian: csr_array) -> Rows:
+def _clamp_rows(
+    texels: TexelMesh, places: RimPlaces, rigidity: Floats, laplacian: csr_array
+) -> Rows:
     """Beside a clamp: the Laplacian, and springs to the height that it makes, d^2 / 2 times the second derivative."""
     areas = texels.areas.reshape(-1)
     clamped = places.conditions == CLAMPED
@@ -339,7 +379,9 @@ def _clamp_rows(texels: TexelMesh, places: RimPlaces, rigidity: Floats, laplacia
     away = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
     share = np.minimum(away**2 / (2 * areas[held]), 0.5)
     heights = eye_array(len(areas), format="csr")[held]
-    leaving = diags_array(np.sqrt(_MISFIT * rigidity / areas)[held]) @ (heights - diags_array(share) @ laplacian[held])
+    leaving = diags_array(np.sqrt(_MISFIT * rigidity / areas)[held]) @ (
+        heights - diags_array(share) @ laplacian[held]
+    )
     once = np.unique(held)  # a texel in a corner lies beside two places
     bent = diags_array(np.sqrt(rigidity / areas)[once]) @ laplacian[once]
     return Rows(csr_array(vstack([leaving, bent])), np.concatenate([held, once]))
@@ -362,7 +404,9 @@ def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> F
     entry = pull.tocoo()
     owner = rows.owners[entry.row]
     factors = np.ones(len(areas))
-    np.minimum.at(factors, owner[owner >= 0], (bound / np.maximum(rate, bound))[entry.col[owner >= 0]])
+    np.minimum.at(
+        factors, owner[owner >= 0], (bound / np.maximum(rate, bound))[entry.col[owner >= 0]]
+    )
     return factors
 
 
@@ -371,15 +415,20 @@ def _warn_of_softened(kept: Floats, areas: Floats) -> None:
     share = areas[kept < 1 - _LOSS].sum() / areas.sum()
     if share > _UNTRUSTED:
         warn_caller(
-            f"the plate is softer than its material on {100 * share:.0f} % of its surface, where texels are too narrow "
-            f"to tell its curvature; frequencies may be too low: take a mesh of evener triangles, or a finer resolution"
+            f"the plate is softer than its material on {100 * share:.0f} % of its surface, where "
+            f"texels are too narrow "
+            f"to tell its curvature; frequencies may be too low: take a mesh of evener triangles, "
+            f"or a finer resolution"
         )
 
 
 def _links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
     """A symmetric stiffness matrix as links between texels, and springs from each to where it is at rest."""
     above = triu(matrix, 1).tocoo()
-    springs, diagonal = matrix @ np.ones(matrix.shape[0]), matrix.diagonal()
+    springs = matrix @ np.ones(matrix.shape[0])
+    diagonal = matrix.diagonal()
     springs[np.abs(springs) <= _TINY * diagonal] = 0.0  # sums that are round-off are no springs
-    links = IrregularLinks.of(np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data)
+    links = IrregularLinks.of(
+        np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data
+    )
     return links, springs

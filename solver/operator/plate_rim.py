@@ -12,13 +12,26 @@ from ..errors import SolverError, shown
 from ..kernel import Floats, Ints
 from ..texels.texel_mesh import TexelMesh
 
-# Waves come back upright from a free rim, inverted from one that is held. "fixed": heights and, of a plate, L h are 0.
+# Waves come back upright from a free rim, inverted from one that is held. "fixed": heights and, of
+# a plate, L h are 0.
 RIMS = ("free", "supported", "clamped", "fixed")
 
-FREE, SUPPORTED, CLAMPED = 1, 2, 3
+FREE = 1
+SUPPORTED = 2
+CLAMPED = 3
 
-# A name for all of the rim, or a function of its points [k, 3]: a name for each, or whether it is clamped, else free.
+# A name for all of the rim, or a function of its points [k, 3]: a name for each, or whether it is
+# clamped, else free.
 Rim: TypeAlias = str | Callable[[NDArray[np.float64]], ArrayLike]
+
+# Places next to a texel, beyond each side of a chart: slices of the halo, and of the texels along
+# it.
+_SIDES = (
+    (np.s_[:, 0, 1:-1], np.s_[:, 0]),
+    (np.s_[:, 1:-1, -1], np.s_[:, :, -1]),
+    (np.s_[:, -1, 1:-1], np.s_[:, -1]),
+    (np.s_[:, 1:-1, 0], np.s_[:, :, 0]),
+)
 
 
 def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
@@ -38,31 +51,30 @@ def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
         conditions[at] = RIMS.index(rim) + 1 if rim != "fixed" else SUPPORTED
         return conditions
     if not callable(rim):
-        raise SolverError(f"rim {shown(rim)} is no name; {valid}, or a function of points [k, 3] that gives them")
+        raise SolverError(
+            f"rim {shown(rim)} is no name; {valid}, or a function of points [k, 3] that gives them"
+        )
     points = texels.halo_positions[at]
-    points = np.where(np.isfinite(points), points, texels.positions.reshape(-1, 3)[texels.topology.halo[at]])
+    points = np.where(
+        np.isfinite(points), points, texels.positions.reshape(-1, 3)[texels.topology.halo[at]]
+    )
     found = np.asarray(rim(points))
     if found.shape != (len(points),) or found.dtype.kind not in "bU":
         raise SolverError(
-            f"the function of the rim gives {found.dtype} of shape {found.shape} for {len(points)} points; valid are "
+            f"the function of the rim gives {found.dtype} of shape {found.shape} for {len(points)} "
+            f"points; valid are "
             "a name or a bool for each: 'free', 'supported' or 'clamped', or whether it is clamped"
         )
     if found.dtype.kind == "b":
         found = np.where(found, "clamped", "free")
     wrong = found[~np.isin(found, RIMS[:3])]
     if len(wrong):
-        raise SolverError(f"the function of the rim gives {str(wrong[0])!r}; valid are 'free', 'supported', 'clamped'")
+        raise SolverError(
+            f"the function of the rim gives {str(wrong[0])!r}; valid are 'free', 'supported', "
+            f"'clamped'"
+        )
     conditions[at] = sum((k + 1) * (found == name) for k, name in enumerate(RIMS[:3]))
     return conditions
-
-
-# Places next to a texel, beyond each side of a chart: slices of the halo, and of the texels along it.
-_SIDES = (
-    (np.s_[:, 0, 1:-1], np.s_[:, 0]),
-    (np.s_[:, 1:-1, -1], np.s_[:, :, -1]),
-    (np.s_[:, -1, 1:-1], np.s_[:, -1]),
-    (np.s_[:, 1:-1, 0], np.s_[:, :, 0]),
-)
 
 
 class RimPlaces(NamedTuple):
@@ -87,7 +99,8 @@ class RimPlaces(NamedTuple):
 
 def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
     """The places where texels lie beside a rim."""
-    topology, around = texels.topology, texels.halo_positions
+    topology = texels.topology
+    around = texels.halo_positions
     found = []
     for outside, inside in _SIDES:
         at = conditions[outside] > 0

@@ -1,9 +1,10 @@
 """What keeps a surface's volume: a pressure on the whole of it, as of an incompressible interior.
 
-It balances sources, and the forces inside a surface of uneven density. Those along links conserve momentum, which is
-not the volume where the density varies: the sum of area times velocity. The pressure is the Lagrange multiplier of that
-sum. It is linear in height and velocity, and moves the surface along the operator's `response`: the accelerations are
-projected with masses as weights, so that the operator stays symmetric and energy is conserved.
+It balances sources, and the forces inside a surface of uneven density. Those along links conserve
+momentum, which is not the volume where the density varies: the sum of area times velocity. The
+pressure is the Lagrange multiplier of that sum. It is linear in height and velocity, and moves the
+surface along the operator's `response`: the accelerations are projected with masses as weights, so
+that the operator stays symmetric and energy is conserved.
 """
 
 from __future__ import annotations
@@ -16,11 +17,16 @@ from ..errors import SolverError, shown
 from ..kernel import Bools, Floats, Floats32, Ints
 from .wave_operator import WaveOperator, damped_step
 
+# What is smaller than this, against the greatest, is round-off.
+_NOTHING = 1e-12
+
 
 def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
     """Whether each part of the surface keeps its volume, [p]: all, none, or, for None, those that do by themselves."""
     if conserve not in (None, True, False):
-        raise SolverError(f"conserve_volume is {shown(conserve)}; it must be True, False or None, the default")
+        raise SolverError(
+            f"conserve_volume is {shown(conserve)}; it must be True, False or None, the default"
+        )
     kept = operator.keeps_volume
     return kept if conserve is None else np.full_like(kept, conserve)
 
@@ -28,8 +34,9 @@ def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
 class VolumeBalance:
     """Takes the mean out of sources, one for each part of the surface that floats freely; see `WaveOperator`.
 
-    A pressure moves each texel by one over its density. Taking that much of it out of a momentum leaves the sum of area
-    times velocity unchanged, and is the orthogonal projection with masses as weights: it adds no energy.
+    A pressure moves each texel by one over its density. Taking that much of it out of a momentum
+    leaves the sum of area times velocity unchanged, and is the orthogonal projection with masses as
+    weights: it adds no energy.
 
     Parameters
     ----------
@@ -60,7 +67,9 @@ class VolumeBalance:
     def balanced_velocity(self, field: Floats) -> Floats:
         """A velocity field [C, n, n] without its volume rate."""
         operator = self._operator
-        return field - operator.response * self._ratio(operator.mass * operator.inverse_density * field, self._least)
+        return field - operator.response * self._ratio(
+            operator.mass * operator.inverse_density * field, self._least
+        )
 
     def balanced_height(self, field: Floats, areas: Floats) -> Floats:
         """A height field [C, n, n] without its mean."""
@@ -71,32 +80,37 @@ class VolumeBalance:
         movable = self._operator.movable
         if self._parts is None:
             return field[movable].sum() * self._kept[0]
-        return np.bincount(self._parts, (field * movable).reshape(-1)).astype(np.float64) * self._kept
+        return (
+            np.bincount(self._parts, (field * movable).reshape(-1)).astype(np.float64) * self._kept
+        )
 
     def _ratio(self, field: Floats, total: Floats) -> Floats | float:
         """Sum of a field over each part, over a total of that part: at every texel, [C, n, n]."""
         if self._parts is None:
             return float(field.sum()) / float(total) if total else 0.0
         sums = np.bincount(self._parts, field.reshape(-1))
-        return np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)[self._parts].reshape(field.shape)
+        return np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)[
+            self._parts
+        ].reshape(field.shape)
 
 
-# What is smaller than this, against the greatest, is round-off.
-_NOTHING = 1e-12
+# begins, texels, heights, velocities; see `volume_rate`
+VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]
 
 
-VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]  # begins, texels, heights, velocities; see `volume_rate`
-
-
-def volume_rate(operator: WaveOperator, dt: float, conserve: bool | None = None) -> VolumeRate | None:
+def volume_rate(
+    operator: WaveOperator, dt: float, conserve: bool | None = None
+) -> VolumeRate | None:
     """What keeps the volume over a substep of dt [s]; None where nothing changes it, or it is not kept anyway.
 
-    It is not where a clamp holds a part of the surface, or the stiffness varies: those take up momentum themselves.
+    It is not where a clamp holds a part of the surface, or the stiffness varies: those take up
+    momentum themselves.
 
     Returns
     -------
     begins : int64 [p + 1]
-        The pressure's acceleration of part p is the sum of heights h + velocities v from begins[p] to begins[p + 1].
+        The pressure's acceleration of part p is the sum of heights h + velocities v from begins[p]
+        to begins[p + 1].
     texels : int64 [k]
         Flat texel index of each entry: where the density varies, as a rule.
     heights, velocities : float32 [k]
@@ -110,7 +124,11 @@ def volume_rate(operator: WaveOperator, dt: float, conserve: bool | None = None)
     for part in np.flatnonzero(kept):
         own = parts == part
         movable = own & operator.movable
-        kept[part] = movable.any() and not operator.anchored[own].any() and not np.ptp(operator.stiffness[movable])
+        kept[part] = (
+            movable.any()
+            and not operator.anchored[own].any()
+            and not np.ptp(operator.stiffness[movable])
+        )
     decay, span = damped_step(operator, dt)
     weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)

@@ -1,6 +1,7 @@
 """The discrete wave operator: stencil weights, masses, the largest time step they allow, and what a substep needs.
 
-The surface falls into parts that float freely: each has a mean height of its own that nothing pulls back.
+The surface falls into parts that float freely: each has a mean height of its own that nothing pulls
+back.
 """
 
 from __future__ import annotations
@@ -18,22 +19,29 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import SolverError
 from ..kernel import Bools, Floats, Floats32, Ints, Ints32
 from ..mesh.topology import labels
-from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
+from ..texels.stencil import (
+    NO_LINKS,
+    IrregularLinks,
+    Stencil,
+    largest_eigenvalue,
+    link_exists,
+    stiffness_matrix,
+)
 from ..texels.topology import TexelTopology
 from .curvatures import Curvatures
+
+# Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
+SAFETY = 0.99
+
+# Square root of the stiffness times the longest substep: leapfrog makes a swing (omega dt)^2 / 24
+# too fast, 0.45 %.
+_SWING = 0.33
 
 
 def _joins_neighbours(stencil: Stencil) -> bool:
     """Whether the sides of all quads are links, so that every part of the mesh is one."""
     topology = stencil.topology
     return all(stencil.weights[:, link][link_exists(topology, link)].all() for link in range(2))
-
-
-# Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
-SAFETY = 0.99
-
-# Square root of the stiffness times the longest substep: leapfrog makes a swing (omega dt)^2 / 24 too fast, 0.45 %.
-_SWING = 0.33
 
 
 class Bending(NamedTuple):
@@ -96,19 +104,22 @@ class WaveOperator:
     viscosity_stencil : Stencil or None
         Link weights of D [kg/s]; None without viscosity.
     bending : Bending, Curvatures or None
-        L and B, or the curvatures of a plate with rims, whose R^T R then stands for L B L; None without bending.
+        L and B, or the curvatures of a plate with rims, whose R^T R then stands for L B L; None
+        without bending.
     yield_height : float64 [C, n, n] or None
         [m]; None where everything is elastic.
     fixed : bool [C, n, n] or None
         Texels that are clamped.
     rim_links : IrregularLinks
-        What a plate's rims give to `stencil`; they and L B L stay as they are at rest where the surface moves.
+        What a plate's rims give to `stencil`; they and L B L stay as they are at rest where the
+        surface moves.
     grip : float64 [C, n, n] or None
         Share of a source that sets a texel in motion, where it is movable; None: 1 everywhere.
     density : float64 [C, n, n] or None
         sigma [kg/m^2], in any unit; None where it is uniform.
     bounded : bool
-        Whether the stable step follows from Gershgorin's bound, at once, rather than from the eigenvalue itself.
+        Whether the stable step follows from Gershgorin's bound, at once, rather than from the
+        eigenvalue itself.
     """
 
     stencil: Stencil
@@ -136,7 +147,10 @@ class WaveOperator:
 
     @functools.cached_property
     def movable(self) -> Bools:
-        """Texels that sources may move: free, and with something that pulls back. All, where nothing pulls anywhere."""
+        """Texels that sources may move: free, and with something that pulls back.
+
+        All, where nothing pulls anywhere.
+        """
         pulled = (self.stencil.absolute_sums() > 0) | (self.stiffness > 0)
         if self.bending is not None:
             pulled |= self.bending.rigidity > 0
@@ -159,7 +173,9 @@ class WaveOperator:
     @functools.cached_property
     def inverse_density(self) -> Floats:
         """Greatest density over that of each texel, [C, n, n]: how much more a pressure moves it."""
-        return np.ones(self.mass.shape) if self.density is None else self.density.max() / self.density
+        return (
+            np.ones(self.mass.shape) if self.density is None else self.density.max() / self.density
+        )
 
     @functools.cached_property
     def response(self) -> Floats:
@@ -170,11 +186,13 @@ class WaveOperator:
     def parts(self) -> Ints32 | None:
         """Number of the freely floating part to which each texel belongs, [C, n, n]; None where there is one part only.
 
-        Texels belong together where something joins them. Of each of the mesh's own parts, all those that a spring or a
-        clamp holds count as one, however zero wave speeds cut them up: what holds them brings them back to where they
-        were. Those that are not movable are rigid, and belong to any part.
+        Texels belong together where something joins them. Of each of the mesh's own parts, all
+        those that a spring or a clamp holds count as one, however zero wave speeds cut them up:
+        what holds them brings them back to where they were. Those that are not movable are rigid,
+        and belong to any part.
         """
-        topology, of_chart = self.topology, self._part_of_chart
+        topology = self.topology
+        of_chart = self._part_of_chart
         if _joins_neighbours(self.stencil) or (self.bending is not None and self.bending.joins_all):
             charts = np.broadcast_to(of_chart[:, None, None], topology.shape)
             return np.ascontiguousarray(charts, np.int32) if of_chart.any() else None
@@ -202,15 +220,19 @@ class WaveOperator:
     def keeps_volume(self) -> Bools:
         """Whether each part keeps its volume unless told otherwise, [p]: it is closed, or nothing holds it.
 
-        A closed surface is as that of an incompressible body, whatever springs or clamps it has. An open one encloses
-        nothing. Its mean height is kept where nothing else would stop it: no rim, clamp or spring.
+        A closed surface is as that of an incompressible body, whatever springs or clamps it has. An
+        open one encloses nothing. Its mean height is kept where nothing else would stop it: no rim,
+        clamp or spring.
         """
         part = np.zeros(self.mass.shape, np.int32) if self.parts is None else self.parts
         is_open_chart = (self.topology.glued[..., 0] < 0).any(axis=1)
         is_open = np.bincount(self._part_of_chart, is_open_chart) > 0
         open_texels = is_open[self._part_of_chart][:, None, None] & self.movable
         held_texels = ((self.stiffness > 0) | self.anchored) & self.movable
-        opens, held = (np.bincount(part.reshape(-1), each.reshape(-1)) > 0 for each in (open_texels, held_texels))
+        opens, held = (
+            np.bincount(part.reshape(-1), each.reshape(-1)) > 0
+            for each in (open_texels, held_texels)
+        )
         return ~(opens & held)
 
     @functools.cached_property
@@ -221,13 +243,29 @@ class WaveOperator:
         return labels(np.stack([chart, glued[chart, side, 0]], axis=1), len(glued))
 
     def moved(
-        self, stencil: Stencil, viscosity_stencil: Stencil | None, bending: Bending | Curvatures | None
+        self,
+        stencil: Stencil,
+        viscosity_stencil: Stencil | None,
+        bending: Bending | Curvatures | None,
     ) -> WaveOperator:
         """The same surface with its texels elsewhere: masses, and what holds or parts it, stay."""
         moved = dataclasses.replace(
-            self, stencil=stencil, viscosity_stencil=viscosity_stencil, bending=bending, bounded=True
+            self,
+            stencil=stencil,
+            viscosity_stencil=viscosity_stencil,
+            bending=bending,
+            bounded=True,
         )
-        kept = "free", "movable", "anchored", "source_share", "inverse_density", "response", "parts", "keeps_volume"
+        kept = (
+            "free",
+            "movable",
+            "anchored",
+            "source_share",
+            "inverse_density",
+            "response",
+            "parts",
+            "keeps_volume",
+        )
         for name in kept:
             object.__setattr__(moved, name, getattr(self, name))
         return moved
@@ -251,13 +289,14 @@ class WaveOperator:
     def stable_timestep(self) -> float:
         """Largest stable step of the leapfrog scheme [s], from the operator's largest eigenvalues.
 
-        A mode with omega^2 = lambda + k and viscous rate mu is stable if dt^2 omega^2 + 2 dt mu <= 4. Infinite if
-        nothing moves.
+        A mode with omega^2 = lambda + k and viscous rate mu is stable if dt^2 omega^2 + 2 dt mu <=
+        4. Infinite if nothing moves.
         """
         bound = self.stencil.fastest(self.mass)
         if self.bending is not None:
             bound += self.bending.fastest(self.mass)
-        if self.stiffness.min() < 0:  # as plates have them beside rims, with links that outweigh them
+        # as plates have them beside rims, with links that outweigh them
+        if self.stiffness.min() < 0:
             wave = self._rate(self.elastic_force, bound + max(self.stiffness.max(), 0.0))
         else:
             wave = self._lightened(self._rate(self.link_force, bound) + self.stiffness.max())
@@ -272,8 +311,8 @@ class WaveOperator:
     def longest_timestep(self) -> float:
         """Longest substep that is taken [s]: it is stable, and half of the springs swing within 0.5 % of their rate.
 
-        Where springs are a large part of what limits a stable step, as in a layer a few texels thick, all modes swing
-        nearly as fast as it allows.
+        Where springs are a large part of what limits a stable step, as in a layer a few texels
+        thick, all modes swing nearly as fast as it allows.
         """
         stiffness = float(np.median(self.stiffness[self.movable]))
         if stiffness <= 0:
@@ -288,23 +327,27 @@ class WaveOperator:
         """Largest eigenvalue of -M^-1 force, or its bound."""
         if self.bounded:
             return bound
-        return largest_eigenvalue(force, self.mass, self.free, bound, loose=isinstance(self.bending, Curvatures))
+        return largest_eigenvalue(
+            force, self.mass, self.free, bound, loose=isinstance(self.bending, Curvatures)
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StepCoefficients:
     """The kick of a step dt: v = decay v + gain force - spring h.
 
-    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2), and 0 where that would be negative, zeta
-    dt > 2: the velocity is then what the forces sustain against the damping, and does not change its sign each substep.
+    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2), and 0 where that would
+    be negative, zeta dt > 2: the velocity is then what the forces sustain against the damping, and
+    does not change its sign each substep.
 
     Attributes
     ----------
     gain : float32 [C, n, n]
         [s/kg]; 0 where the surface is clamped.
     decay, spring, span : float32 or float32 [C, n, n]
-        One number where a coefficient is uniform, which saves the kernel's reads. The spring is in 1/s; the span [s] is
-        how long the acceleration of a pressure that acts everywhere counts: 0 where sources move nothing.
+        One number where a coefficient is uniform, which saves the kernel's reads. The spring is in
+        1/s; the span [s] is how long the acceleration of a pressure that acts everywhere counts: 0
+        where sources move nothing.
     """
 
     gain: Floats32
@@ -331,7 +374,8 @@ def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
         )
     if not all(np.isfinite(value).all() for value in (kick.gain, kick.spring, kick.span)):
         raise SolverError(
-            f"a substep of {dt:.4g} s on texels of {operator.mass.min():.4g} kg and more is beyond float32; valid is a "
+            f"a substep of {dt:.4g} s on texels of {operator.mass.min():.4g} kg and more is beyond "
+            f"float32; valid is a "
             "shorter step, or a larger mesh or material density"
         )
     return kick

@@ -40,7 +40,11 @@ from .distance import (
     march as march,
     seeded as seeded,
 )
-from .halo import fill_halo as fill_halo, sampling_matrix as sampling_matrix, with_filled_halo as with_filled_halo
+from .halo import (
+    fill_halo as fill_halo,
+    sampling_matrix as sampling_matrix,
+    with_filled_halo as with_filled_halo,
+)
 from .maps import texture_map as texture_map, vertex_map as vertex_map
 from .moving import (
     MovedPlaces as MovedPlaces,

@@ -1,7 +1,7 @@
 """The atlas: a texel mesh on the surface of a mesh, each texel with its surface point; and its file.
 
-`texel_atlas` is for surfaces that come as grids of points: its mesh is made of the texels themselves. One verified file
-format, an uncompressed NumPy archive, is for users and for the cache.
+`texel_atlas` is for surfaces that come as grids of points: its mesh is made of the texels
+themselves. One verified file format, an uncompressed NumPy archive, is for users and for the cache.
 """
 
 from __future__ import annotations
@@ -26,6 +26,28 @@ from .chart_map import ChartMap, LinearChartMap, TextureCoordinates, texture_coo
 from .halo import sampling_matrix
 from .texel_mesh import TexelMesh, texel_quality
 
+# Raise it when a layout's map or the file's contents change: the cache has its atlases rebuilt.
+# Files of users are read from that of version 1.0.0 on, as `docs/stability.md` says.
+FORMAT = 16
+OLDEST = 13
+ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
+_NEEDED = {
+    "V",
+    "F",
+    "kind",
+    "format",
+    "glued",
+    "positions",
+    "normals",
+    "areas",
+    "triangles",
+    "barycentrics",
+}
+_INDICES = {"F", "triangles", "glued", "charts", "piece_triangle", "piece_chart"}  # in 32 bits
+
+# [m]. Squares of what is farther away overflow on the way to the nearest surface point.
+_FARTHEST = 1e100
+
 
 def write_arrays(file: BinaryIO, arrays: dict[str, NDArray]) -> None:
     """Write an archive that `read_arrays` and `numpy.load` read."""
@@ -42,27 +64,29 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
     OSError
         If it cannot be read.
     """
-    arrays, damage = {}, (zipfile.BadZipFile, EOFError, MemoryError, OSError, RuntimeError, struct.error, zlib.error)
+    arrays = {}
+    damage = (
+        zipfile.BadZipFile,
+        EOFError,
+        MemoryError,
+        OSError,
+        RuntimeError,
+        struct.error,
+        zlib.error,
+    )
     with path.open("rb") as file:
         try:
             with zipfile.ZipFile(file) as archive:
                 for name in archive.namelist():
                     with archive.open(name) as member:
-                        arrays[name.removesuffix(".npy")] = npy.read_array(member, allow_pickle=False)
+                        arrays[name.removesuffix(".npy")] = npy.read_array(
+                            member, allow_pickle=False
+                        )
                         if member.read(1):  # the checksum is compared at the end
                             raise ValueError(f"{name!r} is damaged")
         except damage as error:
             raise ValueError(str(error)) from error
     return arrays
-
-
-# Raise it when a layout's map or the file's contents change: the cache has its atlases rebuilt. Files of users are read
-# from that of version 1.0.0 on, as `docs/stability.md` says.
-FORMAT, OLDEST = 16, 13
-ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
-
-_NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
-_INDICES = {"F", "triangles", "glued", "charts", "piece_triangle", "piece_chart"}  # in 32 bits
 
 
 def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
@@ -75,19 +99,23 @@ def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
         with atomic_write(path) as unfinished, unfinished.open("wb") as file:
             write_arrays(file, {**arrays, **small, "format": np.array([FORMAT])})
     except OSError as error:
-        raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror or error}") from error
+        raise AtlasError(
+            f"atlas file {str(path)!r} cannot be written: {error.strerror or error}"
+        ) from error
 
 
 def check_atlas_place(path: Path, overwrite: bool) -> None:
     """Make sure that an atlas may be written to a path.
 
-    Raises `AtlasError` if there can be no such name, or another file is there, unless it is empty or `overwrite` says
-    that it is to go.
+    Raises `AtlasError` if there can be no such name, or another file is there, unless it is empty
+    or `overwrite` says that it is to go.
     """
     try:
         final_path(path)
     except OSError as error:
-        raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror}; name another file") from error
+        raise AtlasError(
+            f"atlas file {str(path)!r} cannot be written: {error.strerror}; name another file"
+        ) from error
     if overwrite or not path.is_file() or path.stat().st_size == 0:
         return
     try:
@@ -97,7 +125,8 @@ def check_atlas_place(path: Path, overwrite: bool) -> None:
         known = False
     if not known:
         raise AtlasError(
-            f"atlas file {str(path)!r} cannot be written: it exists and is no atlas; name another file, or "
+            f"atlas file {str(path)!r} cannot be written: it exists and is no atlas; name another "
+            f"file, or "
             "ask to overwrite it"
         )
 
@@ -105,22 +134,27 @@ def check_atlas_place(path: Path, overwrite: bool) -> None:
 def read_atlas_file(path: Path) -> dict[str, NDArray]:
     """Read the arrays of an atlas.
 
-    Raises `AtlasError` if the file is missing, truncated, changed, or of a version before 1.0.0 or after this one.
+    Raises `AtlasError` if the file is missing, truncated, changed, or of a version before 1.0.0 or
+    after this one.
     """
     try:
         if not path.is_file():
             problem = "is not a file" if path.exists() else "does not exist"
-            raise AtlasError(f"atlas file {str(path)!r} {problem}; make one with `ripple-sim atlas MESH -o FILE`")
+            raise AtlasError(
+                f"atlas file {str(path)!r} {problem}; make one with `ripple-sim atlas MESH -o FILE`"
+            )
         arrays = read_arrays(path)
     except (OSError, ValueError) as error:
-        raise AtlasError(f"atlas file {str(path)!r} is damaged or not an atlas ({error}); {ADVICE}") from error
-    if _NEEDED - arrays.keys() or arrays["format"].tolist() not in [[each] for each in range(OLDEST, FORMAT + 1)]:
-        raise AtlasError(f"atlas file {str(path)!r} is not an atlas, or of another version; {ADVICE}")
+        raise AtlasError(
+            f"atlas file {str(path)!r} is damaged or not an atlas ({error}); {ADVICE}"
+        ) from error
+    if _NEEDED - arrays.keys() or arrays["format"].tolist() not in [
+        [each] for each in range(OLDEST, FORMAT + 1)
+    ]:
+        raise AtlasError(
+            f"atlas file {str(path)!r} is not an atlas, or of another version; {ADVICE}"
+        )
     return arrays | {name: arrays[name].astype(np.int64) for name in _INDICES & arrays.keys()}
-
-
-# [m]. Squares of what is farther away overflow on the way to the nearest surface point.
-_FARTHEST = 1e100
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -171,7 +205,9 @@ class Atlas:
         """
         sphere = getattr(self.chart_map, "sphere", None)
         if sphere is None:
-            raise AtlasError(f"an atlas of layout {self.layout!r} has no sphere map; that of layout 'cube' does")
+            raise AtlasError(
+                f"an atlas of layout {self.layout!r} has no sphere map; that of layout 'cube' does"
+            )
         return sphere
 
     @property
@@ -205,10 +241,13 @@ class Atlas:
         triangle, closest = self.closest_points(check_points(points))
         return closest, self.chart_map.coordinates(self.mesh, triangle, closest)
 
-    def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def locate(
+        self, points: ArrayLike
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Chart, row and column of the surface points nearest to the given points [m].
 
-        Row and column are in texel units, 0.0 at the centre of the first texel. Each result has shape [k].
+        Row and column are in texel units, 0.0 at the centre of the first texel. Each result has
+        shape [k].
         """
         return self.chart_map.chart_points(self.project(points)[1], self.resolution)
 
@@ -216,7 +255,9 @@ class Atlas:
         """Closest surface points [m], [k, 3], and the flat index of the texel nearest to each in the atlas, [k]."""
         return self.nearest_places(check_points(points))
 
-    def nearest_places(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def nearest_places(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """The same of points that need no check, [k, 3]."""
         triangle, closest = self.closest_points(points)
         return closest, self.chart_map.texels_at(self.mesh, self.resolution, triangle, closest)
@@ -240,10 +281,11 @@ class Atlas:
     def texture_coordinates(self) -> TextureCoordinates:
         """Chart and place in it at every corner of every triangle, those cut that cross the border of a chart.
 
-        They are exact at the corners. In between, linear interpolation of `uv` deviates in the cube layout from the
-        sphere map's own place by a share of about 0.1 s^2 of a chart, where s is the angle that the triangle spans on
-        the sphere: refine a mesh whose triangles span many texels before it is textured, or interpolate the map
-        coordinates. The object's own texture coordinates, `mesh.uv` and `mesh.corner_uv`, stay as they are.
+        They are exact at the corners. In between, linear interpolation of `uv` deviates in the cube
+        layout from the sphere map's own place by a share of about 0.1 s^2 of a chart, where s is
+        the angle that the triangle spans on the sphere: refine a mesh whose triangles span many
+        texels before it is textured, or interpolate the map coordinates. The object's own texture
+        coordinates, `mesh.uv` and `mesh.corner_uv`, stay as they are.
         """
         return texture_coordinates(self.chart_map, self.mesh)
 
@@ -253,20 +295,25 @@ class Atlas:
         Returns
         -------
         dict
-            Of the cube layout: `solid_angle` [sr] (4 pi for a bijection). Of cube and patches: `flipped` triangles,
-            area-weighted stretch quantiles `q001`, `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose
-            texels are over 4 times too wide. Of every layout: `edge_min` and `edge_max` [m], `folded` texels (their
-            neighbours lie in the wrong order round them), `coverage` (texel area over mesh area: 1 but for limbs that
-            fall between the texels), `spanned` (area of the mesh of texel centres over mesh area: it cuts creases
-            short too), `timestep` (stable time step over that of an endless even grid of as many texels).
+            Of the cube layout: `solid_angle` [sr] (4 pi for a bijection). Of cube and patches:
+            `flipped` triangles, area-weighted stretch quantiles `q001`, `q01`, `q50`, `q99`,
+            `q999`, `starved` share of the area whose texels are over 4 times too wide. Of every
+            layout: `edge_min` and `edge_max` [m], `folded` texels (their neighbours lie in the
+            wrong order round them), `coverage` (texel area over mesh area: 1 but for limbs that
+            fall between the texels), `spanned` (area of the mesh of texel centres over mesh area:
+            it cuts creases short too), `timestep` (stable time step over that of an endless even
+            grid of as many texels).
         """
         return {**self.chart_map.quality(self.mesh), **texel_quality(self.texels, self.mesh)}
 
     @checked(AtlasError, path=PATH)
     def save(self, path: str | Path, overwrite: bool = False) -> None:
-        """Write the atlas to one file, which `load_atlas` reads. The file appears whole or not at all.
+        """Write the atlas to one file, which `load_atlas` reads.
 
-        An older atlas there is replaced, any other file only with `overwrite`. A link is written through.
+        The file appears whole or not at all.
+
+        An older atlas there is replaced, any other file only with `overwrite`. A link is written
+        through.
 
         Raises
         ------
@@ -274,7 +321,8 @@ class Atlas:
             If the file cannot be written.
         """
         check_atlas_place(Path(path), overwrite)
-        mesh, texels = self.mesh, self.texels
+        mesh = self.mesh
+        texels = self.texels
         arrays = {
             "kind": np.array([type(self).__name__, self.layout]),
             "glued": texels.topology.glued,
@@ -295,7 +343,9 @@ class Atlas:
             "detours": texels.detours,
             "notes": notes,
         }
-        write_atlas_file(Path(path), arrays | {name: each for name, each in optional.items() if each is not None})
+        write_atlas_file(
+            Path(path), arrays | {name: each for name, each in optional.items() if each is not None}
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """What `copy` and `pickle` keep: the search tree is made again when it is needed."""
@@ -312,32 +362,46 @@ def check_points(points: ArrayLike) -> NDArray[np.float64]:
     try:
         array = np.asarray(points, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise AtlasError(f"points are {shown(points)}; valid are numbers of shape [3] or [k, 3], in metres") from error
+        raise AtlasError(
+            f"points are {shown(points)}; valid are numbers of shape [3] or [k, 3], in metres"
+        ) from error
     if array.ndim == 0 or array.shape[-1] != 3 or array.ndim > 2:
         raise AtlasError(f"points have shape {array.shape}; valid is [3] or [k, 3], in metres")
     if not (np.abs(array) < _FARTHEST).all():
-        raise AtlasError(f"points hold NaN or numbers beyond {_FARTHEST:g}; valid are finite coordinates in metres")
+        raise AtlasError(
+            f"points hold NaN or numbers beyond {_FARTHEST:g}; valid are finite coordinates in "
+            f"metres"
+        )
     return np.ascontiguousarray(array.reshape(-1, 3))
 
 
 def texel_atlas(texels: TexelMesh) -> Atlas:
     """Atlas of the surface that texels of any topology span themselves.
 
-    Each chart is a grid of its texel centres, closed by half a texel up to the points in the middle between them and
-    those beyond its border, or up to the rim; so every triangle of the mesh lies in one chart.
+    Each chart is a grid of its texel centres, closed by half a texel up to the points in the middle
+    between them and those beyond its border, or up to the rim; so every triangle of the mesh lies
+    in one chart.
     """
     n = texels.resolution
     V, nodes = _welded_nodes(texels)
     # of the corners of each cell, counter-clockwise, [n + 1, n + 1, 4]
-    rows, columns = np.indices((n + 1, n + 1))[..., None] + np.array([[0, 0, 1, 1], [0, 1, 1, 0]])[:, None, None]
-    cells, place = nodes[:, rows, columns], np.concatenate([[-0.5], np.arange(n), [n - 0.5]])
+    rows, columns = (
+        np.indices((n + 1, n + 1))[..., None]
+        + np.array([[0, 0, 1, 1], [0, 1, 1, 0]])[:, None, None]
+    )
+    cells = nodes[:, rows, columns]
+    place = np.concatenate([[-0.5], np.arange(n), [n - 0.5]])
     # the surface may end at the last texels: nothing lies between them and a rim without positions
     exists = (cells >= 0).all(axis=-1)
     chart, r, c = np.nonzero(exists)
     places = np.stack([place[rows], place[columns]], axis=-1)[r, c]
-    F, corners = (np.concatenate([each[:, [0, 1, 2]], each[:, [0, 2, 3]]]) for each in (cells[exists], places))
+    F, corners = (
+        np.concatenate([each[:, [0, 1, 2]], each[:, [0, 2, 3]]]) for each in (cells[exists], places)
+    )
     triangles, barycentrics = triangles_of(F, nodes[:, 1:-1, 1:-1])
-    return Atlas(Mesh(V, F), texels, LinearChartMap(np.tile(chart, 2), corners, n), triangles, barycentrics)
+    return Atlas(
+        Mesh(V, F), texels, LinearChartMap(np.tile(chart, 2), corners, n), triangles, barycentrics
+    )
 
 
 def _welded_nodes(texels: TexelMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -345,15 +409,18 @@ def _welded_nodes(texels: TexelMesh) -> tuple[NDArray[np.float64], NDArray[np.in
 
     The first C n^2 vertices are the texel centres.
     """
-    topology, around = texels.topology, texels.halo_positions
+    topology = texels.topology
+    around = texels.halo_positions
     count = topology.texel_count
     nodes = np.where(topology.own, topology.halo, -1)
-    # a node on a border belongs to the two texels that it lies between, one in a corner to all that meet there
+    # a node on a border belongs to the two texels that it lies between, one in a corner to all that
+    # meet there
     own = np.pad(topology.halo[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
     border = ~topology.own & np.isfinite(around[..., 0])
     border[:, [0, 0, -1, -1], [0, -1, 0, -1]] = False
     points = texels.positions.reshape(-1, 3)
-    low, high = np.minimum(own, topology.halo)[border], np.maximum(own, topology.halo)[border]
+    low = np.minimum(own, topology.halo)[border]
+    high = np.maximum(own, topology.halo)[border]
     rims = topology.rim[border]
     # on a rim, and where a periodic surface goes on elsewhere, a node belongs to its place alone
     alone = rims | (points[topology.halo[border]] != around[border]).any(axis=1)
@@ -364,30 +431,41 @@ def _welded_nodes(texels: TexelMesh) -> tuple[NDArray[np.float64], NDArray[np.in
     corner_points = _corner_points(texels)
     corners, number = np.unique(corner_points.reshape(-1, 3), axis=0, return_inverse=True)
     finite = np.isfinite(corner_points[..., 0])
-    nodes[:, [0, 0, -1, -1], [0, -1, -1, 0]] = np.where(finite, count + len(first) + number.reshape(finite.shape), -1)
+    nodes[:, [0, 0, -1, -1], [0, -1, -1, 0]] = np.where(
+        finite, count + len(first) + number.reshape(finite.shape), -1
+    )
     return np.concatenate([points, middles[first], corners]), nodes
 
 
 def _corner_points(texels: TexelMesh) -> NDArray[np.float64]:
     """Point in which each corner of a chart lies [m], [C, 4, 3]; NaN on a rim without positions."""
-    topology, around = texels.topology, texels.halo_positions
-    rows, columns = [0, 0, -1, -1], [0, -1, -1, 0]
-    inner_rows, inner_columns = [1, 1, -2, -2], [1, -2, -2, 1]
+    topology = texels.topology
+    around = texels.halo_positions
+    rows = [0, 0, -1, -1]
+    columns = [0, -1, -1, 0]
+    inner_rows = [1, 1, -2, -2]
+    inner_columns = [1, -2, -2, 1]
     own = around[:, inner_rows, inner_columns]
     points = np.where(topology.rim[:, rows, columns, None], around[:, rows, columns], own)
     corners = topology.corners.ravel()
     number = np.bincount(corners)
-    means = np.stack([np.bincount(corners, points[..., k].ravel()) / number for k in range(3)], axis=1)
+    means = np.stack(
+        [np.bincount(corners, points[..., k].ravel()) / number for k in range(3)], axis=1
+    )
     beside, shown = (
         each[:, rows, inner_columns] + each[:, inner_rows, columns]
         for each in (around, topology.with_halo(texels.positions))
     )
     displaced = (beside != shown).any(axis=-1)
-    periodic = displaced & ~topology.rim[:, rows, inner_columns] & ~topology.rim[:, inner_rows, columns]
+    periodic = (
+        displaced & ~topology.rim[:, rows, inner_columns] & ~topology.rim[:, inner_rows, columns]
+    )
     return np.where(periodic[..., None], beside / 2, means[topology.corners])
 
 
-def triangles_of(F: NDArray[np.int64], vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def triangles_of(
+    F: NDArray[np.int64], vertices: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """A triangle at each of some vertices, and the barycentrics [..., 3] of that corner."""
     triangle = np.empty(F.max() + 1, np.int64)
     triangle[F[::-1].ravel()] = np.repeat(np.arange(len(F))[::-1], 3)

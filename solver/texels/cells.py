@@ -1,21 +1,24 @@
 """The cells of a texel mesh: finite elements of a quad, a triangle, a strip, a polygon; and where all but quads lie.
 
-A quad takes its gradient from its two diagonals (one-point integration), and a little stiffness against the one pattern
-that this does not see, the hourglass + - + - (Flanagan and Belytschko 1981). That pattern is a second derivative: its
-stiffness is free, as long as linear functions have none of it. In a quad that is no parallelogram they have: where the
-map onto the charts has kinks, eigenvalues then converge with order 1 to 1.6 instead of 2, so that it is taken away.
+A quad takes its gradient from its two diagonals (one-point integration), and a little stiffness
+against the one pattern that this does not see, the hourglass + - + - (Flanagan and Belytschko
+1981). That pattern is a second derivative: its stiffness is free, as long as linear functions have
+none of it. In a quad that is no parallelogram they have: where the map onto the charts has kinks,
+eigenvalues then converge with order 1 to 1.6 instead of 2, so that it is taken away.
 
-The stiffness decides whether short waves lag behind or run ahead, and follows from the quad's shape. Linear triangles
-give it far too much in a sheared quad: there waves ran ahead, by 3 % in the median over the elephant at N = 96.
+The stiffness decides whether short waves lag behind or run ahead, and follows from the quad's
+shape. Linear triangles give it far too much in a sheared quad: there waves ran ahead, by 3 % in the
+median over the elephant at N = 96.
 
-Vectors are three coordinates, of one point or of many. What is `shared` is for NumPy in double precision, where a
-surface is at rest, and for a kernel in single precision, where it moves; `quads.glsl` is its twin on the GPU. Lengths
-are in units of about a cell's own.
+Vectors are three coordinates, of one point or of many. What is `shared` is for NumPy in double
+precision, where a surface is at rest, and for a kernel in single precision, where it moves;
+`quads.glsl` is its twin on the GPU. Lengths are in units of about a cell's own.
 
-The few cells that are no plain quads are strips at rims, triangles and polygons in corners. Where they lie and what
-they add to is worked out once; their weights then follow from wherever their corners are. Between the last texels and a
-rim lies a strip of half a texel: where the rim is free, heights in it change along the rim only, and its area goes to
-the texels. Nothing is known of a strip where the rim has no positions.
+The few cells that are no plain quads are strips at rims, triangles and polygons in corners. Where
+they lie and what they add to is worked out once; their weights then follow from wherever their
+corners are. Between the last texels and a rim lies a strip of half a texel: where the rim is free,
+heights in it change along the rim only, and its area goes to the texels. Nothing is known of a
+strip where the rim has no positions.
 """
 
 from __future__ import annotations
@@ -38,26 +41,46 @@ Numbers: TypeAlias = Any  # a float, or an array of them
 # In single precision, which holds these exactly, they do not make single numbers double.
 _ZERO, _QUARTER, _HALF, _ONE, _TWO, _THREE, _FOUR = map(np.float32, (0, 0.25, 0.5, 1, 2, 3, 4))
 
-# One over the stiffness of a square against the hourglass, which is 0.4. At 1 waves lag along its sides as much as they
-# lead along its diagonals, 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the longest time step.
+# One over the stiffness of a square against the hourglass, which is 0.4. At 1 waves lag along its
+# sides as much as they lead along its diagonals, 1/2 makes the 5-point stencil, 1/3 an isotropic
+# one, 1/4 allows the longest time step.
 PER_HOURGLASS = np.float32(2.5)
 
-# Elongated quads take up to this share of the hourglass stiffness that would begin to shorten their own time step.
+# Elongated quads take up to this share of the hourglass stiffness that would begin to shorten their
+# own time step.
 SHARE = np.float32(0.75)
 
-# A quad whose diagonals have their middles further apart than the root of one over this, in units of the diagonals,
-# counts as uneven. In an even one what linear functions have of the hourglass is of second order, and makes up for some
-# of the waves' lag: on the sphere N = 64 is a third more exact with it.
+# A quad whose diagonals have their middles further apart than the root of one over this, in units
+# of the diagonals, counts as uneven. In an even one what linear functions have of the hourglass is
+# of second order, and makes up for some of the waves' lag: on the sphere N = 64 is a third more
+# exact with it.
 EVEN = np.float32(1000)
 
-# A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
+# A cell folded to a line would ask for an infinitely short time step: least area, in units of a
+# square's as large.
 LEAST_AREA = np.float32(0.02)
 
-# Detours fade out in quads where |p|^2 |q|^2 - (p.q)^2 is below this share of |p|^2 |q|^2, with diagonals p and q.
+# Detours fade out in quads where |p|^2 |q|^2 - (p.q)^2 is below this share of |p|^2 |q|^2, with
+# diagonals p and q.
 FADED = np.float32(0.02)
 
 _TINY = 1e-12  # area of a cell in one point
-TINY, PER_TINY = np.float32(_TINY), np.float32(1 / _TINY)
+TINY = np.float32(_TINY)
+PER_TINY = np.float32(1 / _TINY)
+
+# A polygon flatter than this, in units of its size, counts as flat: many combinations of its
+# corners then make the node in its middle. Its square is well above round-off.
+_FLAT = 1e-5
+
+# The four corners of a cell at (r, c), and its links in the order of `quad`: link, and the place
+# where it is stored.
+CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
+LINKS = ((0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 0, 1), (2, 0, 0), (3, 0, 0))
+
+# Two corners of each strip on the surface, joined by the first four of the links, and the two
+# beyond the rim opposite.
+_STRIPS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 1, 3), (1, 3, 0, 2))
+_NOTHING = np.zeros(0, np.int64)
 
 
 @shared
@@ -71,36 +94,58 @@ def cross_length(a: Vector, b: Vector) -> Numbers:
 def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...]:
     """Weights of a quad's links: south, north, west and east side, diagonal sw-ne, diagonal se-nw; its area.
 
-    Its corners se, nw and ne are at e, n and p from sw; `detours` are those of the links in this order. With diagonals
-    p, q and u_p, u_q the differences along them, area |gradient|^2 is
-    (|q|^2 u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared differences along west
-    and east, less that along south and north. The hourglass, less what the linear function of that gradient has of it,
-    is (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne, where a p + b q is how far the quad is from a parallelogram,
-    and next to none in an even one. A quad in one point has neither.
+    Its corners se, nw and ne are at e, n and p from sw; `detours` are those of the links in this
+    order. With diagonals p, q and u_p, u_q the differences along them, area |gradient|^2 is (|q|^2
+    u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared
+    differences along west and east, less that along south and north. The hourglass, less what the
+    linear function of that gradient has of it, is (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne,
+    where a p + b q is how far the quad is from a parallelogram, and next to none in an even one. A
+    quad in one point has neither.
     """
-    q, north, east = subtract(n, e), subtract(p, n), subtract(p, e)
-    pp, qq, pq, flat = dot(p, p), dot(q, q), dot(p, q), cross_length(p, q)
+    q = subtract(n, e)
+    north = subtract(p, n)
+    east = subtract(p, e)
+    pp = dot(p, p)
+    qq = dot(q, q)
+    pq = dot(p, q)
+    flat = cross_length(p, q)
     # the way between the diagonals' middles, twice; in a convex quad a and b lie between -1 and 1
     way = subtract(north, e)
     # what detours add to the squares of sides and diagonals, and so to the products of diagonals
-    to_south, to_north = detours[0] * dot(e, e), detours[1] * dot(north, north)
-    to_west, to_east = detours[2] * dot(n, n), detours[3] * dot(east, east)
-    to_pp, to_qq, to_pq = detours[4] * pp, detours[5] * qq, _HALF * (to_west + to_east - to_south - to_north)
+    to_south = detours[0] * dot(e, e)
+    to_north = detours[1] * dot(north, north)
+    to_west = detours[2] * dot(n, n)
+    to_east = detours[3] * dot(east, east)
+    to_pp = detours[4] * pp
+    to_qq = detours[5] * qq
+    to_pq = _HALF * (to_west + to_east - to_south - to_north)
     # no more than leaves a quad: in one p.q is less than |p| |q|
-    most, both = (pp + to_pp) * (qq + to_qq), pq + to_pq
-    fit = np.minimum(np.maximum((most - both * both) / (FADED * np.maximum(most, TINY)), _ZERO), _ONE)
-    to_pp, to_qq, to_pq = fit * to_pp, fit * to_qq, fit * to_pq
-    square = np.maximum(flat * flat + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq)), _ZERO)
-    pp, qq, pq = pp + to_pp, qq + to_qq, pq + to_pq
+    most = (pp + to_pp) * (qq + to_qq)
+    both = pq + to_pq
+    fit = np.minimum(
+        np.maximum((most - both * both) / (FADED * np.maximum(most, TINY)), _ZERO), _ONE
+    )
+    to_pp = fit * to_pp
+    to_qq = fit * to_qq
+    to_pq = fit * to_pq
+    square = np.maximum(
+        flat * flat + (to_pp * (qq + to_qq) + pp * to_qq - to_pq * (pq + pq + to_pq)), _ZERO
+    )
+    pp = pp + to_pp
+    qq = qq + to_qq
+    pq = pq + to_pq
     along_p = dot(way, p) + _HALF * fit * (to_east + to_north - to_south - to_west)
     along_q = dot(way, q) + _HALF * fit * (to_east + to_south - to_north - to_west)
     twice = np.maximum(_TWO * np.maximum(np.sqrt(square), _HALF * LEAST_AREA * (pp + qq)), TINY)
     square = _QUARTER * twice * twice
-    a, b = (along_p * qq - along_q * pq) / square, (along_q * pp - along_p * pq) / square
+    a = (along_p * qq - along_q * pq) / square
+    b = (along_q * pp - along_p * pq) / square
     uneven = EVEN * (a * a + b * b)
     share = uneven / (uneven + _ONE)
-    a, b = np.minimum(np.maximum(share * a, -_ONE), _ONE), np.minimum(np.maximum(share * b, -_ONE), _ONE)
-    skew, h = pq / twice, hourglass(pp, qq, pq, _QUARTER * twice)
+    a = np.minimum(np.maximum(share * a, -_ONE), _ONE)
+    b = np.minimum(np.maximum(share * b, -_ONE), _ONE)
+    skew = pq / twice
+    h = hourglass(pp, qq, pq, _QUARTER * twice)
     return (
         skew + h * (_ONE + a) * (_ONE - b),
         skew + h * (_ONE - a) * (_ONE + b),
@@ -116,16 +161,19 @@ def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...
 def hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
     """Hourglass stiffness of a quad of given area whose diagonals p and q have the products pp, qq and pq.
 
-    In a parallelogram with the squared sides a >= b, the product d of its sides and the area J, a wave of wave number k
-    has omega^2 = k^2 - k^4 (a + b) / 16 + k^4 H (J^2 + 3 d^2) / 8 J in the mean over its directions, to leading order:
-    waves are in time on average at H = (a + b) J / 2 (J^2 + 3 d^2). Its time step begins to shorten at
-    H = (a^2 - d^2) / 4 a J.
+    In a parallelogram with the squared sides a >= b, the product d of its sides and the area J, a
+    wave of wave number k has omega^2 = k^2 - k^4 (a + b) / 16 + k^4 H (J^2 + 3 d^2) / 8 J in the
+    mean over its directions, to leading order: waves are in time on average at H = (a + b) J / 2
+    (J^2 + 3 d^2). Its time step begins to shorten at H = (a^2 - d^2) / 4 a J.
     """
     both_sides = np.maximum(_HALF * (pp + qq), TINY)
-    a, d = _HALF * (both_sides + np.abs(pq)), _QUARTER * (pp - qq)
+    a = _HALF * (both_sides + np.abs(pq))
+    d = _QUARTER * (pp - qq)
     in_time = both_sides * area / (_TWO * (area * area + _THREE * d * d))
     free = (a * a - d * d) / (_FOUR * a * area)
-    least = np.minimum(in_time, np.maximum(SHARE * free, _TWO * area / (PER_HOURGLASS * both_sides)))
+    least = np.minimum(
+        in_time, np.maximum(SHARE * free, _TWO * area / (PER_HOURGLASS * both_sides))
+    )
     return np.minimum(PER_TINY * (pp + qq), _ONE) * least
 
 
@@ -143,16 +191,13 @@ def quad_area(e: Vector, n: Vector, p: Vector) -> Numbers:
 @shared
 def triangle(a: Vector, b: Vector, c: Vector) -> tuple[Numbers, Numbers, Numbers, Numbers]:
     """Cotangent weights of the links bc, ca, ab, and the area of a triangle (Pinkall and Polthier 1993)."""
-    ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+    ab = subtract(b, a)
+    ac = subtract(c, a)
+    bc = subtract(c, b)
     double_area = cross_length(ab, ac)
     longest = np.maximum(np.maximum(dot(ab, ab), dot(ac, ac)), dot(bc, bc))
     twice = np.maximum(2 * np.maximum(double_area, LEAST_AREA * longest), _TINY)
     return dot(ab, ac) / twice, -dot(ab, bc) / twice, dot(ac, bc) / twice, double_area / 2
-
-
-# A polygon flatter than this, in units of its size, counts as flat: many combinations of its corners then make the node
-# in its middle. Its square is well above round-off.
-_FLAT = 1e-5
 
 
 @kernel
@@ -161,17 +206,22 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
 
     Links are those of corners 0-1, 0-2 and so on, 1-2 and so on.
 
-    A virtual node in the middle cuts each into triangles; it is an affine combination of the corners, so that linear
-    functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and Botsch 2020).
+    A virtual node in the middle cuts each into triangles; it is an affine combination of the
+    corners, so that linear functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and
+    Botsch 2020).
     """
     _, count, number = corners.shape
-    links, areas = np.empty((count * (count - 1) // 2, number)), np.zeros((count, number))
-    sides, spokes = np.empty(count), np.empty(count)
+    links = np.empty((count * (count - 1) // 2, number))
+    areas = np.zeros((count, number))
+    sides = np.empty(count)
+    spokes = np.empty(count)
     for m in range(number):
         x = corners[:, :, m]
         shares = _virtual_node(x)
-        middle, inner = _mean(x, shares), 0.0
-        total, link = 0.0, 0
+        middle = _mean(x, shares)
+        inner = 0.0
+        total = 0.0
+        link = 0
         for i in range(count):
             spokes[i] = 0.0
         for i in range(count):
@@ -187,7 +237,9 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
         for i in range(count):
             areas[i, m] += shares[i] * inner
             for j in range(i + 1, count):
-                weight = shares[j] * spokes[i] + shares[i] * spokes[j] - shares[i] * shares[j] * total
+                weight = (
+                    shares[j] * spokes[i] + shares[i] * spokes[j] - shares[i] * shares[j] * total
+                )
                 if j == i + 1:
                     weight += sides[i]
                 elif i == 0 and j == count - 1:
@@ -205,14 +257,19 @@ def _virtual_node(corners: Floats) -> Floats:
     """
     count = corners.shape[1]
     # |x - c| x side, squared: x' A x - 2 b' x, with A = sum of |s|^2 1 - s s'
-    squares, right, spread = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
-    weights, total = np.empty(count), 0.0
+    squares = np.zeros((3, 3))
+    right = np.zeros(3)
+    spread = np.zeros((3, 3))
+    weights = np.empty(count)
+    total = 0.0
     for i in range(count):
         weights[i] = 1 / count
     mean = _mean(corners, weights)
     for i in range(count):
-        here, side = subtract(corners[:, i], mean), subtract(corners[:, (i + 1) % count], corners[:, i])
-        squared, along = dot(side, side), dot(side, here)
+        here = subtract(corners[:, i], mean)
+        side = subtract(corners[:, (i + 1) % count], corners[:, i])
+        squared = dot(side, side)
+        along = dot(side, here)
         for a in range(3):
             squares[a, a] += squared
             right[a] += squared * here[a] - side[a] * along
@@ -231,9 +288,13 @@ def _virtual_node(corners: Floats) -> Floats:
 @kernel(no_cpython_wrapper=True)
 def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
     """The point with such weights at the corners [3, k]."""
-    x, y, z = 0.0, 0.0, 0.0
+    x = 0.0
+    y = 0.0
+    z = 0.0
     for i in range(len(weights)):
-        x, y, z = x + weights[i] * corners[0, i], y + weights[i] * corners[1, i], z + weights[i] * corners[2, i]
+        x = x + weights[i] * corners[0, i]
+        y = y + weights[i] * corners[1, i]
+        z = z + weights[i] * corners[2, i]
     return x, y, z
 
 
@@ -242,8 +303,10 @@ def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
     """Solution of a symmetric positive semidefinite system [3, 3]; next to 0 where this leaves it open."""
     ridge = _FLAT**2 * (matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) + 1e-300
     first = matrix[0, 0] + ridge
-    a, b = matrix[0, 1] / first, matrix[0, 2] / first
-    second, coupling = matrix[1, 1] + ridge - a * matrix[0, 1], matrix[1, 2] - a * matrix[0, 2]
+    a = matrix[0, 1] / first
+    b = matrix[0, 2] / first
+    second = matrix[1, 1] + ridge - a * matrix[0, 1]
+    coupling = matrix[1, 2] - a * matrix[0, 2]
     c = coupling / second
     third = matrix[2, 2] + ridge - b * matrix[0, 2] - c * coupling
     p = right[1] - a * right[0]
@@ -262,21 +325,11 @@ def conductance(coefficients: Sequence[Floats], softening: Sequence[Floats]) -> 
     return len(coefficients) / resistance * functools.reduce(np.minimum, softening)
 
 
-# The four corners of a cell at (r, c), and its links in the order of `quad`: link, and the place where it is stored.
-CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
-LINKS = ((0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 0, 1), (2, 0, 0), (3, 0, 0))
-
-
 def at_corners(field: NDArray) -> list[NDArray]:
     """A field [..., r + 1, c + 1] at the four corners of each of r x c cells."""
-    rows, columns = field.shape[-2] - 1, field.shape[-1] - 1
+    rows = field.shape[-2] - 1
+    columns = field.shape[-1] - 1
     return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
-
-
-# Two corners of each strip on the surface, joined by the first four of the links, and the two beyond the rim opposite.
-_STRIPS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 1, 3), (1, 3, 0, 2))
-
-_NOTHING = np.zeros(0, np.int64)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -288,9 +341,11 @@ class SpecialCells:
     corners : int64 [j, k]
         Flat places of their corners in a field with halo.
     law : callable
-        Geometric weights of their links [l, k], shares of their areas [s, k], and these [k], from corners [3, j, k].
+        Geometric weights of their links [l, k], shares of their areas [s, k], and these [k], from
+        corners [3, j, k].
     links : (int64 [m], int64 [m])
-        Of the weights [l, k], flat, those that are added, and the flat places among a stencil's weights.
+        Of the weights [l, k], flat, those that are added, and the flat places among a stencil's
+        weights.
     shares : (int64 [m], int64 [m])
         Of the shares [s, k], flat, those that are added, and flat texels.
     irregular : (int64 [m], int64 [m, 2])
@@ -309,7 +364,8 @@ class SpecialCells:
     def weigh(self, places: Floats, scale: float) -> tuple[Floats, Floats, Floats]:
         """Weights of their links [l, k], shares of their areas [s, k] and the areas [k], both [m^2].
 
-        `places` [3, p] are those of a field with halo [m], and `scale` is one over about a cell's length [1/m].
+        `places` [3, p] are those of a field with halo [m], and `scale` is one over about a cell's
+        length [1/m].
         """
         links, shares, areas = self.law(scale * places[:, self.corners])
         return links, shares / scale**2, areas / scale**2
@@ -324,13 +380,18 @@ def special_cells(topology: TexelTopology, halo_positions: Floats) -> list[Speci
 def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[SpecialCells]:
     """Strips between the last texels and a rim: whole quads where it is fixed."""
     n = topology.shape[1]
-    rim, exists = topology.rim, np.logical_and.reduce(at_corners(topology.halo >= 0))
+    rim = topology.rim
+    exists = np.logical_and.reduce(at_corners(topology.halo >= 0))
     touches = np.logical_or.reduce(at_corners(rim))
     chart, r, c = cells = np.stack(np.nonzero(exists & touches))
-    corners = np.stack([(chart * (n + 2) + r + down) * (n + 2) + c + right for down, right in CORNERS])
+    corners = np.stack(
+        [(chart * (n + 2) + r + down) * (n + 2) + c + right for down, right in CORNERS]
+    )
     finite = np.isfinite(halo_positions.reshape(-1, 3)[corners]).all(axis=(0, 2))
-    cells, corners = cells[:, finite], corners[:, finite]
-    at_rim, shown = rim.reshape(-1)[corners], topology.halo.reshape(-1)[corners]
+    cells = cells[:, finite]
+    corners = corners[:, finite]
+    at_rim = rim.reshape(-1)[corners]
+    shown = topology.halo.reshape(-1)[corners]
     # a corner beyond the rim has its share go to the texel beside it
     belongs = np.broadcast_to(np.arange(4)[:, None], corners.shape).copy()
     for i in range(4):
@@ -351,12 +412,17 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
 
 def _triangles(topology: TexelTopology) -> SpecialCells:
     """The cells in corners of three charts; each chart adds what its own texel there, the first corner, has of it."""
-    n, width = topology.shape[1], topology.halo.shape[1]
+    n = topology.shape[1]
+    width = topology.halo.shape[1]
     corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
     r, c = np.array([[0, 0, n, n], [0, n, n, 0]])[:, corner]
     # of the chart's own texel, and beyond it
-    (row, next_row), (column, next_column) = (np.where(each == 0, [[1], [0]], [each, each + 1]) for each in (r, c))
-    corners = (chart * width + np.stack([row, row, next_row])) * width + np.stack([column, next_column, column])
+    (row, next_row), (column, next_column) = (
+        np.where(each == 0, [[1], [0]], [each, each + 1]) for each in (r, c)
+    )
+    corners = (chart * width + np.stack([row, row, next_row])) * width + np.stack(
+        [column, next_column, column]
+    )
     # the east or west side, and the north or south one
     links = _link_places(topology, np.stack([chart, r, c]), ((1, 0, c == 0), (0, r == 0, 0)))
     own = np.arange(len(chart)), topology.halo.reshape(-1)[corners[0]]
@@ -373,15 +439,20 @@ def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
         beside = np.setdiff1d(np.arange(len(pairs)), link)
         corners = topology.addresses[0][texels]
         shares = np.arange(texels.size), texels.ravel()
-        yield SpecialCells(corners, _polygon, (link, places), shares, (beside, pairs[beside]), on_all_copies=True)
+        yield SpecialCells(
+            corners, _polygon, (link, places), shares, (beside, pairs[beside]), on_all_copies=True
+        )
 
 
 def _link_places(topology: TexelTopology, cells: Ints, links: Sequence[tuple]) -> tuple[Ints, Ints]:
     """Which links [l, k] of cells [3, k] are stored, and where in a stencil's weights; both flat."""
-    n, (chart, r, c) = topology.shape[1], cells
+    n = topology.shape[1]
+    (chart, r, c) = cells
     found = [(link, r + down, c + right) for link, down, right in links]
     stored = np.stack([(row <= n) & (column <= n) for _, row, column in found])
-    places = np.stack([((4 * chart + link) * (n + 1) + row) * (n + 1) + column for link, row, column in found])
+    places = np.stack(
+        [((4 * chart + link) * (n + 1) + row) * (n + 1) + column for link, row, column in found]
+    )
     return np.flatnonzero(stored), places[stored]
 
 
@@ -400,10 +471,13 @@ def _areas(x: Floats) -> tuple[Floats, Floats, Floats]:
 def _strips(x: Floats) -> tuple[Floats, Floats, Floats]:
     """The link of the first two corners, texels at a free rim; the rim's points beside them are the others.
 
-    Heights have no slope across a free rim (the natural condition). Their gradient in the strip is the difference of
-    the two texels over their distance along the rim, at whatever angle the grid lines meet that.
+    Heights have no slope across a free rim (the natural condition). Their gradient in the strip is
+    the difference of the two texels over their distance along the rim, at whatever angle the grid
+    lines meet that.
     """
-    link, rim, area = x[:, 1] - x[:, 0], x[:, 3] - x[:, 2], quad_area(*_from_first(x))
+    link = x[:, 1] - x[:, 0]
+    rim = x[:, 3] - x[:, 2]
+    area = quad_area(*_from_first(x))
     squared = dot(rim, rim)
     along = dot(rim, link) ** 2 / np.maximum(squared, _TINY)
     least = LEAST_AREA * np.maximum(squared, dot(link, link))

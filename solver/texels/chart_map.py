@@ -1,7 +1,7 @@
 """The way from a point of the mesh to its place on the charts, which each layout knows in its own manner.
 
-Each has a compiled loop for the texels of points, since contacts ask at every step. The chart map here is linear in
-each triangle: corners lie at rows and columns of one chart.
+Each has a compiled loop for the texels of points, since contacts ask at every step. The chart map
+here is linear in each triangle: corners lie at rows and columns of one chart.
 """
 
 from __future__ import annotations
@@ -15,11 +15,19 @@ from numpy.typing import NDArray
 from ..kernel import Floats, Ints, kernel
 from ..mesh.mesh import Mesh
 
+MOST_CORNERS = 12  # of a part of a triangle that a few lines have cut
+_BITS = 34  # of coordinates in which copies of a point agree
+_ON_SIDE = 1e-9  # barycentric coordinates below it count as 0
+
 
 def barycentrics_in(corners: Floats, points: Floats) -> Floats:
     """Barycentric coordinates [k, 3], not negative, of points [k, 3] in triangles [k, 3, 3]."""
-    u, v, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
-    uu, uv, vv, pu, pv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v), (p, u), (p, v)))
+    u = corners[:, 1] - corners[:, 0]
+    v = corners[:, 2] - corners[:, 0]
+    p = points - corners[:, 0]
+    uu, uv, vv, pu, pv = (
+        np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v), (p, u), (p, v))
+    )
     area = uu * vv - uv * uv
     # a triangle without area has no barycentrics: its middle is as good as any point of it
     flat = area <= 0
@@ -34,8 +42,14 @@ def barycentrics_at(corners: Floats, point: Floats) -> tuple[float, float]:
     """The second and third barycentric coordinate of a point in a triangle [3, 3], as in `barycentrics_in`."""
     uu = uv = vv = pu = pv = 0.0
     for k in range(3):
-        u, v, p = corners[1, k] - corners[0, k], corners[2, k] - corners[0, k], point[k] - corners[0, k]
-        uu, uv, vv, pu, pv = uu + u * u, uv + u * v, vv + v * v, pu + p * u, pv + p * v
+        u = corners[1, k] - corners[0, k]
+        v = corners[2, k] - corners[0, k]
+        p = point[k] - corners[0, k]
+        uu = uu + u * u
+        uv = uv + u * v
+        vv = vv + v * v
+        pu = pu + p * u
+        pv = pv + p * v
     area = uu * vv - uv * uv
     if not area > 0:
         return 1 / 3, 1 / 3
@@ -43,16 +57,16 @@ def barycentrics_at(corners: Floats, point: Floats) -> tuple[float, float]:
     return s, min(max((uu * pv - uv * pu) / area, 0.0), 1.0 - s)
 
 
-# Parts of triangles: the triangle of each, in ascending order, [p]; where in it the part's three corners lie, in its
-# winding, [p, 3, 3]; and what belongs to the parts, [p, ...].
+# Parts of triangles: the triangle of each, in ascending order, [p]; where in it the part's three
+# corners lie, in its winding, [p, 3, 3]; and what belongs to the parts, [p, ...].
 Parts: TypeAlias = tuple[Ints, Floats, NDArray]
 
 
 class ChartMap(Protocol):
     """Maps the triangles of a mesh to charts.
 
-    Within a triangle, or a part of it, everything is linear in *map coordinates*, of which only the layout knows the
-    meaning: directions on the sphere, or rows and columns.
+    Within a triangle, or a part of it, everything is linear in *map coordinates*, of which only the
+    layout knows the meaning: directions on the sphere, or rows and columns.
     """
 
     @property
@@ -96,7 +110,8 @@ class TextureCoordinates:
     Attributes
     ----------
     triangle : int64 [piece_count]
-        Triangle of the mesh of which each piece is a part, in ascending order. Most are not cut: one piece, the whole.
+        Triangle of the mesh of which each piece is a part, in ascending order. Most are not cut:
+        one piece, the whole.
     barycentrics : float64 [piece_count, 3, 3]
         Where in that triangle the piece's three corners lie, in the winding of the mesh.
     chart : int64 [piece_count]
@@ -104,8 +119,8 @@ class TextureCoordinates:
     coordinates : float64 [piece_count, 3, d]
         Map coordinates of the corners; see `ChartMap`.
     uv : float64 [piece_count, 3, 2]
-        Place in the chart at each corner, 0 to 1: (column + 1/2) / n and (row + 1/2) / n, whatever the resolution n.
-        In a layer with a halo of one texel it is at (1 + n uv) / (n + 2).
+        Place in the chart at each corner, 0 to 1: (column + 1/2) / n and (row + 1/2) / n, whatever
+        the resolution n. In a layer with a halo of one texel it is at (1 + n uv) / (n + 2).
     """
 
     triangle: Ints
@@ -120,21 +135,28 @@ class TextureCoordinates:
         Parameters
         ----------
         corner_values : [triangle_count, 3, ...]
-            Values at the corners of the mesh's triangles, such as `mesh.V[mesh.F]` or `mesh.corner_uv`.
+            Values at the corners of the mesh's triangles, such as `mesh.V[mesh.F]` or
+            `mesh.corner_uv`.
 
         Returns
         -------
         [piece_count, 3, ...]
         """
-        return np.einsum("pij,pj...->pi...", self.barycentrics, np.asarray(corner_values)[self.triangle])
+        return np.einsum(
+            "pij,pj...->pi...", self.barycentrics, np.asarray(corner_values)[self.triangle]
+        )
 
 
 def texture_coordinates(chart_map: ChartMap, mesh: Mesh) -> TextureCoordinates:
     """Coordinates into the atlas at every corner of every triangle of a mesh; see `Atlas.texture_coordinates`."""
     triangle, barycentrics, linear = chart_map.linear_parts(mesh)
     part, within, chart = chart_map.split(linear)
-    barycentrics, coordinates = (np.einsum("pij,pjk->pik", within, each[part]) for each in (barycentrics, linear))
-    return TextureCoordinates(triangle[part], barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))
+    barycentrics, coordinates = (
+        np.einsum("pij,pjk->pik", within, each[part]) for each in (barycentrics, linear)
+    )
+    return TextureCoordinates(
+        triangle[part], barycentrics, chart, coordinates, chart_map.uv(coordinates, chart)
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -172,7 +194,8 @@ class LinearChartMap:
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
         """Flat indices [k] of the texels in which points [k, 3] [m] lie that are on triangles [k]."""
-        charts, corners = self.charts[triangles], np.ascontiguousarray(self.corners[triangles])
+        charts = self.charts[triangles]
+        corners = np.ascontiguousarray(self.corners[triangles])
         return _texels_on_charts(mesh.V[mesh.F[triangles]], charts, corners, resolution, points)
 
     def linear_parts(self, mesh: Mesh) -> Parts:
@@ -198,7 +221,9 @@ class LinearChartMap:
 
 
 @kernel
-def _texels_on_charts(triangles: Floats, charts: Ints, corners: Floats, n: int, points: Floats) -> Ints:
+def _texels_on_charts(
+    triangles: Floats, charts: Ints, corners: Floats, n: int, points: Floats
+) -> Ints:
     """Texels [k] of points [k, 3] on triangles [k, 3, 3] [m] that lie at corners [k, 3, 2] of charts [k]."""
     texels = np.empty(len(points), np.int64)
     for i in range(len(points)):
@@ -211,14 +236,21 @@ def _texels_on_charts(triangles: Floats, charts: Ints, corners: Floats, n: int, 
     return texels
 
 
-MOST_CORNERS = 12  # of a part of a triangle that a few lines have cut
-
-
 @kernel(no_cpython_wrapper=True)
-def clip(corners: Floats, count: int, ox: float, oy: float, nx: float, ny: float, axis: int, result: Floats) -> int:
+def clip(
+    corners: Floats,
+    count: int,
+    ox: float,
+    oy: float,
+    nx: float,
+    ny: float,
+    axis: int,
+    result: Floats,
+) -> int:
     """Keep what lies on the side n of a line through o of a convex polygon (Sutherland and Hodgman 1974).
 
-    Returns the number of corners of the `result`. A line across an axis, 0 or 1 (else -1), is met to the last bit.
+    Returns the number of corners of the `result`. A line across an axis, 0 or 1 (else -1), is met
+    to the last bit.
     """
     kept = 0
     for i in range(count):
@@ -249,7 +281,8 @@ def texel_areas(mesh: Mesh, parts: Parts, corners: Floats, lines: Floats, charts
     parts : Parts
         Parts of its triangles, with the one chart in which each lies, [p].
     corners : float64 [p, 3, 3]
-        x w, y w and w > 0 of the parts' corners, where x and y are places on the chart; linear in each triangle.
+        x w, y w and w > 0 of the parts' corners, where x and y are places on the chart; linear in
+        each triangle.
     lines : float64 [n + 1]
         Where texels end, along x and along y.
     charts : int
@@ -257,25 +290,37 @@ def texel_areas(mesh: Mesh, parts: Parts, corners: Floats, lines: Floats, charts
     """
     triangle, barycentrics, chart = parts
     # barycentrics over w are linear in x and y
-    polygons, n = np.concatenate([corners[..., :2], barycentrics], axis=2) / corners[..., 2:], len(lines) - 1
-    low, high = polygons[..., :2].min(axis=1), polygons[..., :2].max(axis=1)
+    polygons = np.concatenate([corners[..., :2], barycentrics], axis=2) / corners[..., 2:]
+    n = len(lines) - 1
+    low = polygons[..., :2].min(axis=1)
+    high = polygons[..., :2].max(axis=1)
     first = np.searchsorted(lines, low, side="right").clip(1, n) - 1
     last = np.maximum(np.searchsorted(lines, high, side="left").clip(1, n) - 1, first)
     areas = np.zeros((charts, n, n))
-    _add_areas(polygons, mesh.triangle_areas[triangle], chart.astype(np.int64), first, last, lines, areas)
+    _add_areas(
+        polygons, mesh.triangle_areas[triangle], chart.astype(np.int64), first, last, lines, areas
+    )
     return areas
 
 
 @kernel
 def _add_areas(
-    polygons: Floats, triangles: Floats, chart: Ints, first: Ints, last: Ints, lines: Floats, areas: Floats
+    polygons: Floats,
+    triangles: Floats,
+    chart: Ints,
+    first: Ints,
+    last: Ints,
+    lines: Floats,
+    areas: Floats,
 ) -> None:
     """Cut parts [p, 3, 5] of triangles of given areas [p] along lines, and add each cell's to that of its texel.
 
     The first and last column and row of texels [p, 2] are those into which each reaches.
     """
-    rest, strip = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
-    cell, spare = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
+    rest = np.empty((MOST_CORNERS, 5))
+    strip = np.empty((MOST_CORNERS, 5))
+    cell = np.empty((MOST_CORNERS, 5))
+    spare = np.empty((MOST_CORNERS, 5))
     for p in range(len(chart)):
         wide = 3
         for k in range(wide):
@@ -293,7 +338,8 @@ def _add_areas(
                 continue
             bottom = top = strip[0, 1]
             for k in range(1, high):
-                bottom, top = min(bottom, strip[k, 1]), max(top, strip[k, 1])
+                bottom = min(bottom, strip[k, 1])
+                top = max(top, strip[k, 1])
             for j in range(first[p, 1], last[p, 1] + 1):
                 if j < last[p, 1] and lines[j + 1] <= bottom:
                     continue
@@ -309,19 +355,20 @@ def _add_areas(
 @kernel(no_cpython_wrapper=True)
 def _share(corners: Floats, count: int) -> float:
     """Area of a polygon over that of the triangle in which it lies, by its barycentrics up to a factor at each."""
-    share, ux, uy = 0.0, 0.0, 0.0
+    share = 0.0
+    ux = 0.0
+    uy = 0.0
     total = corners[0, 2] + corners[0, 3] + corners[0, 4]
-    x, y = corners[0, 2] / total, corners[0, 3] / total
+    x = corners[0, 2] / total
+    y = corners[0, 3] / total
     for i in range(1, count):
         total = corners[i, 2] + corners[i, 3] + corners[i, 4]
-        vx, vy = corners[i, 2] / total - x, corners[i, 3] / total - y
+        vx = corners[i, 2] / total - x
+        vy = corners[i, 3] / total - y
         share += ux * vy - uy * vx
-        ux, uy = vx, vy
+        ux = vx
+        uy = vy
     return share
-
-
-_BITS = 34  # of coordinates in which copies of a point agree
-_ON_SIDE = 1e-9  # barycentric coordinates below it count as 0
 
 
 class PartsMesh(NamedTuple):
@@ -359,12 +406,15 @@ def parts_mesh(chart_map: ChartMap, mesh: Mesh) -> PartsMesh:
     points = np.einsum("pij,pjk->pik", barycentrics, mesh.V[mesh.F[triangle]])
     step = np.ldexp(1.0, np.frexp(np.abs(mesh.V).max())[1] - _BITS)
     place = np.rint(points / step).astype(np.int64).reshape(-1, 3)
-    # what of the mesh each corner lies on: the ends of an edge, one vertex twice, or a triangle and -1; so sheets that
-    # touch have points of their own
+    # what of the mesh each corner lies on: the ends of an edge, one vertex twice, or a triangle and
+    # -1; so sheets that touch have points of their own
     held = barycentrics > _ON_SIDE
-    corners, inside = np.broadcast_to(mesh.F[triangle][:, None], held.shape), held.all(axis=2)
+    corners = np.broadcast_to(mesh.F[triangle][:, None], held.shape)
+    inside = held.all(axis=2)
     low = np.where(inside, triangle[:, None], np.where(held, corners, len(mesh.V)).min(axis=2))
     high = np.where(inside, -1, np.where(held, corners, -1).max(axis=2))
     key = np.column_stack([low.ravel(), high.ravel(), place])
     _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return PartsMesh(points.reshape(-1, 3)[first], number.reshape(-1, 3), triangle, barycentrics, coordinates)
+    return PartsMesh(
+        points.reshape(-1, 3)[first], number.reshape(-1, 3), triangle, barycentrics, coordinates
+    )

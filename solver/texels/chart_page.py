@@ -45,7 +45,9 @@ class ChartPage:
         row, column = divmod(chart, self.columns)
         return column * self.block, row * self.block
 
-    def locate(self, places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def locate(
+        self, places: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Chart, row and column of places [k, 2] on the page, each [k]; 0.0 is the centre of the first texel."""
         block = np.floor(places / self.block).astype(np.int64)
         column, row = (places - block * self.block - 1.5).T

@@ -1,8 +1,9 @@
 """How much longer the way over the facets of a mesh is than the straight line between two texels.
 
-Straight lines cut the edges between facets short. The way is the shortest over those triangles that a plane through
-both texels, and along the mean normal of their facets, cuts between them: drawn where the plane cuts them, then pulled
-tight. In one fold that is the geodesic of the polyhedron, elsewhere next to it.
+Straight lines cut the edges between facets short. The way is the shortest over those triangles that
+a plane through both texels, and along the mean normal of their facets, cuts between them: drawn
+where the plane cuts them, then pulled tight. In one fold that is the geodesic of the polyhedron,
+elsewhere next to it.
 """
 
 from __future__ import annotations
@@ -15,13 +16,19 @@ from ..mesh.vectors import combine, cross, dot, row, subtract, unit
 from .topology import TexelTopology
 
 _MOST = 256  # edges that a way crosses
-_PULLS, _TIGHT = 32, 1e-4  # passes over a way's points, and how far one moves along its edge where it counts as tight
-# Excess of squares: less is round-off, and a way twice as long as straight leads round other things than folds.
-_LEAST, _GREATEST = 1e-9, 3.0
+# passes over a way's points, and how far one moves along its edge where it counts as tight
+_PULLS = 32
+_TIGHT = 1e-4
+# Excess of squares: less is round-off, and a way twice as long as straight leads round other things
+# than folds.
+_LEAST = 1e-9
+_GREATEST = 3.0
 _ON_SIDE = 1e-9  # barycentric coordinates below it count as 0
 
 
-def link_detours(mesh: Mesh, topology: TexelTopology, triangles: Ints, barycentrics: Floats) -> Floats32:
+def link_detours(
+    mesh: Mesh, topology: TexelTopology, triangles: Ints, barycentrics: Floats
+) -> Floats32:
     """By what share the square of the way over the facets exceeds that of the straight line, for each link.
 
     Parameters
@@ -34,33 +41,48 @@ def link_detours(mesh: Mesh, topology: TexelTopology, triangles: Ints, barycentr
     Returns
     -------
     float32 [4, C, n + 2, n + 2]
-        Of the links of each place with halo to the east, north, north-east, and of its other diagonal, as in a stencil;
-        0 where there is no link, or no way was found. All copies of a link agree to the last bit.
+        Of the links of each place with halo to the east, north, north-east, and of its other
+        diagonal, as in a stencil; 0 where there is no link, or no way was found. All copies of a
+        link agree to the last bit.
     """
     there = np.where(topology.rim, -1, topology.halo)
     detours = np.zeros((4, *there.shape), np.float32)
-    _measure(there, mesh.V, mesh.F, mesh.beside, triangles.reshape(-1), barycentrics.reshape(-1, 3), detours)
+    _measure(
+        there,
+        mesh.V,
+        mesh.F,
+        mesh.beside,
+        triangles.reshape(-1),
+        barycentrics.reshape(-1, 3),
+        detours,
+    )
     return detours
 
 
 @kernel
-def _measure(there: Ints, V: Floats, F: Ints, beside: Ints, triangles: Ints, weights: Floats, out: Floats32) -> None:
+def _measure(
+    there: Ints, V: Floats, F: Ints, beside: Ints, triangles: Ints, weights: Floats, out: Floats32
+) -> None:
     """Fill in the detours between texels at places [C, n + 2, n + 2], -1 for none."""
     charts, width, _ = there.shape
-    edges, points = np.empty((_MOST, 2), np.int64), np.empty((_MOST, 3))
+    edges = np.empty((_MOST, 2), np.int64)
+    points = np.empty((_MOST, 3))
     for link, (dr, dc, shift) in enumerate(((0, 1, 0), (1, 0, 0), (1, 1, 0), (1, -1, 1))):
         for chart in range(charts):
             for r in range(width - dr):
                 for c in range(width - 1 if link != 1 else width):
-                    a, b = there[chart, r, c + shift], there[chart, r + dr, c + shift + dc]
+                    a = there[chart, r, c + shift]
+                    b = there[chart, r + dr, c + shift + dc]
                     a, b = min(a, b), max(a, b)  # from the same end for all copies
                     if a < 0 or a == b or triangles[a] == triangles[b]:
                         continue
-                    p, q = _point(V, F, triangles[a], weights, a), _point(V, F, triangles[b], weights, b)
+                    p = _point(V, F, triangles[a], weights, a)
+                    q = _point(V, F, triangles[b], weights, b)
                     square = dot(subtract(q, p), subtract(q, p))
                     if not square > 0.0:
                         continue
-                    start, end = (a, triangles[a], p), (b, triangles[b], q)
+                    start = (a, triangles[a], p)
+                    end = (b, triangles[b], q)
                     count = _cut(V, F, beside, weights, start, end, edges, points)
                     if count > 0:
                         length = _pulled(V, edges, points, count, p, q)
@@ -69,7 +91,9 @@ def _measure(there: Ints, V: Floats, F: Ints, beside: Ints, triangles: Ints, wei
 
 
 @kernel(no_cpython_wrapper=True)
-def _point(V: Floats, F: Ints, triangle: int, weights: Floats, i: int) -> tuple[float, float, float]:
+def _point(
+    V: Floats, F: Ints, triangle: int, weights: Floats, i: int
+) -> tuple[float, float, float]:
     """The point with weights [i] at the corners of a triangle."""
     first = combine(weights[i, 0], row(V, F[triangle, 0]), weights[i, 1], row(V, F[triangle, 1]))
     return combine(1.0, first, weights[i, 2], row(V, F[triangle, 2]))
@@ -80,38 +104,56 @@ def _holds(F: Ints, triangle: int, other: int, weights: Floats, i: int) -> bool:
     """Whether a triangle holds the point that has weights [i] in another."""
     for k in range(3):
         v = F[other, k]
-        if weights[i, k] > _ON_SIDE and v != F[triangle, 0] and v != F[triangle, 1] and v != F[triangle, 2]:
+        if (
+            weights[i, k] > _ON_SIDE
+            and v != F[triangle, 0]
+            and v != F[triangle, 1]
+            and v != F[triangle, 2]
+        ):
             return False
     return True
 
 
 @kernel(no_cpython_wrapper=True)
 def _cut(
-    V: Floats, F: Ints, beside: Ints, weights: Floats, start: tuple, end: tuple, edges: Ints, points: Floats
+    V: Floats,
+    F: Ints,
+    beside: Ints,
+    weights: Floats,
+    start: tuple,
+    end: tuple,
+    edges: Ints,
+    points: Floats,
 ) -> int:
     """Edges, with the points on them, that the plane cuts from start to end, each a texel, its triangle and its point.
 
     Returns how many there are, 0 where the end is in the same triangle, or is not found.
     """
-    (a, here, p), (b, target, q) = start, end
+    (a, here, p) = start
+    (b, target, q) = end
     if _holds(F, target, here, weights, a) or _holds(F, here, target, weights, b):
         return 0
     way = subtract(q, p)
     normal = cross(way, combine(1.0, _normal(V, F, here), 1.0, _normal(V, F, target)))
     entered = -1
     for count in range(_MOST):
-        best, leaving = -np.inf, -1
+        best = -np.inf
+        leaving = -1
         for k in range(3):
-            v, w = F[here, k], F[here, (k + 1) % 3]
-            side_v, side_w = dot(normal, subtract(row(V, v), p)), dot(normal, subtract(row(V, w), p))
+            v = F[here, k]
+            w = F[here, (k + 1) % 3]
+            side_v = dot(normal, subtract(row(V, v), p))
+            side_w = dot(normal, subtract(row(V, w), p))
             if k == entered or (side_v >= 0.0) == (side_w >= 0.0):
                 continue
             t = side_v / (side_v - side_w)
             x = combine(1.0 - t, row(V, v), t, row(V, w))
             along = dot(way, subtract(x, p))
             if along > best:
-                best, leaving = along, k
-                edges[count, 0], edges[count, 1] = v, w
+                best = along
+                leaving = k
+                edges[count, 0] = v
+                edges[count, 1] = w
                 points[count, 0], points[count, 1], points[count, 2] = x
         if leaving < 0 or beside[here, leaving] < 0:
             return 0
@@ -136,7 +178,8 @@ def _normal(V: Floats, F: Ints, triangle: int) -> tuple[float, float, float]:
 def _pulled(V: Floats, edges: Ints, points: Floats, count: int, p: tuple, q: tuple) -> float:
     """Length of the way from p to q through points on edges, once each has moved along its edge to where it is short.
 
-    Laid flat, the two triangles at an edge hold a straight line between the points before and after.
+    Laid flat, the two triangles at an edge hold a straight line between the points before and
+    after.
     """
     for _ in range(_PULLS):
         moved = 0.0
@@ -146,9 +189,12 @@ def _pulled(V: Floats, edges: Ints, points: Floats, count: int, p: tuple, q: tup
             square = dot(edge, edge)
             before = subtract(p if i == 0 else row(points, i - 1), a)
             after = subtract(q if i == count - 1 else row(points, i + 1), a)
-            s, t = dot(before, edge) / square, dot(after, edge) / square
-            off_s, off_t = combine(1.0, before, -s, edge), combine(1.0, after, -t, edge)
-            far_s, far_t = np.sqrt(dot(off_s, off_s)), np.sqrt(dot(off_t, off_t))
+            s = dot(before, edge) / square
+            t = dot(after, edge) / square
+            off_s = combine(1.0, before, -s, edge)
+            off_t = combine(1.0, after, -t, edge)
+            far_s = np.sqrt(dot(off_s, off_s))
+            far_t = np.sqrt(dot(off_t, off_t))
             place = min(max((s * far_t + t * far_s) / (far_s + far_t), 0.0), 1.0)
             if not (square > 0.0 and far_s + far_t > 0.0):
                 continue
@@ -158,9 +204,11 @@ def _pulled(V: Floats, edges: Ints, points: Floats, count: int, p: tuple, q: tup
             points[i, 0], points[i, 1], points[i, 2] = x
         if count == 1 or moved < _TIGHT * _TIGHT:
             break
-    length, last = 0.0, p
+    length = 0.0
+    last = p
     for i in range(count + 1):
         x = q if i == count else row(points, i)
         step = subtract(x, last)
-        length, last = length + np.sqrt(dot(step, step)), x
+        length = length + np.sqrt(dot(step, step))
+        last = x
     return length

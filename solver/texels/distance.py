@@ -14,9 +14,11 @@ from ..kernel import Bools, Floats, Ints, kernel
 from .texel_mesh import TexelMesh
 
 # Rows and columns in a halo table of the eight neighbours of a texel, in order round it
-_ROWS, _COLUMNS = np.array([1, 2, 2, 2, 1, 0, 0, 0]), np.array([2, 2, 1, 0, 0, 0, 1, 2])
+_ROWS = np.array([1, 2, 2, 2, 1, 0, 0, 0])
+_COLUMNS = np.array([2, 2, 1, 0, 0, 0, 1, 2])
 
-# From one of them to those that share a triangle with it and the texel: the latter two only where it is straight ahead
+# From one of them to those that share a triangle with it and the texel: the latter two only where
+# it is straight ahead
 _TURNS = np.array([-1, 1, -2, 2])
 
 
@@ -44,9 +46,11 @@ def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.
 
     Infinite where there is no outside.
     """
-    grid, scratch = texels.grid, distance_scratch(region.size)
+    grid = texels.grid
+    scratch = distance_scratch(region.size)
     outside = np.flatnonzero(~region)
-    scratch.distance[outside], scratch.touched[: len(outside)] = 0.0, outside
+    scratch.distance[outside] = 0.0
+    scratch.touched[: len(outside)] = outside
     count, _ = march(grid.halo, grid.positions, len(outside), np.inf, scratch)
     depth = scratch.distance.reshape(region.shape).copy()
     clean(scratch, count)
@@ -68,10 +72,11 @@ def _distance_scratch(size: int, thread: int) -> Scratch:
 def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -> float:
     """Distance at neighbour k of those round texel t, by way of that and of those beside it that are known.
 
-    That of a point source, unfolded into the plane of a triangle, where the straight way crosses the edge between the
-    two that are known (Novotni and Klein 2002).
+    That of a point source, unfolded into the plane of a triangle, where the straight way crosses
+    the edge between the two that are known (Novotni and Klein 2002).
     """
-    s, dp = around[k], distance[t]
+    s = around[k]
+    dp = distance[t]
     best = dp + distance_to(positions, s, positions[t])
     for turn in range(4 if k % 2 == 0 else 2):
         q = around[(k + _TURNS[turn]) % 8]
@@ -79,8 +84,11 @@ def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -
             continue
         length2 = ps2 = along = 0.0
         for i in range(3):
-            pq, ps = positions[q, i] - positions[t, i], positions[s, i] - positions[t, i]
-            length2, ps2, along = length2 + pq * pq, ps2 + ps * ps, along + ps * pq
+            pq = positions[q, i] - positions[t, i]
+            ps = positions[s, i] - positions[t, i]
+            length2 = length2 + pq * pq
+            ps2 = ps2 + ps * ps
+            along = along + ps * pq
         length = np.sqrt(length2)
         if length == 0:
             continue
@@ -99,25 +107,36 @@ def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -
 
 
 @kernel
-def march(halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scratch) -> tuple[int, int]:
+def march(
+    halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scratch
+) -> tuple[int, int]:
     """Fast marching with point-source updates over the triangles of both triangulations of every quad.
 
-    The first of those `touched` are the seeds, whose distances are known; see `seeded`. Returns how many texels have
-    been touched, and of how many within the limit the distance is now known.
+    The first of those `touched` are the seeds, whose distances are known; see `seeded`. Returns how
+    many texels have been touched, and of how many within the limit the distance is now known.
     """
-    distance, touched, order, done = scratch.distance, scratch.touched, scratch.order, scratch.known
-    n, around, count, known = halo.shape[1] - 2, np.empty(8, np.int64), seeds, 0
-    # texels that wait, the nearest first; those that came nearer wait more than once, and of two as near as each other
-    # the one of the lower index comes first
+    distance = scratch.distance
+    touched = scratch.touched
+    order = scratch.order
+    done = scratch.known
+    n = halo.shape[1] - 2
+    around = np.empty(8, np.int64)
+    count = seeds
+    known = 0
+    # texels that wait, the nearest first; those that came nearer wait more than once, and of two as
+    # near as each other the one of the lower index comes first
     front = [(distance[t], t) for t in touched[:seeds]]
     heapify(front)
     while len(front) > 0 and front[0][0] <= limit:
         t = heappop(front)[1]
         if done[t]:
             continue
-        order[known], done[t] = t, True
+        order[known] = t
+        done[t] = True
         known += 1
-        chart, row, column = t // (n * n), t // n % n, t % n
+        chart = t // (n * n)
+        row = t // n % n
+        column = t % n
         for k in range(8):
             around[k] = halo[chart, row + _ROWS[k], column + _COLUMNS[k]]
         for k in range(8):
@@ -135,17 +154,22 @@ def march(halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scra
 
 
 @kernel
-def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints) -> int:
+def seeded(
+    halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints
+) -> int:
     """Touch the nine texels round the one nearest to a point, at their straight distances from it; return how many."""
     n = halo.shape[1] - 2
-    chart, row, column = center // (n * n), center // n % n, center % n
+    chart = center // (n * n)
+    row = center // n % n
+    column = center % n
     seeds = 0
     for i in range(3):
         for j in range(3):
             t = halo[chart, row + i, column + j]
             # beyond a rim the halo shows the texel beside it once more
             if t >= 0 and distance[t] == np.inf:
-                touched[seeds], distance[t] = t, distance_to(positions, t, point)
+                touched[seeds] = t
+                distance[t] = distance_to(positions, t, point)
                 seeds += 1
     return seeds
 
@@ -154,11 +178,14 @@ def seeded(halo: Ints, positions: Floats, center: int, point: Floats, distance: 
 def clean(scratch: Scratch, count: int) -> None:
     """Leave a scratch as if so many texels had not been touched."""
     for i in range(count):
-        scratch.distance[scratch.touched[i]], scratch.known[scratch.touched[i]] = np.inf, False
+        scratch.distance[scratch.touched[i]] = np.inf
+        scratch.known[scratch.touched[i]] = False
 
 
 @kernel(no_cpython_wrapper=True)
 def distance_to(positions: Floats, t: int, point: Floats) -> float:
     """Straight distance of texel t from a point [m]."""
-    x, y, z = positions[t, 0] - point[0], positions[t, 1] - point[1], positions[t, 2] - point[2]
+    x = positions[t, 0] - point[0]
+    y = positions[t, 1] - point[1]
+    z = positions[t, 2] - point[2]
     return np.sqrt(x * x + y * y + z * z)

@@ -13,8 +13,9 @@ from .topology import TexelTopology
 def fill_halo(topology: TexelTopology, field: NDArray) -> None:
     """Fill in the halo of a field [C, n + 2, n + 2, ...] from its texels.
 
-    Where no texel lies, in corners of other than four charts, comes the mean of the three next to it: bilinear
-    interpolation is then continuous where three charts meet. Beyond a rim the last texels are repeated.
+    Where no texel lies, in corners of other than four charts, comes the mean of the three next to
+    it: bilinear interpolation is then continuous where three charts meet. Beyond a rim the last
+    texels are repeated.
     """
     _, ghosts, sources = topology.addresses
     flat = field.reshape(topology.halo.size, *field.shape[3:])
@@ -23,7 +24,9 @@ def fill_halo(topology: TexelTopology, field: NDArray) -> None:
     for r, r_in in ((0, 1), (last, last - 1)):
         for c, c_in in ((0, 1), (last, last - 1)):
             missing = topology.halo[:, r, c] < 0
-            mean = (field[:, r_in, c_in] + field[:, r_in, c] + field[:, r, c_in]) / field.dtype.type(3)
+            mean = (
+                field[:, r_in, c_in] + field[:, r_in, c] + field[:, r, c_in]
+            ) / field.dtype.type(3)
             field[missing, r, c] = mean[missing]
 
 
@@ -37,10 +40,13 @@ def with_filled_halo(topology: TexelTopology, field: Floats32) -> Floats32:
 def sampling_matrix(topology: TexelTopology, chart: Ints, row: Floats, column: Floats) -> csr_array:
     """Matrix that takes a flattened field [C n^2] to its values at chart points, each [k]; see `Atlas.locate`.
 
-    In a corner where other than four charts meet the weight of the texel that is missing is shared out.
+    In a corner where other than four charts meet the weight of the texel that is missing is shared
+    out.
     """
-    r, c = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
-    s, t = row - r, column - c
+    r = np.floor(row).astype(np.int64)
+    c = np.floor(column).astype(np.int64)
+    s = row - r
+    t = column - c
     i, j = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[:, :, None]
     texel = topology.halo[chart, r + 1 + i, c + 1 + j]
     share = np.where(texel < 0, 0, [(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t])

@@ -34,12 +34,18 @@ def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
     """
     values = np.asarray(values, dtype=np.float64)
     if values.ndim not in (1, 2) or len(values) != len(atlas.mesh.V):
-        raise SolverError(f"vertex values have shape {values.shape}; valid is [{len(atlas.mesh.V)}], one a vertex")
+        raise SolverError(
+            f"vertex values have shape {values.shape}; valid is [{len(atlas.mesh.V)}], one a vertex"
+        )
     return _interpolate(atlas, values[atlas.mesh.F])
 
 
 def texture_map(
-    atlas: Atlas, image: str | Path | ArrayLike, low: float = 0.0, high: float = 1.0, channel: str = "luminance"
+    atlas: Atlas,
+    image: str | Path | ArrayLike,
+    low: float = 0.0,
+    high: float = 1.0,
+    channel: str = "luminance",
 ) -> NDArray[np.float64]:
     """Sample an image in the object's own texture coordinates, once a texel.
 
@@ -48,14 +54,16 @@ def texture_map(
     atlas : Atlas
         Of a mesh with texture coordinates.
     image : path, or array [height, width] or [height, width, channels]
-        Path of a PNG or any image that Pillow reads, 8 or 16 bits; its values are taken as they are, without gamma.
-        Or an array of values from 0 to 1. It repeats beyond its borders; v = 0 is its lower edge.
+        Path of a PNG or any image that Pillow reads, 8 or 16 bits; its values are taken as they
+        are, without gamma. Or an array of values from 0 to 1. It repeats beyond its borders; v = 0
+        is its lower edge.
     low : float
         What black stands for; in between is linear.
     high : float
         What white stands for.
     channel : str
-        One of `CHANNELS`: "luminance" (mean of red, green and blue), "red", "green", "blue" or "alpha".
+        One of `CHANNELS`: "luminance" (mean of red, green and blue), "red", "green", "blue" or
+        "alpha".
 
     Returns
     -------
@@ -68,14 +76,21 @@ def texture_map(
         If the mesh has no texture coordinates, the image cannot be read, or it lacks the channel.
     """
     if atlas.mesh.corner_uv is None:
-        raise SolverError("the mesh has no texture coordinates for an image; give it some, or use `vertex_map`")
-    values, uv = _pixels(image, channel), _interpolate(atlas, atlas.mesh.corner_uv)
+        raise SolverError(
+            "the mesh has no texture coordinates for an image; give it some, or use `vertex_map`"
+        )
+    values = _pixels(image, channel)
+    uv = _interpolate(atlas, atlas.mesh.corner_uv)
     height, width = values.shape
-    x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
-    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    s, t = x - column, y - row
+    x = uv[..., 0] * width - 0.5
+    y = (1 - uv[..., 1]) * height - 0.5
+    column = np.floor(x).astype(np.int64)
+    row = np.floor(y).astype(np.int64)
+    s = x - column
+    t = y - row
     upper, lower = (
-        (1 - s) * values[each % height, column % width] + s * values[each % height, (column + 1) % width]
+        (1 - s) * values[each % height, column % width]
+        + s * values[each % height, (column + 1) % width]
         for each in (row, row + 1)
     )
     return low + (high - low) * ((1 - t) * upper + t * lower)
@@ -91,7 +106,10 @@ def _pixels(image: str | Path | ArrayLike, channel: str) -> NDArray[np.float64]:
     if isinstance(image, str | Path):
         as_stored = ("L", "LA", "RGB", "RGBA")  # the numbers of a palette are not brightness
         pixels = read_image(
-            SolverError, image, "image", lambda mode: mode if mode in as_stored or mode[0] == "I" else "RGBA"
+            SolverError,
+            image,
+            "image",
+            lambda mode: mode if mode in as_stored or mode[0] == "I" else "RGBA",
         )
         pixels = pixels / (255.0 if pixels.dtype == np.uint8 else 65535.0)
     else:
@@ -99,12 +117,16 @@ def _pixels(image: str | Path | ArrayLike, channel: str) -> NDArray[np.float64]:
     if pixels.ndim == 2:
         pixels = pixels[..., None]
     if pixels.ndim != 3 or 0 in pixels.shape or pixels.shape[2] > 4:
-        raise SolverError(f"image has shape {pixels.shape}; valid is [height, width] with up to 4 channels")
+        raise SolverError(
+            f"image has shape {pixels.shape}; valid is [height, width] with up to 4 channels"
+        )
     channels = pixels.shape[2]
     if channel == "luminance":
         return pixels[..., : 3 if channels >= 3 else 1].mean(axis=2)
     if channel not in _CHANNELS:
-        raise SolverError(f"channel {channel!r} does not exist; valid are {', '.join(map(repr, CHANNELS))}")
+        raise SolverError(
+            f"channel {channel!r} does not exist; valid are {', '.join(map(repr, CHANNELS))}"
+        )
     place = channels - 1 if channel == "alpha" and channels in (2, 4) else _CHANNELS[channel]
     if place >= channels:
         raise SolverError(f"the image has no channel {channel!r}, only {channels}; use 'luminance'")

@@ -13,7 +13,8 @@ from .chart_map import barycentrics_in
 from .stencil import NO_LINKS, IrregularLinks, Stencil
 from .stiffness import CellCoefficient, TexelCells
 
-# Rest positions further off their triangles than this, in units of the surface's size, keep that distance.
+# Rest positions further off their triangles than this, in units of the surface's size, keep that
+# distance.
 _OFF = 1e-9
 
 
@@ -36,25 +37,39 @@ class SurfaceRide:
     """
 
     def __init__(self, atlas: Atlas) -> None:
-        topology, around = atlas.texels.topology, atlas.texels.halo_positions
+        topology = atlas.texels.topology
+        around = atlas.texels.halo_positions
         self._shape = topology.halo.shape
         self._has_beyond = atlas.texels.beyond is not None
-        V, F, places = atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64), around.reshape(-1, 3)
-        halo, rim, nothing = topology.halo.reshape(-1), topology.rim.reshape(-1), ~np.isfinite(places[:, 0])
-        corners, weights = F[atlas.triangles.reshape(-1)[halo]], atlas.barycentrics.reshape(-1, 3)[halo]
+        V = atlas.mesh.V
+        F = np.asarray(atlas.mesh.F, np.int64)
+        places = around.reshape(-1, 3)
+        halo = topology.halo.reshape(-1)
+        rim = topology.rim.reshape(-1)
+        nothing = ~np.isfinite(places[:, 0])
+        corners = F[atlas.triangles.reshape(-1)[halo]]
+        weights = atlas.barycentrics.reshape(-1, 3)[halo]
         if (at := rim & ~nothing).any():
             triangle, closest = atlas.closest_points(np.ascontiguousarray(places[at]))
-            corners[at], weights[at] = F[triangle], barycentrics_in(V[F[triangle]], closest)
+            corners[at] = F[triangle]
+            weights[at] = barycentrics_in(V[F[triangle]], closest)
         weights[nothing] = np.nan
         # images of a periodic surface keep their way to the texels that they show
-        shift = np.where((rim | nothing)[:, None], 0.0, places - atlas.positions.reshape(-1, 3)[halo])
+        shift = np.where(
+            (rim | nothing)[:, None], 0.0, places - atlas.positions.reshape(-1, 3)[halo]
+        )
         self._images = np.flatnonzero(shift.any(axis=1))
         self._shift = shift[self._images].T
-        self.corners, self.weights, self._offsets = corners.astype(np.int32), weights, np.zeros((0, 3))
-        # along the triangle's first side, across it, and along its normal, in units of the root of twice its area
+        self.corners = corners.astype(np.int32)
+        self.weights = weights
+        self._offsets = np.zeros((0, 3))
+        # along the triangle's first side, across it, and along its normal, in units of the root of
+        # twice its area
         off = np.nan_to_num(places - shift - np.einsum("ij,ijk->ik", weights, V[corners]))
         if np.abs(off).max(initial=0.0) > _OFF * np.ptp(V, axis=0).max():
-            self._offsets = np.linalg.solve(np.swapaxes(_frames(V, self.corners), 1, 2), off[..., None])[..., 0]
+            self._offsets = np.linalg.solve(
+                np.swapaxes(_frames(V, self.corners), 1, 2), off[..., None]
+            )[..., 0]
         self.on_triangles = not (len(self._offsets) or len(self._images))
 
     def around(self, V: Floats) -> Floats:
@@ -84,7 +99,8 @@ class MovedPlaces:
     """Where the places of an atlas are, with its vertices at V [n, 3] [m]."""
 
     def __init__(self, ride: SurfaceRide, V: Floats) -> None:
-        self.ride, self.V = ride, V
+        self.ride = ride
+        self.V = V
 
     @functools.cached_property
     def around(self) -> Floats:
@@ -93,7 +109,9 @@ class MovedPlaces:
 
 
 class MovedStencil(Stencil):
-    """A stencil of cells and where they are. A GPU makes its own of it, so that nobody may ever ask for the weights.
+    """A stencil of cells and where they are.
+
+    A GPU makes its own of it, so that nobody may ever ask for the weights.
 
     Parameters
     ----------
@@ -116,15 +134,20 @@ class MovedStencil(Stencil):
         multiple: tuple[MovedStencil, float] | None = None,
         added: IrregularLinks = NO_LINKS,
     ) -> None:
-        self.topology, self.cells, self.coefficient, self.places = cells.topology, cells, coefficient, places
-        self._multiple, self._added = multiple, added
+        self.topology = cells.topology
+        self.cells = cells
+        self.coefficient = coefficient
+        self.places = places
+        self._multiple = multiple
+        self._added = added
         self.known_fastest: float | None = None
 
     @functools.cached_property
     def _made(self) -> tuple[Stencil, Floats]:
         if self._multiple is None:
             return self.cells.moved(self.places.around, self.coefficient)
-        (stencil, areas), factor = self._multiple[0]._made, self._multiple[1]
+        (stencil, areas) = self._multiple[0]._made
+        factor = self._multiple[1]
         links = stencil.irregular._replace(weights=factor * stencil.irregular.weights)
         return Stencil(self.topology, factor * stencil.weights, links), areas
 
@@ -155,7 +178,8 @@ class MovedStencil(Stencil):
 def _frames(V: Floats, corners: NDArray[np.integer]) -> Floats:
     """First side, direction across it, and normal of triangles, as rows as long as the root of twice the area."""
     x = V[corners]
-    along, across = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    along = x[:, 1] - x[:, 0]
+    across = x[:, 2] - x[:, 0]
     normal = np.cross(along, across)
     double = np.linalg.norm(normal, axis=1)[:, None]
     normal /= np.maximum(double, 1e-300)
@@ -167,9 +191,15 @@ def _frames(V: Floats, corners: NDArray[np.integer]) -> Floats:
 def interpolate(values: Floats, corners: Ints32, weights: Floats, out: Floats) -> None:
     """Values [n, 3] of vertices at points with weights [k, 3] at corners [k, 3], into [3, k]."""
     for i in range(len(corners)):
-        a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
+        a = corners[i, 0]
+        b = corners[i, 1]
+        c = corners[i, 2]
         for k in range(3):
-            out[k, i] = weights[i, 0] * values[a, k] + weights[i, 1] * values[b, k] + weights[i, 2] * values[c, k]
+            out[k, i] = (
+                weights[i, 0] * values[a, k]
+                + weights[i, 1] * values[b, k]
+                + weights[i, 2] * values[c, k]
+            )
 
 
 @kernel
@@ -180,10 +210,17 @@ def _interpolate_units(values: Floats, corners: Ints32, weights: Floats, out: Fl
         for r in range(n):
             for column in range(n):
                 i = (chart * (n + 2) + r + 1) * (n + 2) + column + 1
-                a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
-                unit, square = out[chart, r, column], 0.0
+                a = corners[i, 0]
+                b = corners[i, 1]
+                c = corners[i, 2]
+                unit = out[chart, r, column]
+                square = 0.0
                 for k in range(3):
-                    unit[k] = weights[i, 0] * values[a, k] + weights[i, 1] * values[b, k] + weights[i, 2] * values[c, k]
+                    unit[k] = (
+                        weights[i, 0] * values[a, k]
+                        + weights[i, 1] * values[b, k]
+                        + weights[i, 2] * values[c, k]
+                    )
                     square += unit[k] ** 2
                 length = max(np.sqrt(square), 1e-30)
                 for k in range(3):

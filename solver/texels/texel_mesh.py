@@ -1,10 +1,11 @@
 """The texel mesh: charts of texels on a surface, whose centres are the vertices on which waves are solved.
 
-It cuts corners where the surface is creased, and spans twists that the surface has not: its area is up to 2 % too small
-or too large at N = 96. The map onto the charts knows better: a texel's share is the area of the surface that its square
-of a chart covers.
+It cuts corners where the surface is creased, and spans twists that the surface has not: its area is
+up to 2 % too small or too large at N = 96. The map onto the charts knows better: a texel's share is
+the area of the surface that its square of a chart covers.
 
-Here is also what keeps a few small texels from setting the time step for all, and figures of how good a texel mesh is.
+Here is also what keeps a few small texels from setting the time step for all, and figures of how
+good a texel mesh is.
 """
 
 from __future__ import annotations
@@ -29,6 +30,38 @@ from .topology import TexelTopology
 # Passes of the smoothing: a neighbourhood has a standard deviation of 1.4 texels.
 _PASSES = 4
 
+# Least and most area in units of what the texel mesh spans. A limb that falls between the texels is
+# not theirs.
+_LEAST = 0.5
+_MOST = 1.2
+_POSITIVE = 0.05  # of the mean round a texel; one may cover nothing but triangles without area
+
+# What softening may take from a smooth surface, in texels, for each halving of the fastest rate. It
+# falls with the square of their size, as the error of the operator does: eigenvalues stay of second
+# order.
+_TEXELS = 0.5
+
+# Needles at creases, which are faster than most by this factor, may lose more where the time step
+# would be less than this share of an even grid's. Hardly faster are rings of narrow texels round a
+# limb: all waves along the limb pass through those, and softening them made the lowest frequencies
+# too low.
+_NEEDLE = 2.0
+_STEP = 0.45
+
+# All but this share of the surface at most stays as it is, and texels that are hardly faster.
+_BULK = 0.99
+_FASTER = 1.2
+
+# How far eigenvalues may change for the sake of the time step, in units of about the operator's own
+# error.
+_CHANGE = 0.07
+_HEAVIEST = 3.0  # mean texels to which a texel may grow: more would leave a hole round a needle
+
+# of a part's area, at most, that its texels may lack together: tiny parts are too fast altogether
+_SCARCE = 0.2
+_MOST_TURNS = 50
+_HALVINGS = 6
+
 
 def smoothed(topology: TexelTopology, field: Floats) -> Floats:
     """Mean of a field [C, n, n] round each texel, by passes of the weights 1 2 1 along rows and columns."""
@@ -45,11 +78,6 @@ def _sum_around(topology: TexelTopology, field: Floats) -> Floats:
     return rows[:, :, :-2] + 2 * rows[:, :, 1:-1] + rows[:, :, 2:]
 
 
-# Least and most area in units of what the texel mesh spans. A limb that falls between the texels is not theirs.
-_LEAST, _MOST = 0.5, 1.2
-_POSITIVE = 0.05  # of the mean round a texel; one may cover nothing but triangles without area
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class TexelMesh:
     """C charts of n x n texels on a surface.
@@ -62,9 +90,10 @@ class TexelMesh:
     areas : float64 [C, n, n]
         Area of the surface that belongs to each texel [m^2]; the mass of its waves sits there.
     beyond : float64 [C, n + 2, n + 2, 3] or None
-        Positions of the halo [m], where these are not simply those of the texels that it shows: the points of a rim
-        nearest to the texels beside it, or images of a periodic surface; NaN where there is nothing. None: as the
-        texels lie, and the surface ends at the centres of its last ones.
+        Positions of the halo [m], where these are not simply those of the texels that it shows: the
+        points of a rim nearest to the texels beside it, or images of a periodic surface; NaN where
+        there is nothing. None: as the texels lie, and the surface ends at the centres of its last
+        ones.
     detours : float32 [4, C, n + 2, n + 2] or None
         How much longer than straight the links are; see `link_detours`. None: they are straight.
     """
@@ -89,24 +118,31 @@ class TexelMesh:
     ) -> TexelMesh:
         """Texel mesh with the normals of its grid lines where none are given.
 
-        Its areas are those that it spans itself, or those of the surface `covered` [m^2], [C, n, n]. A few are evened
-        out for the sake of the time step; see `evened_areas`.
+        Its areas are those that it spans itself, or those of the surface `covered` [m^2], [C, n,
+        n]. A few are evened out for the sake of the time step; see `evened_areas`.
 
         Raises
         ------
         AtlasError
             If positions are not finite, or of another shape than the topology's.
         """
-        points, shape = np.asarray(positions, dtype=np.float64), (*topology.shape, 3)
+        points = np.asarray(positions, dtype=np.float64)
+        shape = (*topology.shape, 3)
         if points.shape != shape:
-            raise AtlasError(f"texel positions have shape {points.shape}; this topology needs {shape}, in metres")
+            raise AtlasError(
+                f"texel positions have shape {points.shape}; this topology needs {shape}, in metres"
+            )
         if wrong := int((~np.isfinite(points)).sum()):
-            raise AtlasError(f"{wrong} numbers of the texel positions are not finite; valid are metres")
+            raise AtlasError(
+                f"{wrong} numbers of the texel positions are not finite; valid are metres"
+            )
         points = np.ascontiguousarray(points)
         around = _with_halo(topology, points, beyond)
         if normals is None:
             normals = np.cross(*tangents(around))
-            normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
+            normals /= np.maximum(
+                np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny
+            )
         cells = TexelCells(topology, around, detours)
         areas = cells.areas
         if covered is not None:
@@ -126,9 +162,12 @@ class TexelMesh:
     ) -> TexelMesh:
         """The same texels elsewhere: the topology stays, areas and (unless given) normals follow the positions.
 
-        Areas change in proportion to what the texel mesh spans, so that a level taken from a finer mesh is kept.
+        Areas change in proportion to what the texel mesh spans, so that a level taken from a finer
+        mesh is kept.
         """
-        moved = TexelMesh.of(self.topology, positions, normals=normals, beyond=beyond, detours=self.detours)
+        moved = TexelMesh.of(
+            self.topology, positions, normals=normals, beyond=beyond, detours=self.detours
+        )
         spanned = self.cells.areas
         level = np.divide(self.areas, spanned, out=np.ones_like(spanned), where=spanned > 0)
         return dataclasses.replace(moved, areas=moved.cells.areas * level)
@@ -157,44 +196,60 @@ class TexelMesh:
     def grid(self) -> TexelGrid:
         """The texel mesh as compiled code reads it."""
         halo = self.topology.halo.view()
-        halo.flags.writeable = False  # as `glue` makes it: for copies, which can be written, kernels were compiled anew
-        return TexelGrid(halo, self.positions.reshape(-1, 3), self.normals.reshape(-1, 3), self.areas.reshape(-1))
+        # as `glue` makes it: for copies, which can be written, kernels were compiled anew
+        halo.flags.writeable = False
+        return TexelGrid(
+            halo, self.positions.reshape(-1, 3), self.normals.reshape(-1, 3), self.areas.reshape(-1)
+        )
 
     def with_fixed_rim(self) -> TexelMesh:
         """The same with heights of 0 at its rims."""
-        return dataclasses.replace(self, topology=dataclasses.replace(self.topology, fixed_rim=True))
+        return dataclasses.replace(
+            self, topology=dataclasses.replace(self.topology, fixed_rim=True)
+        )
 
     @property
     def bare_rim(self) -> NDArray[np.bool_]:
         """Texels in whose centres the surface ends: a rim beside them has no positions; [C, n, n]."""
         bare = self.topology.rim & ~np.isfinite(self.halo_positions[..., 0])
         bare[:, [0, 0, -1, -1], [0, -1, 0, -1]] = False  # no texel lies beside a corner
-        return np.bincount(self.topology.halo[bare], minlength=self.topology.texel_count).reshape(self.shape) > 0
+        return (
+            np.bincount(self.topology.halo[bare], minlength=self.topology.texel_count).reshape(
+                self.shape
+            )
+            > 0
+        )
 
-    def stencil(self, coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None) -> Stencil:
+    def stencil(
+        self, coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None
+    ) -> Stencil:
         """Stiffness weights of -div(coefficient grad): at a texel, the area integral of div(coefficient grad h).
 
         Parameters
         ----------
         coefficient : [C, n, n]
-            Averaged harmonically over the corners of every cell, as media in series: the operator stays symmetric, and
-            a region where it is 0 is cut off at its edge.
+            Averaged harmonically over the corners of every cell, as media in series: the operator
+            stays symmetric, and a region where it is 0 is cut off at its edge.
         softening : [C, n, n], optional
-            Factors up to 1: the stiffness of every cell is multiplied by the least of those at its corners.
+            Factors up to 1: the stiffness of every cell is multiplied by the least of those at its
+            corners.
         """
-        return self.cells.at_rest(coefficient, np.ones(self.shape) if softening is None else softening)
+        return self.cells.at_rest(
+            coefficient, np.ones(self.shape) if softening is None else softening
+        )
 
     def stiffness(self, speed: float | NDArray[np.float64] = 1.0) -> csr_array:
         """Stiffness matrix [T, T], T = C n^2, of the area integral of c^2 grad . grad for a wave speed c [m/s].
 
-        Symmetric and positive semidefinite; with the areas as lumped mass M, waves on a free surface of density 1 have
-        M h_tt = -K h.
+        Symmetric and positive semidefinite; with the areas as lumped mass M, waves on a free
+        surface of density 1 have M h_tt = -K h.
         """
         try:
             squared = np.broadcast_to(np.asarray(speed, dtype=np.float64) ** 2, self.shape)
         except (TypeError, ValueError, OverflowError) as error:
             raise AtlasError(
-                f"speed is {shown(speed)}; valid is a number, or an array of shape {self.shape}, in m/s"
+                f"speed is {shown(speed)}; valid is a number, or an array of shape {self.shape}, "
+                f"in m/s"
             ) from error
         return stiffness_matrix(self.stencil(squared))
 
@@ -226,39 +281,25 @@ def tangents(around: Floats) -> tuple[Floats, Floats]:
     return east - west, north - south
 
 
-# What softening may take from a smooth surface, in texels, for each halving of the fastest rate. It falls with the
-# square of their size, as the error of the operator does: eigenvalues stay of second order.
-_TEXELS = 0.5
-
-# Needles at creases, which are faster than most by this factor, may lose more where the time step would be less than
-# this share of an even grid's. Hardly faster are rings of narrow texels round a limb: all waves along the limb pass
-# through those, and softening them made the lowest frequencies too low.
-_NEEDLE, _STEP = 2.0, 0.45
-
-# All but this share of the surface at most stays as it is, and texels that are hardly faster.
-_BULK, _FASTER = 0.99, 1.2
-
-# How far eigenvalues may change for the sake of the time step, in units of about the operator's own error.
-_CHANGE = 0.07
-
-_HEAVIEST = 3.0  # mean texels to which a texel may grow: more would leave a hole round a needle
-_SCARCE = 0.2  # of a part's area, at most, that its texels may lack together: tiny parts are too fast altogether
-_MOST_TURNS, _HALVINGS = 50, 6
-
-
 def evened_areas(areas: Floats, stencil: Stencil) -> Floats:
     """Areas [C, n, n] with mass of their neighbours' moved to the few texels that would set the time step for all.
 
-    To the areas is added K w, with the stiffness K of a uniform surface and the least w >= 0 for which no texel is
-    faster than a bound. K w has no sum and, but for the curvature, no first moment: total area and centre of mass stay.
-    A mode of wave number k has a mean square of its heights that changes by 2 k^2 times the mean of w, where the error
-    of the operator is k^2 h^2 / 12; the bound is as low as a share of that allows.
+    To the areas is added K w, with the stiffness K of a uniform surface and the least w >= 0 for
+    which no texel is faster than a bound. K w has no sum and, but for the curvature, no first
+    moment: total area and centre of mass stay. A mode of wave number k has a mean square of its
+    heights that changes by 2 k^2 times the mean of w, where the error of the operator is k^2 h^2 /
+    12; the bound is as low as a share of that allows.
     """
-    flat, pull, matrix = areas.ravel(), stencil.absolute_sums().ravel(), stiffness_matrix(stencil)
+    flat = areas.ravel()
+    pull = stencil.absolute_sums().ravel()
+    matrix = stiffness_matrix(stencil)
     if not pull.any():  # a single texel
         return areas
-    rate, part = pull / flat, connected_components(matrix, directed=False)[1]
-    best, low, high = flat, _FASTER * _bulk(rate, flat), float(rate.max())
+    rate = pull / flat
+    part = connected_components(matrix, directed=False)[1]
+    best = flat
+    low = _FASTER * _bulk(rate, flat)
+    high = float(rate.max())
     bound = max(low, _even(flat))  # beyond which texels are softened, if need be
     for _ in range(_HALVINGS):
         lack = np.minimum(pull / bound, np.maximum(flat, _HEAVIEST * flat.mean())) - flat
@@ -266,7 +307,8 @@ def evened_areas(areas: Floats, stencil: Stencil) -> Floats:
         lack[scarce[part]] = -np.inf
         w = _least_potential(matrix, lack)
         if w is not None and 24 * (w @ flat) <= _CHANGE * flat.mean() * flat.sum():
-            best, high = flat + matrix @ w, bound
+            best = flat + matrix @ w
+            high = bound
         else:
             low = bound
         bound = np.sqrt(low * high)
@@ -278,13 +320,15 @@ def _least_potential(matrix: csr_array, lack: Floats) -> Floats | None:
 
     Where it is not 0 is found by Newton's method (Hintermueller, Ito and Kunisch 2002).
     """
-    w, touching = np.zeros_like(lack), lack > 0
+    w = np.zeros_like(lack)
+    touching = lack > 0
     for _ in range(_MOST_TURNS):
         inside = np.flatnonzero(touching)
         w[:] = 0
         if len(inside):
             w[inside] = spsolve(matrix[inside][:, inside].tocsc(), lack[inside])
-        before, touching = touching, np.where(touching, w > 0, matrix @ w < lack - 1e-9 * np.abs(lack[inside]).sum())
+        before = touching
+        touching = np.where(touching, w > 0, matrix @ w < lack - 1e-9 * np.abs(lack[inside]).sum())
         if (touching == before).all():
             return w
     return None
@@ -298,15 +342,16 @@ def _even(areas: Floats) -> float:
 def softening(texels: TexelMesh) -> Floats:
     """Factors that slow down those few texels that evened areas leave too fast for the others, [C, n, n].
 
-    Where the texel mesh crosses a crease, single texels are needles, for which no mass of their neighbours would do.
-    Waves are through them in no time, even slowed down. On smooth surfaces that the texels resolve little is softened,
-    or nothing, as on the sphere.
+    Where the texel mesh crosses a crease, single texels are needles, for which no mass of their
+    neighbours would do. Waves are through them in no time, even slowed down. On smooth surfaces
+    that the texels resolve little is softened, or nothing, as on the sphere.
     """
     areas = texels.areas
     rate = texels.stencil(np.ones_like(areas)).absolute_sums() / areas
     # the least rate to which softening may bring the faster ones
     order = np.argsort(-rate.ravel())
-    rates, shares = rate.ravel()[order], (areas.ravel() / areas.mean())[order]
+    rates = rate.ravel()[order]
+    shares = (areas.ravel() / areas.mean())[order]
     lost = np.cumsum(shares) - rates * np.cumsum(shares / rates)
     cheapest = float(rates[np.flatnonzero(lost <= _TEXELS * np.log2(rates[0] / rates) + 1e-9)[-1]])
     bulk = _bulk(rate.ravel(), areas.ravel())
@@ -327,8 +372,12 @@ def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
     edges = edges[np.isfinite(edges) & (edges > 0)]
     # of waves of one speed, over that of an endless even grid of as many texels on the same area
     stencil = texels.stencil(np.ones(texels.shape), softening(texels))
-    rate = largest_eigenvalue(stencil, texels.areas, np.ones(texels.shape, bool), stencil.fastest(texels.areas))
-    step = np.sqrt(EVEN_RATE * texels.topology.texel_count / mesh.area / rate) if rate > 0 else np.inf
+    rate = largest_eigenvalue(
+        stencil, texels.areas, np.ones(texels.shape, bool), stencil.fastest(texels.areas)
+    )
+    step = (
+        np.sqrt(EVEN_RATE * texels.topology.texel_count / mesh.area / rate) if rate > 0 else np.inf
+    )
     return {
         "edge_min": float(edges.min()),
         "edge_max": float(edges.max()),
@@ -341,7 +390,8 @@ def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
 
 def folded_texels(texels: TexelMesh) -> int:
     """Number of texels of which a corner between two neighbours faces away from the surface's normal."""
-    around, own = texels.halo_positions, texels.positions
+    around = texels.halo_positions
+    own = texels.positions
     beside = [around[:, 1:-1, 2:], around[:, 2:, 1:-1], around[:, 1:-1, :-2], around[:, :-2, 1:-1]]
     folded = np.zeros(own.shape[:3], bool)
     for k in range(4):

@@ -1,5 +1,9 @@
 from .finite import EVERY as EVERY
-from .footprint import Footprint as Footprint, footprint_at as footprint_at, weigh_each as weigh_each
+from .footprint import (
+    Footprint as Footprint,
+    footprint_at as footprint_at,
+    weigh_each as weigh_each,
+)
 from .height_map import (
     FREE as FREE,
     MOST as MOST,

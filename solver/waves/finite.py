@@ -13,6 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError, shown, whole
 
+# A step that needs more is a mistake in a unit, and would run for ever.
+_MOST = 1_000_000
+_ONE_OR_MORE = whole(1)
+
+# A look at all heights takes a fifth of a substep: one in so many substeps is less than a
+# hundredth. Nobody sees the heights in between without a look of their own.
+EVERY = 32
+_GREATEST = float(np.finfo(np.float32).max)
+
 
 def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """A number, or an array of the given shape, as a float32 field [C, n, n].
@@ -22,12 +31,16 @@ def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.
     try:
         array = np.asarray(value, dtype=np.float32)
     except (TypeError, ValueError, OverflowError) as error:
-        raise SolverError(f"{name} is {shown(value)}; valid is a number, or an array of shape {shape}") from error
+        raise SolverError(
+            f"{name} is {shown(value)}; valid is a number, or an array of shape {shape}"
+        ) from error
     if array.shape not in ((), shape):
         raise SolverError(f"{name} has shape {array.shape}; valid is {shape}, or one number")
     array = np.broadcast_to(array, shape)
     if not np.isfinite(array).all():
-        raise SolverError(f"{name} holds {(~np.isfinite(array)).sum()} values that are NaN or infinite")
+        raise SolverError(
+            f"{name} holds {(~np.isfinite(array)).sum()} values that are NaN or infinite"
+        )
     return array
 
 
@@ -37,11 +50,6 @@ def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -
     if not (isinstance(value, numbers.Real) and max(least, -most) <= value <= most):
         bound = "" if least == -np.inf else f", {least:g} or greater"
         raise SolverError(f"{name} is {shown(value)} {unit}; valid is a finite number{bound}")
-
-
-# A step that needs more is a mistake in a unit, and would run for ever.
-_MOST = 1_000_000
-_ONE_OR_MORE = whole(1)
 
 
 def count_substeps(dt: float, stable: float, asked: int | None) -> int:
@@ -70,21 +78,16 @@ def count_substeps(dt: float, stable: float, asked: int | None) -> int:
         return needed
     if not (_ONE_OR_MORE.holds(asked) and asked <= _MOST):
         raise SolverError(
-            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MOST}, or None for the fewest"
+            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MOST}, or None "
+            f"for the fewest"
         )
     if asked < needed:
         raise SolverError(
-            f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable {stable:.4g} s; "
+            f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable "
+            f"{stable:.4g} s; "
             f"use {needed} or more substeps, or leave the number out"
         )
     return asked
-
-
-# A look at all heights takes a fifth of a substep: one in so many substeps is less than a hundredth. Nobody sees the
-# heights in between without a look of their own.
-EVERY = 32
-
-_GREATEST = float(np.finfo(np.float32).max)
 
 
 class FiniteGuard:
@@ -99,13 +102,16 @@ class FiniteGuard:
 
     def clear(self) -> None:
         """Begin anew, at rest."""
-        self._fastest, self._largest = -np.inf, ("", 0.0, "", 0.0)
-        self._reported, self._unseen = False, 0
+        self._fastest = -np.inf
+        self._largest = ("", 0.0, "", 0.0)
+        self._reported = False
+        self._unseen = 0
 
     def note(self, kind: str, value: float, unit: str, time: float, speed: float) -> None:
         """Remember a source, if it is the largest: "impulse", 2.0, "N s", when [s], and a texel's speed by it [m/s]."""
         if not speed <= self._fastest:
-            self._fastest, self._largest = speed, (kind, value, unit, time)
+            self._fastest = speed
+            self._largest = (kind, value, unit, time)
 
     def due(self, substeps: int) -> bool:
         """Whether it is time for a look, after so many more substeps."""
@@ -133,7 +139,10 @@ class FiniteGuard:
         if kind:
             source = f"the {kind} of {value:.4g} {unit} at time {given:.6g} s"
             cause = f"the largest source is {source}, too much for float32: make it smaller"
-        raise SolverError(f"{name} is no longer finite {where}, at time {time:.6g} s; {cause}, and `reset()` the waves")
+        raise SolverError(
+            f"{name} is no longer finite {where}, at time {time:.6g} s; {cause}, and `reset()` the "
+            f"waves"
+        )
 
 
 def check_kick(velocities: NDArray[np.float64], impulse: float) -> float:
@@ -144,7 +153,8 @@ def check_kick(velocities: NDArray[np.float64], impulse: float) -> float:
     fastest = float(np.abs(velocities).max(initial=0.0))
     if not fastest <= _GREATEST:
         raise SolverError(
-            f"impulse is {impulse:.4g} N s, which would move the surface at {fastest:.4g} m/s, beyond float32; "
+            f"impulse is {impulse:.4g} N s, which would move the surface at {fastest:.4g} m/s, "
+            f"beyond float32; "
             "valid is a smaller one, or a greater density of the material"
         )
     return fastest

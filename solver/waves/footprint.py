@@ -20,15 +20,20 @@ from .finite import require_finite
 # Fewer texels across than this and the source would excite waves that the grid cannot resolve.
 MIN_TEXELS = 2.0
 
-# Distance along the surface over straight distance: up to the first value the surface is flat, from the second on
-# only the way along the surface counts. In between the two are blended, so that no texel jumps in or out.
-_FLAT, _BENT = 1.05, 1.5
+# Distance along the surface over straight distance: up to the first value the surface is flat, from
+# the second on only the way along the surface counts. In between the two are blended, so that no
+# texel jumps in or out.
+_FLAT = 1.05
+_BENT = 1.5
 
 # Rows and columns in a halo table of the four texels beside one
-_DOWN, _RIGHT = np.array([0, 1, 1, 2]), np.array([1, 0, 2, 1])
+_DOWN = np.array([0, 1, 1, 2])
+_RIGHT = np.array([1, 0, 2, 1])
 
 
-def weigh_each(grid: TexelGrid, centers: Ints, points: Floats, radii: Floats) -> tuple[Ints, Ints, Floats, Floats]:
+def weigh_each(
+    grid: TexelGrid, centers: Ints, points: Floats, radii: Floats
+) -> tuple[Ints, Ints, Floats, Floats]:
     """Footprints round points [k, 3] whose nearest texels are `centers`.
 
     Returns
@@ -40,13 +45,17 @@ def weigh_each(grid: TexelGrid, centers: Ints, points: Floats, radii: Floats) ->
     radii : float64 [k]
         Those used [m].
     """
-    begins, used, done = np.zeros(len(centers) + 1, np.int64), np.empty(len(centers)), 0
-    texels, weights = np.empty(4096, np.int64), np.empty(4096)
+    begins = np.zeros(len(centers) + 1, np.int64)
+    used = np.empty(len(centers))
+    done = 0
+    texels = np.empty(4096, np.int64)
+    weights = np.empty(4096)
     scratch = distance_scratch(len(grid.areas))
     while done < len(centers):
         done = _weigh(grid, centers, points, radii, scratch, done, begins, used, texels, weights)
         if done < len(centers):  # there was no room for the next
-            texels, weights = np.resize(texels, 4 * len(texels)), np.resize(weights, 4 * len(weights))
+            texels = np.resize(texels, 4 * len(texels))
+            weights = np.resize(weights, 4 * len(weights))
     return begins, texels[: begins[-1]], weights[: begins[-1]], used
 
 
@@ -56,12 +65,18 @@ def _weigh(
     begins: Ints, used: Floats, texels: Ints, weights: Floats,
 ) -> int:  # fmt: skip
     """Fill in footprints from the first on; one after the last for which there was room."""
-    distance, touched = scratch.distance, scratch.touched
+    distance = scratch.distance
+    touched = scratch.touched
     for i in range(first, len(centers)):
-        center, point = centers[i], points[i]
+        center = centers[i]
+        point = points[i]
         radius = used[i] = max(radii[i], MIN_TEXELS * _spacing(grid, center))
-        count, end, total, near = _nearby(grid, center, point, radius, distance, touched), begins[i], 0.0, touched
-        known, flat = count, count > 0
+        count = _nearby(grid, center, point, radius, distance, touched)
+        end = begins[i]
+        total = 0.0
+        near = touched
+        known = count
+        flat = count > 0
         if not flat:
             count = seeded(grid.halo, grid.positions, center, point, distance, touched)
             count, known = march(grid.halo, grid.positions, count, 1.1 * radius, scratch)
@@ -79,7 +94,8 @@ def _weigh(
                 away = (1 - bend) * straight + bend * away
             weight = max(1 - (away / radius) ** 2, 0.0) ** 3
             if weight > 0:
-                texels[end], weights[end] = t, weight
+                texels[end] = t
+                weights[end] = weight
                 total += weight * grid.areas[t]
                 end += 1
         clean(scratch, count)
@@ -92,9 +108,12 @@ def _weigh(
 @kernel(no_cpython_wrapper=True)
 def _spacing(grid: TexelGrid, center: int) -> float:
     """Greatest distance from a texel to the four beside it."""
-    halo, positions = grid.halo, grid.positions
+    halo = grid.halo
+    positions = grid.positions
     n = halo.shape[1] - 2
-    chart, row, column = center // (n * n), center // n % n, center % n
+    chart = center // (n * n)
+    row = center // n % n
+    column = center % n
     greatest = 0.0
     for k in range(4):
         t = halo[chart, row + _DOWN[k], column + _RIGHT[k]]
@@ -104,16 +123,22 @@ def _spacing(grid: TexelGrid, center: int) -> float:
 
 
 @kernel(no_cpython_wrapper=True)
-def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints) -> int:
+def _nearby(
+    grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints
+) -> int:
     """Touch connected texels within a straight distance of a point; how many, or 0, and none, if they do not lie flat.
 
-    Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
-    whose slope makes no way along it longer than 1.05 times the straight one.
+    Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph
+    over the plane there whose slope makes no way along it longer than 1.05 times the straight one.
     """
-    halo, positions, normals = grid.halo, grid.positions, grid.normals
+    halo = grid.halo
+    positions = grid.positions
+    normals = grid.normals
     n = halo.shape[1] - 2
-    count, done = 1, 0
-    texels[0], distance[center] = center, distance_to(positions, center, point)
+    count = 1
+    done = 0
+    texels[0] = center
+    distance[center] = distance_to(positions, center, point)
     while done < count:
         t = texels[done]
         done += 1
@@ -126,7 +151,9 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, distance
             for i in range(count):
                 distance[texels[i]] = np.inf
             return 0
-        chart, row, column = t // (n * n), t // n % n, t % n
+        chart = t // (n * n)
+        row = t // n % n
+        column = t % n
         for i in range(3):
             for j in range(3):
                 a = halo[chart, row + i, column + j]
@@ -165,8 +192,9 @@ class Footprint:
 def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     """Spread a unit source round a surface point with the kernel (1 - (d/radius)^2)^3.
 
-    The distance d is straight where the surface is nearly flat within the radius and runs along the surface where it is
-    not, so that a source on one side of a thin part does not reach the other side.
+    The distance d is straight where the surface is nearly flat within the radius and runs along the
+    surface where it is not, so that a source on one side of a thin part does not reach the other
+    side.
 
     Parameters
     ----------
@@ -183,17 +211,23 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
         If the point is not finite.
     """
     if not (is_finite(radius) and radius >= 0):
-        raise SolverError(f"impulse radius is {shown(radius)} m; valid is a finite number, 0 or greater")
+        raise SolverError(
+            f"impulse radius is {shown(radius)} m; valid is a finite number, 0 or greater"
+        )
     points = check_points(point)
     if len(points) != 1:
-        raise SolverError(f"a source has {len(points)} points; valid is one, [3]: call this once for each of them")
+        raise SolverError(
+            f"a source has {len(points)} points; valid is one, [3]: call this once for each of them"
+        )
     (closest,), (center,) = atlas.nearest(points)
     return footprint_at(atlas, closest, int(center), float(radius))
 
 
 def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
     """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
-    _, texels, weights, radii = weigh_each(atlas.texels.grid, np.array([center]), point[None], np.array([radius]))
+    _, texels, weights, radii = weigh_each(
+        atlas.texels.grid, np.array([center]), point[None], np.array([radius])
+    )
     return Footprint(texels, weights, center, point, float(radii[0]))
 
 

@@ -1,7 +1,8 @@
 """What a renderer needs of the waves: height and surface gradient of every texel, with a halo for interpolation.
 
-Heights that are drawn have a limit, so that a surface with waves too high for it does not pass through itself. Where
-they are on the GPU, the height map goes into the renderer's texture without leaving it.
+Heights that are drawn have a limit, so that a surface with waves too high for it does not pass
+through itself. Where they are on the GPU, the height map goes into the renderer's texture without
+leaving it.
 """
 
 from __future__ import annotations
@@ -27,16 +28,37 @@ from ..texels.texel_mesh import TexelMesh
 from ..texels.thickness import LEAST, medial_radius
 from ..texels.topology import TexelTopology
 
-# Of the medial radius: heights up to the first share are drawn as they are, and none beyond the second.
-FREE, MOST = 0.25, 0.6
+# Of the medial radius: heights up to the first share are drawn as they are, and none beyond the
+# second.
+FREE = 0.25
+MOST = 0.6
+
+_GROUP = 256
+_SHADERS = "ripple_sim.solver"
+
+# of the table of sources: no texel lies there; below: a texel's mirror image, -2 - its number
+_NONE = -1
+
+# Weight of the second-order terms' regularisation, relative to the squared distances that they
+# multiply.
+_REGULARISATION = 1e-4
+
+# Memory for each texel that is kept [bytes], and texels whose weights are fitted at a time: that
+# takes 1,400 each.
+_TEXEL = 110
+_BLOCK = 16_384
+
+# the eight neighbours (row, column) in the order of the gradient weights
+_AROUND = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 
 
 class DisplacementLimit:
     """Bends heights that are large beside the object's local radius, and leaves the others alone.
 
-    With R the medial radius at a texel (see `medial_radius`), a height h is drawn as it is up to R / 4. Beyond, it is
-    drawn as R (a + (b - a) tanh((|h| / R - a) / (b - a))) with its sign, a = 1/4 and b = 0.6: twice continuously
-    differentiable, growing with h, and never more than 0.6 R. The waves themselves know nothing of it.
+    With R the medial radius at a texel (see `medial_radius`), a height h is drawn as it is up to R
+    / 4. Beyond, it is drawn as R (a + (b - a) tanh((|h| / R - a) / (b - a))) with its sign, a = 1/4
+    and b = 0.6: twice continuously differentiable, growing with h, and never more than 0.6 R. The
+    waves themselves know nothing of it.
     """
 
     def __init__(self, atlas: Atlas) -> None:
@@ -61,7 +83,9 @@ class DisplacementLimit:
         drawn[high] = np.sign(height[high]) * radius * (FREE + (MOST - FREE) * np.tanh(beyond))
         return drawn
 
-    def rate(self, height: NDArray[np.float32], velocity: NDArray[np.float32]) -> NDArray[np.float32]:
+    def rate(
+        self, height: NDArray[np.float32], velocity: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
         """Rate of the heights to draw [m/s], float32 [C, n, n], where heights change with a velocity."""
         high, radius, beyond = self._beyond(height)
         if not len(radius):
@@ -74,33 +98,49 @@ class DisplacementLimit:
         """Texels where heights are bent, the radius at each of these [k], and the hyperbolic tangent's argument [k]."""
         size = np.abs(height)
         if not self.may_bend(float(size.max())):
-            return np.zeros(height.shape, np.bool_), np.empty(0, np.float32), np.empty(0, np.float32)
+            return (
+                np.zeros(height.shape, np.bool_),
+                np.empty(0, np.float32),
+                np.empty(0, np.float32),
+            )
         share = size / self.radius
         high = share > FREE
         # the cap keeps float32 from overflowing, where tanh is 1 by far
         return high, self.radius[high], (np.minimum(share[high], 1e3) - FREE) / (MOST - FREE)
 
 
-_GROUP = 256
-_SHADERS = "ripple_sim.solver"
-_NONE = -1  # of the table of sources: no texel lies there; below: a texel's mirror image, -2 - its number
-
-
 class HeightMapShaders:
     """What turns heights into height maps on the GPU, see `HeightMap`; gradients have `weights` [C n^2, 8, 3]."""
 
     def __init__(
-        self, gl: GLContext, topology: TexelTopology, weights: NDArray[np.float32], limit: DisplacementLimit | None
+        self,
+        gl: GLContext,
+        topology: TexelTopology,
+        weights: NDArray[np.float32],
+        limit: DisplacementLimit | None,
     ) -> None:
-        self._gl, self._limit, self.shape = gl, limit, (*topology.halo.shape, 4)
+        self._gl = gl
+        self._limit = limit
+        self.shape = (*topology.halo.shape, 4)
         charts, n, _ = topology.shape
         sources, means, ends = _tables(topology)
-        self._place_count, self._corner_counts = sources.size, (len(means), len(means) + len(ends))
-        defines = {"GROUP": _GROUP, "N": n, "COLUMNS": ChartPage(charts, n).columns, "FREE": FREE, "MOST": MOST}
+        self._place_count = sources.size
+        self._corner_counts = (len(means), len(means) + len(ends))
+        defines = {
+            "GROUP": _GROUP,
+            "N": n,
+            "COLUMNS": ChartPage(charts, n).columns,
+            "FREE": FREE,
+            "MOST": MOST,
+        }
         shader = functools.partial(gl.compute_shader, _SHADERS, **defines)
         with gl as ctx:
-            self._heights, self._limited = (shader("waves/shaders/halo_heights", **each) for each in ({}, {"LIMIT": 1}))
-            self._map, self._corners = (shader("waves/shaders/height_map", **each) for each in ({}, {"CORNERS": 1}))
+            self._heights, self._limited = (
+                shader("waves/shaders/halo_heights", **each) for each in ({}, {"LIMIT": 1})
+            )
+            self._map, self._corners = (
+                shader("waves/shaders/height_map", **each) for each in ({}, {"CORNERS": 1})
+            )
             self._sources = ctx.buffer(sources.tobytes())
             self._corner_places = ctx.buffer(np.concatenate([means, ends]).tobytes() or bytes(16))
             self._weights = ctx.buffer(weights.tobytes())
@@ -116,7 +156,8 @@ class HeightMapShaders:
         highest = field.peak
         if not np.isfinite(highest):
             raise SolverError(
-                "heights to be drawn are no longer finite; a source was too large for float32: make it smaller and "
+                "heights to be drawn are no longer finite; a source was too large for float32: "
+                "make it smaller and "
                 "`reset()` the waves"
             )
         limit = self._limit
@@ -132,7 +173,10 @@ class HeightMapShaders:
             self._map["layer"] = layer
             self._run(ctx, self._map, self._place_count)
             bind_buffers(self._corner_places)
-            self._corners["layer"], self._corners["means"], self._corners["count"] = layer, *self._corner_counts
+            self._corners["layer"], self._corners["means"], self._corners["count"] = (
+                layer,
+                *self._corner_counts,
+            )
             self._run(ctx, self._corners, self._corner_counts[1])
             return float(np.frombuffer(self._peak.read(), np.float32)[0]) if limited else highest
 
@@ -148,50 +192,63 @@ class DeviceHeightMap:
     Its shape is (C, n + 2, n + 2, 4).
     """
 
-    def __init__(self, shaders: HeightMapShaders, field: DeviceField, on_host: Callable[[NDArray], NDArray]) -> None:
-        self._shaders, self._field, self._on_host = shaders, field, on_host
-        self.gl, self.shape = field.gl, shaders.shape
+    def __init__(
+        self, shaders: HeightMapShaders, field: DeviceField, on_host: Callable[[NDArray], NDArray]
+    ) -> None:
+        self._shaders = shaders
+        self._field = field
+        self._on_host = on_host
+        self.gl = field.gl
+        self.shape = shaders.shape
 
     def fill(self, texture: moderngl.TextureArray, layer: int) -> float:
         """Write it into a texture; see `HeightMapShaders.fill`."""
         return self._shaders.fill(self._field, texture, layer)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray:
-        return self._on_host(self._field.read()).astype(np.float32 if dtype is None else dtype, copy=False)
+        return self._on_host(self._field.read()).astype(
+            np.float32 if dtype is None else dtype, copy=False
+        )
 
 
-def _tables(topology: TexelTopology) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+def _tables(
+    topology: TexelTopology,
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
     """The texel that each place of the charts with halo shows, [C, n + 2, n + 2], and the corners that show none.
 
-    A corner is a row of its place and the three about it: first of those with their mean, then of those in a fixed rim,
-    where the four heights have a mean of 0.
+    A corner is a row of its place and the three about it: first of those with their mean, then of
+    those in a fixed rim, where the four heights have a mean of 0.
     """
     sources = np.where(topology.halo >= 0, topology.halo, _NONE)
-    mirrored = topology.rim & (topology.halo >= 0) if topology.fixed_rim else np.zeros_like(topology.rim)
+    mirrored = (
+        topology.rim & (topology.halo >= 0) if topology.fixed_rim else np.zeros_like(topology.rim)
+    )
     sources[mirrored] = _NONE - 1 - topology.halo[mirrored]
     place = np.arange(sources.size).reshape(sources.shape)
     last = sources.shape[1] - 1
-    means, ends = [], []
+    means = []
+    ends = []
     for corner, (r, c) in enumerate(((0, 0), (0, last), (last, last), (last, 0))):
-        r_in, c_in = abs(r - 1), abs(c - 1)
-        rows = np.stack([place[:, r, c], place[:, r_in, c_in], place[:, r_in, c], place[:, r, c_in]], axis=1)
+        r_in = abs(r - 1)
+        c_in = abs(c - 1)
+        rows = np.stack(
+            [place[:, r, c], place[:, r_in, c_in], place[:, r_in, c], place[:, r, c_in]], axis=1
+        )
         means.append(rows[topology.halo[:, r, c] < 0])
         ends.append(rows[topology.valence[:, corner] == 0] if topology.fixed_rim else rows[:0])
-    return sources.astype(np.int32), np.concatenate(means).astype(np.int32), np.concatenate(ends).astype(np.int32)
-
-
-# Weight of the second-order terms' regularisation, relative to the squared distances that they multiply.
-_REGULARISATION = 1e-4
-
-# Memory for each texel that is kept [bytes], and texels whose weights are fitted at a time: that takes 1,400 each.
-_TEXEL, _BLOCK = 110, 16_384
+    return (
+        sources.astype(np.int32),
+        np.concatenate(means).astype(np.int32),
+        np.concatenate(ends).astype(np.int32),
+    )
 
 
 class HeightMap:
     """Turns a height field into a texture of gradient and height.
 
-    The gradient at a texel is that of the quadratic that fits the eight neighbours' heights best, in the tangent plane:
-    second-order accurate also where grid lines kink at the borders and corners of charts, so that shading shows none.
+    The gradient at a texel is that of the quadratic that fits the eight neighbours' heights best,
+    in the tangent plane: second-order accurate also where grid lines kink at the borders and
+    corners of charts, so that shading shows none.
 
     Parameters
     ----------
@@ -201,9 +258,15 @@ class HeightMap:
     """
 
     def __init__(self, texels: TexelMesh, limit: DisplacementLimit | None = None) -> None:
-        self._topology, self._limit = texels.topology, limit
+        self._topology = texels.topology
+        self._limit = limit
         count = texels.positions[..., 0].size
-        require_memory(SolverError, _TEXEL * count, f"the height map of {count:,} texels", "take a lower resolution")
+        require_memory(
+            SolverError,
+            _TEXEL * count,
+            f"the height map of {count:,} texels",
+            "take a lower resolution",
+        )
         self._weights = _gradient_weights(texels)
         self._shaders: HeightMapShaders | None = None
 
@@ -218,7 +281,9 @@ class HeightMap:
     @overload
     def __call__(self, height: DeviceField) -> DeviceHeightMap: ...
 
-    def __call__(self, height: NDArray[np.float32] | DeviceField) -> NDArray[np.float32] | DeviceHeightMap:
+    def __call__(
+        self, height: NDArray[np.float32] | DeviceField
+    ) -> NDArray[np.float32] | DeviceHeightMap:
         """Height map of a height field.
 
         Parameters
@@ -229,13 +294,15 @@ class HeightMap:
         Returns
         -------
         float32 [C, n + 2, n + 2, 4]
-            Gradient of the height in the frame of the mesh (tangent to the surface, dimensionless), and the height
-            [m]. For the halo see `fill_halo`; beyond a fixed rim lie the negative heights, so that those drawn come
-            to 0 at the rim.
+            Gradient of the height in the frame of the mesh (tangent to the surface, dimensionless),
+            and the height [m]. For the halo see `fill_halo`; beyond a fixed rim lie the negative
+            heights, so that those drawn come to 0 at the rim.
         """
         if isinstance(height, DeviceField):
             if self._shaders is None:
-                self._shaders = HeightMapShaders(height.gl, self._topology, self._weights, self._limit)
+                self._shaders = HeightMapShaders(
+                    height.gl, self._topology, self._weights, self._limit
+                )
             return DeviceHeightMap(self._shaders, height, self)
         around = np.zeros(self._topology.halo.shape, np.float32)
         around[:, 1:-1, 1:-1] = height if self._limit is None else self._limit(height)
@@ -245,10 +312,14 @@ class HeightMap:
         fill_around(self._topology, height_map)
         return height_map
 
-    def rates(self, height: NDArray[np.float32], velocity: NDArray[np.float32]) -> NDArray[np.float32]:
+    def rates(
+        self, height: NDArray[np.float32], velocity: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
         """Rate of the heights in the height map [m/s], [C, n + 2, n + 2], under a height and a velocity [C, n, n]."""
         rates = np.zeros((*self._topology.halo.shape, 4), np.float32)
-        rates[:, 1:-1, 1:-1, 3] = velocity if self._limit is None else self._limit.rate(height, velocity)
+        rates[:, 1:-1, 1:-1, 3] = (
+            velocity if self._limit is None else self._limit.rate(height, velocity)
+        )
         fill_around(self._topology, rates)
         return rates[..., 3]
 
@@ -259,18 +330,19 @@ def fill_around(topology: TexelTopology, height_map: NDArray[np.float32]) -> Non
     if not topology.fixed_rim:
         return
     turned = np.array([1, 1, 1, -1], np.float32)
-    height_map[topology.rim] = height_map[:, 1:-1, 1:-1].reshape(-1, 4)[topology.halo[topology.rim]] * turned
+    height_map[topology.rim] = (
+        height_map[:, 1:-1, 1:-1].reshape(-1, 4)[topology.halo[topology.rim]] * turned
+    )
     last = height_map.shape[1] - 1
     for corner, (r, c) in enumerate(((0, 0), (0, last), (last, last), (last, 0))):
         # the four places round a corner in the rim have a mean height of 0
-        r_in, c_in = abs(r - 1), abs(c - 1)
+        r_in = abs(r - 1)
+        c_in = abs(c - 1)
         ends = topology.valence[:, corner] == 0
         heights = height_map[ends, ..., 3]
-        height_map[ends, r, c, 3] = -(heights[:, r_in, c_in] + heights[:, r_in, c] + heights[:, r, c_in])
-
-
-# the eight neighbours (row, column) in the order of the gradient weights
-_AROUND = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
+        height_map[ends, r, c, 3] = -(
+            heights[:, r_in, c_in] + heights[:, r_in, c] + heights[:, r, c_in]
+        )
 
 
 @kept_with
@@ -278,7 +350,8 @@ def _gradient_weights(texels: TexelMesh) -> NDArray[np.float32]:
     """Vectors g with gradient = sum over the 8 neighbours of g (h_j - h_i), shape [C n^2, 8, 3] in [1/m]."""
     around = texels.halo_positions.copy()
     if not texels.topology.fixed_rim:
-        # beyond a free rim the halo repeats heights: nothing is known there; a fixed one's own points are at 0
+        # beyond a free rim the halo repeats heights: nothing is known there; a fixed one's own
+        # points are at 0
         around[texels.topology.rim] = np.nan
     normals = texels.normals.reshape(-1, 3)
     weights = np.empty((len(normals), 8, 3), np.float32)
@@ -288,15 +361,21 @@ def _gradient_weights(texels: TexelMesh) -> NDArray[np.float32]:
     return weights
 
 
-def _fit(around: NDArray[np.float64], texels: NDArray[np.int64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fit(
+    around: NDArray[np.float64], texels: NDArray[np.int64], normal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """The same vectors of some texels [k], from all positions with halo and the texels' normals: [k, 8, 3]."""
     n = around.shape[1] - 2
     f, r, c = np.unravel_index(texels, (len(around), n, n))
     center = around[f, r + 1, c + 1]
-    tangent = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
+    tangent = np.cross(
+        normal, np.where(np.abs(normal[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    )
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     bitangent = np.cross(normal, tangent)
-    offset = np.stack([around[f, r + 1 + down, c + 1 + right] - center for down, right in _AROUND], axis=1)
+    offset = np.stack(
+        [around[f, r + 1 + down, c + 1 + right] - center for down, right in _AROUND], axis=1
+    )
     exists = np.isfinite(offset[..., :1])
     offset = np.where(exists, offset, 0.0)
     scale = np.sqrt((offset**2).sum(axis=(1, 2)) / exists.sum(axis=(1, 2)))[:, None]
@@ -315,7 +394,8 @@ def _differentiate(weights: Floats32, h: Floats32, height_map: Floats32) -> None
     """Fill in gradient and height, [C, n + 2, n + 2, 4], of the texels of a field with halo, [C, n + 2, n + 2]."""
     n = h.shape[1] - 2
     for i in range(len(h) * n):
-        f, r = i // n, i % n + 1
+        f = i // n
+        r = i % n + 1
         for c in range(1, n + 1):
             g = weights[i * n + c - 1]
             here = h[f, r, c]

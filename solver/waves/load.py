@@ -41,7 +41,10 @@ class Load:
             return cls.none()
         if len(loads) == 1:
             return loads[0]
-        return cls(np.concatenate([each.texels for each in loads]), np.concatenate([each.forces for each in loads]))
+        return cls(
+            np.concatenate([each.texels for each in loads]),
+            np.concatenate([each.forces for each in loads]),
+        )
 
     def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
         """What acts over a step of dt [s]: numbers of its substeps, one after the other, and the load over each.
@@ -61,16 +64,20 @@ class Load:
         texels = self.texels
         if len(texels) and not 0 <= texels.min() <= texels.max() < size:
             raise SolverError(
-                f"texels go from {texels.min()} to {texels.max()}; valid are indices from 0 to {size - 1}"
+                f"texels go from {texels.min()} to {texels.max()}; valid are indices from 0 to "
+                f"{size - 1}"
             )
         if (texels[1:] > texels[:-1]).all():
             return self
-        row, place = np.arange(len(texels)), np.empty(size, np.int64)
+        row = np.arange(len(texels))
+        place = np.empty(size, np.int64)
         place[texels[::-1]] = row[::-1]
         first = place[texels]  # the row in which each texel appears first
         once = (first == row).nonzero()[0]
         place[texels[once]] = row[: len(once)]
-        return Load(texels[once], np.bincount(place[texels], self.forces).astype(np.float64, copy=False))
+        return Load(
+            texels[once], np.bincount(place[texels], self.forces).astype(np.float64, copy=False)
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,7 +87,8 @@ class WaveState:
     Attributes
     ----------
     elastic, dent : float32 [C, n, n]
-        The part of the height that springs back and the part that stays [m]; the height is their sum.
+        The part of the height that springs back and the part that stays [m]; the height is their
+        sum.
     velocity : float32 [C, n, n]
         [m/s].
     held : Load
@@ -117,8 +125,12 @@ class HeldLoad:
         Likewise.
     """
 
-    def __init__(self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance) -> None:
-        self._backend, self.balance, self._share = backend, balance, share
+    def __init__(
+        self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance
+    ) -> None:
+        self._backend = backend
+        self.balance = balance
+        self._share = share
         self.load = self._uploaded = Load.none()
 
     def forces(self) -> NDArray[np.float64]:
@@ -130,7 +142,9 @@ class HeldLoad:
         """Hold a load beside what is held."""
         self.load = Load.together([self.load, load]).merged(self._share.size)
 
-    def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
+    def counterpart(
+        self, texels: NDArray[np.int64], momenta: NDArray[np.float64]
+    ) -> float | NDArray[np.float64]:
         """What balances the momenta of a source on some texels, or forces, outwards, where volume is conserved."""
         return self.balance.counterpart(texels, momenta)
 
@@ -154,7 +168,9 @@ class HeldLoad:
         forces = -once.forces * self._share.reshape(-1)[once.texels]
         total = -float(forces.sum())
         if not np.isfinite(total):
-            raise SolverError(f"the forces of a load add up to {total!r} N; valid are finite numbers")
+            raise SolverError(
+                f"the forces of a load add up to {total!r} N; valid are finite numbers"
+            )
         self._backend.load(once.texels, forces, self.counterpart(once.texels, forces))
         self._uploaded = load
         return total

@@ -19,10 +19,12 @@ from ..texels.moving import MovedPlaces, SurfaceRide
 from ..texels.texel_mesh import TexelMesh, tangents
 from .height_map import fill_around
 
-# The stiffness is made anew once the square of an edge's length has changed by this share since it was made.
+# The stiffness is made anew once the square of an edge's length has changed by this share since it
+# was made.
 _CHANGED = 2e-3
 
-# Folds are looked for once in so many times that the stiffness is made anew: it takes about as long.
+# Folds are looked for once in so many times that the stiffness is made anew: it takes about as
+# long.
 _EVERY = 8
 
 # What is known of a mesh at rest, and stays.
@@ -47,14 +49,16 @@ class Motion:
     """
 
     def __init__(self, atlas: Atlas, material: Material, operator: WaveOperator) -> None:
-        self.rest, self.V = atlas, atlas.mesh.V
+        self.rest = atlas
+        self.V = atlas.mesh.V
         self._ride = SurfaceRide(atlas)
         self._operator = MovingOperator(atlas, material, operator)
         self._folds = Folds(atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64))
         self._edges = edges_of(self._folds.F).ends
         self._squares, _ = _square_lengths(self.V, self._edges, np.zeros(len(self._edges)))
         self._now = operator
-        self._warned, self._looks = False, 0
+        self._warned = False
+        self._looks = 0
 
     def to(self, vertices: ArrayLike) -> WaveOperator | None:
         """Move the vertices [n, 3] [m]; return the operator there, or None where lengths are as they were.
@@ -76,7 +80,8 @@ class Motion:
         if count:
             self._warned = True
             warn_caller(
-                f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over or without area; "
+                f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over "
+                f"or without area; "
                 "waves there are wrong: move the vertices less, or use a stiffer body"
             )
         return self._now
@@ -89,13 +94,20 @@ class Motion:
     @functools.cached_property
     def atlas(self) -> Atlas:
         """The atlas where the vertices are."""
-        rest, V = self.rest, self.V
-        mesh = Mesh(V, rest.mesh.F, rest.mesh.uv, rest.mesh.corner_uv, rest.mesh.notes, rest.mesh.name)
-        mesh.__dict__.update({name: rest.mesh.__dict__[name] for name in _OF_REST if name in rest.mesh.__dict__})
+        rest = self.rest
+        V = self.V
+        mesh = Mesh(
+            V, rest.mesh.F, rest.mesh.uv, rest.mesh.corner_uv, rest.mesh.notes, rest.mesh.name
+        )
+        mesh.__dict__.update(
+            {name: rest.mesh.__dict__[name] for name in _OF_REST if name in rest.mesh.__dict__}
+        )
         mesh.__dict__["vertex_normals"] = self._folds.vertex_normals(V)
         positions, beyond = self._ride.positions(V)
         normals = self._ride.normals(mesh.vertex_normals)
-        texels = TexelMesh(rest.texels.topology, positions, normals, self.areas, beyond, rest.texels.detours)
+        texels = TexelMesh(
+            rest.texels.topology, positions, normals, self.areas, beyond, rest.texels.detours
+        )
         return Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
 
     def _checked(self, vertices: ArrayLike) -> NDArray[np.float64]:
@@ -103,14 +115,20 @@ class Motion:
         try:
             V = np.array(vertices, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise SolverError(f"vertices are {shown(vertices)}; valid are numbers of shape {shape}, in m") from error
+            raise SolverError(
+                f"vertices are {shown(vertices)}; valid are numbers of shape {shape}, in m"
+            ) from error
         if V.shape != shape:
             raise SolverError(
-                f"vertices have shape {V.shape}; the mesh of this surface has {shape}: give all of its vertices, in "
+                f"vertices have shape {V.shape}; the mesh of this surface has {shape}: give all of "
+                f"its vertices, in "
                 "the order of `atlas.mesh.V`"
             )
         if not np.isfinite(V).all():
-            raise SolverError(f"{(~np.isfinite(V)).sum()} numbers of the vertices are not finite; valid are metres")
+            raise SolverError(
+                f"{(~np.isfinite(V)).sum()} numbers of the vertices are not finite; valid are "
+                f"metres"
+            )
         return V
 
 
@@ -120,9 +138,12 @@ def _square_lengths(V: Floats, edges: Ints, before: Floats) -> tuple[Floats, boo
 
     NumPy takes as long as all else that a motion takes.
     """
-    squares, changed = np.empty(len(edges)), False
+    squares = np.empty(len(edges))
+    changed = False
     for i in range(len(edges)):
-        a, b, total = edges[i, 0], edges[i, 1], 0.0
+        a = edges[i, 0]
+        b = edges[i, 1]
+        total = 0.0
         for k in range(3):
             total += (V[b, k] - V[a, k]) ** 2
         squares[i] = total
@@ -134,17 +155,23 @@ def _square_lengths(V: Floats, edges: Ints, before: Floats) -> tuple[Floats, boo
 class MovedGradients:
     """Turns a height map of the surface at rest into that of the moved one.
 
-    Heights stay with the texels, so that their differences along rows and columns stay, while the ways there change.
+    Heights stay with the texels, so that their differences along rows and columns stay, while the
+    ways there change.
     """
 
     def __init__(self, rest: Atlas) -> None:
-        self._texels, self._ride = rest.texels, SurfaceRide(rest)
+        self._texels = rest.texels
+        self._ride = SurfaceRide(rest)
         self._rest = np.stack(tangents(rest.texels.halo_positions), axis=3)
 
-    def __call__(self, height_map: NDArray[np.float32], V: NDArray[np.float64]) -> NDArray[np.float32]:
+    def __call__(
+        self, height_map: NDArray[np.float32], V: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
         """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [vertex_count, 3] [m]."""
         moved = np.array(height_map, np.float32)
-        _carry(self._rest, np.stack(tangents(np.moveaxis(self._ride.around(V), 0, -1)), axis=3), moved)
+        _carry(
+            self._rest, np.stack(tangents(np.moveaxis(self._ride.around(V), 0, -1)), axis=3), moved
+        )
         fill_around(self._texels.topology, moved)
         return moved
 
@@ -156,13 +183,16 @@ def _carry(rest: Floats, moved: Floats, height_map: Floats32) -> None:
     for chart in range(charts):
         for r in range(n):
             for c in range(n):
-                g, t, m = height_map[chart, r + 1, c + 1], rest[chart, r, c], moved[chart, r, c]
+                g = height_map[chart, r + 1, c + 1]
+                t = rest[chart, r, c]
+                m = moved[chart, r, c]
                 a = t[0, 0] * g[0] + t[0, 1] * g[1] + t[0, 2] * g[2]
                 b = t[1, 0] * g[0] + t[1, 1] * g[1] + t[1, 2] * g[2]
                 uu = m[0, 0] ** 2 + m[0, 1] ** 2 + m[0, 2] ** 2
                 vv = m[1, 0] ** 2 + m[1, 1] ** 2 + m[1, 2] ** 2
                 uv = m[0, 0] * m[1, 0] + m[0, 1] * m[1, 1] + m[0, 2] * m[1, 2]
                 area = max(uu * vv - uv * uv, 1e-6 * uu * vv)
-                along, across = (vv * a - uv * b), (uu * b - uv * a)
+                along = vv * a - uv * b
+                across = uu * b - uv * a
                 for k in range(3):
                     g[k] = (along * m[0, k] + across * m[1, k]) / area if area > 0 else 0.0

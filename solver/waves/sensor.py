@@ -1,8 +1,8 @@
 """Sensors: what an accelerometer, a contact microphone or a strain gauge on a rippling surface gives, as samples.
 
-A sensor's points see a weighted sum of the texels round them after every substep, see `Probes`. The samples at its own
-rate come from a low-pass filter, evaluated at their exact times: those that are there do not depend on when they are
-read.
+A sensor's points see a weighted sum of the texels round them after every substep, see `Probes`. The
+samples at its own rate come from a low-pass filter, evaluated at their exact times: those that are
+there do not depend on when they are read.
 """
 
 from __future__ import annotations
@@ -28,9 +28,14 @@ KINDS = tuple(UNITS)
 # Texels along the shortest wave that a sensor is honest about.
 _TEXELS = 5.0
 
-# The filter: half its length in samples, its attenuation [dB], values tabulated a sample, and where it has fallen by
-# half, over the rate. It lets through what is below _PASSED of the rate, and nothing from a half of it on.
-_HALF, _ATTENUATION, _FINE, _CUT, _PASSED = 16, 80.0, 512, 0.42, 0.34
+# The filter: half its length in samples, its attenuation [dB], values tabulated a sample, and where
+# it has fallen by half, over the rate. It lets through what is below _PASSED of the rate, and
+# nothing from a half of it on.
+_HALF = 16
+_ATTENUATION = 80.0
+_FINE = 512
+_CUT = 0.42
+_PASSED = 0.34
 
 # Samples that are made together: their weights take some MB.
 _TOGETHER = 4096
@@ -56,7 +61,8 @@ class Listeners:
     all : tuple of Listener
         See `use`.
     find_points : callable or None
-        From a name to the points [k, 3] that `WaveSolver.sensor` takes for it; None: names are not known.
+        From a name to the points [k, 3] that `WaveSolver.sensor` takes for it; None: names are not
+        known.
     """
 
     def __init__(self, backend: Backend) -> None:
@@ -67,7 +73,9 @@ class Listeners:
     def use(self, listeners: Sequence[Listener]) -> None:
         """Listen with these alone from now on; they go on as they are, also those of another solver of the surface."""
         self.all = tuple(listeners)
-        self._backend.probe(Probes.together([each.probes for each in listeners]) if listeners else None)
+        self._backend.probe(
+            Probes.together([each.probes for each in listeners]) if listeners else None
+        )
 
     def add(self, listener: Heard, time: float) -> Heard:
         """Listen from a time [s] on, beside those that do."""
@@ -82,9 +90,11 @@ class Listeners:
 
     def hear(self, time: float, dt: float) -> None:
         """Hand each its own sums of the latest substeps, of dt [s] from a time on."""
-        sums, end = self._backend.probed(), 0
+        sums = self._backend.probed()
+        end = 0
         for listener in self.all:
-            begin, end = end, end + len(listener.probes.heights)
+            begin = end
+            end = end + len(listener.probes.heights)
             listener.take(time, dt, sums[:, begin:end])
 
     def _begin(self, listener: Listener, time: float) -> None:
@@ -101,9 +111,10 @@ class Samples(NamedTuple):
 class Sensor:
     """Measures a surface at some points from now on, along its normal; made by `WaveSolver.sensor`.
 
-    `times` and `samples` are all that have not been read yet, and `read` takes them away. The last `latency` is not
-    among them: the filter needs what comes after. A kind "strain" is that of the outer face of a thin sheet that the
-    waves bend, -thickness / 4 times the Laplacian of the height: the mean over all directions, positive where longer.
+    `times` and `samples` are all that have not been read yet, and `read` takes them away. The last
+    `latency` is not among them: the filter needs what comes after. A kind "strain" is that of the
+    outer face of a thin sheet that the waves bend, -thickness / 4 times the Laplacian of the
+    height: the mean over all directions, positive where longer.
 
     Attributes
     ----------
@@ -113,13 +124,14 @@ class Sensor:
     rate : float
         Samples a second [1/s].
     bandwidth : float
-        Highest honest frequency [Hz]: that of a wave of five texels where these are the largest, of all points, but no
-        more than a third of the rate, or of the substeps' rate.
+        Highest honest frequency [Hz]: that of a wave of five texels where these are the largest, of
+        all points, but no more than a third of the rate, or of the substeps' rate.
 
     Raises
     ------
     SolverError
-        For an unknown kind, a rate that is not greater than 0, or a thickness without strain or the other way round.
+        For an unknown kind, a rate that is not greater than 0, or a thickness without strain or the
+        other way round.
     AtlasError
         If the points are not finite, or of another shape.
     """
@@ -129,22 +141,35 @@ class Sensor:
         kind: str, rate: float, thickness: float | None,
     ) -> None:  # fmt: skip
         if kind not in KINDS:
-            raise SolverError(f"sensor kind is {shown(kind)}; valid are {', '.join(map(repr, KINDS))}")
-        if not POSITIVE.holds(rate):
-            raise SolverError(f"sensor rate is {shown(rate)}; valid is {POSITIVE.words}, in samples a second")
-        if (kind == "strain") != (thickness is not None) or not (thickness is None or POSITIVE.holds(thickness)):
             raise SolverError(
-                f"sensor thickness is {shown(thickness)} m; valid is {POSITIVE.words} for kind 'strain', that of the "
+                f"sensor kind is {shown(kind)}; valid are {', '.join(map(repr, KINDS))}"
+            )
+        if not POSITIVE.holds(rate):
+            raise SolverError(
+                f"sensor rate is {shown(rate)}; valid is {POSITIVE.words}, in samples a second"
+            )
+        if (kind == "strain") != (thickness is not None) or not (
+            thickness is None or POSITIVE.holds(thickness)
+        ):
+            raise SolverError(
+                f"sensor thickness is {shown(thickness)} m; valid is {POSITIVE.words} for kind "
+                f"'strain', that of the "
                 "sheet that is bent, and none for the others"
             )
         self.points, centers = atlas.nearest(check_points(points))
-        self.kind, self.rate = kind, float(rate)
+        self.kind = kind
+        self.rate = float(rate)
         laplacian = -thickness / 4 if thickness is not None else None
-        rows = (_row(atlas, point, int(center), laplacian) for point, center in zip(self.points, centers, strict=True))
+        rows = (
+            _row(atlas, point, int(center), laplacian)
+            for point, center in zip(self.points, centers, strict=True)
+        )
         texels, weights = zip(*rows, strict=True)
         begins = np.append(0, np.cumsum([len(each) for each in texels]))
         of_heights = np.full(len(texels), kind in ("height", "strain"))
-        self.probes = Probes(begins, np.concatenate(texels), np.concatenate(weights).astype(np.float32), of_heights)
+        self.probes = Probes(
+            begins, np.concatenate(texels), np.concatenate(weights).astype(np.float32), of_heights
+        )
         # where substeps are longer than samples there is nothing between them to filter out
         self._base = min(self.rate, 1 / operator.longest_timestep)
         shortest = (_resolved(atlas, material, int(center)) for center in centers)
@@ -159,7 +184,8 @@ class Sensor:
     def begin(self, time: float, values: NDArray) -> None:
         """Begin anew at a time [s], with the sums of the probes then."""
         self._start = self._latest = time
-        self._next, self._last = 0, np.asarray(values, np.float64)
+        self._next = 0
+        self._last = np.asarray(values, np.float64)
         self._heard: list[tuple[float, float, NDArray]] = []
         # times, spans and values that later samples need
         self._kept = np.zeros(0), np.zeros(0), np.zeros((0, len(values)))
@@ -196,34 +222,46 @@ class Sensor:
             return
         # all that is kept and was heard: times, their spans, and values
         spans = np.concatenate([np.full(len(sums), dt) for _, dt, sums in self._heard])
-        times = np.concatenate([time + dt * np.arange(1, len(sums) + 1) for time, dt, sums in self._heard])
+        times = np.concatenate(
+            [time + dt * np.arange(1, len(sums) + 1) for time, dt, sums in self._heard]
+        )
         values = np.concatenate([sums for *_, sums in self._heard]).astype(np.float64)
         self._heard.clear()
-        last, self._last = self._last, values[-1]
+        last = self._last
+        self._last = values[-1]
         if self.kind == "acceleration":  # they lie between two substeps
-            times, values = times - spans / 2, np.diff(values, axis=0, prepend=last[None]) / spans[:, None]
+            times = times - spans / 2
+            values = np.diff(values, axis=0, prepend=last[None]) / spans[:, None]
         elif self._next == 0:
-            times, spans = np.append(self._start, times), np.append(spans[:1], spans)
+            times = np.append(self._start, times)
+            spans = np.append(spans[:1], spans)
             values = np.concatenate([last[None], values])
         known = zip(self._kept, (times, spans, values), strict=True)
         times, spans, values = (np.concatenate(each) for each in known)
         at = self._start + np.arange(self._next, until + 1) / self.rate
         blocks = [at[i : i + _TOGETHER] for i in range(0, len(at), _TOGETHER)]
-        made = [filtered(times, spans, values, block, self._base).astype(np.float32) for block in blocks]
-        self._made = Samples(np.append(self._made.times, at), np.concatenate([self._made.values, *made]))
+        made = [
+            filtered(times, spans, values, block, self._base).astype(np.float32) for block in blocks
+        ]
+        self._made = Samples(
+            np.append(self._made.times, at), np.concatenate([self._made.values, *made])
+        )
         self._next = until + 1
         kept = np.searchsorted(times, self._start + self._next / self.rate - self.latency)
         self._kept = times[kept:], spans[kept:], values[kept:]
 
 
-def filtered(times: NDArray, spans: NDArray, values: NDArray, at: NDArray, rate: float) -> NDArray[np.float64]:
+def filtered(
+    times: NDArray, spans: NDArray, values: NDArray, at: NDArray, rate: float
+) -> NDArray[np.float64]:
     """Low-pass values [m, points], each of a span [s] round its time, at other times [k]; see `_filter`.
 
-    A sum over the filter's length of values times span, over that of the filter alone: a constant stays what it is,
-    also where the length of the substeps changes.
+    A sum over the filter's length of values times span, over that of the filter alone: a constant
+    stays what it is, also where the length of the substeps changes.
     """
     reach = _HALF / rate
-    first, last = np.searchsorted(times, at - reach), np.searchsorted(times, at + reach)
+    first = np.searchsorted(times, at - reach)
+    last = np.searchsorted(times, at + reach)
     places = first[:, None] + np.arange((last - first).max())
     inside = places < last[:, None]
     places = np.minimum(places, len(times) - 1)
@@ -237,7 +275,8 @@ def filtered(times: NDArray, spans: NDArray, values: NDArray, at: NDArray, rate:
 @functools.cache
 def _filter() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The filter's values from its middle on, `_FINE` to a sample, and from each to the next: a windowed sinc."""
-    from scipy.signal import firwin, kaiser_beta  # a third of what a program imports that has no sensor
+    # a third of what a program imports that has no sensor
+    from scipy.signal import firwin, kaiser_beta
 
     window = "kaiser", kaiser_beta(_ATTENUATION)
     taps = firwin(2 * _HALF * _FINE + 1, 2 * _CUT / _FINE, window=window)[_HALF * _FINE :]
@@ -267,8 +306,8 @@ class _Fit(NamedTuple):
     softening, power : float
         The weight at a distance r, in texels, is 1 / (r^2 + softening)^power.
     growth : float
-        Coefficients of a term are as cheap as its power of this: where texels do not suffice for all of them, as
-        beside rims, 0.1 makes terms of a low order do what they can.
+        Coefficients of a term are as cheap as its power of this: where texels do not suffice for
+        all of them, as beside rims, 0.1 makes terms of a low order do what they can.
     """
 
     degree: int
@@ -278,13 +317,15 @@ class _Fit(NamedTuple):
     growth: float
 
 
-# The value at a point, and second derivatives there: the symbol of a quartic's is 0.7 dB low at five texels a wave,
-# that of a cubic's 4 dB.
+# The value at a point, and second derivatives there: the symbol of a quartic's is 0.7 dB low at
+# five texels a wave, that of a cubic's 4 dB.
 _VALUE = _Fit(degree=3, rings=2, softening=1e-3, power=1.0, growth=1.0)
 _CURVATURE = _Fit(degree=4, rings=3, softening=0.1, power=2.0, growth=0.1)
 
 
-def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> tuple[NDArray, NDArray]:
+def _row(
+    atlas: Atlas, point: NDArray, center: int, laplacian: float | None
+) -> tuple[NDArray, NDArray]:
     """Texels round a point, and the weights that give a field there, or a factor times its Laplacian [1/m^2].
 
     Those of a polynomial that fits the texels, see `_Fit`. It does not care where charts end.
@@ -297,7 +338,8 @@ def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> 
     u /= np.linalg.norm(u)
     v = np.cross(normal, u)
     size = np.sqrt(atlas.areas.reshape(-1)[center])
-    x, y = away @ u / size, away @ v / size
+    x = away @ u / size
+    y = away @ v / size
     near = 1 / (x * x + y * y + fit.softening) ** fit.power
     orders = [(i, j) for i in range(fit.degree + 1) for j in range(fit.degree + 1 - i)]
     growth = np.array([fit.growth ** (i + j) for i, j in orders])
@@ -305,13 +347,17 @@ def _row(atlas: Atlas, point: NDArray, center: int, laplacian: float | None) -> 
     solved = growth[:, None] * np.linalg.pinv(near[:, None] * powers * growth, rcond=1e-6) * near
     if laplacian is None:
         return texels, solved[0]
-    return texels, laplacian * 2 * (solved[orders.index((0, 2))] + solved[orders.index((2, 0))]) / size**2
+    return texels, laplacian * 2 * (
+        solved[orders.index((0, 2))] + solved[orders.index((2, 0))]
+    ) / size**2
 
 
 def _resolved(atlas: Atlas, material: Material, center: int) -> float:
     """Frequency [Hz] of the shortest wave that the texels round one carry, of the material there."""
     texels = _around(atlas.texels.topology, center, 1)
-    away = np.linalg.norm(atlas.positions.reshape(-1, 3)[texels] - atlas.positions.reshape(-1, 3)[center], axis=1)
+    away = np.linalg.norm(
+        atlas.positions.reshape(-1, 3)[texels] - atlas.positions.reshape(-1, 3)[center], axis=1
+    )
     widest = np.sort(away)[: min(5, len(away))].max()  # the four beside it
     return hertz(material, center, _TEXELS * widest)
 
@@ -319,7 +365,9 @@ def _resolved(atlas: Atlas, material: Material, center: int) -> float:
 def hertz(material: Material, texel: int, length: float) -> float:
     """Frequency [Hz] of a wave of a length [m], of the material at a texel of a flat index."""
     here = {
-        name: value if np.ndim(value) == 0 or name == "wavelengths" else np.asarray(value).reshape(-1)[texel]
+        name: value
+        if np.ndim(value) == 0 or name == "wavelengths"
+        else np.asarray(value).reshape(-1)[texel]
         for name, value in vars(material).items()
     }
     return frequency(Material(**here), 2 * np.pi / length) / (2 * np.pi)

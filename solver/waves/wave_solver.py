@@ -31,30 +31,33 @@ _TEXEL = 300
 class WaveSolver:
     """Waves on the surface of an atlas.
 
-    Time stepping is leapfrog in its drift-kick-drift form with implicit damping: second order, stable up to
-    `stable_timestep`, height and velocity at the same time.
+    Time stepping is leapfrog in its drift-kick-drift form with implicit damping: second order,
+    stable up to `stable_timestep`, height and velocity at the same time.
 
     Parameters
     ----------
     atlas : Atlas
     material : Material
     backend : str
-        "gl" (compute shaders), "cpu" (numba), or "auto": the faster one, measured once on each machine.
+        "gl" (compute shaders), "cpu" (numba), or "auto": the faster one, measured once on each
+        machine.
     operator : str
         "fem", or a baseline: "paper", "uncorrected", "dynamic-paint" (see `build_operator`).
     rim : str or callable
-        At the rims of an open surface waves come back upright from a "free" one, inverted from a "supported" one (its
-        height is 0, as on a drum skin) and a "clamped" one (nor does a surface that bends have a slope). A function of
-        points on the rim [k, 3] gives a name for each, or whether it is clamped, else free. "fixed": as "supported",
-        but plates are held as if Poisson's ratio were 1, which is the same at straight edges.
+        At the rims of an open surface waves come back upright from a "free" one, inverted from a
+        "supported" one (its height is 0, as on a drum skin) and a "clamped" one (nor does a surface
+        that bends have a slope). A function of points on the rim [k, 3] gives a name for each, or
+        whether it is clamped, else free. "fixed": as "supported", but plates are held as if
+        Poisson's ratio were 1, which is the same at straight edges.
     conserve_volume : bool, optional
-        Remove the mean of every source, so that a net push does not move the surface as a whole. By default it is
-        removed from closed surfaces, where it is the volume of an incompressible body, and from open ones that nothing
-        holds, whose mean height nothing else would stop. It stays on open ones that a rim, a clamp, or stiffness
-        anywhere holds. True and False: from all surfaces or from none. Each part of a mesh, and each region that rigid
-        texels cut off, has a mean of its own, and is held or not by itself. Where the density varies, a uniform
-        pressure keeps the volume while the waves run as well, unless something holds the surface: a clamp, a fixed rim,
-        or stiffness that varies. Deep fluid always keeps its volume.
+        Remove the mean of every source, so that a net push does not move the surface as a whole. By
+        default it is removed from closed surfaces, where it is the volume of an incompressible
+        body, and from open ones that nothing holds, whose mean height nothing else would stop. It
+        stays on open ones that a rim, a clamp, or stiffness anywhere holds. True and False: from
+        all surfaces or from none. Each part of a mesh, and each region that rigid texels cut off,
+        has a mean of its own, and is held or not by itself. Where the density varies, a uniform
+        pressure keeps the volume while the waves run as well, unless something holds the surface: a
+        clamp, a fixed rim, or stiffness that varies. Deep fluid always keeps its volume.
 
     Attributes
     ----------
@@ -70,7 +73,8 @@ class WaveSolver:
     Raises
     ------
     SolverError
-        For invalid names, a material of another type or of another resolution, or too little memory.
+        For invalid names, a material of another type or of another resolution, or too little
+        memory.
     GLError
         If "gl" is asked for and no context can be made.
     """
@@ -92,16 +96,25 @@ class WaveSolver:
     ) -> None:
         self.material = material if material is not None else Material()
         what = f"a wave solver of {atlas.areas.size:,} texels"
-        require_memory(SolverError, _TEXEL * atlas.areas.size, what, "take an atlas of lower resolution")
+        require_memory(
+            SolverError, _TEXEL * atlas.areas.size, what, "take an atlas of lower resolution"
+        )
         warn_of_wavelengths(atlas, self.material)
         self._kind = operator
-        self._begin(atlas, build_operator(atlas, self.material, operator, rim), backend, conserve_volume)
+        self._begin(
+            atlas, build_operator(atlas, self.material, operator, rim), backend, conserve_volume
+        )
 
-    def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool | None) -> None:
+    def _begin(
+        self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool | None
+    ) -> None:
         """At rest, at time 0."""
-        self.rest, self.operator = atlas, operator
+        self.rest = atlas
+        self.operator = operator
         self._motion: Motion | None = None
-        self.time, self.substeps_taken, self._substep = 0.0, 0, 0.0
+        self.time = 0.0
+        self.substeps_taken = 0
+        self._substep = 0.0
         self._backend = make_backend(backend, operator, keeps_volume=conserve_volume)
         self._balance = VolumeBalance(operator, conserve_volume)
         self._held = HeldLoad(self._backend, operator.source_share, self._balance)
@@ -144,16 +157,17 @@ class WaveSolver:
         Raises
         ------
         SolverError
-            If dt is negative or not finite, a given number of substeps is too small to be stable, a load is not finite
-            or names no texel, or the height is no longer finite: the CPU looks at it every 32 substeps, and both
-            backends look at whatever is read.
+            If dt is negative or not finite, a given number of substeps is too small to be stable, a
+            load is not finite or names no texel, or the height is no longer finite: the CPU looks
+            at it every 32 substeps, and both backends look at whatever is read.
         """
         require_finite("time step", dt, "s", least=0.0)
         if dt == 0:
             return
         longest = self.stable_timestep if substeps is None else self.operator.stable_timestep
         substeps = count_substeps(dt, longest, substeps)
-        self._substep, begin = dt / substeps, self.time
+        begin = self.time
+        self._substep = dt / substeps
         for count, part in [(substeps, None)] if load is None else load.parts(dt, substeps):
             # values too large for float32 become infinite here; the next look reports them
             with np.errstate(over="ignore", invalid="ignore"):
@@ -172,21 +186,29 @@ class WaveSolver:
     def reset(self) -> None:
         """Flatten the surface, end all pressure, and set the time back to 0."""
         self.height = self.velocity = self.pressure = 0.0
-        self.time, self.substeps_taken = 0.0, 0
+        self.time = 0.0
+        self.substeps_taken = 0
         self._guard.clear()
         self.listeners.begin(self.time)
 
     def sensor(
-        self, at: str | ArrayLike, kind: str = "acceleration", rate: float = 48_000, *, thickness: float | None = None
+        self,
+        at: str | ArrayLike,
+        kind: str = "acceleration",
+        rate: float = 48_000,
+        *,
+        thickness: float | None = None,
     ) -> Sensor:
         """Measure the surface from now on, along its normal, after every substep; see `Sensor`.
 
         Parameters
         ----------
         at : [3], [k, 3] or str
-            Points in the frame of the mesh [m]; the nearest surface points are taken. In `Ripples` also a site's name.
+            Points in the frame of the mesh [m]; the nearest surface points are taken. In `Ripples`
+            also a site's name.
         kind : str
-            "acceleration" [m/s^2], "velocity" [m/s], "height" [m], or "strain" of a bent sheet's outer face.
+            "acceleration" [m/s^2], "velocity" [m/s], "height" [m], or "strain" of a bent sheet's
+            outer face.
         rate : float
             Samples a second [1/s].
         thickness : float, optional
@@ -194,7 +216,10 @@ class WaveSolver:
         """
         if isinstance(at, str):
             if self.listeners.find_points is None:
-                raise SolverError(f"sensor at {at!r}: this surface knows no names; valid are points, [3] or [k, 3]")
+                raise SolverError(
+                    f"sensor at {at!r}: this surface knows no names; valid are points, [3] or [k, "
+                    f"3]"
+                )
             at = self.listeners.find_points(at)
         sensor = Sensor(self.atlas, self.material, self.operator, at, kind, rate, thickness)
         return self.listeners.add(sensor, self.time)
@@ -202,10 +227,11 @@ class WaveSolver:
     def move(self, V: ArrayLike) -> None:
         """Move the surface: the texels ride on their triangles, at their barycentric coordinates.
 
-        Each texel keeps its mass, so that the surface gets thinner where it stretches, and its height and velocity,
-        along the normal that it has then. Stiffness and stable time step follow the lengths on the surface as soon as
-        one changes by a part in 1,000; a motion that leaves them as they are changes nothing. Speed and rates stay the
-        material's own, but for its `tightening`. The motion itself neither pushes the waves nor feels them.
+        Each texel keeps its mass, so that the surface gets thinner where it stretches, and its
+        height and velocity, along the normal that it has then. Stiffness and stable time step
+        follow the lengths on the surface as soon as one changes by a part in 1,000; a motion that
+        leaves them as they are changes nothing. Speed and rates stay the material's own, but for
+        its `tightening`. The motion itself neither pushes the waves nor feels them.
 
         Parameters
         ----------
@@ -215,11 +241,14 @@ class WaveSolver:
         Raises
         ------
         SolverError
-            If they are not finite, or not as many as the mesh has; for a baseline operator, or deep fluid.
+            If they are not finite, or not as many as the mesh has; for a baseline operator, or deep
+            fluid.
         """
         if self._motion is None:
             if self._kind != "fem":
-                raise SolverError(f"a surface with the operator {self._kind!r} cannot move; valid is 'fem'")
+                raise SolverError(
+                    f"a surface with the operator {self._kind!r} cannot move; valid is 'fem'"
+                )
             self._motion = Motion(self.rest, self.material, self.operator)
         operator = self._motion.to(V)
         if operator is not None:
@@ -260,8 +289,9 @@ class WaveSolver:
         point : [3]
             Where [m], in the frame of the mesh; the nearest surface point is taken.
         impulse : float
-            J [N s]. Positive presses inwards: the sum of sigma A dv over the texels is -J (before the mean is removed,
-            where volume is conserved). The part on clamped or rigid texels is lost to what supports them.
+            J [N s]. Positive presses inwards: the sum of sigma A dv over the texels is -J (before
+            the mean is removed, where volume is conserved). The part on clamped or rigid texels is
+            lost to what supports them.
         radius : float
             Footprint radius [m], along the surface; at least two texels are used.
 
@@ -273,8 +303,8 @@ class WaveSolver:
         Raises
         ------
         SolverError
-            If the impulse or the radius is not finite, the radius is negative, there are several points, or the
-            velocity is beyond float32.
+            If the impulse or the radius is not finite, the radius is negative, there are several
+            points, or the velocity is beyond float32.
         """
         where, impulses = spread(self.atlas, "impulse", impulse, "N s", point, radius)
         momentum = -impulses * self.operator.source_share.reshape(-1)[where.texels]
@@ -301,7 +331,8 @@ class WaveSolver:
         Raises
         ------
         SolverError
-            If the force or the radius is not finite, the radius is negative, or there are several points.
+            If the force or the radius is not finite, the radius is negative, or there are several
+            points.
         """
         where, forces = spread(self.atlas, "force", force, "N", point, radius)
         self._held.add(Load(where.texels, forces))
@@ -315,14 +346,22 @@ class WaveSolver:
 
     def add_height(self, height: ArrayLike) -> None:
         """Raise the surface by a field [m], [C, n, n]; where volume is conserved its mean over the area is removed."""
-        field = as_field(height, "height", self.operator.mass.shape).astype(np.float64) * self.operator.free
+        field = (
+            as_field(height, "height", self.operator.mass.shape).astype(np.float64)
+            * self.operator.free
+        )
         field = self._balance.balanced_height(field, self._areas)
         self._note("height", field)
-        self._backend.set_height(self._backend.elastic() + field.astype(np.float32), self._backend.dent())
+        self._backend.set_height(
+            self._backend.elastic() + field.astype(np.float32), self._backend.dent()
+        )
 
     def add_velocity(self, velocity: ArrayLike) -> None:
         """Add a field [m/s], [C, n, n], to the velocity; where volume is conserved its volume rate is removed."""
-        field = as_field(velocity, "velocity", self.operator.mass.shape).astype(np.float64) * self.operator.movable
+        field = (
+            as_field(velocity, "velocity", self.operator.mass.shape).astype(np.float64)
+            * self.operator.movable
+        )
         field = self._balance.balanced_velocity(field)
         self._note("velocity", field)
         self._backend.set_velocity(self._backend.velocity() + field.astype(np.float32))
@@ -331,8 +370,9 @@ class WaveSolver:
     def height(self) -> NDArray[np.float32]:
         """Displacement along the outward normal [m], float32 [C, n, n]: a copy; assign to change it.
 
-        `waves.height = field` and `waves.height += field` work, also with one number; `waves.height[0] = x` changes the
-        copy only. A height that is assigned is elastic: dents are gone.
+        `waves.height = field` and `waves.height += field` work, also with one number;
+        `waves.height[0] = x` changes the copy only. A height that is assigned is elastic: dents are
+        gone.
 
         Reading raises `SolverError` once if it is no longer finite.
         """
@@ -347,7 +387,8 @@ class WaveSolver:
     def crests(self) -> NDArray[np.float32]:
         """Greatest size that each height has had after any step since the last call, or has now [m], [C, n, n].
 
-        Kept from the first call on, where the waves are; a copy begins anew. Not finite, they raise as `height` does.
+        Kept from the first call on, where the waves are; a copy begins anew. Not finite, they raise
+        as `height` does.
         """
         return self._finite(self._backend.crests(), "height")
 
@@ -368,7 +409,8 @@ class WaveSolver:
     def velocity(self) -> NDArray[np.float32]:
         """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change it, as with `height`.
 
-        Reading raises `SolverError` once if it is no longer finite, which it may be before the height is.
+        Reading raises `SolverError` once if it is no longer finite, which it may be before the
+        height is.
         """
         return self._finite(self._backend.velocity(), "velocity")
 
@@ -381,15 +423,19 @@ class WaveSolver:
     def energy(self) -> float:
         """Kinetic plus potential energy [J] of the discrete system.
 
-        Without damping this is what the leapfrog scheme conserves to round-off while the substep stays the same:
-        1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all elastic forces. It differs from the
-        continuous energy by O(dt^2). Energy spent on dents is not included.
+        Without damping this is what the leapfrog scheme conserves to round-off while the substep
+        stays the same: 1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all
+        elastic forces. It differs from the continuous energy by O(dt^2). Energy spent on dents is
+        not included.
         """
         elastic = self._finite(self._backend.elastic(), "height")
-        height, velocity = elastic.astype(np.float64), self.velocity.astype(np.float64)
+        height = elastic.astype(np.float64)
+        velocity = self.velocity.astype(np.float64)
         with np.errstate(invalid="ignore"):  # NaN says enough
             kinetic = float((self.operator.momenta(velocity) * velocity).sum()) / 2
-            of_h, of_v = (-float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity))
+            of_h, of_v = (
+                -float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity)
+            )
             return kinetic + of_h - self._substep**2 / 4 * of_v
 
     def volume(self) -> float:
@@ -415,8 +461,9 @@ class WaveSolver:
     def state(self) -> WaveState:
         """All that decides how the waves go on, but for atlas and material; assign it to another solver.
 
-        Assigning raises `SolverError` for a state of another resolution. Where the solver's own material clamps the
-        surface or carries no waves, it takes over dents alone, and comes to rest.
+        Assigning raises `SolverError` for a state of another resolution. Where the solver's own
+        material clamps the surface or carries no waves, it takes over dents alone, and comes to
+        rest.
         """
         elastic = self._finite(self._backend.elastic(), "height")
         clock = self.time, self._substep, self.substeps_taken
@@ -426,11 +473,15 @@ class WaveSolver:
     def state(self, state: WaveState) -> None:
         shape = self.operator.mass.shape
         if state.elastic.shape != shape:
-            raise SolverError(f"the state of waves has shape {state.elastic.shape}; valid is {shape}")
+            raise SolverError(
+                f"the state of waves has shape {state.elastic.shape}; valid is {shape}"
+            )
         self._backend.set_height(state.elastic * self.operator.free, state.dent)
         self._backend.set_velocity(state.velocity * self.operator.movable)
         self._held.load = state.held
-        self.time, self._substep, self.substeps_taken = state.time, state.substep, state.substeps_taken
+        self.time = state.time
+        self._substep = state.substep
+        self.substeps_taken = state.substeps_taken
         self._guard.clear()
         self.listeners.begin(self.time)
         self._note("height", state.elastic)

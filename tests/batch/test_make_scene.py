@@ -30,7 +30,8 @@ def test_a_scene_has_the_same_bytes_in_another_folder_and_order(unbroken, tmp_pa
 def test_the_files_of_a_scene_agree(unbroken):
     folder = unbroken.scene(2)
     facts = json.loads((folder / "scene.json").read_text())
-    heights, positions = load_batch(unbroken.path)[2].heights()["egg"], np.load(folder / "qpos.npy")
+    heights = load_batch(unbroken.path)[2].heights()["egg"]
+    positions = np.load(folder / "qpos.npy")
     assert (heights.shape, positions.shape) == ((4, 6, 8, 8), (4, 14))
     assert np.abs(heights).max() == np.float32(facts["targets"]["egg"]["height_max"]) > 0
     rows = [line.split(",") for line in (folder / "impulses.csv").read_text().splitlines()]
@@ -61,10 +62,15 @@ def test_a_scene_that_is_there_or_being_made_is_left_alone(unbroken, tmp_path):
     os.close(other)  # as when it dies
     (work / "scene.json").write_text("from a worker that died")
     assert make_scene(str(batch.path), 0).state == "made"
-    assert json.loads((batch.scene(0) / "scene.json").read_text())["files"].keys() == {"impulses.csv", "qpos.npy"}
+    assert json.loads((batch.scene(0) / "scene.json").read_text())["files"].keys() == {
+        "impulses.csv",
+        "qpos.npy",
+    }
 
 
-@pytest.mark.parametrize(("error", "state"), [(ValueError("bad"), "failed"), (OSError(errno.ENOSPC, "full"), "full")])
+@pytest.mark.parametrize(
+    ("error", "state"), [(ValueError("bad"), "failed"), (OSError(errno.ENOSPC, "full"), "full")]
+)
 def test_a_failure_leaves_nothing_behind_and_says_why(tmp_path, monkeypatch, error, state):
     batch = new_batch(tmp_path, 'video = "none"\n')
 
@@ -93,7 +99,8 @@ def packed(opengl, tmp_path_factory):
 
 
 def test_scenes_read_the_same_from_folders_and_tar_files(packed, unbroken):
-    loose, batch = load_batch(unbroken.path), load_batch(packed.path)
+    loose = load_batch(unbroken.path)
+    batch = load_batch(packed.path)
     assert (loose.numbers, batch.numbers) == ([0, 1, 2, 3, 4], [0, 1, 2, 3])
     assert packed.finished() == {0, 1, 2, 3}
     assert packed.loose() == {3}
@@ -131,7 +138,9 @@ def test_a_tar_file_has_the_same_bytes_in_whatever_steps_it_is_packed(packed, tm
         names = file.getnames()
     samples = [name.split(".")[0] for name in names]
     assert samples == sorted(samples)
-    assert {"000001.video.mp4", "000001.scene.json", "000001.video.passes.passes_00002.npz"} <= set(names)
+    assert {"000001.video.mp4", "000001.scene.json", "000001.video.passes.passes_00002.npz"} <= set(
+        names
+    )
 
 
 def test_a_kill_between_tar_file_and_folders_doubles_nothing(packed, tmp_path, monkeypatch):
@@ -157,6 +166,8 @@ def test_a_loaded_batch_goes_to_other_processes(unbroken):
 
 def test_shards_keep_the_scenes_of_a_tar_file_together(tmp_path):
     plan = small_plan(tmp_path, PACKED, PLAN.replace("count = 5", "count = 20"))
-    shards = [[number for number in range(20) if in_shard(number, plan, (part, 3))] for part in (1, 2, 3)]
+    shards = [
+        [number for number in range(20) if in_shard(number, plan, (part, 3))] for part in (1, 2, 3)
+    ]
     assert sorted(number for shard in shards for number in shard) == list(range(20))
     assert shards[1] == [3, 4, 5, 12, 13, 14]

@@ -126,7 +126,11 @@ def varied(tmp_path, vary="", model="", number=0):
 
 
 def test_keys_are_names_between_dots_with_a_choice_in_brackets():
-    assert parse_key("ripple[a.b c].material.speed") == (("ripple", "a.b c"), ("material", ""), ("speed", ""))
+    assert parse_key("ripple[a.b c].material.speed") == (
+        ("ripple", "a.b c"),
+        ("material", ""),
+        ("speed", ""),
+    )
     assert parse_key("camera.lookat[2]")[-1] == ("lookat", "2")
 
 
@@ -138,7 +142,12 @@ def test_what_is_no_key_is_refused(key):
 
 def test_a_number_has_the_same_values_whatever_else_varies(tmp_path):
     few = [Variation(small_plan(tmp_path), number) for number in range(4)]
-    more = Variation(small_plan(tmp_path, text=PLAN.replace("[vary]", '[vary]\n"camera.fovy" = {uniform=[30,50]}')), 2)
+    more = Variation(
+        small_plan(
+            tmp_path, text=PLAN.replace("[vary]", '[vary]\n"camera.fovy" = {uniform=[30,50]}')
+        ),
+        2,
+    )
     values = [each.load()[1] for each in few]
     again = more.load()[1]
     assert again == {**values[2], "camera.fovy": again["camera.fovy"]}
@@ -149,9 +158,11 @@ def test_a_number_has_the_same_values_whatever_else_varies(tmp_path):
 def test_values_reach_the_scene_and_the_model(tmp_path):
     scene, values = varied(
         tmp_path,
-        vary='camera.lookat = {uniform = [-1, 1], length = 3}\n"ripple.material.speed" = {uniform = [2, 3], '
+        vary='camera.lookat = {uniform = [-1, 1], length = 3}\n"ripple.material.speed" = {uniform '
+        "= [2, 3], "
         'apply = "multiply"}\n"ripple[egg].look" = "clay"',
-        model='"geom[stone].mass" = {uniform = [2, 3], apply = "multiply"}\n"geom[*].friction" = {uniform = [0, 1]}\n'
+        model='"geom[stone].mass" = {uniform = [2, 3], apply = "multiply"}\n"geom[*].friction" = '
+        "{uniform = [0, 1]}\n"
         '"body[stone].pos[2]" = {uniform = [1, 2], apply = "add"}\n"option.gravity[2]" = -1.5\n'
         '"light[0].diffuse" = {uniform = [0, 1], length = 3}\n"geom[grain].rgba" = [0, 1, 0]',
     )
@@ -205,7 +216,8 @@ def test_a_path_may_be_a_string():
 def test_a_drop_scene_takes_keys_of_scene_files_too(tmp_path):
     (tmp_path / "plan.toml").write_text(
         f'count = 4\n[meshes]\nfiles = ["{LIMBED_FILE}"]\nbodies = {{integers = [2, 4]}}\n'
-        '[vary]\ncamera.azimuth = 7.0\n"ripple.material.speed" = {constant = 2.0, apply = "multiply"}\n'
+        '[vary]\ncamera.azimuth = 7.0\n"ripple.material.speed" = {constant = 2.0, apply = '
+        '"multiply"}\n'
         '[model]\n"geom[floor].rgba" = [0.5, 0.5, 0.5]'
     )
     plan = read_plan(tmp_path / "plan.toml")

@@ -13,7 +13,16 @@ import pyarrow.parquet
 import pytest
 from small_batch import PLAN, Here, files, new_batch, small_plan
 
-from ripple_sim.batch import BatchFolder, DaskExecutor, Outcome, RunOptions, make_scene, run, run_batch, status_text
+from ripple_sim.batch import (
+    BatchFolder,
+    DaskExecutor,
+    Outcome,
+    RunOptions,
+    make_scene,
+    run,
+    run_batch,
+    status_text,
+)
 from ripple_sim.batch.folder import Failure, load_stored
 from ripple_sim.cli.main import main
 from ripple_sim.errors import BatchError, SceneError
@@ -32,12 +41,16 @@ def same_scenes(batch, reference, numbers=range(5)):
     assert batch.finished() == set(numbers)
     for number in numbers:
         for name in ("heights.zarr.zip", "qpos.npy", "impulses.csv"):
-            assert (batch.scene(number) / name).read_bytes() == (reference.scene(number) / name).read_bytes()
+            assert (batch.scene(number) / name).read_bytes() == (
+                reference.scene(number) / name
+            ).read_bytes()
 
 
 @pytest.mark.parametrize("name", ["index.html", "failed", "work/000000", "failed/000000.log"])
 def test_links_in_its_folder_are_not_followed(here, tmp_path, name):
-    plan, folder, mine = small_plan(tmp_path, DATA), tmp_path / "out", tmp_path / "mine"
+    plan = small_plan(tmp_path, DATA)
+    folder = tmp_path / "out"
+    mine = tmp_path / "mine"
     run_batch(plan, folder, RunOptions(shard=(2, 2), limit=1))
     mine.write_text("mine")
     path = folder / name
@@ -49,7 +62,8 @@ def test_links_in_its_folder_are_not_followed(here, tmp_path, name):
 
 
 def test_shards_and_limits_share_out_the_scenes(here, unbroken, tmp_path):
-    plan, folder = small_plan(tmp_path, DATA), tmp_path / "out"
+    plan = small_plan(tmp_path, DATA)
+    folder = tmp_path / "out"
     batch = BatchFolder(folder)
     assert run_batch(plan, folder, RunOptions(shard=(2, 2), limit=1)).made == 1
     assert batch.finished() == {1}
@@ -69,13 +83,18 @@ def test_the_index_has_a_row_a_scene(here, tmp_path):
     run_batch(None, tmp_path / "out", RunOptions(limit=1))
     table = pyarrow.parquet.read_table(tmp_path / "out" / "index.parquet").to_pylist()
     assert [row["number"] for row in table] == [0, 1, 2]
-    assert all(row["status"] == "finished" and row["seconds"] > 0 and len(row["hash"]) == 32 for row in table)
+    assert all(
+        row["status"] == "finished" and row["seconds"] > 0 and len(row["hash"]) == 32
+        for row in table
+    )
     assert len({row["camera.azimuth"] for row in table}) == 3
     page = (tmp_path / "out" / "index.html").read_text()
     assert page.count("scenes/00000") == 3
 
 
-def test_a_scene_that_fails_three_times_is_put_aside_and_can_be_tried_again(here, tmp_path, monkeypatch):
+def test_a_scene_that_fails_three_times_is_put_aside_and_can_be_tried_again(
+    here, tmp_path, monkeypatch
+):
     tried = []
 
     def make(folder, number):
@@ -126,21 +145,29 @@ def test_a_scene_that_another_process_makes_is_waited_for(here, tmp_path, monkey
 
 def test_a_full_disk_stops_the_batch_and_counts_as_no_failure(here, tmp_path, monkeypatch):
     plan = small_plan(tmp_path, DATA)
-    with pytest.raises(BatchError, match="GB left, less than the 1e\\+06 GB to be kept free; make room"):
+    with pytest.raises(
+        BatchError, match="GB left, less than the 1e\\+06 GB to be kept free; make room"
+    ):
         run_batch(plan, tmp_path / "out", RunOptions(keep_free=1e15))
-    monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
+    monkeypatch.setattr(
+        run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left")
+    )
     with pytest.raises(BatchError, match="the disk is full: No space left"):
         run_batch(plan, tmp_path / "out")
     assert BatchFolder(tmp_path / "out").failures() == {}
 
 
 @pytest.mark.parametrize("name", ["keep_plan", "write_index"])
-def test_a_disk_too_full_for_the_batchs_own_files_is_told_as_one(name, here, tmp_path, monkeypatch, capsys):
+def test_a_disk_too_full_for_the_batchs_own_files_is_told_as_one(
+    name, here, tmp_path, monkeypatch, capsys
+):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(run, name, full)
-    monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
+    monkeypatch.setattr(
+        run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left")
+    )
     small_plan(tmp_path, DATA)
     assert main(["batch", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "out")]) == 1
     assert "the disk is full: No space left on device; make room" in capsys.readouterr().err
@@ -156,8 +183,12 @@ def test_a_plan_that_has_changed_is_refused_with_what_changed(tmp_path):
         with pytest.raises(BatchError, match=message):
             run_batch(small_plan(tmp_path, text=PLAN.replace(old, new)), tmp_path / "out")
     plan = small_plan(tmp_path)
-    (tmp_path / "scene.xml").write_text((tmp_path / "scene.xml").read_text().replace("0.25", "0.24"))
-    with pytest.raises(BatchError, match=r"files.scene.toml was .* take it back, or name another folder"):
+    (tmp_path / "scene.xml").write_text(
+        (tmp_path / "scene.xml").read_text().replace("0.25", "0.24")
+    )
+    with pytest.raises(
+        BatchError, match=r"files.scene.toml was .* take it back, or name another folder"
+    ):
         run_batch(plan, tmp_path / "out")
 
 
@@ -173,7 +204,9 @@ def test_strings_that_are_not_text_are_damage_as_any_other(tmp_path):
 
 def test_a_key_that_fits_nothing_is_told_before_anything_is_made(tmp_path):
     with pytest.raises(SceneError, match=r"no geom\[stoone\]"):
-        run_batch(small_plan(tmp_path, text=PLAN.replace("geom[stone]", "geom[stoone]")), tmp_path / "out")
+        run_batch(
+            small_plan(tmp_path, text=PLAN.replace("geom[stone]", "geom[stoone]")), tmp_path / "out"
+        )
     assert not (tmp_path / "out").exists()
 
 
@@ -210,7 +243,15 @@ def test_killed_workers_and_a_killed_parent_lose_and_change_nothing(unbroken, tm
     small_plan(tmp_path, "heights = true\n")
     folder = tmp_path / "out"
     batch = BatchFolder(folder)
-    command = [sys.executable, "-m", "ripple_sim", "batch", str(tmp_path / "plan.toml"), "-o", str(folder)]
+    command = [
+        sys.executable,
+        "-m",
+        "ripple_sim",
+        "batch",
+        str(tmp_path / "plan.toml"),
+        "-o",
+        str(folder),
+    ]
     command += ["--workers", "1", "--keep-free", "0.001"]
     parent = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     try:
@@ -252,7 +293,9 @@ def test_a_dask_cluster_makes_the_same_scenes(unbroken, tmp_path):
     plan = small_plan(tmp_path, DATA)
     options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tcp"}
     with LocalCluster(**options, dashboard_address=None) as cluster:
-        assert run_batch(plan, tmp_path / "out", RunOptions(dask=cluster.scheduler_address)).made == 5
+        assert (
+            run_batch(plan, tmp_path / "out", RunOptions(dask=cluster.scheduler_address)).made == 5
+        )
     same_scenes(BatchFolder(tmp_path / "out"), unbroken)
 
 
@@ -263,7 +306,9 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path, monkeypatch):
         raise OSError("timed out")
 
     monkeypatch.setattr(distributed, "Client", refuse)
-    with pytest.raises(BatchError, match=r"no Dask scheduler answers at 'tcp://nowhere:1' \(timed out\)"):
+    with pytest.raises(
+        BatchError, match=r"no Dask scheduler answers at 'tcp://nowhere:1' \(timed out\)"
+    ):
         run_batch(small_plan(tmp_path, DATA), tmp_path / "out", RunOptions(dask="tcp://nowhere:1"))
 
 
@@ -274,7 +319,8 @@ def test_a_dask_scheduler_that_is_gone_is_one_line(tmp_path, monkeypatch, capsys
         places = 1
 
         def __init__(self, address: str) -> None:
-            self._address, self._client = address, SimpleNamespace(status="closed")
+            self._address = address
+            self._client = SimpleNamespace(status="closed")
 
         def submit(self, *_: object, **__: object) -> Future:
             raise RuntimeError("ConnectionPool closing.")
@@ -283,8 +329,22 @@ def test_a_dask_scheduler_that_is_gone_is_one_line(tmp_path, monkeypatch, capsys
             pass
 
     monkeypatch.setattr("ripple_sim.batch.run.DaskExecutor", Lost)
-    (tmp_path / "plan.toml").write_text('count = 2\nscenes = ["sphere"]\n[store]\nresolution = 8\nduration = 0.1\n')
-    assert main(["batch", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "out"), "--dask", "tcp://host:1"]) == 1
+    (tmp_path / "plan.toml").write_text(
+        'count = 2\nscenes = ["sphere"]\n[store]\nresolution = 8\nduration = 0.1\n'
+    )
+    assert (
+        main(
+            [
+                "batch",
+                str(tmp_path / "plan.toml"),
+                "-o",
+                str(tmp_path / "out"),
+                "--dask",
+                "tcp://host:1",
+            ]
+        )
+        == 1
+    )
     error = capsys.readouterr().err
     assert "the Dask scheduler at tcp://host:1 is gone; finished scenes are kept" in error
     assert "ConnectionPool" not in error and error.count("\n") == 1

@@ -20,13 +20,20 @@ FOCAL_PIXELS = HEIGHT / 2 / np.tan(np.radians(FOVY) / 2)
 
 def bead(depth: float, alpha: float = 1.0) -> str:
     """A body beside the target, at a distance [m] from the camera."""
-    return f'<geom pos="{depth - DISTANCE} {-0.35 * depth} 0" size="{0.03 * depth}" rgba="0.9 0.9 0.9 {alpha}"/>'
+    return (
+        f'<geom pos="{depth - DISTANCE} {-0.35 * depth} 0" size="{0.03 * depth}" rgba="0.9 0.9 '
+        f'0.9 {alpha}"/>'
+    )
 
 
 def last_frame(scene: Scene, frames: int = 1, **options: Any) -> np.ndarray:
     simulation = Simulation(scene, fps=FPS, backend="cpu")
     source = FrameSource(simulation, width=WIDTH, height=HEIGHT, **options)
-    pictures = [picture for state in snapshots(simulation, frames) if (picture := source.render(state)) is not None]
+    pictures = [
+        picture
+        for state in snapshots(simulation, frames)
+        if (picture := source.render(state)) is not None
+    ]
     assert len(pictures) == frames
     return pictures[-1]
 
@@ -40,8 +47,11 @@ def blot(scene: Scene, part: tuple[slice, slice], frames: int = 1) -> tuple[floa
 
 
 @pytest.mark.parametrize("shutter", [90.0, 180.0, 360.0])
-def test_a_ball_leaves_a_streak_as_long_as_it_flies_while_the_shutter_is_open(opengl, make_scene, shutter):
-    above, count = (slice(0, HEIGHT // 2 - 8), slice(None)), 24
+def test_a_ball_leaves_a_streak_as_long_as_it_flies_while_the_shutter_is_open(
+    opengl, make_scene, shutter
+):
+    above = (slice(0, HEIGHT // 2 - 8), slice(None))
+    count = 24
     area, sharp = blot(make_scene(), above, frames=2)
     streak_area, streak = blot(make_scene(shutter=shutter, exposures=count), above, frames=2)
     # an even row of points of a length has a variance of length^2 (1 - 1 / count^2) / 12
@@ -53,10 +63,20 @@ def test_a_ball_leaves_a_streak_as_long_as_it_flies_while_the_shutter_is_open(op
 
 @pytest.mark.parametrize(
     ("depth", "focus", "alpha"),
-    [(1.2, 2.0, 1.0), (1.2, 2.0, 0.6), (1.6, 2.0, 1.0), (6.0, 2.0, 1.0), (6.0, 3.0, 0.6), (3.0, 3.0, 1.0)],
+    [
+        (1.2, 2.0, 1.0),
+        (1.2, 2.0, 0.6),
+        (1.6, 2.0, 1.0),
+        (6.0, 2.0, 1.0),
+        (6.0, 3.0, 0.6),
+        (3.0, 3.0, 1.0),
+    ],
 )
-def test_what_is_out_of_focus_blurs_to_the_disc_of_a_thin_lens(opengl, make_scene, depth, focus, alpha):
-    aperture, right = 0.12, (slice(None), slice(WIDTH // 2 + 12, None))
+def test_what_is_out_of_focus_blurs_to_the_disc_of_a_thin_lens(
+    opengl, make_scene, depth, focus, alpha
+):
+    aperture = 0.12
+    right = (slice(None), slice(WIDTH // 2 + 12, None))
     area, sharp = blot(make_scene(bead(depth, alpha), ""), right)
     scene = make_scene(bead(depth, alpha), "", aperture=aperture, focus=focus, exposures=48)
     disc_area, disc = blot(scene, right)
@@ -69,7 +89,9 @@ def test_what_is_out_of_focus_blurs_to_the_disc_of_a_thin_lens(opengl, make_scen
 
 def test_depth_of_field_loses_no_light(opengl, make_scene):
     def light(**exposure: Any) -> np.ndarray:
-        return linear(last_frame(make_scene(bead(1.2) + bead(5.0), "", **exposure))).mean(axis=(0, 1))
+        return linear(last_frame(make_scene(bead(1.2) + bead(5.0), "", **exposure))).mean(
+            axis=(0, 1)
+        )
 
     np.testing.assert_allclose(light(aperture=0.12), light(), rtol=3e-3)
 
@@ -77,14 +99,19 @@ def test_depth_of_field_loses_no_light(opengl, make_scene):
 @pytest.mark.parametrize("transparent", [False, True])
 def test_one_exposure_is_the_plain_frame(opengl, make_scene, transparent):
     plain = last_frame(make_scene(), 2, transparent=transparent)
-    single = last_frame(make_scene(shutter=180.0, aperture=0.1, exposures=1), 2, transparent=transparent)
+    single = last_frame(
+        make_scene(shutter=180.0, aperture=0.1, exposures=1), 2, transparent=transparent
+    )
     np.testing.assert_array_equal(single, plain)
 
 
 def test_a_camera_that_goes_round_blurs_what_stands_still(opengl, make_scene):
-    right, orbit, depth = (slice(None), slice(WIDTH // 2 + 12, None)), 120.0, 1.2
+    right = (slice(None), slice(WIDTH // 2 + 12, None))
+    orbit = 120.0
+    depth = 1.2
     scene = make_scene(bead(depth), "", shutter=360.0, exposures=24)
-    (_, still), (_, moved) = blot(scene, right), blot(with_exposure(scene, orbit=orbit), right)
+    (_, still) = blot(scene, right)
+    (_, moved) = blot(with_exposure(scene, orbit=orbit), right)
     angle = np.radians(orbit / FPS)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     x, y = turn @ [depth - DISTANCE, -0.35 * depth]
@@ -103,11 +130,16 @@ def test_shadows_of_many_exposures_are_smoother(opengl, make_scene):
 def test_overlays_are_laid_over_the_mean(opengl, make_scene, tmp_path):
     def render(name: str, **options: Any) -> np.ndarray:
         path = tmp_path / name
-        render_video(make_scene(), path, VideoOptions(size=(WIDTH, HEIGHT), fps=FPS, duration=2 / FPS, **options))
+        render_video(
+            make_scene(),
+            path,
+            VideoOptions(size=(WIDTH, HEIGHT), fps=FPS, duration=2 / FPS, **options),
+        )
         return np.asarray(Image.open(path / "frame_00001.png")).astype(int)
 
     blur = {"shutter": 180.0, "exposures": 8}
-    bare, clock = render("bare", **blur), render("clock", overlay=["time"], **blur)
+    bare = render("bare", **blur)
+    clock = render("clock", overlay=["time"], **blur)
     ink = np.abs(clock - bare).max(axis=2) > 0
     assert 0 < ink.mean() < 0.1
     away = ink & (render("still") == bare).all(axis=2)  # from what moves
@@ -124,9 +156,12 @@ def shrink(picture: np.ndarray, factor: int) -> np.ndarray:
 @pytest.mark.parametrize("factor", [1, 2, 3])
 @pytest.mark.parametrize("channels", [3, 4])
 def test_even_areas_keep_their_colour(factor, channels):
-    small = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(channels, axis=2)  # all values survive
+    # all values survive
+    small = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(channels, axis=2)
     small[..., 3:] = 255
-    np.testing.assert_array_equal(shrink(small.repeat(factor, axis=0).repeat(factor, axis=1), factor), small)
+    np.testing.assert_array_equal(
+        shrink(small.repeat(factor, axis=0).repeat(factor, axis=1), factor), small
+    )
 
 
 def test_transparent_pixels_lend_no_colour():
@@ -143,10 +178,14 @@ def test_the_sensor_averages_codes_and_linear_light_alike(channels):
     light = linear(codes)
     light[..., 3:] = codes[..., 3:] / 255
     light[..., :3] *= light[..., 3:] if channels == 4 else 1
-    sensor, meter = Sensor(2, 3), Sensor(2, 3)
+    sensor = Sensor(2, 3)
+    meter = Sensor(2, 3)
     for number in range(3):
-        frame, mean = sensor.expose(codes[number]), meter.expose(light[number].astype(np.float16))
-    np.testing.assert_allclose(mean, light.reshape(3, 2, 2, 3, 2, channels).mean(axis=(0, 2, 4)), rtol=1e-3)
+        frame = sensor.expose(codes[number])
+        mean = meter.expose(light[number].astype(np.float16))
+    np.testing.assert_allclose(
+        mean, light.reshape(3, 2, 2, 3, 2, channels).mean(axis=(0, 2, 4)), rtol=1e-3
+    )
     assert (frame.dtype, mean.dtype) == (np.uint8, np.float16)
     expected = mean[..., :3] / (mean[..., 3:] if channels == 4 else 1)
     np.testing.assert_allclose(linear(frame)[..., :3], expected, atol=5e-3)
@@ -212,14 +251,24 @@ def test_a_tracking_camera_of_the_model_turns_to_the_body_upright(world):
 
 def test_a_camera_focuses_on_what_it_is_told_to(world):
     model, data = world
-    free = {"lookat": (0.0, 0.0, 1.0), "distance": 4.0, "azimuth": 0.0, "elevation": 0.0}  # looks along x, from x = -4
-    for focus, depth in ((None, 4.0), (1.5, 1.5), ("cart", 4.5), ("lamp", 5.0), ((2.0, 7.0, -3.0), 6.0)):
+    # looks along x, from x = -4
+    free = {"lookat": (0.0, 0.0, 1.0), "distance": 4.0, "azimuth": 0.0, "elevation": 0.0}
+    for focus, depth in (
+        (None, 4.0),
+        (1.5, 1.5),
+        ("cart", 4.5),
+        ("lamp", 5.0),
+        ((2.0, 7.0, -3.0), 6.0),
+    ):
         entry = CameraEntry(**free, focus=focus)
         check_camera(model, entry)
-        assert focal_distance(model, data, entry, viewpoint(model, data, entry, 0.0).pose()) == pytest.approx(depth)
+        assert focal_distance(
+            model, data, entry, viewpoint(model, data, entry, 0.0).pose()
+        ) == pytest.approx(depth)
     entry = CameraEntry(**free, focus="cart")
     pose = viewpoint(model, data, entry, 0.0).pose()
-    for shift, depth in ((1.0, 5.5), (-9.0, 0.08)):  # behind the camera: as near as anything is drawn
+    # behind the camera: as near as anything is drawn
+    for shift, depth in ((1.0, 5.5), (-9.0, 0.08)):
         data.qpos[0] = 0.5 + shift
         mujoco.mj_forward(model, data)
         assert focal_distance(model, data, entry, pose) == pytest.approx(depth)
@@ -227,18 +276,25 @@ def test_a_camera_focuses_on_what_it_is_told_to(world):
 
 def test_the_eye_goes_over_the_lens_and_the_focal_plane_stays(world):
     camera = Camera((0.1, 0.2, 0.3), distance=3.0, azimuth=130.0, elevation=-25.0, fovy=40.0)
-    lens, focus, aspect = (0.05, -0.02), 2.0, 1.5
-    middle, pose = camera.pose(), dataclasses.replace(camera.pose(), lens=lens, focal_distance=focus)
+    lens = (0.05, -0.02)
+    focus = 2.0
+    aspect = 1.5
+    middle = camera.pose()
+    pose = dataclasses.replace(camera.pose(), lens=lens, focal_distance=focus)
     half = np.tan(np.radians(20.0))
     for depth in (0.5, focus, 9.0):
         point = middle.position + middle.rotation @ [0.3, -0.2, -depth]
         seen = []
         for each in (middle, pose):
-            clip = perspective(40.0, aspect, 0.1, 50.0, each.shear) @ view_matrix(each) @ [*point, 1.0]
+            clip = (
+                perspective(40.0, aspect, 0.1, 50.0, each.shear) @ view_matrix(each) @ [*point, 1.0]
+            )
             x, y = clip[:2] / clip[3]
             seen.append([half * aspect * x, half * y])
             # the ray that the shaders send through that pixel meets the point
             way = each.rotation @ [seen[-1][0] + each.shear[0], seen[-1][1] + each.shear[1], -1.0]
             np.testing.assert_allclose(each.eye + depth * way, point, atol=1e-12)
         # thin lens: a point of the aperture sees it shifted by its share of the circle of confusion
-        np.testing.assert_allclose(np.subtract(*seen[::-1]), np.array(lens) * (1 / focus - 1 / depth), atol=1e-12)
+        np.testing.assert_allclose(
+            np.subtract(*seen[::-1]), np.array(lens) * (1 / focus - 1 / depth), atol=1e-12
+        )

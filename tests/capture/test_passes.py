@@ -10,7 +10,8 @@ from ripple_sim import Simulation, load_scene
 from ripple_sim.capture import FrameSource, Sighting, passes_of, snapshots
 from ripple_sim.export import MovingMesh
 
-WIDTH, HEIGHT = 160, 120
+WIDTH = 160
+HEIGHT = 120
 MJCF = """<mujoco><option timestep="0.002" gravity="0 0 -3"/><worldbody>
 <geom name="floor" type="plane" size="3 3 .1" pos="0 0 -0.5"/>
 <body name="egg" pos="-0.4 0 0"><joint type="hinge" axis="0 0 1"/>
@@ -33,12 +34,18 @@ resolution = 16
 limit = false
 material = {speed = 0.5, density = 20.0}
 """
-FLOOR, EGG, BALL = 1, 2, 3  # in the segmentation
+# in the segmentation
+FLOOR = 1
+EGG = 2
+BALL = 3
 
 
 @pytest.fixture(scope="module", params=["rigid", "moving"])
 def seen(request, tmp_path_factory, opengl) -> list[tuple[Sighting, np.ndarray]]:
-    """Two frames: what is seen, and where points on the egg are in the world. Its surface may move by itself, too."""
+    """Two frames: what is seen, and where points on the egg are in the world.
+
+    Its surface may move by itself, too.
+    """
     path = write_scene(tmp_path_factory.mktemp("scene"), MJCF, TOML)
     simulation = Simulation(load_scene(path), fps=20, backend="cpu")
     simulation.data.qvel[:] = [1.5, 0.8, 0, 0, 0, 0, 0]
@@ -51,8 +58,11 @@ def seen(request, tmp_path_factory, opengl) -> list[tuple[Sighting, np.ndarray]]
 
     def look() -> Iterator[tuple[Sighting, np.ndarray]]:
         for snapshot in snapshots(simulation, 2):
-            rotation, V = snapshot.data.geom("egg").xmat.reshape(3, 3), waves.vertices
-            points = mesh.shape(snapshot.heights["egg"], snapshot.heights["egg"], V).points.astype(float)
+            rotation = snapshot.data.geom("egg").xmat.reshape(3, 3)
+            V = waves.vertices
+            points = mesh.shape(snapshot.heights["egg"], snapshot.heights["egg"], V).points.astype(
+                float
+            )
             yield source.sighting(snapshot), points @ rotation.T + snapshot.data.geom("egg").xpos
             if request.param == "moving":
                 rest = waves.rest.mesh.V
@@ -68,7 +78,9 @@ def test_segmentation_names_every_pixel(seen: list[tuple[Sighting, np.ndarray]])
     assert counts.sum() == counts[:4].sum()
 
 
-def test_positions_and_normals_on_a_ball_are_its_own(seen: list[tuple[Sighting, np.ndarray]]) -> None:
+def test_positions_and_normals_on_a_ball_are_its_own(
+    seen: list[tuple[Sighting, np.ndarray]],
+) -> None:
     sighting = seen[0][0]
     passes = passes_of(sighting, None, ("position", "normal", "segmentation", "depth"))
     ball = passes["segmentation"] == BALL
@@ -86,7 +98,9 @@ def test_positions_and_normals_on_a_ball_are_its_own(seen: list[tuple[Sighting, 
     assert np.isinf(passes["depth"][passes["segmentation"] == 0]).all()
 
 
-def nearest_points(sighting: Sighting, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def nearest_points(
+    sighting: Sighting, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of points of the egg, those that are seen, and the rows and columns of their pixels."""
     place = sighting.pixels(points)
     column, row = np.floor(place).astype(int).T
@@ -102,13 +116,18 @@ def test_heights_and_places_are_those_of_the_waves(seen: list[tuple[Sighting, np
     sighting, points = seen[0]
     found, row, column = nearest_points(sighting, points)
     assert len(found) > 300
-    assert np.median(np.linalg.norm(sighting.positions_seen[row, column] - points[found], axis=1)) < 0.01
+    assert (
+        np.median(np.linalg.norm(sighting.positions_seen[row, column] - points[found], axis=1))
+        < 0.01
+    )
     height = passes_of(sighting, None, ("height",))["height"]
     assert np.ptp(height) > 0.04
     assert (height[sighting.image.geom != EGG - 1] == 0).all()
 
 
-def test_flow_is_the_displacement_of_tracked_points(seen: list[tuple[Sighting, np.ndarray]]) -> None:
+def test_flow_is_the_displacement_of_tracked_points(
+    seen: list[tuple[Sighting, np.ndarray]],
+) -> None:
     (sighting, before), (later, after) = seen
     flow = passes_of(sighting, later, ("flow",))["flow"]
     found, row, column = nearest_points(sighting, before)
@@ -117,7 +136,14 @@ def test_flow_is_the_displacement_of_tracked_points(seen: list[tuple[Sighting, n
     error = np.linalg.norm(flow[row, column] - moved, axis=1)
     assert np.median(error) < 0.1
     # without the waves' share it would be off
-    still = Sighting(later.image, later.pose, later.positions, later.rotations, sighting.height_maps, later.meshes)
+    still = Sighting(
+        later.image,
+        later.pose,
+        later.positions,
+        later.rotations,
+        sighting.height_maps,
+        later.meshes,
+    )
     unwaved = np.linalg.norm(sighting.flow_to(still)[row, column] - moved, axis=1)
     assert np.median(unwaved) > 3 * np.median(error)
     ball = sighting.image.geom == BALL - 1
@@ -126,7 +152,9 @@ def test_flow_is_the_displacement_of_tracked_points(seen: list[tuple[Sighting, n
     assert (flow[sighting.image.geom < 0] == 0).all()
 
 
-def test_a_point_of_the_world_is_where_the_camera_projects_it(seen: list[tuple[Sighting, np.ndarray]]) -> None:
+def test_a_point_of_the_world_is_where_the_camera_projects_it(
+    seen: list[tuple[Sighting, np.ndarray]],
+) -> None:
     sighting = seen[0][0]
     column, row = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
     there = sighting.image.depth > 0

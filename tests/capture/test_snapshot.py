@@ -12,7 +12,9 @@ from ripple_sim.scene import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap
 
-POKE = '[[poke]]\ngeom = "egg"\ntime = 0.01\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
+POKE = (
+    '[[poke]]\ngeom = "egg"\ntime = 0.01\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
+)
 HITTING = '<body name="shot" pos="0 0 0.1005"><freejoint/><geom size="0.05" mass="0.1"/></body>'
 DOWN = '[[throw]]\nbody = "shot"\ntime = 0.0\nvelocity = [0, 0, -0.5]\n'
 
@@ -46,11 +48,14 @@ def test_only_as_many_snapshots_as_are_in_use_keep_their_bodies(make_scene) -> N
 
 def test_impulses_are_those_since_the_frame_before_and_none_is_told_twice(make_scene) -> None:
     scene = make_scene(bodies=HITTING, script=DOWN)
-    alone, told = Simulation(scene, fps=FPS, backend="cpu"), 0
+    alone = Simulation(scene, fps=FPS, backend="cpu")
+    told = 0
     for number, snapshot in enumerate(taken(scene, 3)):
         if number:
             alone.advance_frame()
-        assert [each.impulse for each in snapshot.impulses] == [each.impulse for each in alone.impulses]
+        assert [each.impulse for each in snapshot.impulses] == [
+            each.impulse for each in alone.impulses
+        ]
         told += len(snapshot.impulses)
     assert told > 0
     shared = taken(make_scene(bodies=HITTING, script=DOWN, shutter=180.0, exposures=4), 3)
@@ -59,12 +64,14 @@ def test_impulses_are_those_since_the_frame_before_and_none_is_told_twice(make_s
 
 def test_the_digest_is_the_same_for_the_same_state_and_tells_every_bit(make_scene) -> None:
     scene = make_scene(script=THROW + POKE)
-    one, same = taken(scene, 3), taken(scene, 3)
+    one = taken(scene, 3)
+    same = taken(scene, 3)
     assert [each.digest() for each in one] == [each.digest() for each in same]
     assert len({each.digest() for each in one}) == 3
     last = one[-1]
     for change in ("qpos", "qvel", "heights"):
-        data, heights = mujoco.MjData(scene.model), {name: each.copy() for name, each in last.heights.items()}
+        data = mujoco.MjData(scene.model)
+        heights = {name: each.copy() for name, each in last.heights.items()}
         mujoco.mj_copyData(data, scene.model, last.data)
         array = heights["egg"] if change == "heights" else getattr(data, change)
         copied = dataclasses.replace(last, data=data, heights=heights)
@@ -96,14 +103,20 @@ def test_exposures_of_a_camera():
 
 
 def test_states_within_a_step_are_interpolated_and_do_not_change_the_motion(make_scene):
-    poke = '[[poke]]\ngeom = "egg"\ntime = 0.02\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
+    poke = (
+        '[[poke]]\ngeom = "egg"\ntime = 0.02\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius '
+        "= 0.02\n"
+    )
     scene = make_scene(script=THROW + poke)
     whole, parts = (Simulation(scene, fps=FPS, backend="cpu") for _ in range(2))
-    steps, dt = whole.steps_per_frame, whole.model.opt.timestep
+    steps = whole.steps_per_frame
+    dt = whole.model.opt.timestep
     times = np.array([0, 0.5, 1, 1.25, steps - 0.5, steps])
     shutter_times = ShutterTimes(parts, times / steps)
     for number in range(3):
-        begin, start, heights = whole.data.time, whole.data.body("shot").xpos[1], [whole.ripples["egg"].height]
+        begin = whole.data.time
+        start = whole.data.body("shot").xpos[1]
+        heights = [whole.ripples["egg"].height]
         for _ in range(steps):
             whole.step()
             heights.append(whole.ripples["egg"].height)
@@ -111,9 +124,14 @@ def test_states_within_a_step_are_interpolated_and_do_not_change_the_motion(make
         for time, (data, shown) in zip(times, shutter_times, strict=True):
             assert data.time == pytest.approx(begin + time * dt, abs=1e-12)
             if number:  # in frame 0 it stands still until the first step
-                assert data.body("shot").xpos[1] == pytest.approx(start - SPEED * time * dt, abs=1e-9)
-            before, after = heights[int(np.floor(time))], heights[int(np.ceil(time))]
-            np.testing.assert_allclose(shown["egg"], before + (time % 1) * (after - before), rtol=1e-5, atol=1e-9)
+                assert data.body("shot").xpos[1] == pytest.approx(
+                    start - SPEED * time * dt, abs=1e-9
+                )
+            before = heights[int(np.floor(time))]
+            after = heights[int(np.ceil(time))]
+            np.testing.assert_allclose(
+                shown["egg"], before + (time % 1) * (after - before), rtol=1e-5, atol=1e-9
+            )
         parts.advance_frame()
         np.testing.assert_array_equal(parts.data.qpos, whole.data.qpos)
         np.testing.assert_array_equal(parts.ripples["egg"].height, whole.ripples["egg"].height)

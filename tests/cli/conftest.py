@@ -9,7 +9,11 @@ from ripple_sim.cli import main as cli
 
 
 @pytest.fixture(autouse=True)
-def _left_as_found(signals_as_found: None, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch):
+def _left_as_found(
+    signals_as_found: None,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+):
     """Keep the cache apart, and give the signals back."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
 

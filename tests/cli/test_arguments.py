@@ -38,8 +38,16 @@ def test_a_word_is_read(parse: str, word: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("parse", "words", "valid"),
     [
-        ("size", ["", "1280", "1280X720", "1280 x 720", "-1x5", "1.5x2", "1x2x3", "٣x٣", "1280x720\n"], "WIDTHxHEIGHT"),
-        ("count", ["0", "-1", "1.0", "", "ten", "1e3", "1000000000", "²"], "a whole number, 1 or more"),
+        (
+            "size",
+            ["", "1280", "1280X720", "1280 x 720", "-1x5", "1.5x2", "1x2x3", "٣x٣", "1280x720\n"],
+            "WIDTHxHEIGHT",
+        ),
+        (
+            "count",
+            ["0", "-1", "1.0", "", "ten", "1e3", "1000000000", "²"],
+            "a whole number, 1 or more",
+        ),
         ("seed", ["-1", "0.5", ""], "a whole number, 0 or more"),
         ("seconds", ["0", "-0.0", "-1", "nan", "inf", "1s", ""], "a positive number of seconds"),
         ("factor", ["0", "inf", "nan", "4x"], "a positive number, such as 4"),
@@ -49,7 +57,9 @@ def test_a_word_is_read(parse: str, word: str, value: object) -> None:
         ("axis", ["x", "Z", ""], "y or z"),
     ],
 )
-def test_what_is_not_valid_is_quoted_with_what_would_be(parse: str, words: list[str], valid: str) -> None:
+def test_what_is_not_valid_is_quoted_with_what_would_be(
+    parse: str, words: list[str], valid: str
+) -> None:
     for word in words:
         with pytest.raises(ValueError, match="valid") as refusal:
             getattr(arguments, f"parse_{parse}")(word)
@@ -96,7 +106,8 @@ def test_every_option_has_a_word_in_this_test() -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("option", WORDS)
 def test_an_option_changes_its_own_field_alone(command: str, option: str) -> None:
-    (name, kind), (word, value) = COMMANDS[command], WORDS[option]
+    (name, kind) = COMMANDS[command]
+    (word, value) = WORDS[option]
     flag = [f"--{option.replace('_', '-')}", *([] if word is None else [word])]
     made = parse([command, name, "-o", "clip.mp4", *flag])
     assert (type(made), made.output) == (kind, Path("clip.mp4"))
@@ -104,14 +115,35 @@ def test_an_option_changes_its_own_field_alone(command: str, option: str) -> Non
 
 
 def test_the_commands_have_their_own_arguments() -> None:
-    drop = parse(["drop", "m.obj", "-o", "a.mp4", "--bodies", "3", "--seed", "7", "--up", "y", "--repair", "--wrap"])
+    drop = parse(
+        [
+            "drop",
+            "m.obj",
+            "-o",
+            "a.mp4",
+            "--bodies",
+            "3",
+            "--seed",
+            "7",
+            "--up",
+            "y",
+            "--repair",
+            "--wrap",
+        ]
+    )
     assert (drop.mesh, drop.bodies, drop.seed, drop.up) == (Path("m.obj"), 3, 7, "y")
     assert drop.repair and drop.wrap
     render = parse(["render", "duck", "--output", "a.mp4", "--camera", "side", "--device", "1"])
     assert (render.scene, render.camera, render.device) == ("duck", "side", 1)
     view = parse(["view", "duck", "--bodies", "0", "--size", "320x200", "--web", "--port", "9000"])
     assert isinstance(view, ViewCommand)
-    assert (view.bodies, view.size, view.web, view.port, view.benchmark) == (0, (320, 200), True, 9000, False)
+    assert (view.bodies, view.size, view.web, view.port, view.benchmark) == (
+        0,
+        (320, 200),
+        True,
+        9000,
+        False,
+    )
     assert view.folder == Path()
 
 

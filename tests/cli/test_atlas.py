@@ -27,14 +27,18 @@ BALL = trimesh.creation.icosphere(subdivisions=2)
 def ball_file(tmp_path):
     """A ball of radius 2 with one triangle turned, one doubled and a vertex too many."""
     F = np.vstack([BALL.faces[:1, ::-1], BALL.faces[1:], BALL.faces[:1]])
-    trimesh.Trimesh(np.vstack([2 * BALL.vertices, [[9, 9, 9]]]), F, process=False).export(tmp_path / "ball.off")
+    trimesh.Trimesh(np.vstack([2 * BALL.vertices, [[9, 9, 9]]]), F, process=False).export(
+        tmp_path / "ball.off"
+    )
     return tmp_path / "ball.off"
 
 
 @pytest.fixture
 def open_file(tmp_path):
     """A ball without the triangles round a vertex."""
-    open_ball = trimesh.Trimesh(BALL.vertices, BALL.faces[(BALL.faces != 0).all(axis=1)], process=False)
+    open_ball = trimesh.Trimesh(
+        BALL.vertices, BALL.faces[(BALL.faces != 0).all(axis=1)], process=False
+    )
     open_ball.export(tmp_path / "open.off")
     return tmp_path / "open.off"
 
@@ -44,7 +48,12 @@ def told(capsys):
     """Run the command and return its report."""
 
     def run(path, *words, resolution=8):
-        assert cli.main(["atlas", str(path), "--resolution", str(resolution), "--json", *map(str, words)]) == 0
+        assert (
+            cli.main(
+                ["atlas", str(path), "--resolution", str(resolution), "--json", *map(str, words)]
+            )
+            == 0
+        )
         return json.loads(capsys.readouterr().out)
 
     return run
@@ -57,9 +66,14 @@ def test_json_tells_size_area_quality_seconds_and_what_was_mended(told, ball_fil
     np.testing.assert_allclose(report["size"], 4, rtol=0.02)
     assert report["area"] == pytest.approx(16 * np.pi, rel=0.03)
     assert report["volume"] == pytest.approx(32 / 3 * np.pi, rel=0.05)
-    notes = "1 unreferenced vertex dropped, 1 repeated triangle dropped, 1 triangle reversed (inconsistent winding)"
+    notes = (
+        "1 unreferenced vertex dropped, 1 repeated triangle dropped, 1 triangle reversed "
+        "(inconsistent winding)"
+    )
     assert report["notes"] == notes.split(", ")
-    assert {"flipped", "solid_angle", "q001", "q50", "q999", "starved", "coverage"} <= report["quality"].keys()
+    assert {"flipped", "solid_angle", "q001", "q50", "q999", "starved", "coverage"} <= report[
+        "quality"
+    ].keys()
     assert {"load", "sphere_map", "rays"} == report["seconds"].keys()
     assert {"load", "cache"} == told(ball_file)["seconds"].keys()
 
@@ -93,9 +107,15 @@ def test_a_picture_is_written_and_is_not_blank(coarse_pictures, tmp_path, told, 
 
 @pytest.mark.parametrize(
     ("path", "said"),
-    [("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"), ("atlas", "valid are"), ("no/atlas.png", "folder that exists")],
+    [
+        ("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"),
+        ("atlas", "valid are"),
+        ("no/atlas.png", "folder that exists"),
+    ],
 )
-def test_a_picture_without_a_place_is_refused_before_the_mesh_is_read(refusal, monkeypatch, tmp_path, path, said):
+def test_a_picture_without_a_place_is_refused_before_the_mesh_is_read(
+    refusal, monkeypatch, tmp_path, path, said
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mesh.obj").write_text("no mesh")
     assert re.search(said, refusal("atlas", "mesh.obj", "--plot", path))
@@ -110,32 +130,53 @@ def test_repair_closes_or_says_what_to_install(refusal, monkeypatch, open_file):
 
 def test_repair_says_what_it_did(told, open_file):
     pytest.importorskip("pymeshfix")
-    assert [note[:11] for note in told(open_file, "--repair")["notes"]] == ["1 unreferen", "hole closed"]
+    assert [note[:11] for note in told(open_file, "--repair")["notes"]] == [
+        "1 unreferen",
+        "hole closed",
+    ]
 
 
 def test_wrapped_balls_get_one_atlas_and_a_line_that_says_so(capsys, refusal, tmp_path):
-    trimesh.util.concatenate([BALL, BALL.copy().apply_translation([1, 0, 0])]).export(tmp_path / "balls.off")
+    trimesh.util.concatenate([BALL, BALL.copy().apply_translation([1, 0, 0])]).export(
+        tmp_path / "balls.off"
+    )
     command = ["atlas", str(tmp_path / "balls.off"), "--resolution", "8"]
     assert "2 separate parts" in refusal(*command, "--layout", "cube")
     assert cli.main([*command, "--wrap"]) == 0
-    line = r"^note +wrapped, 0\.045 m off: 2 parts in 1 closed surface with 0 handles, [\d,]+ triangles$"
+    line = (
+        r"^note +wrapped, 0\.045 m off: 2 parts in 1 closed surface with 0 handles, [\d,]+ "
+        r"triangles$"
+    )
     assert re.search(line, capsys.readouterr().out, re.MULTILINE)
 
 
 def test_an_open_mesh_gets_patches(told, open_file):
     report = told(open_file, resolution=32)
-    assert (report["layout"], report["method"], report["quality"]["flipped"]) == ("patches", None, 0)
+    assert (report["layout"], report["method"], report["quality"]["flipped"]) == (
+        "patches",
+        None,
+        0,
+    )
     charts, n, _ = report["charts"]
     assert charts * n * n == pytest.approx(6 * 32**2, rel=0.2)
 
 
-def test_the_thickness_over_what_is_inside_is_told_and_drawn(coarse_pictures, tmp_path, told, refusal, ball_file):
-    core, plot = tmp_path / "core.off", tmp_path / "thickness.png"
+def test_the_thickness_over_what_is_inside_is_told_and_drawn(
+    coarse_pictures, tmp_path, told, refusal, ball_file
+):
+    core = tmp_path / "core.off"
+    plot = tmp_path / "thickness.png"
     trimesh.creation.icosphere(subdivisions=3, radius=1.5).export(core)
     thickness = told(ball_file, "--inside", core, "--plot", plot)["thickness"]
     assert thickness["least"] <= thickness["median"] <= thickness["greatest"]
-    assert thickness["median"] == pytest.approx(0.5, rel=0.08)  # over a ball of radius 2 with flat sides
+    # over a ball of radius 2 with flat sides
+    assert thickness["median"] == pytest.approx(0.5, rel=0.08)
     pixels = np.asarray(Image.open(plot).convert("RGB"))
     assert pixels[200:900, 200:800].std() > 20
-    assert refusal("atlas", str(ball_file), "--inside", str(core), "--threshold", "3").count("takes no threshold") == 1
+    assert (
+        refusal("atlas", str(ball_file), "--inside", str(core), "--threshold", "3").count(
+            "takes no threshold"
+        )
+        == 1
+    )
     assert "--inside" in refusal("atlas", str(ball_file), "--threshold", "3")

@@ -16,9 +16,19 @@ def plan(tmp_path):
 def test_a_dry_run_tells_values_time_and_room_and_leaves_nothing(plan, capsys):
     assert main(["batch", str(plan), "--dry-run", "--workers", "4"]) == 0
     out = capsys.readouterr().out
-    assert [line.split(" (scene.toml, seed ")[0] for line in out.splitlines()[:3]] == ["scene 0", "scene 1", "scene 2"]
-    assert all(each in out for each in ("camera.azimuth = ", "5 scenes of 4 frames: ", "here by 4 workers"))
-    assert sorted(path.name for path in plan.parent.iterdir()) == ["plan.toml", "scene.toml", "scene.xml"]
+    assert [line.split(" (scene.toml, seed ")[0] for line in out.splitlines()[:3]] == [
+        "scene 0",
+        "scene 1",
+        "scene 2",
+    ]
+    assert all(
+        each in out for each in ("camera.azimuth = ", "5 scenes of 4 frames: ", "here by 4 workers")
+    )
+    assert sorted(path.name for path in plan.parent.iterdir()) == [
+        "plan.toml",
+        "scene.toml",
+        "scene.xml",
+    ]
 
 
 def test_the_status_is_told_from_the_folder(tmp_path, capsys):
@@ -31,11 +41,16 @@ def test_the_status_is_told_from_the_folder(tmp_path, capsys):
     ("options", "message"),
     [
         (["{plan}"], "add -o DIR"),
-        (["{plan}", "-o", "{folder}/out", "--shard", "5/4"], "'5/4' is not valid; it must be a part of how many"),
+        (
+            ["{plan}", "-o", "{folder}/out", "--shard", "5/4"],
+            "'5/4' is not valid; it must be a part of how many",
+        ),
         (["{folder}"], "it has no plan.json"),
         (["{folder}/lost.toml", "-o", "out"], "does not exist"),
     ],
     ids=["no folder", "shard", "no batch", "no plan"],
 )
 def test_what_is_wrong_is_told_in_a_line(plan, refusal, options, message):
-    assert message in refusal("batch", *(each.format(plan=plan, folder=plan.parent) for each in options))
+    assert message in refusal(
+        "batch", *(each.format(plan=plan, folder=plan.parent) for each in options)
+    )

@@ -45,21 +45,34 @@ def test_the_version_is_that_of_the_package(capsys):
         (["render", "duck", "-o", "x.mp4", "--resolution", "1.5"], "--resolution.*'1.5'"),
         (["render", "duck", "-o", "x.mp4", "--device", "gpu"], "--device.*'gpu'"),
         (["drop", "mesh.obj", "-o", "x.mp4", "--seed", "luck"], "--seed.*'luck'"),
-        (["atlas", "any.off", "--layout", "octahedron"], "'octahedron' is not valid; it must be auto, cube or patches"),
+        (
+            ["atlas", "any.off", "--layout", "octahedron"],
+            "'octahedron' is not valid; it must be auto, cube or patches",
+        ),
     ],
 )
 def test_a_usage_error_names_the_argument_and_the_help(refusal, argv, named):
     line = refusal(*argv)
     assert re.search(named, line)
-    assert line.rstrip().endswith(f"; see ripple-sim {argv[0]} --help" if len(argv) > 1 else "; see ripple-sim --help")
+    assert line.rstrip().endswith(
+        f"; see ripple-sim {argv[0]} --help" if len(argv) > 1 else "; see ripple-sim --help"
+    )
     assert line.isascii()
 
 
 def test_a_usage_error_reads_the_same_in_every_locale():
     words = ["render", "duck", "-o", "x.mp4", "--backend", "vulkan"]
-    result = ended("-m", "ripple_sim", *words, env={**os.environ, "PYTHONIOENCODING": "ascii", "FORCE_COLOR": "1"})
+    result = ended(
+        "-m",
+        "ripple_sim",
+        *words,
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "FORCE_COLOR": "1"},
+    )
     said = "invalid choice 'vulkan' for argument '--backend'. Expected one of ('auto', 'gl', 'cpu')"
-    assert (result.returncode, result.stderr) == (2, f"ripple-sim: {said}; see ripple-sim render --help\n")
+    assert (result.returncode, result.stderr) == (
+        2,
+        f"ripple-sim: {said}; see ripple-sim render --help\n",
+    )
 
 
 @pytest.mark.parametrize("command", ["render", "drop"])
@@ -74,7 +87,9 @@ def test_a_usage_error_reads_the_same_in_every_locale():
         (["-o", "clip.mp4", "--size", "0x0"], r"size is \(0, 0\); valid is"),
     ],
 )
-def test_a_bad_output_is_refused_before_the_scene_is_read(tmp_path, monkeypatch, refusal, command, options, said):
+def test_a_bad_output_is_refused_before_the_scene_is_read(
+    tmp_path, monkeypatch, refusal, command, options, said
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken").touch()
     assert re.search(said, refusal(command, "broken", *options))
@@ -82,7 +97,9 @@ def test_a_bad_output_is_refused_before_the_scene_is_read(tmp_path, monkeypatch,
 
 
 def test_a_folder_that_is_not_there_is_told_before_the_viewer_opens(refusal):
-    assert "there is no folder 'nowhere' for screenshots" in refusal("view", "sphere", "--folder", "nowhere")
+    assert "there is no folder 'nowhere' for screenshots" in refusal(
+        "view", "sphere", "--folder", "nowhere"
+    )
 
 
 def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypatch, capsys):
@@ -105,7 +122,9 @@ def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypat
     ],
     ids=lambda argv: argv[0],
 )
-def test_a_missing_input_is_told_before_what_the_machine_lacks(tmp_path, monkeypatch, refusal, argv):
+def test_a_missing_input_is_told_before_what_the_machine_lacks(
+    tmp_path, monkeypatch, refusal, argv
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
@@ -140,12 +159,15 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
 
 
 @pytest.mark.parametrize(
-    ("words", "need"), [("render duck -o x.mp4", 2.4), ("export duck -o x.usda", 3.0), ("atlas a.obj", 1.2)]
+    ("words", "need"),
+    [("render duck -o x.mp4", 2.4), ("export duck -o x.usda", 3.0), ("atlas a.obj", 1.2)],
 )
 def test_little_address_space_is_told_at_once_with_what_is_needed(tmp_path, words, need):
     """Later OpenBLAS, LLVM or Mesa run out of it, and end the process or blame something else."""
     code = f"ulimit -v 800000; {sys.executable} -m ripple_sim {words}"
-    result = subprocess.run(["bash", "--norc", "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False)
+    result = subprocess.run(
+        ["bash", "--norc", "-c", code], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
     limit = "the limit (ulimit -v) is 0.82 GB; allow more"
     assert result.stderr == f"ripple-sim: this needs {need} GB of address space, but {limit}\n"
     assert result.returncode == 1
@@ -164,11 +186,14 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
         (signal.SIGTERM, 143, "terminated", "reports.InfoCommand.run = meet_signal"),
     ],
 )
-def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
+def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(
+    tmp_path, number, status, word, where
+):
     (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\n")
     code = (
         "import signal, sys\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # which a job in the background has ignored
+        # which a job in the background has ignored
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from ripple_sim.cli import reports\n"
         "from ripple_sim.cli import main as cli\n"
         "def meet_signal(argument):\n"
@@ -221,7 +246,9 @@ LONG = "a" * 5000
         (["bench", LONG], "File name too long"),
     ],
 )
-def test_strange_words_are_refused_in_a_line(refusal, tmp_path, monkeypatch, tetrahedron, argv, named):
+def test_strange_words_are_refused_in_a_line(
+    refusal, tmp_path, monkeypatch, tetrahedron, argv, named
+):
     monkeypatch.chdir(tmp_path)
     assert named in refusal(*argv)
     assert list(tmp_path.iterdir()) == [tetrahedron]
@@ -236,5 +263,9 @@ def test_the_meshes_of_a_benchmark_are_read_before_anything_is_measured(refusal,
 def test_a_nul_in_a_scene_file_is_refused(refusal, tmp_path, name):
     text = {"model": "a.xml", "look": "rubber"} | {name: "a\\u0000b"}
     scene = tmp_path / "scene.toml"
-    scene.write_text(f'model = "{text["model"]}"\n[[ripple]]\ngeom = "g"\nlook = "{text["look"]}"\n')
-    assert "valid are names without a NUL" in refusal("render", str(scene), "-o", str(tmp_path / "x.mp4"))
+    scene.write_text(
+        f'model = "{text["model"]}"\n[[ripple]]\ngeom = "g"\nlook = "{text["look"]}"\n'
+    )
+    assert "valid are names without a NUL" in refusal(
+        "render", str(scene), "-o", str(tmp_path / "x.mp4")
+    )

@@ -16,9 +16,19 @@ SHEET = "v 0 0 0\nv 0.5 0 0\nv 1 0 0\nv 0 0 1\nv 0.5 0 1\nv 1 0 1\nf 1 4 5 2\nf 
 def test_a_sheet_fixed_at_its_rim_is_told_and_drawn(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(atlas_plot, "OVERSAMPLING", 1)
     monkeypatch.setattr(mode_plot, "_LARGEST", 64)
-    mesh, plot = tmp_path / "sheet.obj", tmp_path / "modes.png"
+    mesh = tmp_path / "sheet.obj"
+    plot = tmp_path / "modes.png"
     mesh.write_text(SHEET)
-    argv = ["modes", str(mesh), "--material", "membrane,tension=9,damping=0.5", "-n", "6", "--resolution", "8"]
+    argv = [
+        "modes",
+        str(mesh),
+        "--material",
+        "membrane,tension=9,damping=0.5",
+        "-n",
+        "6",
+        "--resolution",
+        "8",
+    ]
     assert cli.main([*argv, "--rim", "fixed", "--plot", str(plot), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     exact = np.sqrt([2, 5, 5, 8, 10, 10])
@@ -49,4 +59,6 @@ def test_what_is_wrong_is_told(refusal, tetrahedron, material, said):
     material, *more = material.split(" ")
     argv = ("modes", str(tetrahedron), "--material", material, "--resolution", "4", *more)
     assert said in refusal(*argv)
-    assert "the mesh itself" in refusal("modes", str(tetrahedron), "--material", "plate", "--plot", str(tetrahedron))
+    assert "the mesh itself" in refusal(
+        "modes", str(tetrahedron), "--material", "plate", "--plot", str(tetrahedron)
+    )

@@ -27,7 +27,11 @@ def write(path: Path, overwrite: bool = False, count: int = 2, **settings: str) 
 
 
 def tree(folder: Path) -> dict[str, bytes]:
-    return {str(each.relative_to(folder)): each.read_bytes() for each in folder.rglob("*") if each.is_file()}
+    return {
+        str(each.relative_to(folder)): each.read_bytes()
+        for each in folder.rglob("*")
+        if each.is_file()
+    }
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -66,7 +70,9 @@ def test_anothers_frames_are_replaced_only_when_told_to(tmp_path: Path) -> None:
     path.mkdir()
     Image.fromarray(FRAME).save(path / "frame_00000.png")
     before = tree(tmp_path)
-    with pytest.raises(VideoError, match=r"frames that were not made by ripple-sim \(frame_00000\.png\)"):
+    with pytest.raises(
+        VideoError, match=r"frames that were not made by ripple-sim \(frame_00000\.png\)"
+    ):
         write(path)
     assert tree(tmp_path) == before
     write(path, overwrite=True)
@@ -75,8 +81,11 @@ def test_anothers_frames_are_replaced_only_when_told_to(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("overwrite", [False, True])
 @pytest.mark.parametrize("kind", ["folder", "link"])
-def test_what_has_a_frames_name_and_is_no_file_is_never_deleted(tmp_path: Path, kind: str, overwrite: bool) -> None:
-    stranger, path = tmp_path / "thesis", tmp_path / "frames"
+def test_what_has_a_frames_name_and_is_no_file_is_never_deleted(
+    tmp_path: Path, kind: str, overwrite: bool
+) -> None:
+    stranger = tmp_path / "thesis"
+    path = tmp_path / "frames"
     (path if kind == "link" else path / "frame_00000.png").mkdir(parents=True)
     stranger.mkdir()
     if kind == "link":
@@ -112,9 +121,12 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["run.usda", "run.usdc", "run.csv"])
 def test_an_export_goes_through_no_link_to_another_ending(tmp_path: Path, name: str) -> None:
     link = tmp_path / name
-    for target in ("nowhere", "run.mp4"):  # USD would write it to a name of the ending's beside, and that was lost
+    # USD would write it to a name of the ending's beside, and that was lost
+    for target in ("nowhere", "run.mp4"):
         link.symlink_to(target)
-        with pytest.raises(ExportError, match=f"is a link to '{target}'; valid is a link to a name that ends in"):
+        with pytest.raises(
+            ExportError, match=f"is a link to '{target}'; valid is a link to a name that ends in"
+        ):
             check_export(link, True)
         link.unlink()
     link.symlink_to(f"real{link.suffix}")
@@ -131,7 +143,9 @@ def test_a_part_folder_that_is_a_link_is_left_alone(tmp_path: Path, overwrite: b
     assert tree(tmp_path / "thesis") == {"states.txt": b"mine"}
 
 
-@pytest.mark.parametrize("name", ["frames/photo.jpg", "frames/frame_00000.png", "frames/deep/a.txt", "settings.json"])
+@pytest.mark.parametrize(
+    "name", ["frames/photo.jpg", "frames/frame_00000.png", "frames/deep/a.txt", "settings.json"]
+)
 def test_strangers_in_a_part_folder_are_left_alone(tmp_path: Path, name: str) -> None:
     stranger = tmp_path / "clip.part" / name
     stranger.parent.mkdir(parents=True)
@@ -141,8 +155,11 @@ def test_strangers_in_a_part_folder_are_left_alone(tmp_path: Path, name: str) ->
     assert stranger.read_text() == "[1]"
 
 
-def test_an_atlas_never_takes_its_meshs_place(tmp_path: Path, refusal: Callable[..., str], tetrahedron: Path) -> None:
-    before, link = tetrahedron.read_bytes(), tmp_path / "link.npz"
+def test_an_atlas_never_takes_its_meshs_place(
+    tmp_path: Path, refusal: Callable[..., str], tetrahedron: Path
+) -> None:
+    before = tetrahedron.read_bytes()
+    link = tmp_path / "link.npz"
     link.symlink_to(tetrahedron)
     command = "atlas", str(tetrahedron)
     for output in (tetrahedron, link):
@@ -153,7 +170,9 @@ def test_an_atlas_never_takes_its_meshs_place(tmp_path: Path, refusal: Callable[
     assert "is no atlas" in refusal(*command, "-o", str(tmp_path / "notes.npz"))
     assert "--overwrite" in refusal(*command, "--plot", str(tmp_path / "photo.png"))
     assert tetrahedron.read_bytes() == before
-    assert {each.read_text() for each in (tmp_path / "notes.npz", tmp_path / "photo.png")} == {"mine"}
+    assert {each.read_text() for each in (tmp_path / "notes.npz", tmp_path / "photo.png")} == {
+        "mine"
+    }
 
 
 def test_an_atlas_replaces_an_older_one_and_goes_through_links(tmp_path: Path) -> None:
@@ -182,11 +201,17 @@ def test_an_atlas_replaces_an_older_one_and_goes_through_links(tmp_path: Path) -
         (".png", lambda path: check_plot_path(path, False)),
     ],
 )
-def test_names_that_cannot_be_are_refused_before_work_begins(tmp_path: Path, ending: str, check, kind: str):
-    path = tmp_path / (f"circle{ending}" if kind == "circle" else (250 - len(ending)) * "a" + ending)
+def test_names_that_cannot_be_are_refused_before_work_begins(
+    tmp_path: Path, ending: str, check, kind: str
+):
+    path = tmp_path / (
+        f"circle{ending}" if kind == "circle" else (250 - len(ending)) * "a" + ending
+    )
     if kind == "circle":
         path.symlink_to(path.name)
-    with pytest.raises(RippleError, match=r"File name too long|Too many levels of symbolic links") as refusal:
+    with pytest.raises(
+        RippleError, match=r"File name too long|Too many levels of symbolic links"
+    ) as refusal:
         check(path)
     assert isinstance(refusal.value, VideoError | ExportError | AtlasError)
 

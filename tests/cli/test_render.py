@@ -61,18 +61,23 @@ def test_a_terminal_shows_title_and_frames_done(monkeypatch: pytest.MonkeyPatch,
     with frame_progress("llvmpipe [red] (LLVM 15), waves cpu") as report:
         report(3, 120)
         report(60, 120)
-    assert all(each in told.getvalue() for each in ("llvmpipe [red] (LLVM 15), waves cpu", "60/120"))
+    assert all(
+        each in told.getvalue() for each in ("llvmpipe [red] (LLVM 15), waves cpu", "60/120")
+    )
     assert capsys.readouterr().out == ""
 
 
 def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
-    told, kernels = terminal(monkeypatch), "ripple_sim.solver.backends.kernels"
+    told = terminal(monkeypatch)
+    kernels = "ripple_sim.solver.backends.kernels"
     monkeypatch.setattr("ripple_sim.solver.kernel.compiling", lambda: kernels)
     times = {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0}
     monkeypatch.setattr("ripple_sim.solver.kernel.compile_times", lambda: times)
     with frame_progress("renderer", 120):
         pass
-    assert all(each in told.getvalue() for each in ("compiling the wave step (once): 12 s", "0/120"))
+    assert all(
+        each in told.getvalue() for each in ("compiling the wave step (once): 12 s", "0/120")
+    )
 
 
 def test_what_takes_long_is_logged_and_printed_as_a_line(monkeypatch, capsys, caplog) -> None:
@@ -87,7 +92,11 @@ def test_what_takes_long_is_logged_and_printed_as_a_line(monkeypatch, capsys, ca
     monkeypatch.setattr(reports.InfoCommand, "run", run)
     assert cli.main(["info"]) == 0
     atlas, compiling = capsys.readouterr().err.splitlines()
-    assert atlas == "ripple-sim: an atlas of resolution 1000 has about 6 million texels, which take 30 s or more"
+    assert atlas == (
+        "ripple-sim: an atlas of resolution 1000 has about 6 million texels, which take 30 s "
+        "or "
+        "more"
+    )
     assert compiling.startswith("ripple-sim: compiling for this machine, once")
     assert [record.levelname for record in caplog.records] == ["WARNING"] * 2
 
@@ -110,7 +119,9 @@ COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}; COMP_LINE='{line}'; COMP_POI
 "$2" ripple-sim '{words[-1]}' '{words[-2]}'
 printf '%s\\n' "${{COMPREPLY[@]}}"
 """
-    result = subprocess.run(["bash", "--norc", "-c", trial], capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        ["bash", "--norc", "-c", trial], capture_output=True, text=True, check=True
+    )
     return {word.strip() for word in result.stdout.split()}
 
 
@@ -136,7 +147,9 @@ def test_zsh_gets_a_script_of_its_own(capsys: pytest.CaptureFixture[str]) -> Non
     assert err == ""
 
 
-def test_every_material_is_listed_with_source_speed_and_decay(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_material_is_listed_with_source_speed_and_decay(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert cli.main(["materials", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert list(told) == list(PRESETS)
@@ -153,12 +166,18 @@ def test_every_material_is_listed_with_source_speed_and_decay(capsys: pytest.Cap
 
 @pytest.mark.parametrize("number", ["nan", "inf", "1e300"])
 @pytest.mark.parametrize("place", ["gravity", "size", "body"])
-def test_a_number_out_of_range_in_an_mjcf_is_one_line(refusal, tmp_path: Path, number: str, place: str) -> None:
+def test_a_number_out_of_range_in_an_mjcf_is_one_line(
+    refusal, tmp_path: Path, number: str, place: str
+) -> None:
     """Not MuJoCo's warning and ours, nor NumPy's of what they lead to."""
     numbers = {"gravity": "-9.81", "size": "0.3", "body": "0.7"} | {place: number}
     model = f"""<mujoco><option gravity="0 0 {numbers["gravity"]}"/><worldbody>
         <geom name="egg" type="ellipsoid" size="0.4 {numbers["size"]} 0.3"/>
         <body pos="0 0 {numbers["body"]}"><freejoint/><geom size="0.06"/></body></worldbody></mujoco>"""
-    scene = write_scene(tmp_path, model, 'model = "scene.xml"\n[[ripple]]\ngeom = "egg"\nresolution = 8\n')
+    scene = write_scene(
+        tmp_path, model, 'model = "scene.xml"\n[[ripple]]\ngeom = "egg"\nresolution = 8\n'
+    )
     message = refusal("render", str(scene), "-o", str(tmp_path / "o.mp4"), "--duration", "0.1")
-    assert re.search(r"(nan|inf|1e\+300).*valid are numbers up to 1e\+10|MuJoCo refuses .*nan", message)
+    assert re.search(
+        r"(nan|inf|1e\+300).*valid are numbers up to 1e\+10|MuJoCo refuses .*nan", message
+    )

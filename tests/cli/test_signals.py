@@ -24,8 +24,10 @@ ALL = [*BOTH, signal.SIGHUP]
 
 @pytest.fixture(autouse=True)
 def _no_timer() -> Iterator[None]:
-    handler, hook = signal.getsignal(signal.SIGALRM), sys.unraisablehook
-    # a shell in the background starts us with Ctrl-C ignored, and nohup with SIGHUP, which children would inherit
+    handler = signal.getsignal(signal.SIGALRM)
+    hook = sys.unraisablehook
+    # a shell in the background starts us with Ctrl-C ignored, and nohup with SIGHUP, which children
+    # would inherit
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
@@ -37,7 +39,9 @@ def _no_timer() -> Iterator[None]:
 
 def ended(program: str) -> tuple[int, str, str]:
     """Exit status and both outputs of a Python program."""
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
+    result = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False
+    )
     return result.returncode, result.stdout, result.stderr
 
 
@@ -67,11 +71,15 @@ def test_a_signal_that_the_parent_ignores_stays_ignored(number: int, take: objec
 
 def test_an_import_is_waited_for(tmp_path: Path) -> None:
     """An export that was interrupted while it imported its writer left a hidden folder behind."""
-    (tmp_path / "slow.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nprint('imported')\n")
+    (tmp_path / "slow.py").write_text(
+        "import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nprint('imported')\n"
+    )
     program = (
-        f"import sys, time\nsys.path.insert(0, {str(tmp_path)!r})\nfrom ripple_sim.cli import signals\n"
+        f"import sys, time\nsys.path.insert(0, {str(tmp_path)!r})\nfrom ripple_sim.cli import "
+        f"signals\n"
         "signals.end_in_good_order()\n"
-        "try:\n    import slow\n    for _ in range(500): time.sleep(0.01)\nfinally:\n    print('cleaned up')\n"
+        "try:\n    import slow\n    for _ in range(500): time.sleep(0.01)\nfinally:\n    "
+        "print('cleaned up')\n"
     )
     assert ended(program)[:2] == (128 + signal.SIGTERM, "imported\ncleaned up\n")
 
@@ -102,7 +110,10 @@ def test_after_the_command_while_the_interpreter_shuts_down_its_status_stands() 
 def within(module: str, number: int, function: str = "call") -> list[str]:
     """Send a signal while a function of a module is running; return what had happened when the exception came."""
     happened: list[str] = []
-    code = f"def {function}():\n os.kill(os.getpid(), number)\n time.sleep(0.1)\n happened.append('call ended')\n"
+    code = (
+        f"def {function}():\n os.kill(os.getpid(), number)\n time.sleep(0.1)\n "
+        f"happened.append('call ended')\n"
+    )
     names = {"__name__": module, "os": os, "time": time, "number": number, "happened": happened}
     exec(code, names)
     signals.end_in_good_order()
@@ -121,7 +132,8 @@ def test_no_exception_is_raised_within_a_call_of_moderngls_but_soon_after(number
     from pyvista.plotting import render_window_interactor
     from zarr.core import sync
 
-    # VTK calls back, kernels are compiled or loaded, threads would write on, Python swallows what a weak set's raise
+    # VTK calls back, kernels are compiled or loaded, threads would write on, Python swallows what a
+    # weak set's raise
     names = [each.__name__ for each in (moderngl, ffi, render_window_interactor, sync)]
     for name in (*names, WeakSet.__module__):
         assert within(name, number) == ["call ended"]
@@ -144,7 +156,8 @@ def test_what_a_finalizer_swallows_comes_again() -> None:
 def test_a_second_signal_ends_the_process_while_the_first_is_cleaned_up() -> None:
     program = (
         "import signal, time\nfrom ripple_sim.cli import signals\nsignals.end_in_good_order()\n"
-        "try:\n    signal.raise_signal(signal.SIGTERM)\nfinally:\n    signal.raise_signal(signal.SIGINT)\n"
+        "try:\n    signal.raise_signal(signal.SIGTERM)\nfinally:\n    "
+        "signal.raise_signal(signal.SIGINT)\n"
         "    print('cleaned up')\n"
     )
     status, _, err = ended(program)
@@ -152,25 +165,41 @@ def test_a_second_signal_ends_the_process_while_the_first_is_cleaned_up() -> Non
     assert (status, err) in ((130, "ripple-sim: interrupted\n"), (143, ""))
 
 
-def run(folder: Path, words: str, redirections: str = "", **environment: str | None) -> subprocess.CompletedProcess:
+def run(
+    folder: Path, words: str, redirections: str = "", **environment: str | None
+) -> subprocess.CompletedProcess:
     """The program in a shell."""
     command = f"{sys.executable} -m ripple_sim {words} {redirections}"
-    env = {name: value for name, value in {**os.environ, **environment}.items() if value is not None}
+    env = {
+        name: value for name, value in {**os.environ, **environment}.items() if value is not None
+    }
     words = ["sh", "-c", command]
-    return subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, timeout=600, check=False)
+    return subprocess.run(
+        words, cwd=folder, env=env, capture_output=True, text=True, timeout=600, check=False
+    )
 
 
 @pytest.mark.parametrize(
     ("words", "redirections", "status"),
-    [("fly", ">&- 2>&-", 2), ("fly", "2>/dev/full", 2), ("completion bash", ">&-", 0), ("--help", "| head -c 0", 0)],
+    [
+        ("fly", ">&- 2>&-", 2),
+        ("fly", "2>/dev/full", 2),
+        ("completion bash", ">&-", 0),
+        ("--help", "| head -c 0", 0),
+    ],
 )
-def test_closed_and_full_streams(tmp_path: Path, words: str, redirections: str, status: int) -> None:
+def test_closed_and_full_streams(
+    tmp_path: Path, words: str, redirections: str, status: int
+) -> None:
     result = run(tmp_path, words, redirections)
     assert (result.returncode, result.stdout, result.stderr) == (status, "", "")
 
 
-def test_without_streams_home_and_cache_an_atlas_is_whole(tmp_path: Path, tetrahedron: Path) -> None:
-    words, cache = f"atlas {tetrahedron} --resolution 4 -o mesh.npz", "/dev/null"
+def test_without_streams_home_and_cache_an_atlas_is_whole(
+    tmp_path: Path, tetrahedron: Path
+) -> None:
+    words = f"atlas {tetrahedron} --resolution 4 -o mesh.npz"
+    cache = "/dev/null"
     result = run(tmp_path, words, "<&- >&- 2>&-", HOME=None, XDG_CACHE_HOME=cache)
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
     assert load_atlas(tmp_path / "mesh.npz").resolution == 4
@@ -183,6 +212,9 @@ def test_a_full_disk_is_no_bad_input(tmp_path, monkeypatch, capsys, tetrahedron)
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(atlas, "write_arrays", full)
-    assert cli.main(["atlas", str(tetrahedron), "--resolution", "4", "-o", str(tmp_path / "a.npz")]) == 1
+    assert (
+        cli.main(["atlas", str(tetrahedron), "--resolution", "4", "-o", str(tmp_path / "a.npz")])
+        == 1
+    )
     assert capsys.readouterr().err.endswith("a.npz' cannot be written: No space left on device\n")
     assert list(tmp_path.iterdir()) == [tetrahedron]

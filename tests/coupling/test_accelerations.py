@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 
-# bodies on rails that are joined like this have a Hessian with neighbouring rows that look alike and are not
+# bodies on rails that are joined like this have a Hessian with neighbouring rows that look alike
+# and are not
 JOINED = ((3, 2), (4, 0), (4, 1), (5, 2), (6, 0), (6, 1), (6, 4), (6, 5))
 MODEL = f"""<mujoco><option iterations="200" tolerance="0"/><worldbody>
 {
@@ -12,12 +13,15 @@ MODEL = f"""<mujoco><option iterations="200" tolerance="0"/><worldbody>
         for i in range(7)
     )
 }</worldbody><equality>
-{"".join(f'<connect body1="{a}" body2="{b}" anchor=".5 0 0"/>' for a, b in JOINED)}</equality></mujoco>"""
+{
+    "".join(f'<connect body1="{a}" body2="{b}" anchor=".5 0 0"/>' for a, b in JOINED)
+}</equality></mujoco>"""
 
 
 def test_sparse_and_dense_jacobians_give_the_same_accelerations() -> None:
     """MuJoCo 4.0.0 merges rows of the sparse Cholesky factor that differ, and is wrong by as much as the answer."""
-    model, velocity = mujoco.MjModel.from_xml_string(MODEL), np.random.default_rng(0).normal(size=7)
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    velocity = np.random.default_rng(0).normal(size=7)
     accelerations = []
     for model.opt.jacobian in (mujoco.mjtJacobian.mjJAC_DENSE, mujoco.mjtJacobian.mjJAC_SPARSE):
         data = mujoco.MjData(model)

@@ -34,7 +34,9 @@ def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
         make_collidable(spec, "target", route)
         add_ball(spec, "ball", [0, 0, 0.35], size=[0.02, 0, 0])
         data = mujoco.MjData(model := spec.compile())
-        while data.time < 2 and not any(contact.dist < contact.includemargin for contact in data.contact):
+        while data.time < 2 and not any(
+            contact.dist < contact.includemargin for contact in data.contact
+        ):
             mujoco.mj_step(model, data)
         heights[route] = data.body("ball").xpos[2] - 0.02
     assert heights == pytest.approx({"sdf": waist, "flex": waist, "hull": V[:, 2].max()}, abs=0.012)
@@ -42,7 +44,9 @@ def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
 
 
 @pytest.mark.parametrize(("solref", "restitution"), [([0.02, 1.0], 0.13), ([-40000.0, -90.0], 0.5)])
-def test_routes_agree_where_the_hull_is_the_surface(solref: list[float], restitution: float) -> None:
+def test_routes_agree_where_the_hull_is_the_surface(
+    solref: list[float], restitution: float
+) -> None:
     V, F = peanut(0.05)
     for route in ("sdf", "flex", "hull"):
         spec = spec_of(0.3 * V / np.linalg.norm(V, axis=1, keepdims=True), F)
@@ -53,7 +57,9 @@ def test_routes_agree_where_the_hull_is_the_surface(solref: list[float], restitu
         run = Run(spec, "target", resolution=8, conserve_volume=True)
         run.data.qvel[2] = -1.5
         given = run.until(0.3).given()
-        assert given == pytest.approx(0.1 * np.linalg.norm(run.data.qvel[:3] - [0, 0, -1.5]), rel=0.03)
+        assert given == pytest.approx(
+            0.1 * np.linalg.norm(run.data.qvel[:3] - [0, 0, -1.5]), rel=0.03
+        )
         assert run.data.qvel[2] / 1.5 == pytest.approx(restitution, abs=0.1)
 
 
@@ -67,7 +73,14 @@ def test_a_route_that_fails_leaves_the_earlier_one(earlier: str, route: str) -> 
     geom = spec.geom("target")
 
     def state() -> tuple[int, ...]:
-        return geom.type, geom.contype, geom.conaffinity, spec.option.enableflags, len(spec.flexes), len(spec.geoms)
+        return (
+            geom.type,
+            geom.contype,
+            geom.conaffinity,
+            spec.option.enableflags,
+            len(spec.flexes),
+            len(spec.geoms),
+        )
 
     before = state()
     with pytest.raises(SceneError):
@@ -92,8 +105,12 @@ def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:
         make_collidable(spec_of(*peanut(0.05)), geom, route)
 
 
-@pytest.mark.parametrize(("mesh", "before", "points"), [(False, None, 10), (False, 6, 6), (True, None, 50)])
-def test_starting_points_are_never_raised_and_mujoco_has_room_for_their_contacts(mesh, before, points) -> None:
+@pytest.mark.parametrize(
+    ("mesh", "before", "points"), [(False, None, 10), (False, 6, 6), (True, None, 50)]
+)
+def test_starting_points_are_never_raised_and_mujoco_has_room_for_their_contacts(
+    mesh, before, points
+) -> None:
     spec = mesh_spec(limbed(0.1), route=None)
     spec.option.sdf_initpoints = before or spec.option.sdf_initpoints
     body = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "shape"} if mesh else {}
@@ -105,7 +122,9 @@ def test_starting_points_are_never_raised_and_mujoco_has_room_for_their_contacts
 GEOM = mujoco.mjtGeom
 
 
-def solid(extents: tuple[float, float, float], fineness: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
+def solid(
+    extents: tuple[float, float, float], fineness: float = 2.0
+) -> tuple[np.ndarray, np.ndarray]:
     box = trimesh.creation.box(extents=extents)
     return trimesh.remesh.subdivide_to_size(box.vertices, box.faces, fineness)
 
@@ -141,15 +160,32 @@ def test_sides_of_a_thin_part_do_not_change_places() -> None:
 
 
 def test_geom_keeps_its_mass_and_gives_its_contacts_to_the_flex() -> None:
-    contact = {"contype": 2, "conaffinity": 5, "condim": 4, "priority": 1, "solref": [-900.0, -20.0], "solmix": 0.5}
-    contact |= {"friction": [0.3, 0.02, 0.01], "solimp": [0.8, 0.9, 0.01, 0.4, 3.0], "margin": 0.001, "gap": 0.0}
-    models = {route: mesh_spec(peanut(0.05), "free", route, **contact).compile() for route in ("sdf", "flex")}
+    contact = {
+        "contype": 2,
+        "conaffinity": 5,
+        "condim": 4,
+        "priority": 1,
+        "solref": [-900.0, -20.0],
+        "solmix": 0.5,
+    }
+    contact |= {
+        "friction": [0.3, 0.02, 0.01],
+        "solimp": [0.8, 0.9, 0.01, 0.4, 3.0],
+        "margin": 0.001,
+        "gap": 0.0,
+    }
+    models = {
+        route: mesh_spec(peanut(0.05), "free", route, **contact).compile()
+        for route in ("sdf", "flex")
+    }
     flex = models["flex"]
     np.testing.assert_allclose(flex.body_inertia, models["sdf"].body_inertia, rtol=1e-6)
     assert flex.geom("target").contype == flex.geom("target").conaffinity == 0
     for name in set(contact) - {"margin"}:
         np.testing.assert_allclose(getattr(flex, f"flex_{name}")[0], contact[name])
-    assert flex_thickness(flex, 0) == pytest.approx(0.001 + 0.05 * np.ptp(flex.mesh_vert, axis=0).max())
+    assert flex_thickness(flex, 0) == pytest.approx(
+        0.001 + 0.05 * np.ptp(flex.mesh_vert, axis=0).max()
+    )
 
 
 def test_bodies_and_worlds_without_a_name_will_do() -> None:
@@ -174,13 +210,16 @@ def test_flex_that_cannot_be_made_is_refused() -> None:
         make_collidable(spec, "target", "flex")
 
 
-MASS, SPEED = 0.2, 1.5
+MASS = 0.2
+SPEED = 1.5
 
 
 def bowl() -> tuple[np.ndarray, np.ndarray]:
     """Lower half of a ball of 0.5 m."""
     ball = sphere((0.0, 0.0, 0.0), 0.5)
-    return opened(ball, *polygonise(ball, ((-0.6,) * 3, (0.6,) * 3), 0.08), (0, 0, 0), (0, 0, 1), 0.08)
+    return opened(
+        ball, *polygonise(ball, ((-0.6,) * 3, (0.6,) * 3), 0.08), (0, 0, 0), (0, 0, 1), 0.08
+    )
 
 
 def test_an_open_mesh_collides_through_a_flex_and_a_closed_one_as_a_distance() -> None:
@@ -190,10 +229,15 @@ def test_an_open_mesh_collides_through_a_flex_and_a_closed_one_as_a_distance() -
 
 @pytest.mark.parametrize("inside", [True, False])
 def test_a_ball_gives_a_sheet_the_momentum_that_it_loses_on_either_side(inside: bool) -> None:
-    (V, F), spec, way = bowl(), mujoco.MjSpec(), np.array([0.48, 0.36, -0.8])
-    spec.option.gravity, spec.option.timestep = [0, 0, 0], 0.0005
+    (V, F) = bowl()
+    spec = mujoco.MjSpec()
+    way = np.array([0.48, 0.36, -0.8])
+    spec.option.gravity = [0, 0, 0]
+    spec.option.timestep = 0.0005
     spec.add_mesh(name="bowl", uservert=V.ravel(), userface=F.ravel())
-    spec.worldbody.add_geom(name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="bowl", solref=[0.01, 0.4])
+    spec.worldbody.add_geom(
+        name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="bowl", solref=[0.01, 0.4]
+    )
     make_collidable(spec, "target")
     add_ball(spec, "ball", ((0.3 if inside else 0.7) * way).tolist(), solref=[0.01, 0.4], mass=MASS)
     run = Run(spec, "target", resolution=24)

@@ -25,7 +25,9 @@ def plate() -> Atlas:
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize("height", [-0.2, -0.04, 0.0, 0.04, 0.2])
-def test_contact_with_a_thin_part_is_placed_on_its_own_side(plate: Atlas, side: float, height: float) -> None:
+def test_contact_with_a_thin_part_is_placed_on_its_own_side(
+    plate: Atlas, side: float, height: float
+) -> None:
     rng = np.random.default_rng(3)
     points = np.column_stack([rng.uniform(-0.35, 0.35, (20, 2)), np.full(20, height)])
     normals = np.tile([0.0, 0.0, side], (20, 1))
@@ -39,12 +41,15 @@ def test_contact_with_a_thin_part_is_placed_on_its_own_side(plate: Atlas, side: 
 
 def test_point_is_the_nearest_of_all_that_face_the_contact(animal: Atlas) -> None:
     rng = np.random.default_rng(4)
-    positions, outward = animal.positions.reshape(-1, 3), animal.normals.reshape(-1, 3)
+    positions = animal.positions.reshape(-1, 3)
+    outward = animal.normals.reshape(-1, 3)
     points = rng.choice(positions, 60) + rng.normal(0, 0.03, (60, 3))
     normals = rng.standard_normal((60, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     texel = np.sqrt(animal.areas.max())
-    for point, normal, place in zip(points, normals, places_facing(animal, points, normals), strict=True):
+    for point, normal, place in zip(
+        points, normals, places_facing(animal, points, normals), strict=True
+    ):
         [there] = animal.nearest_texel(place)
         assert outward[there] @ normal > 0
         least = np.linalg.norm(positions[outward @ normal > 0.25] - point, axis=1).min()
@@ -62,7 +67,9 @@ MASS = 0.3
 SEEN = 'contype="0" conaffinity="0" group="2"'
 
 
-def play(model: mujoco.MjModel, targets: tuple[str, ...], seconds: float = 0.3, **options: object) -> tuple:
+def play(
+    model: mujoco.MjModel, targets: tuple[str, ...], seconds: float = 0.3, **options: object
+) -> tuple:
     """The run, and the momentum that the ball lost [N s]."""
     run = Run(model, *targets, resolution=24, **options).until(seconds)
     velocity = run.data.qvel[model.body("ball").dofadr[0] :][:3]
@@ -74,20 +81,32 @@ def slab(offset: float, body: str = "") -> mujoco.MjModel:
     solid = trimesh.creation.box(extents=(1, 1, 0.1)).subdivide_to_size(0.1)
     link = f"""<body name="link">{body}<geom name="plate" type="mesh" mesh="plate" mass="3" {SEEN}/>
         <geom name="core" type="box" size="0.5 0.5 0.005" pos="0 0 {offset}" mass="0" group="3"/></body>"""
-    return model_of(link + BALL.format(f"0.13 -0.07 {offset + 0.2}"), mesh_asset("plate", solid.vertices, solid.faces))
+    return model_of(
+        link + BALL.format(f"0.13 -0.07 {offset + 0.2}"),
+        mesh_asset("plate", solid.vertices, solid.faces),
+    )
 
 
 @pytest.mark.parametrize("offset", [-0.03, 0.0, 0.03])
-def test_visible_plate_is_loaded_on_the_side_that_is_hit_with_all_that_the_ball_loses(offset: float) -> None:
-    """The lower side is nearer to a core that lies low. Nothing was given to a geom that does not collide itself."""
+def test_visible_plate_is_loaded_on_the_side_that_is_hit_with_all_that_the_ball_loses(
+    offset: float,
+) -> None:
+    """The lower side is nearer to a core that lies low.
+
+    Nothing was given to a geom that does not collide itself.
+    """
     run, lost = play(slab(offset), ("plate",))
     assert lost > 0.5
     assert run.given() == pytest.approx(lost, rel=0.01)
     assert -run.ripples["plate"].momentum() == pytest.approx(run.given(), rel=1e-4)
     assert run.pairs == {("plate", "ball")}
-    points = np.array([hit.point for hits in run.hits for hit in hits]) - run.data.geom("plate").xpos
+    points = (
+        np.array([hit.point for hits in run.hits for hit in hits]) - run.data.geom("plate").xpos
+    )
     texel = np.sqrt(run.ripples["plate"].atlas.areas.max())
-    np.testing.assert_allclose(points[:, :2], np.tile([0.13, -0.07], (len(points), 1)), atol=1.5 * texel)
+    np.testing.assert_allclose(
+        points[:, :2], np.tile([0.13, -0.07], (len(points), 1)), atol=1.5 * texel
+    )
     np.testing.assert_allclose(points[:, 2], 0.05, atol=1e-9)
 
 
@@ -210,16 +229,27 @@ LINK = '<body name="link">{}</body>' + BALL.format("0 0 2")
 @pytest.mark.parametrize(
     ("link", "target", "message"),
     [
-        (f'<geom name="shell" size="0.3" {SEEN}/>', Target(), r"does not collide .*Target\(contacts=\[\.\.\.\]\)"),
+        (
+            f'<geom name="shell" size="0.3" {SEEN}/>',
+            Target(),
+            r"does not collide .*Target\(contacts=\[\.\.\.\]\)",
+        ),
         (
             '<geom name="shell" size="0.3" contype="4" conaffinity="4"/>',
             Target(),
             "'shell' has contype 4 and conaffinity 4",
         ),
         (
-            f'<geom name="shell" size="0.3" {SEEN}/><geom name="core" size="0.29" contype="0" conaffinity="2"/>',
+            (
+                f'<geom name="shell" size="0.3" {SEEN}/><geom name="core" size="0.29" contype="0" '
+                f'conaffinity="2"/>'
+            ),
             Target(),
-            "nothing can touch geom 'shell': 'core' has contype 0 and conaffinity 2, which match no geom",
+            (
+                "nothing can touch geom 'shell': 'core' has contype 0 and conaffinity 2, which "
+                "match "
+                "no geom"
+            ),
         ),
         (
             f'<geom name="shell" size="0.3" {SEEN}/><geom size="0.3"/>',
@@ -252,13 +282,20 @@ def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: float | N
     target = Target(contacts=["core"] if "plane" in core or "hfield" in core else None)
     with warnings.catch_warnings(record=True, action="always") as caught:
         Ripples(model, {"shell": target}, resolution=16, backend="cpu")
-    told = [re.search(r"'shell' collides as 'core'.*up to ([\d.]+) m", str(each.message)) for each in caught]
-    assert [float(each[1]) for each in told] == ([] if gap is None else [pytest.approx(gap, rel=0.05)])
+    told = [
+        re.search(r"'shell' collides as 'core'.*up to ([\d.]+) m", str(each.message))
+        for each in caught
+    ]
+    assert [float(each[1]) for each in told] == (
+        [] if gap is None else [pytest.approx(gap, rel=0.05)]
+    )
 
 
 def test_sdf_geoms_that_height_fields_let_through_are_warned_of() -> None:
     spec = mesh_spec(peanut(0.06), "free", "sdf")
     spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 0.1, 0.1], userdata=[0, 1, 1, 0])
     spec.worldbody.add_geom(name="hills", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="hills")
-    with pytest.warns(RippleWarning, match=r"SDF geom 'target' with height fields \('hills'\).*\"flex\""):
+    with pytest.warns(
+        RippleWarning, match=r"SDF geom 'target' with height fields \('hills'\).*\"flex\""
+    ):
         Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")

@@ -10,7 +10,11 @@ from mujoco_models import BALL, mesh_asset, model_of
 from ripple_sim import make_collidable
 from ripple_sim.coupling import ContactReader, Contacts, CoupledModel, first_rows, target_atlas
 
-SHAPES = ('type="box" size="0.2 0.2 0.1"', 'type="sphere" size="0.15"', 'type="capsule" size="0.08 0.1"')
+SHAPES = (
+    'type="box" size="0.2 0.2 0.1"',
+    'type="sphere" size="0.15"',
+    'type="capsule" size="0.08 0.1"',
+)
 
 
 def pit(seed: int, cone: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -25,7 +29,9 @@ def pit(seed: int, cone: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
         for i, (x, y) in enumerate(rng.uniform(-0.1, 0.1, (8, 2)))
     )
     option = f'<option timestep="0.002" cone="{cone}"/>'
-    model = mujoco.MjModel.from_xml_string(f"<mujoco>{option}<worldbody>{walls}{bodies}</worldbody></mujoco>")
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco>{option}<worldbody>{walls}{bodies}</worldbody></mujoco>"
+    )
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, nstep=400)
     return model, data
@@ -33,7 +39,9 @@ def pit(seed: int, cone: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
 @pytest.mark.parametrize("seed", range(3))
-def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(cone: str, seed: int) -> None:
+def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(
+    cone: str, seed: int
+) -> None:
     model, data = pit(seed, cone)
     is_target = np.zeros(model.ngeom, dtype=bool)
     is_target[[5, 6, 8, 9, 11]] = True
@@ -45,7 +53,9 @@ def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(con
         for target, other, sign in ((*contact.geom, 1.0), (*contact.geom[::-1], -1.0)):
             if is_target[target] and wrench[0] > 0:
                 of_target = expected.setdefault(int(target), {})
-                of_target.setdefault(int(other), []).append((wrench[0], sign * contact.frame[:3], contact.pos))
+                of_target.setdefault(int(other), []).append(
+                    (wrench[0], sign * contact.frame[:3], contact.pos)
+                )
     assert list(found) == sorted(expected), "targets stand in ascending order"
     assert sum(len(others) for others in expected.values()) > 6
     for target, others in expected.items():
@@ -94,7 +104,9 @@ def slab_and_table(bodies: str, slab: str = "") -> mujoco.MjModel:
 
 def reader_of(model: mujoco.MjModel, *targets: str | int) -> ContactReader:
     geoms = [model.geom(name).id for name in targets]
-    return ContactReader(CoupledModel(model), {geom: target_atlas(model, geom, 8) for geom in geoms})
+    return ContactReader(
+        CoupledModel(model), {geom: target_atlas(model, geom, 8) for geom in geoms}
+    )
 
 
 def after(model: mujoco.MjModel, steps: int) -> mujoco.MjData:
@@ -110,7 +122,9 @@ def push_on_target(contacts: Contacts) -> np.ndarray:
 def test_a_body_at_rest_on_a_flex_and_a_geom_weighs_on_both_what_it_weighs() -> None:
     model = slab_and_table(PLANK)
     slab, table, plank = (model.geom(name).id for name in ("slab", "table", "plank"))
-    reader, data, push = reader_of(model, "slab", "table"), after(model, 600), np.zeros(3)
+    reader = reader_of(model, "slab", "table")
+    data = after(model, 600)
+    push = np.zeros(3)
     found = reader.read(data)
     assert sorted(found) == sorted((slab, table))
     for contacts in found.values():
@@ -124,17 +138,23 @@ def test_a_body_at_rest_on_a_flex_and_a_geom_weighs_on_both_what_it_weighs() -> 
 def test_a_flex_that_does_not_ripple_goes_by_its_geom() -> None:
     model = slab_and_table("", slab='pos="0.6 0 0.41"')
     [(target, contacts)] = reader_of(model, "table").read(after(model, 600)).items()
-    assert (target, set(contacts.others.tolist())) == (model.geom("table").id, {model.geom("slab").id})
+    assert (target, set(contacts.others.tolist())) == (
+        model.geom("table").id,
+        {model.geom("slab").id},
+    )
     np.testing.assert_allclose(push_on_target(contacts), [0, 0, -3 * 9.81], atol=0.05)
 
 
-SECONDS, WEIGHT = 0.4, 9.81
+SECONDS = 0.4
+WEIGHT = 9.81
 
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
 @pytest.mark.parametrize("sticky", ["geom", "actuator", "both"])
 @pytest.mark.parametrize("side", [1, -1], ids=["above", "below"])
-def test_a_sticky_ball_gives_the_target_its_weight_and_no_more(cone: str, sticky: str, side: int) -> None:
+def test_a_sticky_ball_gives_the_target_its_weight_and_no_more(
+    cone: str, sticky: str, side: int
+) -> None:
     adhesion = 'adhesion="20"' if sticky != "actuator" else ""
     actuator = '<adhesion body="ball" ctrlrange="0 1" gain="30"/>' if sticky != "geom" else ""
     model = mujoco.MjModel.from_xml_string(
@@ -146,7 +166,9 @@ def test_a_sticky_ball_gives_the_target_its_weight_and_no_more(cone: str, sticky
     run = Run(model, "target", resolution=8)
     run.data.ctrl[:] = 1.0
     given = run.until(SECONDS).given()
-    assert abs(run.data.body("ball").xpos[2]) == pytest.approx(0.55, abs=2e-3), "the ball stays where it is"
+    assert abs(run.data.body("ball").xpos[2]) == pytest.approx(0.55, abs=2e-3), (
+        "the ball stays where it is"
+    )
     lost = (run.data.qvel[2] + WEIGHT * SECONDS) * model.body("ball").mass[0]
     assert given == pytest.approx(side * WEIGHT * SECONDS, rel=0.01)
     assert given == pytest.approx(side * abs(lost), rel=1e-3)

@@ -28,7 +28,9 @@ def ell() -> tuple[np.ndarray, np.ndarray]:
     return solid.subdivide_to_size(0.1).vertices, solid.subdivide_to_size(0.1).faces
 
 
-def test_parts_fill_the_solid_are_the_same_each_time_and_come_from_the_cache(tmp_path, monkeypatch) -> None:
+def test_parts_fill_the_solid_are_the_same_each_time_and_come_from_the_cache(
+    tmp_path, monkeypatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     mesh = Mesh.from_arrays(*ell())
     first = convex_parts(mesh)
@@ -52,12 +54,20 @@ def test_a_missing_package_is_named_with_the_way_to_install_it(monkeypatch) -> N
         raise importlib.metadata.PackageNotFoundError
 
     monkeypatch.setattr(colliders.importlib.metadata, "version", missing)
-    with pytest.raises(RippleError, match=r"needs coacd.*pip install 'ripple-sim\[convex\]'.*'sdf'"):
+    with pytest.raises(
+        RippleError, match=r"needs coacd.*pip install 'ripple-sim\[convex\]'.*'sdf'"
+    ):
         make_collidable(mesh_spec(WAIST, route=None), "target", "convex")
 
 
 def test_the_geom_keeps_mass_and_looks_and_its_parts_collide_like_it() -> None:
-    settings = {"friction": [0.3, 0.01, 0.001], "solref": [0.015, 0.7], "condim": 4, "contype": 3, "conaffinity": 5}
+    settings = {
+        "friction": [0.3, 0.01, 0.001],
+        "solref": [0.015, 0.7],
+        "condim": 4,
+        "contype": 3,
+        "conaffinity": 5,
+    }
     plain = mesh_spec(WAIST, "free", None, **settings).compile()
     model = mesh_spec(WAIST, "free", "convex", **settings).compile()
     coupled = CoupledModel(model)
@@ -69,7 +79,9 @@ def test_the_geom_keeps_mass_and_looks_and_its_parts_collide_like_it() -> None:
         np.testing.assert_array_equal(getattr(model, each)[body], getattr(plain, each)[body])
     assert model.geom_contype[geom] == model.geom_conaffinity[geom] == 0
     for name, value in settings.items():
-        np.testing.assert_allclose(getattr(model, f"geom_{name}")[parts], np.tile(value, (len(parts), 1)).squeeze())
+        np.testing.assert_allclose(
+            getattr(model, f"geom_{name}")[parts], np.tile(value, (len(parts), 1)).squeeze()
+        )
     assert (model.geom_group[parts] == 3).all(), "a group that is not drawn"
     assert not coupled.convex[geom]
 
@@ -90,30 +102,43 @@ def test_another_route_undoes_this_one(earlier: str, route: str) -> None:
 
 
 @pytest.mark.parametrize("joint", [None, "free"])
-def test_balls_are_felt_where_they_hit_the_visible_surface_with_what_they_lose(joint: str | None) -> None:
+def test_balls_are_felt_where_they_hit_the_visible_surface_with_what_they_lose(
+    joint: str | None,
+) -> None:
     spec = mesh_spec(WAIST, joint, "convex", condim=1)
     spec.option.gravity = [0, 0, 0]
     add_ball(spec, "ball", [0, 0, 0], condim=1)
     run = Run(spec, "target", resolution=32)
-    rng, off, model, data, atlas = np.random.default_rng(1), [], run.model, run.data, run.ripples["target"].atlas
-    ball, target = data.joint(model.body("ball").jntadr[0]), data.geom("target")
-    # not on the waist, where a ball touches two pieces at once: their impulses have no one direction
+    rng = np.random.default_rng(1)
+    off = []
+    model = run.model
+    data = run.data
+    atlas = run.ripples["target"].atlas
+    ball = data.joint(model.body("ball").jntadr[0])
+    target = data.geom("target")
+    # not on the waist, where a ball touches two pieces at once: their impulses have no one
+    # direction
     lobes = np.flatnonzero(np.abs(atlas.positions[..., 0]) > 0.1)
     for _ in range(6):
         mujoco.mj_resetData(model, data)
         mujoco.mj_forward(model, data)
         run.ripples.reset()
-        rotation, given, lost = target.xmat.reshape(3, 3), 0.0, 0.0
+        rotation = target.xmat.reshape(3, 3)
+        given = 0.0
+        lost = 0.0
         texel = rng.choice(lobes)
         aim = target.xpos + rotation @ atlas.positions.reshape(-1, 3)[texel]
         way = rotation @ atlas.normals.reshape(-1, 3)[texel] + 0.3 * rng.standard_normal(3)
         way /= np.linalg.norm(way)
-        ball.qpos[:3], ball.qvel[:3] = aim + 0.5 * way, -3.0 * way
+        ball.qpos[:3] = aim + 0.5 * way
+        ball.qvel[:3] = -3.0 * way
         while data.time < 0.4:
             before = ball.qvel[:3].copy()
             for hit in run.step():
                 given += hit.impulse
-                local, there = ((at - target.xpos) @ rotation for at in (data.geom("ball").xpos, hit.point))
+                local, there = (
+                    (at - target.xpos) @ rotation for at in (data.geom("ball").xpos, hit.point)
+                )
                 off.append(np.linalg.norm(there - atlas.project(local)[0][0]))
             lost += 0.2 * np.linalg.norm(ball.qvel[:3] - before)
         assert lost > 0.3
@@ -130,7 +155,14 @@ def test_boxes_stack_on_a_concave_target_and_weigh_what_they_weigh() -> None:
     spec.worldbody.add_geom(name="target", type=GEOM.mjGEOM_MESH, meshname="ell", quat=[1, 0, 0, 0])
     make_collidable(spec, "target", "convex")
     for i in range(4):
-        add_ball(spec, f"box {i}", [0.1, 0.4, 0.35 + 0.1 * i], type=GEOM.mjGEOM_BOX, size=[0.05, 0.05, 0.05], mass=1.0)
+        add_ball(
+            spec,
+            f"box {i}",
+            [0.1, 0.4, 0.35 + 0.1 * i],
+            type=GEOM.mjGEOM_BOX,
+            size=[0.05, 0.05, 0.05],
+            mass=1.0,
+        )
     run = Run(spec, "target", density=100, resolution=24).until(1.5)
     weights = [sum(hit.impulse for hit in hits) / run.model.opt.timestep for hits in run.hits]
     np.testing.assert_allclose([hit.point[2] for hits in run.hits for hit in hits], 0.3, atol=1e-6)
@@ -149,13 +181,16 @@ def test_an_unnamed_visual_geom_is_found_by_its_place_and_collides() -> None:
 def test_an_open_mesh_is_refused_with_the_routes_that_take_it() -> None:
     V, F = ell()
     lid = V[F].mean(axis=1)[:, 2] > 0.3 - 1e-9
-    with pytest.raises(RippleError, match=r"mesh of geom 'target' is open .* routes for it are 'flex' and 'hull'"):
+    with pytest.raises(
+        RippleError, match=r"mesh of geom 'target' is open .* routes for it are 'flex' and 'hull'"
+    ):
         make_collidable(mesh_spec((V, F[~lid]), None, None), "target", "convex")
 
 
 def test_parts_leave_the_hole_of_a_ring_open() -> None:
     ring = trimesh.creation.torus(0.3, 0.1, major_sections=16, minor_sections=8)
-    V, F = np.array(ring.vertices), np.array(ring.faces)
+    V = np.array(ring.vertices)
+    F = np.array(ring.faces)
     parts = [trimesh.convex.convex_hull(part) for part in convex_parts(Mesh.from_arrays(V, F))]
     assert len(parts) > 3
     assert not any(part.contains([[0.0, 0.0, 0.0], [0.05, 0.05, 0.0]]).any() for part in parts)

@@ -17,11 +17,17 @@ def taken_up(forces: list[float], collider: int = 1, easing: Easing | None = Non
     """What is taken up of forces that one collider holds, step by step [N]."""
     easing = easing or Easing(LAW, BODIES, ATLAS)
     at = np.array([0])
-    return np.array([force * easing.shares(np.array([collider]), at, np.array([force]), DT)[0] for force in forces])
+    return np.array(
+        [
+            force * easing.shares(np.array([collider]), at, np.array([force]), DT)[0]
+            for force in forces
+        ]
+    )
 
 
 def test_light_hits_and_weights_are_taken_up_whole() -> None:
-    hit = [100.0] * 2 + [0.0] * 50  # 0.2 N s, at a rate of 50 a second as much as 10 N, less what fades
+    # 0.2 N s, at a rate of 50 a second as much as 10 N, less what fades
+    hit = [100.0] * 2 + [0.0] * 50
     np.testing.assert_array_equal(taken_up(hit), hit)
     weight = [9.0] * 500
     np.testing.assert_array_equal(taken_up(weight), weight)
@@ -37,9 +43,12 @@ def test_a_heavy_hit_gives_as_much_as_the_hardest_that_is_taken_up_whole() -> No
 
 def test_each_body_has_its_own_and_a_pause_gives_it_back() -> None:
     easing = Easing(LAW, BODIES, ATLAS)
-    colliders, texels = np.array([0, 1, 2, 3]), np.zeros(4, np.int64)
+    colliders = np.array([0, 1, 2, 3])
+    texels = np.zeros(4, np.int64)
     shares = easing.shares(colliders, texels, np.array([1.0, 1e5, 1e5, 1.0]), DT)
-    assert shares[0] == shares[3] == 1.0 and shares[1] == shares[2] < 0.01, "colliders 1 and 2 are one body"
+    assert shares[0] == shares[3] == 1.0 and shares[1] == shares[2] < 0.01, (
+        "colliders 1 and 2 are one body"
+    )
     assert taken_up([100.0], easing=easing)[0] < 50.0
     easing.pause(1.0)
     assert taken_up([100.0], easing=easing)[0] == 100.0

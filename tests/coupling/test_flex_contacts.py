@@ -35,12 +35,20 @@ def test_bodies_in_any_pose_give_what_they_lose_on_their_side(body: str, seed: i
     spec.add_mesh(name="pebble", uservert=pebble.ravel(), userface=F.ravel())
     spec.option.gravity = [0, 0, 0]
     add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND[body])
-    run, lost = Run(spec, "target"), 0.0
-    data, joint, waves = run.data, run.model.joint(run.model.body("body").jntadr[0]), run.ripples["target"]
+    run = Run(spec, "target")
+    lost = 0.0
+    data = run.data
+    joint = run.model.joint(run.model.body("body").jntadr[0])
+    waves = run.ripples["target"]
     mujoco.mj_forward(run.model, data)
-    way, place, start = rng.standard_normal(3), joint.qposadr[0], joint.dofadr[0]
+    way = rng.standard_normal(3)
+    place = joint.qposadr[0]
+    start = joint.dofadr[0]
     way /= np.linalg.norm(way)
-    data.qpos[place : place + 7] = [*(data.geom("target").xpos + 0.6 * way), *rng.standard_normal(4)]
+    data.qpos[place : place + 7] = [
+        *(data.geom("target").xpos + 0.6 * way),
+        *rng.standard_normal(4),
+    ]
     data.qvel[start : start + 6] = [*(-2 * way + rng.uniform(-0.1, 0.1, 3)), *rng.uniform(-3, 3, 3)]
     while data.time < 0.5:
         before = data.qvel[start : start + 3].copy()
@@ -48,7 +56,9 @@ def test_bodies_in_any_pose_give_what_they_lose_on_their_side(body: str, seed: i
         change = 0.2 * (data.qvel[start : start + 3] - before)
         lost += float(np.linalg.norm(change))
         for hit in hits:
-            assert data.geom("target").xmat.reshape(3, 3) @ waves.atlas.normals[hit.texel] @ change > 0
+            assert (
+                data.geom("target").xmat.reshape(3, 3) @ waves.atlas.normals[hit.texel] @ change > 0
+            )
     assert run.given() > 0.1
     assert run.given() == pytest.approx(lost, rel=0.03)
     assert -waves.momentum() == pytest.approx(run.given(), rel=0.03)
@@ -59,18 +69,30 @@ def test_impulses_lie_where_the_balls_are_nearest_to_the_true_surface() -> None:
     spec.option.gravity = [0, 0, 0]
     rng = np.random.default_rng(0)
     # one side collides with the other alone: the balls pass through each other
-    spec.flex("target").contype, spec.flex("target").conaffinity = 2, 0
+    spec.flex("target").contype = 2
+    spec.flex("target").conaffinity = 0
     directions = rng.standard_normal((30, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     for i, direction in enumerate(directions):
         start = np.array([0.1, -0.2, 0.3]) + 0.5 * direction + rng.uniform(-0.03, 0.03, 3)
-        add_ball(spec, f"ball {i}", start.tolist(), size=[0.02, 0, 0], contype=0, conaffinity=2, solref=[0.01, 1.0])
-    run, off = Run(spec, "target", resolution=48), []
-    data, atlas = run.data, run.ripples["target"].atlas
+        add_ball(
+            spec,
+            f"ball {i}",
+            start.tolist(),
+            size=[0.02, 0, 0],
+            contype=0,
+            conaffinity=2,
+            solref=[0.01, 1.0],
+        )
+    run = Run(spec, "target", resolution=48)
+    off = []
+    data = run.data
+    atlas = run.ripples["target"].atlas
     data.qvel.reshape(-1, 6)[:, :3] = -directions
     while data.time < 0.6:
         for hit in run.step():
-            position, rotation = data.geom("target").xpos, data.geom("target").xmat.reshape(3, 3)
+            position = data.geom("target").xpos
+            rotation = data.geom("target").xmat.reshape(3, 3)
             nearest, _ = atlas.project((data.geom(hit.other).xpos - position) @ rotation)
             off.append(np.linalg.norm((hit.point - position) @ rotation - nearest))
     assert len(run.pairs) == len(directions)
@@ -106,7 +128,8 @@ def test_what_hits_a_flex_and_ripples_itself_gets_as_much_as_it_loses(targets: l
     spec = mesh_spec(limbed(0.04), condim=1)
     spec.option.gravity = [0, 0, 0]
     add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND["cylinder"])
-    run, lost = Run(spec, *targets), 0.0
+    run = Run(spec, *targets)
+    lost = 0.0
     data = run.data
     mujoco.mj_forward(run.model, data)
     data.qpos[:3] = data.geom("target").xpos + np.array([0, 0, 0.6])
@@ -133,12 +156,15 @@ def test_flex_written_by_hand_is_known_by_its_name() -> None:
     add_ball(spec, "ball", [-0.17, 0.01, 0.35])
     run = Run(spec, "target").until(0.25)
     assert run.pairs == {("target", "ball")}
-    lost = 0.2 * np.linalg.norm(run.data.body("ball").cvel[3:] + np.array([0, 0, 9.81]) * run.data.time)
+    lost = 0.2 * np.linalg.norm(
+        run.data.body("ball").cvel[3:] + np.array([0, 0, 9.81]) * run.data.time
+    )
     assert run.given() == pytest.approx(lost, rel=0.03)
     assert -run.ripples["target"].momentum() == pytest.approx(lost, rel=0.05)
 
 
-UP, ASIDE = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+UP = (0.0, 0.0, 1.0)
+ASIDE = (1.0, 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -156,8 +182,8 @@ def slab() -> tuple[mujoco.MjModel, np.ndarray]:
 def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None = UP):
     """Which contacts of the ball with the block are kept, and their forces and normals.
 
-    A contact is an outward normal and the force on the ball [N]; the surface is the normal of the touched triangle,
-    or None for a vertex.
+    A contact is an outward normal and the force on the ball [N]; the surface is the normal of the
+    touched triangle, or None for a vertex.
     """
     model, normals = slab
     k = len(contacts)
@@ -175,7 +201,9 @@ def summed(slab: tuple, contacts: list[tuple], surface: tuple[float, ...] | None
     data = SimpleNamespace(contact=contact, geom_xmat=np.tile(np.eye(3).ravel(), (2, 1)))
     rows = np.arange(k), np.zeros(k, int), np.zeros(k, int), np.ones(k, int), np.zeros(1, int)
     along = np.einsum("kij,kj->ki", frames, [force for _, force in contacts])
-    kept, _, *loads = FlexContacts(CoupledModel(model), {0: target_mesh(model, 0)}).loads(data, *rows, along)
+    kept, _, *loads = FlexContacts(CoupledModel(model), {0: target_mesh(model, 0)}).loads(
+        data, *rows, along
+    )
     return kept, *loads
 
 
@@ -184,7 +212,9 @@ RIM = [(UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2))]
 
 def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: tuple) -> None:
     """Two opposite contacts at a rim cancel along x, but their friction pushes upwards: 3 + 1 + 2 N."""
-    assert summed(slab, RIM, surface=None)[0].all(), "without the surface's normals all three would count as normals"
+    assert summed(slab, RIM, surface=None)[0].all(), (
+        "without the surface's normals all three would count as normals"
+    )
     kept, forces, normals = summed(slab, RIM)
     assert kept.tolist() == [True, False, False]
     np.testing.assert_allclose(forces, [6])
@@ -205,7 +235,10 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
     )
     make_collidable(spec, "slab", "flex")
     model = spec.compile()
-    data, coupled, wrench, steps = mujoco.MjData(model), CoupledModel(model), np.zeros(6), 0
+    data = mujoco.MjData(model)
+    coupled = CoupledModel(model)
+    wrench = np.zeros(6)
+    steps = 0
     reader = ContactReader(coupled, {0: target_atlas(model, 0, 8)})
     data.qvel[:] = [0.4, 0.2, -1.0, 4.0, 2.0, 5.0]
     for _ in range(100):
@@ -241,7 +274,9 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
         ([(ASIDE, (5, 0, 0))], 1.0),
     ],
 )
-def test_pushes_sideways_beyond_friction_are_warned_of(slab: tuple, contacts: list, unexplained: float) -> None:
+def test_pushes_sideways_beyond_friction_are_warned_of(
+    slab: tuple, contacts: list, unexplained: float
+) -> None:
     with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
         summed(slab, contacts)
     told = [f"wrong by about {unexplained:.1%}" in str(each.message) for each in caught]

@@ -25,12 +25,20 @@ def test_every_geom_has_a_name_of_its_own_by_which_it_is_found() -> None:
     assert [find_geom(model, name) for name in names] == list(range(6))
     assert find_geom(model, "torso/0") == find_geom(model, np.int64(1)) == 1
     # names with a slash, as dm_control gives them
-    model = model_of('<body name="walker/arm"><geom size="0.1"/><geom name="walker/hand" size="0.1"/></body>')
+    model = model_of(
+        '<body name="walker/arm"><geom size="0.1"/><geom name="walker/hand" size="0.1"/></body>'
+    )
     assert [geom_name(model, geom) for geom in range(2)] == ["walker/arm/0", "walker/hand"]
-    assert [find_geom(model, key) for key in ("walker/arm/0", "walker/arm/1", "walker/hand")] == [0, 1, 1]
+    assert [find_geom(model, key) for key in ("walker/arm/0", "walker/arm/1", "walker/hand")] == [
+        0,
+        1,
+        1,
+    ]
 
 
-@pytest.mark.parametrize("key", ["leg", "torso/4", "torso/-1", "torso/", "/0", 6, -1, None, 1.0, ("chest",)])
+@pytest.mark.parametrize(
+    "key", ["leg", "torso/4", "torso/-1", "torso/", "/0", 6, -1, None, 1.0, ("chest",)]
+)
 def test_a_key_that_is_no_geom_is_named(key: object) -> None:
     message = r"the model has no geom .*its geoms are 'world/0', 'chest', .*\"body/index\""
     with pytest.raises(RippleError, match=message):
@@ -46,13 +54,17 @@ def test_long_lists_of_geoms_are_cut() -> None:
 def test_a_geom_with_two_values_is_refused() -> None:
     model = model_of(NAMELESS)
     assert coupling.by_name(model, {"chest": 1, 2: 5}, "numbers") == {"chest": 1, "torso/1": 5}
-    with pytest.raises(RippleError, match="numbers has two entries for geom 'chest', one of them as 1"):
+    with pytest.raises(
+        RippleError, match="numbers has two entries for geom 'chest', one of them as 1"
+    ):
         coupling.by_name(model, {"chest": 1, 1: 2}, "numbers")
 
 
 def test_targets_go_by_name_or_id_or_place() -> None:
     """Ids and unnamed geoms once ended in a TypeError, or could not be asked for."""
-    model = model_of('<geom size="0.5"/><body name="b" pos="0.1 0 0.53"><freejoint/><geom size="0.05"/></body>')
+    model = model_of(
+        '<geom size="0.5"/><body name="b" pos="0.1 0 0.53"><freejoint/><geom size="0.05"/></body>'
+    )
     data = mujoco.MjData(model)
     targets = {0: Target(resolution=8), "b/0": Target(resolution=12)}
     ripples = Ripples(model, targets, backend="cpu")
@@ -62,7 +74,10 @@ def test_targets_go_by_name_or_id_or_place() -> None:
     assert ripples[1].atlas.areas.shape[-1] == 12
     mujoco.mj_step(model, data)
     ripples.step(data)
-    assert [(each.geom, each.other) for each in ripples.last_impulses] == [("world/0", "b/0"), ("b/0", "world/0")]
+    assert [(each.geom, each.other) for each in ripples.last_impulses] == [
+        ("world/0", "b/0"),
+        ("b/0", "world/0"),
+    ]
     ripples.change_material(0, speed=0.5)
     ripples.make_rigid(1, [0, 0, 0.05], 0.02)
     assert ripples[0].material.speed == 0.5
@@ -109,7 +124,9 @@ def model() -> mujoco.MjModel:
 def test_colliders_of_targets(model, targets, contacts, expected) -> None:
     ids = [find_geom(model, name) for name in targets]
     coupled = CoupledModel(model, ids, coupling.named_collision_geoms(model, targets, contacts))
-    assert [[coupled.names[geom] for geom in coupled.collision_geoms(target)] for target in ids] == expected
+    assert [
+        [coupled.names[geom] for geom in coupled.collision_geoms(target)] for target in ids
+    ] == expected
 
 
 def test_a_pair_collides_whatever_its_masks_say() -> None:
@@ -128,10 +145,16 @@ def test_a_pair_collides_whatever_its_masks_say() -> None:
 @pytest.mark.parametrize(
     ("contacts", "message"),
     [
-        ({"shell": ["pad"]}, "names geom 'pad' on body 'finger', which moves by itself; valid are .* body 'link'"),
+        (
+            {"shell": ["pad"]},
+            "names geom 'pad' on body 'finger', which moves by itself; valid are .* body 'link'",
+        ),
         ({"shell": ["cap"]}, "names geom 'cap', which ripples itself"),
         ({"shell": ["hull2"]}, "no geom 'hull2'; its geoms are"),
-        ({"blade": ["guard"]}, "geom 'blade', which does not ripple; the rippling geoms are 'shell', 'cap'"),
+        (
+            {"blade": ["guard"]},
+            "geom 'blade', which does not ripple; the rippling geoms are 'shell', 'cap'",
+        ),
         ({"shell": "hull0"}, "contacts of geom 'shell' is 'hull0'; valid is a list"),
         ({"shell": 3}, "contacts of geom 'shell' is 3; valid is a list"),
         ({"shell": ["hull0"], 4: []}, "contacts has two entries for geom 'shell'"),
@@ -140,7 +163,13 @@ def test_a_pair_collides_whatever_its_masks_say() -> None:
 )
 def test_contacts_that_cannot_be_are_named(model, contacts, message: str) -> None:
     with pytest.raises(RippleError, match=message):
-        Ripples(model, {"shell": Material(), "cap": Material()}, contacts=contacts, resolution=8, backend="cpu")
+        Ripples(
+            model,
+            {"shell": Material(), "cap": Material()},
+            contacts=contacts,
+            resolution=8,
+            backend="cpu",
+        )
 
 
 SCENE = '<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2")
@@ -151,7 +180,11 @@ SCENE = '<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2")
     [
         ({"target": 1.0}, {}, "material of geom 'target' is 1.0; valid is a Material"),
         (["target"], {}, "materials is list; valid is a mapping of geom names to Material"),
-        ({"target": Material()}, {"resolution": {}}, "resolution has no entry for geom 'target'; it has none"),
+        (
+            {"target": Material()},
+            {"resolution": {}},
+            "resolution has no entry for geom 'target'; it has none",
+        ),
         ({"target": Material()}, {"resolution": {"ball": 8}}, "it has 'ball'"),
         ({"target": Material()}, {"resolution": "fine"}, "resolution is 'fine'"),
     ],
@@ -162,7 +195,9 @@ def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: 
 
 
 def begun(model: mujoco.MjModel) -> Ripples:
-    return Ripples(model, {"target": Material(speed=1.0, density=100.0)}, resolution=8, backend="cpu")
+    return Ripples(
+        model, {"target": Material(speed=1.0, density=100.0)}, resolution=8, backend="cpu"
+    )
 
 
 @pytest.mark.parametrize(
@@ -182,9 +217,15 @@ def test_places_and_keys_that_are_none_are_named(call, message: str) -> None:
 
 @pytest.mark.parametrize(
     ("before", "after", "what"),
-    [('mass="0.3"', 'mass="0.6"', "body_"), ('size="0.5"', 'size="0.4"', "geom_"), ("0 0 2", "0 0 3", "body_pos")],
+    [
+        ('mass="0.3"', 'mass="0.6"', "body_"),
+        ('size="0.5"', 'size="0.4"', "geom_"),
+        ("0 0 2", "0 0 3", "body_pos"),
+    ],
 )
-def test_data_of_a_model_compiled_with_another_number_is_refused(before: str, after: str, what: str) -> None:
+def test_data_of_a_model_compiled_with_another_number_is_refused(
+    before: str, after: str, what: str
+) -> None:
     other = model_of(SCENE.replace(before, after))
     with pytest.raises(RippleError, match=f"belongs to another model .* of another {what}"):
         begun(model_of(SCENE)).mj_step(mujoco.MjData(other))
@@ -200,7 +241,14 @@ def test_data_of_a_model_compiled_with_another_number_is_refused(before: str, af
         lambda model: pickle.loads(pickle.dumps(mujoco.MjData(model))),
         lambda model: mujoco.MjData(pickle.loads(pickle.dumps(model))),
     ],
-    ids=["compiled again", "copied model", "copied data", "deep copy", "pickled data", "pickled model"],
+    ids=[
+        "compiled again",
+        "copied model",
+        "copied data",
+        "deep copy",
+        "pickled data",
+        "pickled model",
+    ],
 )
 def test_data_of_a_copy_is_as_good_as_the_model_s_own(make) -> None:
     model = model_of(SCENE)
@@ -224,8 +272,18 @@ def coupled() -> CoupledModel:
     spec = mesh_spec(peanut(0.06), "free", contype=2, conaffinity=5, solref=[0.03, 1.0])
     add_ball(spec, "ball", [0, 0, 2], contype=1, conaffinity=0, solref=[0.01, 1.0])
     add_ball(spec, "", [0, 0, 3], contype=0, conaffinity=0)
-    add_ball(spec, "pebble", [0, 0, 4], type=mujoco.mjtGeom.mjGEOM_SDF, meshname="shape", contype=8, conaffinity=8)
-    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1], contype=2, conaffinity=2)
+    add_ball(
+        spec,
+        "pebble",
+        [0, 0, 4],
+        type=mujoco.mjtGeom.mjGEOM_SDF,
+        meshname="shape",
+        contype=8,
+        conaffinity=8,
+    )
+    spec.worldbody.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1], contype=2, conaffinity=2
+    )
     return CoupledModel(spec.compile())
 
 
@@ -238,9 +296,15 @@ def test_flex_speaks_for_its_geom(coupled: CoupledModel) -> None:
     assert coupled.flex_colliders == {target: 0}
     np.testing.assert_array_equal(np.flatnonzero(coupled.has_flex), [target])
     np.testing.assert_allclose(coupled.solref[target], [0.03, 1.0])
-    assert coupled.collider_extents[target] == coupling.flex_thickness(coupled.model, 0) < coupled.extents[target]
+    assert (
+        coupled.collider_extents[target]
+        == coupling.flex_thickness(coupled.model, 0)
+        < coupled.extents[target]
+    )
     # the geom's own masks are 0 now
-    assert np.flatnonzero(coupled.can_collide(target)).tolist() == sorted(numbers(coupled, "ball", "floor"))
+    assert np.flatnonzero(coupled.can_collide(target)).tolist() == sorted(
+        numbers(coupled, "ball", "floor")
+    )
 
 
 def test_geoms_collide_where_either_mask_says_so_but_not_on_one_body(coupled: CoupledModel) -> None:

@@ -12,7 +12,9 @@ from ripple_sim import Material
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import WaveSolver
 
-MASS, RADIUS, FALL = 0.05, 0.02, 0.18
+MASS = 0.05
+RADIUS = 0.02
+FALL = 0.18
 SPEED = np.sqrt(2 * 9.81 * FALL)
 BLOCK = '<geom name="target" type="box" size=".3 .3 .1" solref="{solref}"/>'
 BALL = '<geom name="other" size=".02" mass=".05" solref="{solref}"/>'
@@ -23,12 +25,22 @@ ELASTIC = "-1e5 0"
 class Fall(Run):
     """A body falls on a target; what the target gets is noted: times [s], and forces [N] over them."""
 
-    def __init__(self, target=BLOCK, other=BALL, height=0.1 + RADIUS + FALL, speed=0.0, solref="0.02 1", **options):
+    def __init__(
+        self,
+        target=BLOCK,
+        other=BALL,
+        height=0.1 + RADIUS + FALL,
+        speed=0.0,
+        solref="0.02 1",
+        **options,
+    ):
         xml = f"""<mujoco><option timestep="0.002" gravity="0 0 {-9.81 * (speed == 0)}"/><worldbody>{target}
             <body pos="0 0 {height}"><freejoint/>{other}</body></worldbody></mujoco>"""
         options = {"resolution": 16, "pulse": "hertz", "modulus": 1e8, **options}
         model = mujoco.MjModel.from_xml_string(xml.format(solref=solref))
-        super().__init__(model, "target", material=Material(speed=300.0, density=20.0, damping=20.0), **options)
+        super().__init__(
+            model, "target", material=Material(speed=300.0, density=20.0, damping=20.0), **options
+        )
         self.data.qvel[2] = -speed
         self.loads: list[tuple[float, float]] = []
 
@@ -53,7 +65,9 @@ def note_loads(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def noting(waves, dt, substeps=None, load=None):
         count = int(np.ceil(dt / waves.stable_timestep * (1 - 1e-12)))
-        RUNS[-1].loads += [(part * dt / count, each.forces.sum()) for part, each in load.parts(dt, count)]
+        RUNS[-1].loads += [
+            (part * dt / count, each.forces.sum()) for part, each in load.parts(dt, count)
+        ]
         step(waves, dt, substeps, load)
 
     monkeypatch.setattr(WaveSolver, "step", noting)
@@ -63,19 +77,24 @@ def hertz(modulus: float, radius: float) -> tuple[float, float]:
     """Time in which nine tenths of the impulse are given [s], and greatest force [N], of a mass on Hertz's spring."""
     spring = 4 / 3 * modulus * np.sqrt(radius)
     times = np.linspace(0, 4 * (MASS**2 / (radius * modulus**2 * SPEED)) ** 0.2, 4001)
-    way, speed = odeint(lambda x, _: (x[1], -spring / MASS * max(x[0], 0) ** 1.5), (0, SPEED), times, rtol=1e-10).T
+    way, speed = odeint(
+        lambda x, _: (x[1], -spring / MASS * max(x[0], 0) ** 1.5), (0, SPEED), times, rtol=1e-10
+    ).T
     return np.diff(np.interp([-0.9, 0.9], -speed / SPEED, times))[0], spring * way.max() ** 1.5
 
 
 def given_time(run: Fall) -> float:
     times, forces = np.array(run.loads).T
-    return np.diff(np.interp([0.05, 0.95], np.cumsum(times * forces) / run.total, np.cumsum(times)))[0]
+    return np.diff(
+        np.interp([0.05, 0.95], np.cumsum(times * forces) / run.total, np.cumsum(times))
+    )[0]
 
 
 FLIES = {"speed": SPEED, "solref": ELASTIC}
 
 
-@pytest.mark.parametrize("modulus", [1e6, 1e8])  # 7 ms, which is several physics steps, and 1.1 ms, within one
+# 7 ms, which is several physics steps, and 1.1 ms, within one
+@pytest.mark.parametrize("modulus", [1e6, 1e8])
 def test_ball_on_a_heavy_target_pushes_as_long_and_as_hard_as_by_hertz(modulus):
     run = Fall(height=0.121, modulus=modulus, **FLIES).steps(20)
     time, force = hertz(modulus, RADIUS)
@@ -100,7 +119,11 @@ PIN = '<geom name="other" type="capsule" size=".02 .05" mass=".05" solref="{solr
 
 @pytest.mark.parametrize(
     ("target", "other", "height", "radius"),
-    [(SPHERE, BALL, 0.121, 1 / (1 / 0.1 + 1 / 0.02)), (BLOCK, EGG, 0.131, 0.02**2 / 0.03), (BLOCK, PIN, 0.171, 0.02)],
+    [
+        (SPHERE, BALL, 0.121, 1 / (1 / 0.1 + 1 / 0.02)),
+        (BLOCK, EGG, 0.131, 0.02**2 / 0.03),
+        (BLOCK, PIN, 0.171, 0.02),
+    ],
 )
 def test_curvatures_of_both_count(target, other, height, radius):
     run = Fall(target=target, other=other, height=height, modulus=1e6, **FLIES).steps(20)
@@ -129,9 +152,13 @@ def test_resting_and_sliding_contacts_stay_as_they_are(speed):
 
 def test_what_is_not_round_keeps_the_contacts_pulse_and_says_so_once():
     cube = '<geom name="other" type="box" size=".02 .02 .02" mass=".05" solref="{solref}"/>'
-    with pytest.warns(RippleWarning, match="'other' on 'target' keeps MuJoCo's contact pulse") as told:
+    with pytest.warns(
+        RippleWarning, match="'other' on 'target' keeps MuJoCo's contact pulse"
+    ) as told:
         run = Fall(other=cube, solref=ELASTIC).steps(220)  # two bounces
-    assert [each.filename for each in told if "contact pulse" in str(each.message)] == [inspect.getfile(Run)]
+    assert [each.filename for each in told if "contact pulse" in str(each.message)] == [
+        inspect.getfile(Run)
+    ]
     assert run.loads == Fall(pulse="contact", other=cube, solref=ELASTIC).steps(220).loads
 
 

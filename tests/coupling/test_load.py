@@ -13,7 +13,9 @@ from ripple_sim.coupling import Contacts, Impulse, StepContacts, TargetLoad
 from ripple_sim.solver import WaveSolver, sphere_atlas
 
 DT = 0.002
-POLE, SIDE, CORNER = (0, 0, 1), (1, 0, 0), (1, 0.8, -0.7)
+POLE = (0, 0, 1)
+SIDE = (1, 0, 0)
+CORNER = (1, 0.8, -0.7)
 RADII = np.array([1.0, 0.1, 0.1, 0.1])
 CONVEX = np.ones(4, dtype=bool)
 
@@ -37,12 +39,16 @@ def sphere_load(**material: object) -> TargetLoad:
 
 def contacts_on(pose: Pose, contacts: dict[int, list[tuple[np.ndarray, float]]]) -> Contacts:
     """Contacts by geom: points of the unit sphere in its own frame, and normal forces [N]."""
-    normals = np.array([normal for each in contacts.values() for normal, _ in each], dtype=np.float64)
+    normals = np.array(
+        [normal for each in contacts.values() for normal, _ in each], dtype=np.float64
+    )
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return Contacts(
         others=np.repeat(list(contacts), [len(each) for each in contacts.values()]),
         points=pose.position + 1.003 * normals @ pose.rotation.T,
-        forces=np.array([force for each in contacts.values() for _, force in each], dtype=np.float64),
+        forces=np.array(
+            [force for each in contacts.values() for _, force in each], dtype=np.float64
+        ),
         normals=normals @ pose.rotation.T,
     )
 
@@ -69,18 +75,25 @@ def test_a_step_gives_the_contacts_impulse_however_much_time_has_passed(elapsed:
 
 @pytest.mark.parametrize("steps", [3, 40, 400])
 def test_after_all_geoms_have_left_the_whole_impulse_has_been_given(steps: int) -> None:
-    rng, pose, load = np.random.default_rng(steps), tilted(), sphere_load()
+    rng = np.random.default_rng(steps)
+    pose = tilted()
+    load = sphere_load()
     pushed = given = 0.0
     for _ in range(steps):
         forces = rng.exponential(3.0, 2)
-        present, _ = load.touched(contacts_on(pose, {1: [(POLE, forces[0])], 2: [(SIDE, forces[1])]}), pose, DT, DT)
-        pushed, given = pushed + forces.sum() * DT, given + present.forces.sum() * DT
+        present, _ = load.touched(
+            contacts_on(pose, {1: [(POLE, forces[0])], 2: [(SIDE, forces[1])]}), pose, DT, DT
+        )
+        pushed = pushed + forces.sum() * DT
+        given = given + present.forces.sum() * DT
     assert given + given_until_over(load) == pytest.approx(pushed, rel=1e-9)
 
 
 def test_new_waves_on_the_same_atlas_get_what_the_old_ones_did_not() -> None:
     """After a rest with chatter there is a deficit; it survives a change of the material."""
-    pose, kept, changed = tilted(), sphere_load(), sphere_load()
+    pose = tilted()
+    kept = sphere_load()
+    changed = sphere_load()
     for step in range(301):
         for load in (kept, changed):
             if step % 3:
@@ -95,7 +108,8 @@ def test_new_waves_on_the_same_atlas_get_what_the_old_ones_did_not() -> None:
 
 def test_what_bears_on_fixed_texels_is_lost() -> None:
     """Footprints made for the old waves must not serve the new ones."""
-    atlas, pose = sphere_atlas(1.0, 16), tilted()
+    atlas = sphere_atlas(1.0, 16)
+    pose = tilted()
     load = TargetLoad(WaveSolver(atlas, Material(), backend="cpu"), 0, RADII, CONVEX)
     both = contacts_on(pose, {1: [(POLE, 5.0)], 2: [((0, 0, -1), 7.0)]})
     before, _ = load.touched(both, pose, DT, DT)
@@ -118,7 +132,9 @@ def record_of(each: dict = EACH, elapsed: float = DT) -> tuple[StepContacts, Pos
 
 
 @pytest.mark.parametrize("elapsed", [DT, 4 * DT])
-def test_there_is_one_impulse_for_each_geom_however_its_load_is_spread_over_time(elapsed: float) -> None:
+def test_there_is_one_impulse_for_each_geom_however_its_load_is_spread_over_time(
+    elapsed: float,
+) -> None:
     impulses = list(record_of(elapsed=elapsed)[0].impulses(*TOLD))
     assert [(each.geom, each.other) for each in impulses] == [("globe", "one"), ("globe", "three")]
     assert [each.impulse for each in impulses] == pytest.approx([5.0 * DT, 3.0 * DT])
@@ -131,13 +147,15 @@ def test_the_point_lies_within_the_texel() -> None:
         record, pose = record_of({2: [(direction, 1.0)]})
         [impulse] = record.impulses(*TOLD)
         away = np.linalg.norm(atlas.positions[impulse.texel] - local_to(pose, impulse.point))
-        # at the cube's corners texels are rhombi of 120 degrees: half the diagonal is 0.93 of the area's root
+        # at the cube's corners texels are rhombi of 120 degrees: half the diagonal is 0.93 of the
+        # area's root
         assert away < 0.95 * np.sqrt(atlas.areas[impulse.texel])
 
 
 def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface() -> None:
     record, pose = record_of()
-    names, owners = ["globe", "cloth"], np.array([0, 1, 1, 1])
+    names = ["globe", "cloth"]
+    owners = np.array([0, 1, 1, 1])
     [impulse] = record.impulses(names, owners, sphere_atlas(1.0, 16), DT)
     assert (impulse.geom, impulse.other) == ("globe", "cloth")
     assert impulse.impulse == pytest.approx(8.0 * DT)
@@ -150,14 +168,19 @@ def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface()
 def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
     """Three targets and bodies on all of them: those that ripple with others have the same waves, bit for bit."""
     rng = np.random.default_rng(4)
-    target, names = '<geom name="{}" type="box" size="0.3 0.3 0.05" pos="{} 0 0"/>', ("left", "middle", "right")
-    targets = "".join(target.format(name, x) for name, x in zip(names, (-0.7, 0.0, 0.7), strict=True))
+    target = '<geom name="{}" type="box" size="0.3 0.3 0.05" pos="{} 0 0"/>'
+    names = ("left", "middle", "right")
+    targets = "".join(
+        target.format(name, x) for name, x in zip(names, (-0.7, 0.0, 0.7), strict=True)
+    )
     bodies = "".join(
         f'<body pos="{0.7 * (i % 3 - 1) + x:.3f} {y:.3f} {0.1 + 0.02 * i:.3f}"><freejoint/>'
         f'<geom type="{("sphere", "box", "capsule")[i // 3]}" size="0.04 0.04 0.04"/></body>'
         for i, (x, y) in enumerate(rng.uniform(-0.2, 0.2, (9, 2)))
     )
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{targets}{bodies}</worldbody></mujoco>")
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><worldbody>{targets}{bodies}</worldbody></mujoco>"
+    )
     data = mujoco.MjData(model)
     options = {"resolution": 16, "backend": "cpu"}
     together = Ripples(model, {name: Material() for name in names}, **options)
@@ -169,7 +192,10 @@ def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
         for ripples in alone.values():
             ripples.step(data)
         one_by_one = [each for ripples in alone.values() for each in ripples.last_impulses]
-        hits, expected = ([(each.geom, each.other) for each in told] for told in (together.last_impulses, one_by_one))
+        hits, expected = (
+            [(each.geom, each.other) for each in told]
+            for told in (together.last_impulses, one_by_one)
+        )
         assert hits == expected
         most = max(most, len(together.last_impulses))
     assert most > 6
@@ -194,14 +220,19 @@ GROOVE = """<mujoco><option timestep="0.001"/><asset>
 def test_a_wedged_ball_is_told_of_where_it_touches() -> None:
     """The middle of its contacts lies in the air between the two walls."""
     model = mujoco.MjModel.from_xml_string(GROOVE.format(height=0.16 * np.sqrt(2) + 1e-3))
-    run, wedged = Run(model, "groove", density=10, resolution=16, contacts=["left", "right"]), 0
+    run = Run(model, "groove", density=10, resolution=16, contacts=["left", "right"])
+    wedged = 0
     for _ in range(200):
-        hits, contact = run.step(), run.data.contact
+        hits = run.step()
+        contact = run.data.contact
         if run.data.ncon == 2 and len(hits) == 2:
             wedged += 1
             places = sorted(hits, key=lambda hit: hit.point[0])
             at = contact.pos[np.argsort(contact.pos[:, 0])]
-            assert max(np.linalg.norm(hit.point - each) for hit, each in zip(places, at, strict=True)) < 0.01
+            assert (
+                max(np.linalg.norm(hit.point - each) for hit, each in zip(places, at, strict=True))
+                < 0.01
+            )
         else:
             assert run.data.ncon < 2
     assert wedged > 100

@@ -11,7 +11,9 @@ import pytest
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning
 
-N, GRAVITY, MASS = 16, 9.81, 0.3
+N = 16
+GRAVITY = 9.81
+MASS = 0.3
 BALL = f"""<mujoco model="bounce"><option timestep="0.001"/><worldbody>
 <geom name="block" type="box" size="0.5 0.5 0.2" pos="0 0 -0.2" solref="0.01 0.3"/>
 <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
@@ -24,7 +26,11 @@ def bounce(**options: object) -> tuple[Ripples, mujoco.MjModel, mujoco.MjData]:
     """A ball about to fall on a block."""
     model = mujoco.MjModel.from_xml_string(BALL)
     material = Material(speed=1.0, density=100.0)
-    return Ripples(model, {"block": material}, resolution=N, backend="cpu", **options), model, mujoco.MjData(model)
+    return (
+        Ripples(model, {"block": material}, resolution=N, backend="cpu", **options),
+        model,
+        mujoco.MjData(model),
+    )
 
 
 def plain(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -137,7 +143,8 @@ def test_forces_that_are_not_solved_yet_are_solved_for() -> None:
 @pytest.mark.parametrize("two_way", [False, True])
 def test_forces_lost_to_a_new_collision_are_found_again(two_way: bool, integrator: str) -> None:
     """`mj_collision` takes the rows of the constraint solver away."""
-    waves, places = [], []
+    waves = []
+    places = []
     with warnings.catch_warnings(action="error", category=RippleWarning):
         for collide in (False, True):
             ripples, model, data = bounce(two_way=two_way)
@@ -157,7 +164,9 @@ def test_forces_that_cannot_be_found_again_are_told_of() -> None:
     """With poses of the coming step its forces are taken."""
     ripples, model, data = bounce()
     given = 0.0
-    with pytest.warns(RippleWarning, match="`mj_collision`, called after `mj_step`, throws them away") as told:
+    with pytest.warns(
+        RippleWarning, match="`mj_collision`, called after `mj_step`, throws them away"
+    ) as told:
         for _ in range(200):
             mujoco.mj_step(model, data)
             mujoco.mj_kinematics(model, data)
@@ -171,10 +180,14 @@ def test_forces_that_cannot_be_found_again_are_told_of() -> None:
 
 def test_data_of_another_model_is_refused() -> None:
     ripples, _, _ = bounce()
-    other = mujoco.MjModel.from_xml_string('<mujoco model="chair"><worldbody><geom size="1"/></worldbody></mujoco>')
+    other = mujoco.MjModel.from_xml_string(
+        '<mujoco model="chair"><worldbody><geom size="1"/></worldbody></mujoco>'
+    )
     data = mujoco.MjData(other)
     for call in (ripples.step, ripples.mj_step):
-        with pytest.raises(RippleError, match=r"another model \('chair', nq 0.*\) than .* \('bounce', nq 7"):
+        with pytest.raises(
+            RippleError, match=r"another model \('chair', nq 0.*\) than .* \('bounce', nq 7"
+        ):
             call(data)
     with pytest.raises(RippleError, match="data is NoneType"):
         ripples.step(None)
@@ -230,14 +243,18 @@ def test_a_warning_names_the_line_that_steps(loop: Loop, in_tmp_path: None) -> N
 
 
 @pytest.mark.parametrize("two_way", [False, True])
-def test_a_broken_state_makes_no_waves_where_mujoco_goes_on_with_it(two_way: bool, in_tmp_path: None) -> None:
+def test_a_broken_state_makes_no_waves_where_mujoco_goes_on_with_it(
+    two_way: bool, in_tmp_path: None
+) -> None:
     """With its automatic reset disabled: NaN positions once ended in an error about points."""
     ripples, model, data = bounce(two_way=two_way)
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     plain(ripples, model, data)
     spoilt(ripples)
     data.qpos[2] = np.nan
-    with pytest.warns(RippleWarning, match=r"diverged \(mjWARN_BADQPOS\): its automatic reset is disabled") as told:
+    with pytest.warns(
+        RippleWarning, match=r"diverged \(mjWARN_BADQPOS\): its automatic reset is disabled"
+    ) as told:
         plain(ripples, model, data)
     assert len(told) == 1
     assert not ripples["block"].velocity.any()
@@ -276,7 +293,9 @@ def test_two_data_in_turn_are_warned_of_once(copied: bool) -> None:
             ripples.mj_step(other)
             ripples.mj_step(data)
 
-    assert [message for message in said_by(in_turn) if "make one Ripples for each MjData" in message] != []
+    assert [
+        message for message in said_by(in_turn) if "make one Ripples for each MjData" in message
+    ] != []
     assert said_by(in_turn) == []
 
 

@@ -47,7 +47,13 @@ def assets() -> str:
 
 
 def drop(
-    assets: str, target: str, body: str, restitution: float, joint: str = "", cone: str = "pyramidal", condim: int = 1
+    assets: str,
+    target: str,
+    body: str,
+    restitution: float,
+    joint: str = "",
+    cone: str = "pyramidal",
+    condim: int = 1,
 ) -> tuple[float, float, float, float]:
     """Sum of impulses, the body's change of momentum, the surface's momentum, and the coefficient of restitution."""
     geom, top = TARGETS[target]
@@ -67,30 +73,50 @@ def drop(
     run = Run(model, "target")
     data = run.data
     data.qvel[2] = -2.2 if joint else 0.0
-    change, first, after, contact = np.zeros(3), None, np.zeros(3), 0.0
+    change = np.zeros(3)
+    first = None
+    after = np.zeros(3)
+    contact = 0.0
     while data.time < 0.6:
         before = data.qvel[:3].copy()
         if run.step():
             first = before if first is None else first
-            contact, after = data.time, data.qvel[:3].copy()
+            contact = data.time
+            after = data.qvel[:3].copy()
             change += MASS * (data.qvel[:3] - before - model.opt.gravity * model.opt.timestep)
         elif first is not None and data.time - contact > 0.02:
             break
     assert first is not None
-    return run.given(), float(np.linalg.norm(change)), run.ripples["target"].momentum(), float(-after[2] / first[2])
+    return (
+        run.given(),
+        float(np.linalg.norm(change)),
+        run.ripples["target"].momentum(),
+        float(-after[2] / first[2]),
+    )
 
 
-PAIRS = [(target, "sphere") for target in TARGETS] + [(target, body) for target in ("sdf", "flex") for body in BODIES]
+PAIRS = [(target, "sphere") for target in TARGETS] + [
+    (target, body) for target in ("sdf", "flex") for body in BODIES
+]
 HINGE = '<joint axis="0 1 0" pos="0.4 0 0" damping="0.2" stiffness="40"/>'
 # a flex that moves, or has friction
-MOUNTS = [("<freejoint/>", "pyramidal", 1), (HINGE, "elliptic", 3), ("", "elliptic", 3), ("", "pyramidal", 3)]
-CASES = [(*pair, share) for share in (0.0, 0.9) for pair in [*PAIRS, ("box", "box"), ("hull", "box")]]
+MOUNTS = [
+    ("<freejoint/>", "pyramidal", 1),
+    (HINGE, "elliptic", 3),
+    ("", "elliptic", 3),
+    ("", "pyramidal", 3),
+]
+CASES = [
+    (*pair, share) for share in (0.0, 0.9) for pair in [*PAIRS, ("box", "box"), ("hull", "box")]
+]
 CASES += [(target, "sphere", 0.5) for target in TARGETS]
 ON_FLEX = itertools.product(enumerate(("capsule", "box", "cylinder")), enumerate(MOUNTS))
 CASES += [("flex", body, 0.9 * ((i + j) % 2), *mount) for (i, body), (j, mount) in ON_FLEX]
 
 
-@pytest.mark.filterwarnings("ignore:geom 'target' collides", "ignore:body 'body' meets geom 'target'")
+@pytest.mark.filterwarnings(
+    "ignore:geom 'target' collides", "ignore:body 'body' meets geom 'target'"
+)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: "-".join(map(str, case)))
 def test_impulses_are_the_bodys_change_of_momentum(assets: str, case: tuple) -> None:
     given, change, surface, _ = drop(assets, *case)
@@ -111,7 +137,8 @@ def aside(waves: WaveSolver) -> int:
 
 def first_crest(model: mujoco.MjModel, seconds: float = 0.75) -> tuple[float, float, float]:
     """Momentum that the surface gained and that the ball lost, and when the crest is 0.7 rad from the hit [s]."""
-    run, record = Run(model, "target", resolution=32), []
+    run = Run(model, "target", resolution=32)
+    record = []
     waves = run.ripples["target"]
     texel = aside(waves)
     while run.data.time < seconds - 1e-9:
@@ -155,7 +182,12 @@ def test_integrators_that_hold_their_forces_agree(integrator: str) -> None:
 
 def test_integrator_that_does_not_is_warned_of() -> None:
     with pytest.warns(RippleWarning, match='RK4 .* integrator="implicitfast"'):
-        Ripples(ball_on_sphere(0.002, SOLREF[0.5], "RK4"), {"target": Material()}, resolution=8, backend="cpu")
+        Ripples(
+            ball_on_sphere(0.002, SOLREF[0.5], "RK4"),
+            {"target": Material()},
+            resolution=8,
+            backend="cpu",
+        )
 
 
 @pytest.mark.filterwarnings("error")
@@ -165,12 +197,18 @@ def test_without_targets_no_integrator_is_warned_of() -> None:
 
 def test_answer_does_not_depend_on_the_frame_rate(tmp_path: Path) -> None:
     mujoco.mj_saveLastXML(str(tmp_path / "scene.xml"), ball_on_sphere(0.002, "0.02 1"))
-    table = 'model = "scene.xml"\n[[ripple]]\ngeom = "target"\nresolution = 32\nmaterial = {density = 50.0}\n'
+    table = (
+        'model = "scene.xml"\n[[ripple]]\ngeom = "target"\nresolution = 32\nmaterial = '
+        "{density = 50.0}\n"
+    )
     (tmp_path / "scene.toml").write_text(table)
     scene = load_scene(tmp_path / "scene.toml")
-    given, arrivals = [], []
+    given = []
+    arrivals = []
     for fps in (24, 60, 100):
-        simulation, total, record = Simulation(scene, fps=fps, backend="cpu"), 0.0, []
+        simulation = Simulation(scene, fps=fps, backend="cpu")
+        total = 0.0
+        record = []
         waves = simulation.ripples["target"]
         texel = aside(waves)
         while simulation.data.time < 0.75 - 1e-9:
@@ -198,10 +236,19 @@ FALLING = {
 @pytest.mark.parametrize(
     ("target", "ground"),
     # MuJoCo finds no contacts of SDF geoms with height fields, which is warned of
-    [(target, ground) for target in FALLING for ground in GROUND if (target, ground) != ("sdf", "hfield")],
+    [
+        (target, ground)
+        for target in FALLING
+        for ground in GROUND
+        if (target, ground) != ("sdf", "hfield")
+    ],
 )
-@pytest.mark.filterwarnings("ignore:geom 'target' collides as its convex hull", "ignore:the waves on geom")
-def test_a_target_that_falls_on_the_ground_gets_its_change_of_momentum(target: str, ground: str) -> None:
+@pytest.mark.filterwarnings(
+    "ignore:geom 'target' collides as its convex hull", "ignore:the waves on geom"
+)
+def test_a_target_that_falls_on_the_ground_gets_its_change_of_momentum(
+    target: str, ground: str
+) -> None:
     if target == "convex":
         pytest.importorskip("coacd")
     spec = mujoco.MjSpec.from_string(
@@ -223,7 +270,9 @@ def test_a_target_that_falls_on_the_ground_gets_its_change_of_momentum(target: s
     assert run.pairs == {("target", "ground")}
 
 
-CASES = SimpleNamespace(**runpy.run_path(str(Path(__file__).parents[2] / "examples" / "benchmarks" / "momentum.py")))
+CASES = SimpleNamespace(
+    **runpy.run_path(str(Path(__file__).parents[2] / "examples" / "benchmarks" / "momentum.py"))
+)
 
 
 @pytest.mark.filterwarnings("ignore:the waves on geom")

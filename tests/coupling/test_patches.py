@@ -13,7 +13,9 @@ SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
 
 def spread_patch(atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool):
     patch = np.zeros(1, int), np.array([radius]), np.array([convex])
-    patches, at, shares, radii = load_points(points, forces, *patch, lambda probes: atlas.nearest(probes)[0])
+    patches, at, shares, radii = load_points(
+        points, forces, *patch, lambda probes: atlas.nearest(probes)[0]
+    )
     assert not patches.any()
     assert np.ptp(radii) == 0
     return at, shares, radii[0]
@@ -21,7 +23,8 @@ def spread_patch(atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: f
 
 def test_four_equal_corners_spread_evenly_over_the_square(block: Atlas) -> None:
     points, forces, radius = spread_patch(block, SQUARE, np.full(4, 2.5), 0.01, convex=True)
-    # nodes of a 3 x 3 lattice, each with the area that it stands for: 1 at a corner, 2 at a rim, 4 in the middle
+    # nodes of a 3 x 3 lattice, each with the area that it stands for: 1 at a corner, 2 at a rim, 4
+    # in the middle
     assert sorted(np.round(forces / 10 * 16)) == [1, 1, 1, 1, 2, 2, 2, 2, 4]
     assert np.abs(points[:, :2]).max() < 0.1
     assert radius > 0.05
@@ -42,7 +45,8 @@ def test_no_force_where_the_surface_is_not() -> None:
     """Two contacts on the head and on the rump of an animal load it there, and not on the saddle between them."""
     V, F = limbed(0.05)
     animal = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
-    head, rump = V[V[:, 2].argmax()], V[V[:, 0].argmin()]
+    head = V[V[:, 2].argmax()]
+    rump = V[V[:, 0].argmin()]
     loads = np.array([2.0, 1.0])
     points, forces, radius = spread_patch(animal, np.array([head, rump]), loads, 0.02, convex=True)
     np.testing.assert_array_equal(points, [head, rump])
@@ -69,15 +73,22 @@ def test_patches_do_not_depend_on_one_another(block: Atlas, seed: int) -> None:
     rng = np.random.default_rng(seed)
     counts = rng.integers(1, 6, 4)
     counts[rng.integers(4)] = 1
-    starts, size = np.cumsum([0, *counts[:-1]]), counts.sum()
+    starts = np.cumsum([0, *counts[:-1]])
+    size = counts.sum()
     points = np.column_stack([rng.uniform(-0.4, 0.4, (size, 2)), rng.uniform(0.5, 0.501, size)])
-    forces, radii = rng.uniform(0.1, 3.0, size), np.array([0.04, 0.06, 0.03, 0.05])
+    forces = rng.uniform(0.1, 3.0, size)
+    radii = np.array([0.04, 0.06, 0.03, 0.05])
     convex = np.array([True, False, True, True])
-    patches, *together = load_points(points, forces, starts, radii, convex, lambda probes: block.nearest(probes)[0])
+    patches, *together = load_points(
+        points, forces, starts, radii, convex, lambda probes: block.nearest(probes)[0]
+    )
     assert (np.diff(patches) >= 0).all()
     for i, (first, count) in enumerate(zip(starts, counts, strict=True)):
-        mine, rows = patches == i, slice(first, first + count)
-        at, pushes, radius = spread_patch(block, points[rows], forces[rows], radii[i], bool(convex[i]))
+        mine = patches == i
+        rows = slice(first, first + count)
+        at, pushes, radius = spread_patch(
+            block, points[rows], forces[rows], radii[i], bool(convex[i])
+        )
         np.testing.assert_allclose(together[0][mine], at, atol=1e-12)
         np.testing.assert_allclose(together[1][mine], pushes, rtol=1e-9)
         np.testing.assert_allclose(together[2][mine], radius)
@@ -85,12 +96,17 @@ def test_patches_do_not_depend_on_one_another(block: Atlas, seed: int) -> None:
 
 def test_footprints_under_many_points_are_those_of_each() -> None:
     animal = build_atlas(Mesh.from_arrays(*limbed(0.05)), 24, cache=False)
-    rng, areas = np.random.default_rng(2), animal.areas.reshape(-1)
+    rng = np.random.default_rng(2)
+    areas = animal.areas.reshape(-1)
     movable = rng.uniform(0.5, 1.0, areas.size)
     points = animal.mesh.V[rng.choice(len(animal.mesh.V), 60, replace=False)]
-    found = Footprints(animal, movable).under(np.zeros(60, int), points, np.full(60, 0.08), np.zeros(1, bool))
+    found = Footprints(animal, movable).under(
+        np.zeros(60, int), points, np.full(60, 0.08), np.zeros(1, bool)
+    )
     for point, (texels, shares) in zip(points, found, strict=True):
         where = footprint(animal, point, 0.08)
         np.testing.assert_array_equal(texels, where.texels)
-        np.testing.assert_allclose(shares, where.weights * areas[where.texels] * movable[where.texels])
+        np.testing.assert_allclose(
+            shares, where.weights * areas[where.texels] * movable[where.texels]
+        )
         assert (where.weights * areas[where.texels]).sum() == pytest.approx(1.0)

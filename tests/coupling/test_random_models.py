@@ -14,11 +14,14 @@ from wave_heights import WaveHeights
 from ripple_sim import Impulse, Material, Ripples, RippleWarning
 from ripple_sim.solver.layouts import build
 
-RESOLUTION, TOLERANCE = 16, 0.01
+RESOLUTION = 16
+TOLERANCE = 0.01
 # as long as this the surface receives every force as it comes [s]
 AT_ONCE = 0.1
 # heights over the local radius, and slopes on a hundredth of the surface, that are warned of
-HIGH, STEEP, STEEP_AREA = 0.25, 1.0, 0.01
+HIGH = 0.25
+STEEP = 1.0
+STEEP_AREA = 0.01
 # they are looked at once in 16 steps, and measured in another way here
 SLACK = 1.5
 
@@ -34,11 +37,16 @@ class Hit:
         steps = min(scene.steps, int(AT_ONCE / random.timestep))
         again = steps // 2 if random.restarted else None
         self.balance = MomentumBalance(scene.model, random.targets)
-        with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
+        with warnings.catch_warnings(
+            record=True, action="always", category=RippleWarning
+        ) as caught:
             options = {"resolution": RESOLUTION, "backend": "cpu", "conserve_volume": False}
             ripples = self.ripples = Ripples(scene.model, materials, **options)
-            self.heights = {name: WaveHeights(ripples[name].atlas, SLACK * STEEP) for name in ripples}
-            self.off, self.facing = 0.0, 1.0
+            self.heights = {
+                name: WaveHeights(ripples[name].atlas, SLACK * STEEP) for name in ripples
+            }
+            self.off = 0.0
+            self.facing = 1.0
             with scene.filtering():
                 for step in range(steps):
                     if step == again:
@@ -53,32 +61,47 @@ class Hit:
                     for name, each in self.heights.items():
                         each.look(ripples[name])
             self.momentum = {name: ripples[name].momentum() for name in ripples}
-            self.finite = all(np.isfinite([ripples[name].height, ripples[name].velocity]).all() for name in ripples)
+            self.finite = all(
+                np.isfinite([ripples[name].height, ripples[name].velocity]).all()
+                for name in ripples
+            )
             ripples.reset()  # reports waves that are still followed
         told = [str(each.message) for each in caught]
-        self.warned_high = {name for name in ripples if any(f"the waves on geom {name!r} are too" in x for x in told)}
+        self.warned_high = {
+            name
+            for name in ripples
+            if any(f"the waves on geom {name!r} are too" in x for x in told)
+        }
         self.told = [text for text in told if "the waves on geom" not in text]
 
     def _look_at_place(self, data: mujoco.MjData, impulse: Impulse, kind: str) -> None:
         """How far from the true surface an impulse lies, over its size, and whether it faces what it pushes away."""
-        atlas, geom = self.ripples[impulse.geom].atlas, data.geom(impulse.geom)
+        atlas = self.ripples[impulse.geom].atlas
+        geom = data.geom(impulse.geom)
         rotation = geom.xmat.reshape(3, 3)
         local = (impulse.point - geom.xpos) @ rotation
         off = np.linalg.norm(atlas.project(local)[0][0] - local)
         self.off = max(self.off, off / np.ptp(atlas.mesh.V, axis=0).max())
         pair = impulse.geom, impulse.other
         push = self.balance.pushes[pair]
-        pressed = sum(each.impulse for each in self.ripples.last_impulses if (each.geom, each.other) == pair)
+        pressed = sum(
+            each.impulse for each in self.ripples.last_impulses if (each.geom, each.other) == pair
+        )
         strength = float(np.linalg.norm(push))
-        # contacts with a flex or a coarse signed distance push sideways too, and hills from several sides
+        # contacts with a flex or a coarse signed distance push sideways too, and hills from several
+        # sides
         types = [data.model.geom(name).type[0] for name in (impulse.geom, impulse.other)]
         # and the normal of geoms that MuJoCo pairs a hair before they touch may be any
         contact = data.contact
         pair_id = [data.geom(name).id for name in (impulse.geom, impulse.other)]
-        touching = (np.isin(contact.geom, pair_id).all(axis=1) & (contact.dist < contact.includemargin)).any()
+        touching = (
+            np.isin(contact.geom, pair_id).all(axis=1) & (contact.dist < contact.includemargin)
+        ).any()
         straight = touching and kind != "flex" and mujoco.mjtGeom.mjGEOM_SDF not in types
         if straight and strength * data.model.opt.timestep > 0.99 * pressed > 0:
-            self.facing = min(self.facing, rotation @ atlas.normals[impulse.texel] @ push / strength)
+            self.facing = min(
+                self.facing, rotation @ atlas.normals[impulse.texel] @ push / strength
+            )
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +114,8 @@ def _one_sphere_map_a_shape() -> Iterator[None]:
             shape = np.round((V - V.mean(axis=0)) / np.ptp(V, axis=0).max(), 4) + 0.0
             key = name, shape.tobytes(), F.tobytes()
             if key not in known:
-                # of the shape as it is looked up: what a test sees must not hang on which size came first
+                # of the shape as it is looked up: what a test sees must not hang on which size came
+                # first
                 known[key] = sphere_map(shape, F)
             return known[key]
 
@@ -105,7 +129,9 @@ def _one_sphere_map_a_shape() -> Iterator[None]:
 
 @pytest.mark.usefixtures("_one_sphere_map_a_shape", "in_tmp_path")
 @pytest.mark.parametrize("block", range(3))
-def test_impulses_are_the_change_of_momentum_and_waves_low_or_a_warning_says_that_not(block: int) -> None:
+def test_impulses_are_the_change_of_momentum_and_waves_low_or_a_warning_says_that_not(
+    block: int,
+) -> None:
     touched = 0
     for seed in range(20 * block, 20 * block + 20):
         hit = Hit(seed)
@@ -121,8 +147,12 @@ def test_impulses_are_the_change_of_momentum_and_waves_low_or_a_warning_says_tha
             if hit.told or not exchanged:
                 continue
             touched += 1
-            given, limit = sum(pair.given for pair in pairs), TOLERANCE * exchanged
-            assert given == pytest.approx(sum(pair.reported for pair in pairs), abs=limit), (seed, name)
+            given = sum(pair.given for pair in pairs)
+            limit = TOLERANCE * exchanged
+            assert given == pytest.approx(sum(pair.reported for pair in pairs), abs=limit), (
+                seed,
+                name,
+            )
             assert sum(abs(pair.felt - pair.reported) for pair in pairs) <= limit, (seed, name)
             assert hit.momentum[name] == pytest.approx(-given, abs=limit), (seed, name)
     assert touched >= 5

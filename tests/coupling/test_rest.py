@@ -46,18 +46,25 @@ def model_of(target: str, body: str, solref: str) -> mujoco.MjModel:
     return spec.compile()
 
 
-pytestmark = pytest.mark.filterwarnings("ignore:geom 'target' collides through a flex", "ignore:the waves on geom")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:geom 'target' collides through a flex", "ignore:the waves on geom"
+)
 
-CALM, CHATTERING = "0.02 1", "0.01 0.2"
+CALM = "0.02 1"
+CHATTERING = "0.01 0.2"
 
 
 # the latter never comes quite to rest: contacts of flat bodies break and close at every other step
-@pytest.mark.parametrize("pair", ["sphere ball", "box box", "box capsule", "animal box", "flex box"])
+@pytest.mark.parametrize(
+    "pair", ["sphere ball", "box box", "box capsule", "animal box", "flex box"]
+)
 def test_surface_under_a_body_at_rest_becomes_still_in_its_dimple(pair: str) -> None:
     target, body = pair.split()
     model = model_of(target, body, CALM if target == "sphere" else CHATTERING)
-    run, history = Run(model, "target", material=MATERIAL, resolution=24), []
-    data, waves = run.data, run.ripples["target"]
+    run = Run(model, "target", material=MATERIAL, resolution=24)
+    history = []
+    data = run.data
+    waves = run.ripples["target"]
     while data.time < 4:
         run.step()
         history.append(rms(waves))
@@ -66,20 +73,34 @@ def test_surface_under_a_body_at_rest_becomes_still_in_its_dimple(pair: str) -> 
     # the springs under the whole surface bear the weight
     support = -(waves.operator.mass * MATERIAL.stiffness * waves.height.astype(np.float64)).sum()
     # ... of which the slope of the animal's back takes a little along the surface
-    assert support == pytest.approx(0.5 * GRAVITY, rel=0.02 if target in ("animal", "flex") else 0.005)
+    assert support == pytest.approx(
+        0.5 * GRAVITY, rel=0.02 if target in ("animal", "flex") else 0.005
+    )
     deepest = waves.atlas.positions.reshape(-1, 3)[waves.height.argmin()]
-    position, rotation = data.geom("target").xpos, data.geom("target").xmat.reshape(3, 3)
+    position = data.geom("target").xpos
+    rotation = data.geom("target").xmat.reshape(3, 3)
     assert np.linalg.norm(position + rotation @ deepest - data.body("body").xpos) < 0.12
 
 
 def test_box_that_lies_flat_loads_the_surface_under_its_middle_too() -> None:
     material = Material(speed=0.1, damping=20.0, stiffness=1000.0, density=100.0)
-    run = Run(model_of("box", "box", "0.02 1"), "target", material=material, resolution=64, conserve_volume=True)
+    run = Run(
+        model_of("box", "box", "0.02 1"),
+        "target",
+        material=material,
+        resolution=64,
+        conserve_volume=True,
+    )
     waves = run.until(1.5).ripples["target"]
-    place, height = waves.atlas.positions.reshape(-1, 3), waves.height.reshape(-1)
+    place = waves.atlas.positions.reshape(-1, 3)
+    height = waves.height.reshape(-1)
     above = place[:, 2] > 0.099
     middle = above & (np.hypot(place[:, 0], place[:, 1]) < 0.015)
-    corner = above & (np.abs(np.abs(place[:, 0]) - 0.06) < 0.012) & (np.abs(np.abs(place[:, 1]) - 0.05) < 0.012)
+    corner = (
+        above
+        & (np.abs(np.abs(place[:, 0]) - 0.06) < 0.012)
+        & (np.abs(np.abs(place[:, 1]) - 0.05) < 0.012)
+    )
     away = above & (np.hypot(place[:, 0], place[:, 1]) > 0.2)
     assert height[middle].max() < 0
     assert height[middle].mean() < height[corner].mean() < 0
@@ -97,7 +118,8 @@ def test_surface_under_a_stack_and_its_neighbours_becomes_still(target: str, dt:
         f"""<mujoco><option timestep="{dt}" sdf_initpoints="10"/><default><geom friction="1 0.05 0.05" condim="6"/>
         </default><asset>{limbed_asset()}</asset><worldbody>{TARGETS[target][0]}{bodies}</worldbody></mujoco>"""
     )
-    run, history = Run(model, "target", material=MATERIAL, resolution=16), []
+    run = Run(model, "target", material=MATERIAL, resolution=16)
+    history = []
     while run.data.time < 4:
         run.step()
         history.append(rms(run.ripples["target"]))
@@ -118,15 +140,22 @@ def hammered(target: str, off: float) -> mujoco.MjModel:
 
 
 @pytest.mark.parametrize("rest", [0.05, 2.0])
-@pytest.mark.parametrize(("target", "off", "speed"), [("box", 0.03, 3.0), ("box", 0.0, 0.2), ("animal", 0.03, 3.0)])
-def test_a_hit_makes_the_same_wave_after_any_rest(target: str, off: float, speed: float, rest: float) -> None:
+@pytest.mark.parametrize(
+    ("target", "off", "speed"), [("box", 0.03, 3.0), ("box", 0.0, 0.2), ("animal", 0.03, 3.0)]
+)
+def test_a_hit_makes_the_same_wave_after_any_rest(
+    target: str, off: float, speed: float, rest: float
+) -> None:
     model = hammered(target, off)
-    data, waves = mujoco.MjData(model), WithAndWithout(model, MATERIAL, 12)
-    hammer, struck = model.joint("hammer"), False
+    data = mujoco.MjData(model)
+    waves = WithAndWithout(model, MATERIAL, 12)
+    hammer = model.joint("hammer")
+    struck = False
     while data.time < rest + 0.2:
         if data.time >= rest and not struck:
             above = data.body("body").xpos[2] + 0.04 + 0.03 + 0.002
-            data.qpos[hammer.qposadr], data.qvel[hammer.dofadr] = above - model.body("hammer").pos[2], -speed
+            data.qpos[hammer.qposadr] = above - model.body("hammer").pos[2]
+            data.qvel[hammer.dofadr] = -speed
             struck = True
         mujoco.mj_step(model, data)
         waves.step(data)
@@ -141,7 +170,8 @@ def test_a_rod_that_stays_in_contact_drives_waves_for_ever(frequency: float, dt:
         <body pos="0 0 0.06"><joint name="rod" type="slide" axis="0 0 1"/><geom type="capsule" size="0.03 0.03"
         mass="1"/></body></worldbody><actuator><motor joint="rod"/></actuator></mujoco>"""
     )
-    data, waves = mujoco.MjData(model), WithAndWithout(model, MATERIAL, 8)
+    data = mujoco.MjData(model)
+    waves = WithAndWithout(model, MATERIAL, 8)
     while data.time < 6:
         data.ctrl[0] = 0.8 * GRAVITY * np.sin(2 * np.pi * frequency * data.time)
         mujoco.mj_step(model, data)
@@ -150,7 +180,9 @@ def test_a_rod_that_stays_in_contact_drives_waves_for_ever(frequency: float, dt:
     late = np.array(waves.history)[-round(2 / dt) :]
     np.testing.assert_allclose(*np.sqrt((late**2).mean(axis=0)), rtol=0.01)
     # the wave of the height at the time, not of its amount alone
-    np.testing.assert_allclose(waves.filtered.height, waves.unfiltered.height, atol=0.01 * late.max())
+    np.testing.assert_allclose(
+        waves.filtered.height, waves.unfiltered.height, atol=0.01 * late.max()
+    )
 
 
 def test_a_body_that_rolls_slowly_leaves_a_calm_surface() -> None:
@@ -159,7 +191,8 @@ def test_a_body_that_rolls_slowly_leaves_a_calm_surface() -> None:
         """<mujoco><option timestep="0.002"/><worldbody><geom name="target" type="box" size="0.4 0.2 0.1"/>
         <body pos="-0.1 0 0.15"><freejoint/><geom size="0.05" mass="0.5"/></body></worldbody></mujoco>"""
     )
-    data, waves = mujoco.MjData(model), WithAndWithout(model, MATERIAL, 24)
+    data = mujoco.MjData(model)
+    waves = WithAndWithout(model, MATERIAL, 24)
     data.qvel[[0, 4]] = 0.05, 1.0
     while data.time < 3:
         mujoco.mj_step(model, data)
@@ -172,13 +205,16 @@ def test_a_body_that_rolls_slowly_leaves_a_calm_surface() -> None:
 
 
 # a slab without symmetries: round-off does not choose its layout
-UNEVEN = "-.5 -.41 -.1 .52 -.4 -.1 .5 .43 -.1 -.48 .4 -.1 -.4 -.31 .1 .42 -.3 .1 .4 .33 .1 -.43 .3 .1"
+UNEVEN = (
+    "-.5 -.41 -.1 .52 -.4 -.1 .5 .43 -.1 -.48 .4 -.1 -.4 -.31 .1 .42 -.3 .1 .4 .33 .1 -.43 .3 .1"
+)
 
 
 @functools.cache
 def dropped(scale: float) -> np.ndarray:
     """Heights over the scale under a box and a ball that chatter: lengths by the scale, times by its square root."""
-    s, t = scale, np.sqrt(scale)
+    s = scale
+    t = np.sqrt(scale)
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="{0.002 * t}" tolerance="1e-14" iterations="200"/>
         <default><geom solref="{0.01 * t} 0.2" solimp="0.9 0.95 {0.001 * s} 0.5 2"/></default>
@@ -190,7 +226,8 @@ def dropped(scale: float) -> np.ndarray:
         </worldbody></mujoco>"""
     )
     material = Material(t, 1 / t, 200 / s, density=100 * s, viscosity=1e-3 * s * t)
-    ripples, data = Ripples(model, {"target": material}, resolution=16, backend="cpu"), mujoco.MjData(model)
+    ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu")
+    data = mujoco.MjData(model)
     heights = []
     for _ in range(50):
         ripples.mj_step(data, nstep=10)
@@ -209,22 +246,32 @@ class LoadedSphere:
     """A sphere of 1 m under the load of one geom, geom 0."""
 
     def __init__(self, resolution: int, radius: float, dt: float) -> None:
-        self.atlas, self.radius, self.dt = sphere_atlas(1.0, resolution), radius, dt
+        self.atlas = sphere_atlas(1.0, resolution)
+        self.radius = radius
+        self.dt = dt
         self.filter = RestFilter(1, self.atlas.areas.size)
 
     def at(self, point: np.ndarray, force: float) -> Load:
         where = footprint(self.atlas, point, self.radius)
         forces = force * where.weights * self.atlas.areas.reshape(-1)[where.texels]
         rows = np.array([0, len(forces)])
-        geoms, radii = np.zeros(1, np.int64), np.array([self.radius / 2])
-        return self.filter(TexelForces(geoms, point[None], radii, rows, where.texels, forces), self.dt)
+        geoms = np.zeros(1, np.int64)
+        radii = np.array([self.radius / 2])
+        return self.filter(
+            TexelForces(geoms, point[None], radii, rows, where.texels, forces), self.dt
+        )
 
 
 def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
     """Force that the surface receives in each step, while a geom touches and for a second after."""
-    sphere, given = LoadedSphere(16, 0.3, dt), []
+    sphere = LoadedSphere(16, 0.3, dt)
+    given = []
     for force in np.concatenate([forces, np.zeros(round(1.0 / dt))]):
-        out = sphere.at(np.array([0.0, 0.0, 1.0]), force) if force > 0 else sphere.filter(NO_FORCES, dt)
+        out = (
+            sphere.at(np.array([0.0, 0.0, 1.0]), force)
+            if force > 0
+            else sphere.filter(NO_FORCES, dt)
+        )
         given.append(out.forces.sum())
     assert not sphere.filter.active.any()
     return np.array(given)
@@ -232,7 +279,8 @@ def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["steady", "driven", "noise", "hit"])
 def test_the_force_of_unbroken_contact_passes_as_it_is(kind: str) -> None:
-    dt, steps = 0.002, 2000
+    dt = 0.002
+    steps = 2000
     force = np.full(steps, 3.0)
     if kind == "driven":
         force += 2.9 * np.sin(2 * np.pi * 5.0 * dt * np.arange(steps))
@@ -251,7 +299,11 @@ CHATTER = {"each other step": (0, 6), "sixth": (1.5, 4.4, 4.2, 3.5, 2.9, 0), "th
 
 @pytest.mark.parametrize(
     ("kind", "dt"),
-    [("each other step", 0.004), ("third", 0.004), *((kind, dt) for kind in CHATTER for dt in (0.0005, 0.002))],
+    [
+        ("each other step", 0.004),
+        ("third", 0.004),
+        *((kind, dt) for kind in CHATTER for dt in (0.0005, 0.002)),
+    ],
 )
 def test_nothing_of_chatter_is_lost_and_it_is_averaged(kind: str, dt: float) -> None:
     steps = round(6.0 / dt)
@@ -265,7 +317,8 @@ def test_nothing_of_chatter_is_lost_and_it_is_averaged(kind: str, dt: float) -> 
 
 
 def test_a_hit_on_a_chattering_geom_passes() -> None:
-    dt, steps = 0.002, 2500
+    dt = 0.002
+    steps = 2500
     force = np.resize([0.0, 6.0, 4.0], steps)
     hit = np.zeros(steps)
     hit[2000:2006] = [100, 300, 500, 500, 300, 100]
@@ -278,10 +331,14 @@ def test_a_hit_on_a_chattering_geom_passes() -> None:
 
 def test_the_place_of_a_geom_at_rest_is_averaged() -> None:
     """Its weight jumps between two points, which a hit does not wait for."""
-    sphere, rng, given = LoadedSphere(32, 0.2, 0.002), np.random.default_rng(1), []
+    sphere = LoadedSphere(32, 0.2, 0.002)
+    rng = np.random.default_rng(1)
+    given = []
     for step in range(2000):
         angle = 0.04 * rng.integers(2)
-        load = sphere.at(np.array([np.sin(angle), 0.0, np.cos(angle)]), 3.0 if step < 1990 else 300.0)
+        load = sphere.at(
+            np.array([np.sin(angle), 0.0, np.cos(angle)]), 3.0 if step < 1990 else 300.0
+        )
         given.append(np.bincount(load.texels, load.forces, sphere.atlas.areas.size))
     given = np.array(given)
     change = np.abs(np.diff(given, axis=0)).sum(axis=1)
@@ -291,21 +348,29 @@ def test_the_place_of_a_geom_at_rest_is_averaged() -> None:
 
 def forces_of(geoms: list[int], texels: list[np.ndarray], forces: list[np.ndarray]) -> TexelForces:
     """Geoms that load eight texels each, and stay in their places."""
-    begins, middles = 8 * np.arange(len(geoms) + 1), np.zeros((len(geoms), 3))
-    at, loads = np.array(texels, np.int64).reshape(-1), np.array(forces, np.float64).reshape(-1)
-    return TexelForces(np.array(geoms, np.int64), middles, np.full(len(geoms), 0.05), begins, at, loads)
+    begins = 8 * np.arange(len(geoms) + 1)
+    middles = np.zeros((len(geoms), 3))
+    at = np.array(texels, np.int64).reshape(-1)
+    loads = np.array(forces, np.float64).reshape(-1)
+    return TexelForces(
+        np.array(geoms, np.int64), middles, np.full(len(geoms), 0.05), begins, at, loads
+    )
 
 
 def test_geoms_are_filtered_each_for_itself() -> None:
     """Three geoms that come and go, together and alone."""
-    size, dt, rng = 96, 0.002, np.random.default_rng(3)
-    alone, every = [RestFilter(4, size) for _ in range(4)], RestFilter(4, size)
+    size = 96
+    dt = 0.002
+    rng = np.random.default_rng(3)
+    alone = [RestFilter(4, size) for _ in range(4)]
+    every = RestFilter(4, size)
     for step in range(400):
         present = [g for g in range(1, 4) if rng.random() < (0.9, 0.5, 0.02)[g - 1] and step < 200]
         texels = [rng.permutation(8) + 10 * g for g in present]
         forces = [rng.exponential(1.0, 8) for _ in present]
         load = every(forces_of(present, texels, forces), dt)
-        together, apart = np.bincount(load.texels, load.forces, size), np.zeros(size)
+        together = np.bincount(load.texels, load.forces, size)
+        apart = np.zeros(size)
         for g in range(1, 4):
             mine = slice(present.index(g), present.index(g) + 1) if g in present else slice(0, 0)
             own = alone[g](forces_of(present[mine], texels[mine], forces[mine]), dt)

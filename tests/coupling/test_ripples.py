@@ -15,9 +15,13 @@ from ripple_sim import Material, Ripples
 
 def impulses(model: mujoco.MjModel, geom: str, seconds: float, **options):
     """Run; return the ripples, and every impulse with the data's pose of the target at that moment."""
-    run, record = Run(model, geom, material=Material(speed=0.5, density=50.0), conserve_volume=True, **options), []
+    run = Run(
+        model, geom, material=Material(speed=0.5, density=50.0), conserve_volume=True, **options
+    )
+    record = []
     while run.data.time < seconds:
-        hits, placed = run.step(), run.data.geom(geom)
+        hits = run.step()
+        placed = run.data.geom(geom)
         pose = placed.xpos.copy(), placed.xmat.reshape(3, 3).copy()
         record += [(hit, pose, run.data.body("ball").xpos.copy()) for hit in hits]
     return run.ripples, record
@@ -54,32 +58,44 @@ def test_ball_on_a_concave_mesh_hits_the_surface_under_it(transform: str, placin
         assert np.linalg.norm(closest[0] - local) < 1e-9
         # ... where it is nearest to the ball's middle, which is where a ball touches
         touching, _ = ripples["target"].atlas.project((ball - position) @ rotation)
-        atlas, texel = ripples["target"].atlas, impulse.texel
+        atlas = ripples["target"].atlas
+        texel = impulse.texel
         assert np.linalg.norm(atlas.positions[texel] - touching[0]) < np.sqrt(atlas.areas[texel])
         assert np.linalg.norm(impulse.point - ball) == pytest.approx(0.05, abs=0.012)
 
 
 def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> None:
     """Independent of the atlas: the contacts' force-weighted point, and the nearest point of the mesh in the world."""
-    target = '<body name="target"><freejoint/><geom name="target" type="sdf" mesh="limbed" mass="20"/></body>'
+    target = (
+        '<body name="target"><freejoint/><geom name="target" type="sdf" mesh="limbed" '
+        'mass="20"/></body>'
+    )
     model = model_of(target + BALL.format("3 0 0"), limbed_asset(), 'gravity="0 0 0"')
-    run, off = Run(model, "target", material=Material(), resolution=128, conserve_volume=True), []
-    data, rng, atlas = run.data, np.random.default_rng(7), run.ripples["target"].atlas
+    run = Run(model, "target", material=Material(), resolution=128, conserve_volume=True)
+    off = []
+    data = run.data
+    rng = np.random.default_rng(7)
+    atlas = run.ripples["target"].atlas
     for _ in range(14):
         mujoco.mj_resetData(model, data)
         data.qpos[3:7] = (quat := rng.standard_normal(4)) / np.linalg.norm(quat)
         data.qvel[:6] = rng.uniform(-1, 1, 6) * [0.3, 0.3, 0.3, 2, 2, 2]
         mujoco.mj_kinematics(model, data)
         pose = data.geom("target").xmat.reshape(3, 3), data.geom("target").xpos
-        aim, way = pose[0] @ rng.choice(atlas.mesh.V) + pose[1], rng.standard_normal(3)
+        aim = pose[0] @ rng.choice(atlas.mesh.V) + pose[1]
+        way = rng.standard_normal(3)
         way /= np.linalg.norm(way)
-        data.qpos[7:10], data.qvel[6:9] = aim - 0.9 * way, 3.0 * way
+        data.qpos[7:10] = aim - 0.9 * way
+        data.qvel[6:9] = 3.0 * way
         hits = 0
         while data.time < 0.5 and hits < 4:
             for impulse in run.step():
                 hits += 1
                 forces = np.maximum(contact_forces(model, data)[:, 0], 0.0)
-                world = atlas.mesh.V @ data.geom("target").xmat.reshape(3, 3).T + data.geom("target").xpos
+                world = (
+                    atlas.mesh.V @ data.geom("target").xmat.reshape(3, 3).T
+                    + data.geom("target").xpos
+                )
                 weighted = forces @ data.contact.pos / forces.sum()
                 _, _, nearest = igl.point_mesh_squared_distance(weighted[None], world, atlas.mesh.F)
                 texel = np.sqrt(atlas.areas[impulse.texel])
@@ -91,9 +107,11 @@ def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> 
 def test_second_step_at_the_same_time_does_nothing() -> None:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.549"))
     run = Run(model, "target", material=Material(), resolution=8, conserve_volume=True).until(0.003)
-    ripples, waves = run.ripples, run.ripples["target"]
+    ripples = run.ripples
+    waves = run.ripples["target"]
     assert ripples.last_impulses
-    height, velocity = waves.height, waves.velocity
+    height = waves.height
+    velocity = waves.velocity
     ripples.step(run.data)
     assert not ripples.last_impulses
     np.testing.assert_array_equal(waves.height, height)
@@ -104,9 +122,15 @@ def test_second_step_at_the_same_time_does_nothing() -> None:
 @pytest.mark.filterwarnings("ignore:MuJoCo. compiler attribute 'settotalmass'")
 def test_seat_of_gymnasiums_humanoid_that_falls_on_its_back_ripples() -> None:
     """A model as others write them, in anybody's loop with three lines more: an import, and two that are marked."""
-    model = mujoco.MjModel.from_xml_path(str(Path(gymnasium.__file__).parent / "envs/mujoco/assets/humanoid.xml"))
-    ripples = Ripples(model, {"butt": Material(speed=0.3, density=30.0)}, resolution=24, backend="cpu")  # (1)
-    ends, given = [], 0.0
+    model = mujoco.MjModel.from_xml_path(
+        str(Path(gymnasium.__file__).parent / "envs/mujoco/assets/humanoid.xml")
+    )
+    # (1)
+    ripples = Ripples(
+        model, {"butt": Material(speed=0.3, density=30.0)}, resolution=24, backend="cpu"
+    )
+    ends = []
+    given = 0.0
     for rippling in (True, False):
         data = mujoco.MjData(model)
         data.qpos[2:7] = 0.5, 0.7, 0.0, 0.7, 0.0

@@ -19,7 +19,11 @@ WAVES = Material(speed=1.0, damping=1.0, density=1000.0)
 
 def made(*names, **options):
     model, data = posed(MODEL)
-    return model, data, Ripples(model, dict.fromkeys(names, WAVES), resolution=8, backend="cpu", **options)
+    return (
+        model,
+        data,
+        Ripples(model, dict.fromkeys(names, WAVES), resolution=8, backend="cpu", **options),
+    )
 
 
 @pytest.mark.filterwarnings("ignore:no wave")
@@ -28,7 +32,9 @@ def test_impulses_lie_on_a_terrain_that_is_written_anew():
     ripples.mj_step(data, 3)
     model.hfield_data[:] = np.linspace(0.6, 1.0, 144)
     data.qpos[2] = 0.5
-    with pytest.warns(RippleWarning, match="surface of 'terrain' was changed in the model: it gets a new atlas"):
+    with pytest.warns(
+        RippleWarning, match="surface of 'terrain' was changed in the model: it gets a new atlas"
+    ):
         ripples.mj_step(data)
     points = []
     for _ in range(100):
@@ -40,7 +46,9 @@ def test_impulses_lie_on_a_terrain_that_is_written_anew():
 
 
 @pytest.mark.parametrize(
-    ("name", "array", "part"), [("ball", "geom_size", 2), ("rock", "mesh_vert", ...)], ids=["ball", "rock"]
+    ("name", "array", "part"),
+    [("ball", "geom_size", 2), ("rock", "mesh_vert", ...)],
+    ids=["ball", "rock"],
 )
 @pytest.mark.filterwarnings("ignore:the surface of")
 def test_a_resized_target_gets_a_new_atlas_and_flat_waves_and_others_go_on(name, array, part):
@@ -48,7 +56,8 @@ def test_a_resized_target_gets_a_new_atlas_and_flat_waves_and_others_go_on(name,
     other = {"ball": "rock", "rock": "ball"}[name]
     for each in ripples:
         ripples[each].height = np.full_like(ripples[each].height, 0.01)
-    before, waves = np.ptp(ripples[name].atlas.mesh.V, axis=0), ripples[other]
+    before = np.ptp(ripples[name].atlas.mesh.V, axis=0)
+    waves = ripples[other]
     getattr(model, array)[part] *= 2
     ripples.follow_shapes()
     np.testing.assert_allclose(np.ptp(ripples[name].atlas.mesh.V, axis=0), 2 * before, rtol=1e-5)
@@ -85,7 +94,8 @@ def test_what_belongs_to_texels_of_the_old_surface_is_refused_at_the_next_step(w
         ripples.change_material("ball", speed=np.full(ripples["ball"].height.shape, 2.0))
     model.geom("ball").size[0] = 0.3
     with pytest.raises(
-        RippleError, match=f"surface of 'ball' was changed in the model, and .*{what}.*make new Ripples"
+        RippleError,
+        match=f"surface of 'ball' was changed in the model, and .*{what}.*make new Ripples",
     ):
         ripples.mj_step(data)
 

@@ -13,7 +13,9 @@ MATERIAL = Material(speed=0.6, damping=20.0, stiffness=1000.0, viscosity=3e-4, d
 pytestmark = pytest.mark.filterwarnings("ignore:the waves on geom")
 
 
-def model_of(target: str = "", solref: str = "0.02 1", tolerance: float = 1e-4, flag: str = "enable") -> mujoco.MjModel:
+def model_of(
+    target: str = "", solref: str = "0.02 1", tolerance: float = 1e-4, flag: str = "enable"
+) -> mujoco.MjModel:
     """Two boxes on one another, on a plate that is static, or stands on a floor."""
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" sleep_tolerance="{tolerance}"><flag sleep="{flag}"/></option>
@@ -39,10 +41,14 @@ def still_asleep(run: Run, time: float) -> Run:
 def weight(run: Run) -> float:
     """That the springs under the surface bear [N], where they bear no floor."""
     waves = run.ripples["target"]
-    return -float((waves.operator.mass * MATERIAL.stiffness * waves.height.astype(np.float64)).sum())
+    return -float(
+        (waves.operator.mass * MATERIAL.stiffness * waves.height.astype(np.float64)).sum()
+    )
 
 
-@pytest.mark.parametrize(("solref", "tolerance"), [("0.02 1", 1e-4), ("0.01 0.2", 0.03)], ids=["calm", "chattering"])
+@pytest.mark.parametrize(
+    ("solref", "tolerance"), [("0.02 1", 1e-4), ("0.01 0.2", 0.03)], ids=["calm", "chattering"]
+)
 def test_a_sleeping_body_keeps_its_dimple_and_presses(solref: str, tolerance: float) -> None:
     run = asleep(model_of("", solref, tolerance), 2.0)
     [impulse] = run.hits[-1]

@@ -9,17 +9,24 @@ from mujoco_models import mesh_asset
 from ripple_sim import Material, Ripples, RippleWarning, make_collidable
 from ripple_sim.scenes.shapes import limbed
 
-MASS, DT = 0.5, 0.002
+MASS = 0.5
+DT = 0.002
 BOX = '<geom name="target" type="box" size="0.4 0.4 0.2"/>'
 SEEN = 'contype="0" conaffinity="0"'
 
 
-def draped(target: str, body: str = "", contact: str = "", kind: str = "2", integrator: str = "Euler"):
+def draped(
+    target: str, body: str = "", contact: str = "", kind: str = "2", integrator: str = "Euler"
+):
     """A cloth of 0.4 m, or a soft cube, over a target whose top is at 0.2 m."""
     count = "11 11 1" if kind == "2" else "4 4 4"
     # the discrete integrator of MuJoCo 4 refuses damped edges
     damping = "" if integrator == "discrete" else 'damping="0.01"'
-    edge = f'<edge equality="true" {damping}/>' if kind == "2" else '<elasticity young="2e4" poisson="0.2"/>'
+    edge = (
+        f'<edge equality="true" {damping}/>'
+        if kind == "2"
+        else '<elasticity young="2e4" poisson="0.2"/>'
+    )
     return mujoco.MjSpec.from_string(
         f"""<mujoco><option timestep="{DT}" solver="CG" tolerance="1e-6" integrator="{integrator}"/>
         <asset>{mesh_asset("animal", *limbed(0.05))}</asset><worldbody><body name="link">{body}{target}</body>
@@ -32,7 +39,8 @@ def draped(target: str, body: str = "", contact: str = "", kind: str = "2", inte
 
 def play(spec: mujoco.MjSpec, seconds: float) -> tuple[Run, float]:
     """The run, and the sum of MuJoCo's normal forces times time step [N s]."""
-    run, told = Run(spec, "target", resolution=24), 0.0
+    run = Run(spec, "target", resolution=24)
+    told = 0.0
     while run.data.time < seconds - 1e-9:
         run.step()
         told += contact_forces(run.model, run.data)[:, 0].sum() * DT
@@ -51,7 +59,9 @@ def test_cloth_and_soft_cube_give_a_flat_top_all_the_momentum_that_they_lose(kin
     assert -run.ripples["target"].momentum() == pytest.approx(run.given(), rel=0.01)
     while not run.hits[-1] and run.data.time < 0.5:
         run.step()
-    middle = np.average(run.data.contact.pos, axis=0, weights=contact_forces(run.model, run.data)[:, 0])
+    middle = np.average(
+        run.data.contact.pos, axis=0, weights=contact_forces(run.model, run.data)[:, 0]
+    )
     np.testing.assert_allclose(run.hits[-1][0].point, [*middle[:2], 0.2], atol=1e-6)
 
 
@@ -93,7 +103,9 @@ def test_risen_surface_pushes_a_cloth_up() -> None:
         spec = draped(BOX)
         spec.body("link").pos = [0, 0, 0.09]
         material = Material(speed=0.3, density=200.0)
-        run = Run(spec, "target", material=material, resolution=24, two_way=two_way, conserve_volume=True).until(0.06)
+        run = Run(
+            spec, "target", material=material, resolution=24, two_way=two_way, conserve_volume=True
+        ).until(0.06)
         run.ripples["target"].add_impulse([0.03, 0, 0.2], -5.0, 0.1)
         heights.append(run.until(0.11).data.flexvert_xpos[:, 2].max())
     assert heights[1] > heights[0] + 0.002
@@ -101,5 +113,7 @@ def test_risen_surface_pushes_a_cloth_up() -> None:
 
 def test_passive_contacts_which_tell_no_force_are_warned_of() -> None:
     spec = draped(BOX, contact='passive="true"', integrator="discrete")
-    with pytest.warns(RippleWarning, match="passive contacts of flex 'cloth', under which geom 'target' will"):
+    with pytest.warns(
+        RippleWarning, match="passive contacts of flex 'cloth', under which geom 'target' will"
+    ):
         Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")

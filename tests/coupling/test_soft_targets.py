@@ -31,19 +31,22 @@ CLOTH = f"""<mujoco>{HEAD}<worldbody>
 
 def skinned() -> str:
     """A box of skin over two links, of which the second one turns."""
-    x, corners = np.linspace(-0.5, 0.5, 5), [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    x = np.linspace(-0.5, 0.5, 5)
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     V = np.array([[each, 0.06 * y, 0.06 * z] for each in x for y, z in corners])
     F = [(0, 3, 2), (0, 2, 1), (16, 17, 18), (16, 18, 19)]
     for i in range(4):
         for j in range(4):
-            a, b = 4 * i + j, 4 * i + (j + 1) % 4
+            a = 4 * i + j
+            b = 4 * i + (j + 1) % 4
             F += [(a, b, b + 4), (a, b + 4, a + 4)]
     far = np.clip((V[:, 0] + 0.1) / 0.2, 0, 1)
     bones = ""
     for body, weights, at in (("near", 1 - far, "0 0 0"), ("far", far, "0 0 0")):
         which = np.flatnonzero(weights)
         bones += (
-            f'<bone body="{body}" bindpos="{at}" bindquat="1 0 0 0" vertid="{" ".join(map(str, which))}" '
+            f'<bone body="{body}" bindpos="{at}" bindquat="1 0 0 0" '
+            f'vertid="{" ".join(map(str, which))}" '
             f'vertweight="{" ".join(f"{weight:g}" for weight in weights[which])}"/>'
         )
     return f"""<mujoco><option timestep="0.001" gravity="0 0 -9.81"/><worldbody>
@@ -67,7 +70,8 @@ TARGETS = {"3d": (JELLY, "jelly"), "2d": (CLOTH, "cloth"), "skin": (skinned(), "
 def test_the_balls_momentum_reaches_the_surface(xml, name, recwarn):
     run = begun(xml, name).until(0.35)
     assert not any("wraps" in str(each.message) for each in recwarn)
-    ball, waves = run.model.body("ball"), run.ripples[name]
+    ball = run.model.body("ball")
+    waves = run.ripples[name]
     gained = ball.mass[0] * (run.data.qvel[ball.dofadr[0] + 2] + 9.81 * run.data.time)
     assert gained > 0.2
     given = sum(hit.impulse for hits in run.hits for hit in hits if hit.other == "ball")
@@ -80,7 +84,9 @@ def test_the_balls_momentum_reaches_the_surface(xml, name, recwarn):
 def test_the_stiffness_that_is_left_open_suits_the_speed_that_is_given():
     model = mujoco.MjModel.from_xml_string(CLOTH)
     slow, fast = (Run(model, "cloth", material=Material(speed=c), resolution=8) for c in (0.4, 0.8))
-    assert fast.ripples["cloth"].material.stiffness == pytest.approx(4 * slow.ripples["cloth"].material.stiffness)
+    assert fast.ripples["cloth"].material.stiffness == pytest.approx(
+        4 * slow.ripples["cloth"].material.stiffness
+    )
 
 
 HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
@@ -93,13 +99,20 @@ HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
 def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses(recwarn):
     """Forces on its slopes cancel as vectors, and those are exact; the surface gets the amounts of the normal ones."""
     run = begun(HAMMOCK, "cloth")
-    model, data, amounts, whole = run.model, run.data, 0.0, np.zeros(3)
+    model = run.model
+    data = run.data
+    amounts = 0.0
+    whole = np.zeros(3)
     for _ in range(400):
         run.step()
-        forces, on_ball = contact_forces(model, data), np.where(data.contact.geom[:, 1] >= 0, 1, -1)
+        forces = contact_forces(model, data)
+        on_ball = np.where(data.contact.geom[:, 1] >= 0, 1, -1)
         amounts += 0.001 * forces[:, 0].sum()
-        whole += 0.001 * np.einsum("k,ki,kij->j", on_ball, forces[:, :3], data.contact.frame.reshape(-1, 3, 3))
-    dof, gained = model.body("ball").dofadr[0], np.array([0.0, 0.0, 0.1 * 9.81 * data.time])
+        whole += 0.001 * np.einsum(
+            "k,ki,kij->j", on_ball, forces[:, :3], data.contact.frame.reshape(-1, 3, 3)
+        )
+    dof = model.body("ball").dofadr[0]
+    gained = np.array([0.0, 0.0, 0.1 * 9.81 * data.time])
     assert_allclose(whole, 0.1 * data.qvel[dof : dof + 3] + gained, atol=1e-6)
     assert run.given() == pytest.approx(amounts, rel=1e-6)
     assert run.given() > 1.1 * np.linalg.norm(whole)
@@ -110,7 +123,8 @@ def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses(
 
 def test_texels_lie_where_the_flex_is():
     run = begun(JELLY, "jelly").until(0.1)
-    corners, waves = run.data.flexvert_xpos, run.ripples["jelly"]
+    corners = run.data.flexvert_xpos
+    waves = run.ripples["jelly"]
     assert all(np.linalg.norm(corners - each, axis=1).min() < 1e-12 for each in waves.vertices)
     assert_allclose(waves.vertices[waves.atlas.mesh.F].min(axis=(0, 1)), corners.min(axis=0))
 
@@ -121,7 +135,8 @@ def test_a_skin_follows_its_bones():
     run.data.qpos[0] = np.pi / 2
     run.step()
     after = run.ripples["arm"].vertices
-    near, far = before[:, 0] < -0.2, before[:, 0] > 0.2
+    near = before[:, 0] < -0.2
+    far = before[:, 0] > 0.2
     assert_allclose(after[near], before[near], atol=1e-6)
     assert_allclose(after[far][:, 1], before[far][:, 0], atol=2e-3)
 
@@ -133,9 +148,15 @@ def test_names_that_no_surface_has_are_refused():
     with pytest.raises(SceneError, match="cannot push back: their waves have the masses"):
         Ripples(model, {"jelly": SOFT}, resolution=8, two_way=True)
     with pytest.raises(
-        SceneError, match=r"^contacts names 'cloth', a flex or a skin, for which no geoms can be chosen"
+        SceneError,
+        match=r"^contacts names 'cloth', a flex or a skin, for which no geoms can be chosen",
     ):
-        Ripples(mujoco.MjModel.from_xml_string(HAMMOCK), {"cloth": SOFT}, contacts={"cloth": ["ball"]}, resolution=8)
+        Ripples(
+            mujoco.MjModel.from_xml_string(HAMMOCK),
+            {"cloth": SOFT},
+            contacts={"cloth": ["ball"]},
+            resolution=8,
+        )
 
 
 def test_what_a_material_leaves_open_is_chosen_by_the_model():
@@ -150,7 +171,8 @@ def test_a_geom_moved_by_hand_takes_its_contacts_along():
         """<mujoco><worldbody><geom name="target" type="sphere" size=".2"/>
         <body pos="0 0 .26"><freejoint/><geom name="ball" type="sphere" size=".05"/></body></worldbody></mujoco>"""
     )
-    data, ripples = mujoco.MjData(model), Ripples(model, {"target": SOFT}, resolution=8)
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"target": SOFT}, resolution=8)
     for i in range(100):
         ripples["target"].move(ripples["target"].rest.mesh.V * [1, 1, 1 - 0.002 * i])
         ripples.mj_step(data)
@@ -165,7 +187,9 @@ def flexed(dof: str) -> tuple[mujoco.MjModel, Ripples, SoftSurface]:
         radius=".005" mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3"/></flexcomp>
         </worldbody></mujoco>"""
     )
-    ripples = Ripples(model, {"jelly": Target(Material(speed=1.0, density=5.0), high_pass=True)}, resolution=8)
+    ripples = Ripples(
+        model, {"jelly": Target(Material(speed=1.0, density=5.0), high_pass=True)}, resolution=8
+    )
     return model, ripples, SoftSurface(model, first_flex(model))
 
 

@@ -13,7 +13,8 @@ from ripple_sim import Material, Ripples, RippleWarning, Target, make_collidable
 from ripple_sim.coupling import PAIR, CoupledModel, TunnellingCheck, too_fast, tunnelling
 from ripple_sim.scenes.shapes import peanut
 
-MASS, DT = 1e-5, 0.001
+MASS = 1e-5
+DT = 0.001
 
 
 def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str]]:
@@ -25,7 +26,9 @@ def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str
         <body pos="0.1 0 0.54"><freejoint/><geom type="box" size="0.05 0.04 0.03" mass="{MASS}"/></body>
         </worldbody></mujoco>"""
     )
-    data, missing, pressed = mujoco.MjData(model), 0.0, 0.0
+    data = mujoco.MjData(model)
+    missing = 0.0
+    pressed = 0.0
     data.qvel[8] = -1.0
     with warnings.catch_warnings(record=True, action="always", category=RippleWarning) as caught:
         ripples = Ripples(model, {"target": Material(density=1.0)}, resolution=8, backend="cpu")
@@ -37,7 +40,9 @@ def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str
             force = np.einsum("kij,ki->j", frames, contact_forces(model, data)[:, :3])
             pressed += np.linalg.norm(force) * DT
             missing += np.linalg.norm(MASS * (data.qvel[6:9] - before) - force * DT)
-    return missing / pressed, [str(warning.message) for warning in caught if "solver" in str(warning.message)]
+    return missing / pressed, [
+        str(warning.message) for warning in caught if "solver" in str(warning.message)
+    ]
 
 
 @pytest.mark.parametrize("solver", ["Newton", "CG"])
@@ -74,21 +79,29 @@ def rows_of(pairs: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(4))
 def test_speeds_of_geoms_on_turning_trees_of_bodies_are_mujocos(seed: int) -> None:
     model = mujoco.MjModel.from_xml_string(TREES)
-    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(seed)
     mujoco.mj_integratePos(model, data.qpos, rng.uniform(-1, 1, model.nv), 1.0)
-    forwards, pairs, seen = rng.uniform(-3, 3, model.nv), np.argwhere(~np.eye(model.ngeom, dtype=bool)), []
+    forwards = rng.uniform(-3, 3, model.nv)
+    pairs = np.argwhere(~np.eye(model.ngeom, dtype=bool))
+    seen = []
     for data.qvel[:] in (forwards, -forwards):
         mujoco.mj_forward(model, data)
         velocities = np.zeros((model.ngeom, 6))
         for geom in range(model.ngeom):
-            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, velocities[geom], 0)
-        apart, relative = np.diff(data.geom_xpos[pairs], axis=1)[:, 0], np.diff(velocities[pairs, 3:], axis=1)[:, 0]
+            mujoco.mj_objectVelocity(
+                model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, velocities[geom], 0
+            )
+        apart = np.diff(data.geom_xpos[pairs], axis=1)[:, 0]
+        relative = np.diff(velocities[pairs, 3:], axis=1)[:, 0]
         approaching = np.flatnonzero(np.einsum("ij,ij->i", apart, relative) < 0)
         rows, speeds = too_fast(rows_of(pairs), model, data, 5)
         np.testing.assert_array_equal(rows, approaching)
         np.testing.assert_allclose(speeds, np.linalg.norm(relative[rows], axis=1), rtol=1e-12)
         seen += rows.tolist()
-    assert sorted(seen) == list(range(len(pairs))), "what comes nearer goes away when time runs backwards"
+    assert sorted(seen) == list(range(len(pairs))), (
+        "what comes nearer goes away when time runs backwards"
+    )
     data.cvel[:] = np.nan
     assert not len(too_fast(rows_of(pairs), model, data, 5)[0])
     assert not len(too_fast(rows_of(pairs[:0]), model, data, 5)[0])
@@ -166,12 +179,15 @@ def test_one_warning_serves_all_pairs_but_those_that_are_much_worse() -> None:
 
 
 def test_moving_target_counts_with_its_own_speed() -> None:
-    model, data, check = watched(f"<worldbody><body><freejoint/>{PLATE}</body>{SHOT.format(0.2)}</worldbody>")
+    model, data, check = watched(
+        f"<worldbody><body><freejoint/>{PLATE}</body>{SHOT.format(0.2)}</worldbody>"
+    )
     data.qvel[:6] = data.qvel[6:] = [0, 0, -30, 0, 0, 0]
     mujoco.mj_forward(model, data)
     with warnings.catch_warnings(action="error"):
         check(data)  # both fly along together
-    data.qvel[2], data.qvel[8] = 15, -15
+    data.qvel[2] = 15
+    data.qvel[8] = -15
     mujoco.mj_forward(model, data)
     with pytest.warns(RippleWarning, match="at 30 m/s"):
         TunnellingCheck(CoupledModel(model), [0])(data)
@@ -188,8 +204,11 @@ def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
     )
     outcomes = []
     for speed in np.geomspace(1, 30, 8):
-        data, check = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
-        data.qvel[2], forces, push = -speed, 0.0, 0.0
+        data = mujoco.MjData(model)
+        check = TunnellingCheck(CoupledModel(model), [0])
+        data.qvel[2] = -speed
+        forces = 0.0
+        push = 0.0
         with warnings.catch_warnings(record=True, action="always") as caught:
             while data.time < 0.2 / speed + 0.06:
                 mujoco.mj_step(model, data)
@@ -200,12 +219,17 @@ def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
         outcomes.append((forces / push < 1.03, bool(caught)))
     assert all(warned for right, warned in outcomes if not right)
     # and not much too early: within two of the speeds tried
-    first_wrong, first_warned = [right for right, _ in outcomes].index(False), [w for _, w in outcomes].index(True)
+    first_wrong = [right for right, _ in outcomes].index(False)
+    first_warned = [w for _, w in outcomes].index(True)
     assert first_wrong - first_warned <= 2
 
 
-@pytest.mark.parametrize(("kind", "solref"), [("sphere", "0.02 1"), ("sphere", BOUNCY), ("cylinder", BOUNCY)])
-def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: str, solref: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "solref"), [("sphere", "0.02 1"), ("sphere", BOUNCY), ("cylinder", BOUNCY)]
+)
+def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(
+    kind: str, solref: str
+) -> None:
     slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
     V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.06)
     spec = mujoco.MjSpec.from_string(
@@ -215,9 +239,13 @@ def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: s
         </worldbody></mujoco>"""
     )
     make_collidable(spec, "slab", "flex")
-    model, right, warned, back = spec.compile(), [], [], None
+    model = spec.compile()
+    right = []
+    warned = []
+    back = None
     for speed in np.geomspace(0.5, 60, 9):
-        data, check = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
+        data = mujoco.MjData(model)
+        check = TunnellingCheck(CoupledModel(model), [0])
         data.qvel[2] = -speed
         with warnings.catch_warnings(record=True, action="always") as caught:
             while data.time < 0.03 / speed + 0.06:
@@ -232,8 +260,12 @@ def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: s
     assert 0 < right.index(False) - warned.index(True) + 1 <= 4
 
 
-def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
-    flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
+def test_speculative_contacts_make_the_check_needless_but_for_sdf(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flags = [
+        flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name
+    ]
     assert sum(int(flag) for flag in flags) == tunnelling.SPECULATIVE
     monkeypatch.setattr(tunnelling, "SPECULATIVE", 1 << 20)
     model, data, check = watched(f"<worldbody>{PLATE}{SHOT.format(0.2)}</worldbody>")

@@ -76,11 +76,15 @@ def test_a_warning_is_given_once_though_it_tells_another_time() -> None:
         for _ in range(3):
             mujoco.mj_step(model, data)
     assert sum("Too many contacts" in str(each.message) for each in said) == 1
-    assert all(each.category is RippleWarning and str(each.message).startswith("MuJoCo: ") for each in said)
+    assert all(
+        each.category is RippleWarning and str(each.message).startswith("MuJoCo: ") for each in said
+    )
 
 
 def test_ripples_adopt_warnings_and_leave_a_handler_that_the_user_has_set() -> None:
-    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>')
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>'
+    )
     mujoco.set_mju_user_warning(None)
     Ripples(model, {"g": Material()}, resolution=8)
     with pytest.warns(RippleWarning, match="Too many contacts"):
@@ -108,9 +112,12 @@ MODEL = """<mujoco><option integrator="{}"><flag fwdinv="{}"/></option><worldbod
 <keyframe><key time="3.5"/></keyframe></mujoco>"""
 
 
-def made(integrator: str = "Euler", fwdinv: str = "disable") -> tuple[mujoco.MjModel, mujoco.MjData, StepClock]:
+def made(
+    integrator: str = "Euler", fwdinv: str = "disable"
+) -> tuple[mujoco.MjModel, mujoco.MjData, StepClock]:
     model = mujoco.MjModel.from_xml_string(MODEL.format(integrator, fwdinv))
-    data, clock = mujoco.MjData(model), StepClock()
+    data = mujoco.MjData(model)
+    clock = StepClock()
     mujoco.mj_step(model, data)
     assert goes_on(clock, model, data)
     return model, data, clock
@@ -169,7 +176,9 @@ TUMBLING = """<mujoco><option solver="{}" integrator="{}" noslip_iterations="{}"
 @pytest.mark.parametrize("solver", ["PGS", "CG", "Newton"])
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
 @pytest.mark.parametrize(("noslip", "sleep"), [(0, "disable"), (3, "disable"), (0, "enable")])
-def test_data_after_a_step_is_taken_as_it_is(solver: str, integrator: str, noslip: int, sleep: str) -> None:
+def test_data_after_a_step_is_taken_as_it_is(
+    solver: str, integrator: str, noslip: int, sleep: str
+) -> None:
     model = mujoco.MjModel.from_xml_string(TUMBLING.format(solver, integrator, noslip, sleep))
     data = mujoco.MjData(model)
     solved = SolvedForces(model)
@@ -181,7 +190,8 @@ def test_data_after_a_step_is_taken_as_it_is(solver: str, integrator: str, nosli
 
 def test_forces_that_are_solved_come_out_the_same() -> None:
     model = mujoco.MjModel.from_xml_string(TUMBLING.format("Newton", "Euler", 0, "disable"))
-    data, solved = mujoco.MjData(model), SolvedForces(model)
+    data = mujoco.MjData(model)
+    solved = SolvedForces(model)
     for _ in range(200):
         mujoco.mj_step(model, data)
         mujoco.mj_forward(model, data)

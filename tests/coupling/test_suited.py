@@ -32,13 +32,17 @@ FALLING = '<body pos="0 0 1.6"><freejoint/><geom size="{}" mass="{}"/></body>'
 
 
 def test_the_preset_suited_takes_its_size_and_a_typical_hit_from_the_model(tmp_path: Path) -> None:
-    bodies = "".join(FALLING.format(radius, mass) for radius, mass in ((0.05, 0.2), (0.08, 0.5), (0.2, 9.0)))
+    bodies = "".join(
+        FALLING.format(radius, mass) for radius, mass in ((0.05, 0.2), (0.08, 0.5), (0.2, 9.0))
+    )
     (tmp_path / "rain.xml").write_text(RAIN.format(bodies))
     (tmp_path / "nothing.xml").write_text(RAIN.format(""))
     scene = tmp_path / "scene.toml"
 
     def chosen(model: str, preset: str) -> Material:
-        scene.write_text(f'model = "{model}"\n[[ripple]]\ngeom = "target"\nmaterial = {{preset = {preset}}}')
+        scene.write_text(
+            f'model = "{model}"\n[[ripple]]\ngeom = "target"\nmaterial = {{preset = {preset}}}'
+        )
         return load_scene(scene).targets[0].material.material()
 
     # all of it is left to the model
@@ -46,12 +50,14 @@ def test_the_preset_suited_takes_its_size_and_a_typical_hit_from_the_model(tmp_p
     # the body of median mass, 1.6 m - 0.5 m - 0.08 m above the target, or a fall of its size
     expected = Material.suited(1.0, (0.5, (2 * 9.81 * 1.02) ** 0.5), radius=0.04)
     for name in ("density", "stiffness", "speed", "damping", "viscosity"):
-        assert getattr(chosen("rain.xml", '{name = "suited", amplitude = 0.05}'), name) == pytest.approx(
-            getattr(expected, name), rel=0.03
-        )
+        assert getattr(
+            chosen("rain.xml", '{name = "suited", amplitude = 0.05}'), name
+        ) == pytest.approx(getattr(expected, name), rel=0.03)
     lower = chosen("rain.xml", '{name = "suited", amplitude = 0.02}')
     assert lower.density == pytest.approx(2.5 * expected.density, rel=0.03)
-    with pytest.raises(SceneError, match=r"needs a size .* and a hit .*: nothing that moves can touch it"):
+    with pytest.raises(
+        SceneError, match=r"needs a size .* and a hit .*: nothing that moves can touch it"
+    ):
         chosen("nothing.xml", '{name = "suited", amplitude = 0.02}')
     given = chosen("nothing.xml", '{name = "suited", size = 1.0, hit = 3.0}')
     assert given.density == Material.suited(1.0, 3.0).density
@@ -63,9 +69,12 @@ FALL = """<mujoco><option timestep="{dt}"/><worldbody><geom name="target" type="
     </worldbody></mujoco>"""
 
 
-def highest(model: mujoco.MjModel, material: Material, seconds: float, **options: object) -> tuple[float, Ripples]:
+def highest(
+    model: mujoco.MjModel, material: Material, seconds: float, **options: object
+) -> tuple[float, Ripples]:
     """Greatest height [m]; any warning is an error."""
-    run, top = Run(model, "target", material=material, conserve_volume=True, **options), 0.0
+    run = Run(model, "target", material=material, conserve_volume=True, **options)
+    top = 0.0
     with warnings.catch_warnings(action="error"):
         while run.data.time < seconds - 1e-9:
             run.step()
@@ -73,7 +82,9 @@ def highest(model: mujoco.MjModel, material: Material, seconds: float, **options
     return top, run.ripples
 
 
-def test_a_heavy_box_comes_to_rest_in_a_shallow_pit_and_density_makes_up_for_a_given_stiffness() -> None:
+def test_a_heavy_box_comes_to_rest_in_a_shallow_pit_and_density_makes_up_for_a_given_stiffness() -> (
+    None
+):
     model = mujoco.MjModel.from_xml_string(BOX.format(mass=20))
     top, ripples = highest(model, Material(), 1.5, resolution=24)
     assert 1e-5 < top < 0.01
@@ -87,14 +98,17 @@ def test_a_heavy_box_comes_to_rest_in_a_shallow_pit_and_density_makes_up_for_a_g
 def test_waves_suit_the_target_at_every_scale(size: float) -> None:
     dt = 0.002 * min(1.0, math.sqrt(size))
     xml = FALL.format(dt=dt, half=size / 2, start=1.08 * size, radius=0.07 * size)
-    top, _ = highest(mujoco.MjModel.from_xml_string(xml), Material(), 0.45 * math.sqrt(size), resolution=24)
+    top, _ = highest(
+        mujoco.MjModel.from_xml_string(xml), Material(), 0.45 * math.sqrt(size), resolution=24
+    )
     assert 1e-4 * size < top < 0.1 * size
 
 
 def test_density_is_the_bodys_mass_over_the_targets_area_where_nothing_can_touch_it() -> None:
     xml = """<mujoco><worldbody><geom name="still" type="sphere" size="0.3" contype="2" conaffinity="2"/>
     <body pos="0 0 2"><freejoint/><geom name="free" type="sphere" size="0.5" mass="7"/></body></worldbody></mujoco>"""
-    model, chosen = mujoco.MjModel.from_xml_string(xml), Material()
+    model = mujoco.MjModel.from_xml_string(xml)
+    chosen = Material()
     ripples = Ripples(model, {"still": chosen, "free": chosen}, resolution=8, backend="cpu")
     assert ripples["free"].material.density == pytest.approx(7 / (4 * np.pi * 0.25), rel=0.01)
     # the world has no mass: 1000 kg/m^3 times volume over area
@@ -143,9 +157,11 @@ def cheetah(dt: float | None = None) -> mujoco.MjModel:
 def test_heights_stay_within_a_quarter_of_the_radius_at_every_time_step(
     make: Callable[[float], mujoco.MjModel], targets: Sequence[str], seconds: float, dt: float
 ) -> None:
-    model, rng = make(dt), np.random.default_rng(3)
+    model = make(dt)
+    rng = np.random.default_rng(3)
     run = Run(model, *targets, material=Material(), resolution=16, conserve_volume=True)
-    data, ripples = run.data, run.ripples
+    data = run.data
+    ripples = run.ripples
     for name in targets:
         ripples.allow_any_height(name)
         ripples[name].crests()
@@ -168,7 +184,11 @@ def test_what_is_given_stays_and_a_density_says_that_all_is_given() -> None:
 
 def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so() -> None:
     """As torsos of robots are where surfaces push back: they bear the whole robot."""
-    link = BOX.format(mass=3e4).replace('"target"', '"target" mass="1"').replace("<geom", "<body><freejoint/><geom", 1)
+    link = (
+        BOX.format(mass=3e4)
+        .replace('"target"', '"target" mass="1"')
+        .replace("<geom", "<body><freejoint/><geom", 1)
+    )
     model = mujoco.MjModel.from_xml_string(link.replace('0.25"/>', '0.25"/></body>', 1))
     with pytest.warns(
         RippleWarning, match=r"'target' is to bear 3e\+04 kg.*Material.suited\(size=1, hit=\(1, m/s"
@@ -188,11 +208,15 @@ LEGS = '<geom type="box" size="0.2 0.2 0.1" pos="0 0 -0.3" mass="1"/>'
 
 def test_a_chosen_material_shows_a_light_ball_on_a_heavy_robot_and_bears_the_robot() -> None:
     """Their impulses differ by a factor of thousands."""
-    peaks, given, said = [], [], []
+    peaks = []
+    given = []
+    said = []
     for legs, x in ((LEGS, 0.1), ("", 5.0)):
         model = mujoco.MjModel.from_xml_string(ROBOT.format(legs=legs, x=x))
         run = Run(model, "target", material=Material(), resolution=24, conserve_volume=True)
-        waves, impulse, peak = run.ripples["target"], 0.0, 0.0
+        waves = run.ripples["target"]
+        impulse = 0.0
+        peak = 0.0
         with warnings.catch_warnings(record=True, action="always") as caught:
             while run.data.time < 0.5:
                 impulse += sum(hit.impulse for hit in run.step())
@@ -200,12 +224,16 @@ def test_a_chosen_material_shows_a_light_ball_on_a_heavy_robot_and_bears_the_rob
         peaks.append(peak)
         given.append(impulse)
         said.append([str(each.message) for each in caught])
-    size, radius = 0.8, 0.15
+    size = 0.8
+    radius = 0.15
     assert given[0] < 0.3 < 300 < given[1], "impulses are told as they are"
     assert 0.004 * size < peaks[0] < 2 * peaks[1] and peaks[1] < 0.25 * radius
     assert said[0] == []
     [message] = said[1]
-    assert "geom 'target' shows hits of the lightest body" in message and "give the material a density" in message
+    assert (
+        "geom 'target' shows hits of the lightest body" in message
+        and "give the material a density" in message
+    )
 
 
 def test_a_density_ends_the_easing() -> None:
@@ -215,7 +243,9 @@ def test_a_density_ends_the_easing() -> None:
         run = Run(model, "target", material=Material(), resolution=16, conserve_volume=True)
         run.ripples.allow_any_height("target")
         if changed:
-            run.ripples.change_material("target", density=float(run.ripples["target"].material.density))
+            run.ripples.change_material(
+                "target", density=float(run.ripples["target"].material.density)
+            )
         with warnings.catch_warnings(action="ignore", category=RippleWarning):
             run.until(0.4)
         heights.append(float(np.abs(run.ripples["target"].height).max()))
@@ -229,7 +259,9 @@ def test_a_heavier_body_is_met_by_a_heavier_surface() -> None:
     assert light.density < middle.density < heavy.density
     assert heavy.density == pytest.approx(10 * middle.density)
     # without gravity it is there, too: the hit of a fall of a size a second
-    assert middle.density / 100 < in_box(Material(), gravity=(0.0, 0.0, 0.0)).density < middle.density
+    assert (
+        middle.density / 100 < in_box(Material(), gravity=(0.0, 0.0, 0.0)).density < middle.density
+    )
 
 
 EGG = """<mujoco><option timestep="{dt}"/><worldbody><geom name="egg" type="ellipsoid" size="{a} {a} {b}"/>
@@ -266,7 +298,9 @@ def test_only_meshes_that_are_no_spheres_in_shape_are_intricate() -> None:
     V, F = icosphere(5)
     assert not _is_intricate(Mesh.from_arrays(V, F))
     assert _is_intricate(Mesh.from_arrays(V, F[1:])), "a hole"
-    assert _is_intricate(Mesh.from_arrays(np.concatenate([V, V + 3.0]), np.concatenate([F, F + len(V)]))), "two parts"
+    assert _is_intricate(
+        Mesh.from_arrays(np.concatenate([V, V + 3.0]), np.concatenate([F, F + len(V)]))
+    ), "two parts"
     V, F = icosphere(3)
     assert not _is_intricate(Mesh.from_arrays(V, F[1:])), "few triangles"
 
@@ -274,8 +308,16 @@ def test_only_meshes_that_are_no_spheres_in_shape_are_intricate() -> None:
 def test_a_resolution_that_is_given_is_the_one_that_is_taken() -> None:
     model = mujoco.MjModel.from_xml_string(EGG.format(dt=0.002, a=0.3, b=0.5, start=1, ball=0.1))
     for given in (24, {"egg": 24}):
-        assert Ripples(model, {"egg": Material()}, resolution=given, backend="cpu")["egg"].atlas.resolution == 24
-    assert Ripples(model, {"egg": Target(resolution=None)}, backend="cpu")["egg"].atlas.resolution >= 32
+        assert (
+            Ripples(model, {"egg": Material()}, resolution=given, backend="cpu")[
+                "egg"
+            ].atlas.resolution
+            == 24
+        )
+    assert (
+        Ripples(model, {"egg": Target(resolution=None)}, backend="cpu")["egg"].atlas.resolution
+        >= 32
+    )
     assert Simulation(load_scene("sphere"), resolution=16).ripples["sphere"].atlas.resolution == 16
 
 
@@ -287,12 +329,15 @@ def test_dents_stay_small_and_rings_are_seen(share: float) -> None:
         <body pos="0.01 0.02 {1.5 + share / 2}"><freejoint/><geom size="{share / 2}"/></body></worldbody></mujoco>"""
     )
     run = Run(model, "target", material=Material(), resolution=32, conserve_volume=True)
-    waves, dent, ring = run.ripples["target"], 0.0, 0.0
+    waves = run.ripples["target"]
+    dent = 0.0
+    ring = 0.0
     places = waves.atlas.positions
     around = (np.hypot(places[..., 0], places[..., 1]) > share / 2 + 0.05) & (places[..., 2] > 0)
     while run.data.time < 0.9:
         run.step()
-        dent, ring = max(dent, -float(waves.height.min())), max(ring, float(np.abs(waves.height[around]).max()))
+        dent = max(dent, -float(waves.height.min()))
+        ring = max(ring, float(np.abs(waves.height[around]).max()))
     assert 0.01 < dent / 0.5 < 0.25
     assert 0.005 < ring < 0.02
 
@@ -310,10 +355,14 @@ ON_ANIMAL = f"""<mujoco><option timestep="0.002" sdf_initpoints="8"/><asset>{lim
 WEAK = Material(speed=0.6, damping=1.0, stiffness=0.0, density=1.0)
 
 
-def warned(xml: str, material: Material, seconds: float = 0.5, backend: str = "cpu") -> tuple[list[str], Ripples]:
+def warned(
+    xml: str, material: Material, seconds: float = 0.5, backend: str = "cpu"
+) -> tuple[list[str], Ripples]:
     """Messages of a ball that falls on the target at 4.5 m/s, and the ripples afterwards."""
     model = mujoco.MjModel.from_xml_string(xml)
-    run = Run(model, "target", material=material, resolution=32, conserve_volume=True, backend=backend)
+    run = Run(
+        model, "target", material=material, resolution=32, conserve_volume=True, backend=backend
+    )
     run.data.qvel[2] = -4.5
     with warnings.catch_warnings(record=True, action="always") as caught:
         run.until(seconds)
@@ -342,7 +391,9 @@ def advised(message: str) -> Material:
     ],
     ids=["weak", "density alone", "plate", "plastic", "jelly"],
 )
-def test_a_hard_hit_is_reported_once_and_the_named_material_would_do(xml: str, material: Material) -> None:
+def test_a_hard_hit_is_reported_once_and_the_named_material_would_do(
+    xml: str, material: Material
+) -> None:
     [message], light = warned(xml, material)
     assert "geom 'target' are too high" in message
     heavier = advised(message)
@@ -355,12 +406,15 @@ def test_a_hard_hit_is_reported_once_and_the_named_material_would_do(xml: str, m
 
 
 @pytest.mark.filterwarnings("ignore:MuJoCo. compiler attribute 'settotalmass'")
-@pytest.mark.parametrize("material", [Material(density=1.0), Material(speed=0.3, damping=1, stiffness=300, density=5)])
+@pytest.mark.parametrize(
+    "material", [Material(density=1.0), Material(speed=0.3, damping=1, stiffness=300, density=5)]
+)
 def test_what_is_named_for_a_foot_holds_under_other_steps_too(material: Material) -> None:
     model = cheetah()
 
     def messages(material: Material, seed: int) -> list[str]:
-        data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+        data = mujoco.MjData(model)
+        rng = np.random.default_rng(seed)
         with warnings.catch_warnings(record=True, action="always") as caught:
             ripples = Ripples(model, {"ffoot": material}, resolution=16, backend="cpu")
             for _ in range(30):
@@ -379,7 +433,8 @@ def test_what_is_named_is_whole_where_the_model_chose_the_material() -> None:
     ripples.poke("target", [0, 0, 0.5], 200.0, 0.1)
     with pytest.warns(RippleWarning) as caught:
         ripples.mj_step(data, nstep=80)
-    heavier, chosen = advised(str(caught[0].message)), ripples["target"].material
+    heavier = advised(str(caught[0].message))
+    chosen = ripples["target"].material
     for name in ("speed", "damping", "stiffness"):
         assert getattr(heavier, name) == pytest.approx(getattr(chosen, name), rel=1e-3)
     data, ripples = still_ripples(heavier)
@@ -389,7 +444,8 @@ def test_what_is_named_is_whole_where_the_model_chose_the_material() -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "end"), [(18, 1, "goes on"), (2, 1, "new material"), (0, 16, "reset"), (1, 0, "reset")]
+    ("before", "after", "end"),
+    [(18, 1, "goes on"), (2, 1, "new material"), (0, 16, "reset"), (1, 0, "reset")],
 )
 def test_a_crest_of_any_step_is_reported(before: int, after: int, end: str) -> None:
     """With an old material too, and at a reset, though nobody has looked yet."""
@@ -441,7 +497,9 @@ def test_of_a_map_a_factor_is_named() -> None:
     with pytest.warns(RippleWarning) as caught:
         ripples.mj_step(data, nstep=80)
     [message] = [str(each.message) for each in caught]
-    call = re.search(r"would do: (ripples\.change_material\('target', density=[\d.]+ \* .*)$", message)
+    call = re.search(
+        r"would do: (ripples\.change_material\('target', density=[\d.]+ \* .*)$", message
+    )
     assert call is not None, message
     before = ripples["target"].material.density
     exec(call[1], {"ripples": ripples})

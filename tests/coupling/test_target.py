@@ -42,8 +42,16 @@ def test_what_a_target_leaves_open_is_as_the_arguments_say(model: mujoco.MjModel
 def test_targets_and_mappings_by_geom_give_the_same_waves(model: mujoco.MjModel) -> None:
     targets = {"egg": Target(MATERIAL, resolution=8), "box": Target(MATERIAL, resolution=12)}
     new = heights(model, Ripples(model, targets, backend="cpu"))
-    with pytest.warns(DeprecationWarning, match=r"resolution as a mapping by geom.*Target\(material, resolution=...\)"):
-        old = Ripples(model, {"egg": MATERIAL, "box": MATERIAL}, resolution={"egg": 8, "box": 12}, backend="cpu")
+    with pytest.warns(
+        DeprecationWarning,
+        match=r"resolution as a mapping by geom.*Target\(material, resolution=...\)",
+    ):
+        old = Ripples(
+            model,
+            {"egg": MATERIAL, "box": MATERIAL},
+            resolution={"egg": 8, "box": 12},
+            backend="cpu",
+        )
     assert np.array_equal(heights(model, old), new)
     assert np.abs(new).max() > 0
 
@@ -51,27 +59,47 @@ def test_targets_and_mappings_by_geom_give_the_same_waves(model: mujoco.MjModel)
 def test_one_value_for_all_targets_is_not_deprecated(model: mujoco.MjModel) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
-        Ripples(model, {"egg": MATERIAL, "box": Target(MATERIAL)}, resolution=8, layout="cube", backend="cpu")
+        Ripples(
+            model,
+            {"egg": MATERIAL, "box": Target(MATERIAL)},
+            resolution=8,
+            layout="cube",
+            backend="cpu",
+        )
 
 
 def test_a_mapping_that_leaves_a_geom_out_is_refused(model: mujoco.MjModel) -> None:
-    with pytest.warns(DeprecationWarning), pytest.raises(SceneError, match="layout has no entry for geom 'box'"):
-        Ripples(model, {"egg": MATERIAL, "box": MATERIAL}, resolution=8, layout={"egg": "cube"}, backend="cpu")
+    with (
+        pytest.warns(DeprecationWarning),
+        pytest.raises(SceneError, match="layout has no entry for geom 'box'"),
+    ):
+        Ripples(
+            model,
+            {"egg": MATERIAL, "box": MATERIAL},
+            resolution=8,
+            layout={"egg": "cube"},
+            backend="cpu",
+        )
 
 
 def test_hits_of_one_target_may_have_hertz_s_pulse(model: mujoco.MjModel) -> None:
     with pytest.raises(SceneError, match="modulus is None Pa for geom 'egg'"):
         Ripples(model, {"egg": Target(MATERIAL, pulse="hertz")}, resolution=8, backend="cpu")
     hard = {"egg": Target(MATERIAL, pulse="hertz", modulus=1e6), "box": MATERIAL}
-    soft = heights(model, Ripples(model, {"egg": MATERIAL, "box": MATERIAL}, resolution=8, backend="cpu"))
+    soft = heights(
+        model, Ripples(model, {"egg": MATERIAL, "box": MATERIAL}, resolution=8, backend="cpu")
+    )
     mixed = heights(model, Ripples(model, hard, resolution=8, backend="cpu"))
-    egg, box = slice(0, 6 * 8**2), slice(6 * 8**2, None)
+    egg = slice(0, 6 * 8**2)
+    box = slice(6 * 8**2, None)
     assert not np.array_equal(mixed[egg], soft[egg])
     assert np.array_equal(mixed[box], soft[box])
 
 
 @pytest.mark.parametrize(("limit", "count"), [(True, 1), (False, 0)])
-def test_only_a_target_with_a_limit_is_warned_of_as_too_high(model: mujoco.MjModel, limit: bool, count: int) -> None:
+def test_only_a_target_with_a_limit_is_warned_of_as_too_high(
+    model: mujoco.MjModel, limit: bool, count: int
+) -> None:
     light = dataclasses.replace(MATERIAL, density=0.01)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
@@ -82,5 +110,7 @@ def test_only_a_target_with_a_limit_is_warned_of_as_too_high(model: mujoco.MjMod
 
 
 def test_what_is_neither_a_material_nor_a_target_is_refused(model: mujoco.MjModel) -> None:
-    with pytest.raises(SceneError, match=r"material of geom 'egg' is 0\.5; valid is a Material or a Target"):
+    with pytest.raises(
+        SceneError, match=r"material of geom 'egg' is 0\.5; valid is a Material or a Target"
+    ):
         Ripples(model, {"egg": 0.5})  # type: ignore[dict-item]

@@ -32,12 +32,19 @@ def test_material_may_change_under_a_body_at_rest() -> None:
 def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None:
     """MuJoCo puts a mesh's frame at its middle, along its axes of inertia: nobody knows it."""
     target = '<geom name="target" type="ellipsoid" size="0.3 0.2 0.2" pos="1 0 0" euler="0 90 0"/>'
-    model = model_of(f'<body pos="3 0 0" euler="0 0 90">{target}<site name="end" pos="1 0 -0.3"/></body>')
+    model = model_of(
+        f'<body pos="3 0 0" euler="0 0 90">{target}<site name="end" pos="1 0 -0.3"/></body>'
+    )
     run = Run(model, "target", resolution=16, conserve_volume=True)
     mujoco.mj_forward(model, data := run.data)
-    ripples, geom, end = run.ripples, data.geom("target"), model.site("end").pos
+    ripples = run.ripples
+    geom = data.geom("target")
+    end = model.site("end").pos
     if place == "poke":
-        with pytest.warns(RippleWarning, match=r"a poke of 'target' is 2\.7 m off its surface \(450% of its size\)"):
+        with pytest.warns(
+            RippleWarning,
+            match=r"a poke of 'target' is 2\.7 m off its surface \(450% of its size\)",
+        ):
             ripples.poke("target", [1.0, 0.0, -3.0], 0.0)
         ripples.poke("target", end, 0.01, 0.1)
         ripples["target"].step(1e-3)
@@ -95,11 +102,14 @@ def test_texels_without_waves_do_not_drift_under_a_body_at_rest() -> None:
     assert (ripples["target"].height == before)[rigid].all()
 
 
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda ripples: pickle.loads(pickle.dumps(ripples))])
+@pytest.mark.parametrize(
+    "copied", [copy.deepcopy, lambda ripples: pickle.loads(pickle.dumps(ripples))]
+)
 def test_copied_ripples_go_on_as_the_original(copied: Callable[[Ripples], Ripples]) -> None:
     model = model_of('<geom name="target" type="box" size="0.5 0.5 0.5"/>' + BALL.format("0 0 0.6"))
     run = Run(model, "target", resolution=16, conserve_volume=True).until(0.15)
-    twin, twin_data = copied(run.ripples), copy.copy(run.data)
+    twin = copied(run.ripples)
+    twin_data = copy.copy(run.data)
     twin.mj_step(twin_data, nstep=50)
     height = run.until(0.2).ripples["target"].height
     assert np.abs(height).max() > 0
@@ -108,7 +118,9 @@ def test_copied_ripples_go_on_as_the_original(copied: Callable[[Ripples], Ripple
 
 def test_the_rim_of_the_surfaces_is_handed_on_and_outlives_changes() -> None:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>')
-    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=8, backend="cpu", rim="fixed")
+    ripples = Ripples(
+        model, {"target": Material(density=50.0)}, resolution=8, backend="cpu", rim="fixed"
+    )
     assert ripples["target"].operator.topology.fixed_rim
     ripples.change_material("target", speed=2.0)
     assert ripples["target"].operator.topology.fixed_rim
@@ -118,13 +130,16 @@ def test_the_rim_of_the_surfaces_is_handed_on_and_outlives_changes() -> None:
 
 def test_a_sensor_on_a_site_goes_on_when_the_material_changes() -> None:
     model = model_of(
-        '<body name="a" pos="3 0 0" euler="0 0 90"><geom name="target" type="ellipsoid" size="0.3 0.2 0.2" '
-        'pos="1 0 0" euler="0 90 0"/><body euler="0 0 20"><site name="end" pos="0.94 -0.34 -0.3"/></body></body>'
+        '<body name="a" pos="3 0 0" euler="0 0 90"><geom name="target" type="ellipsoid" size="0.3 '
+        '0.2 0.2" '
+        'pos="1 0 0" euler="0 90 0"/><body euler="0 0 20"><site name="end" pos="0.94 -0.34 '
+        '-0.3"/></body></body>'
         '<body name="b"><freejoint/><geom size="0.1"/><site name="off"/></body>'
     )
     data = forwarded(model)
     ripples = Run(model, "target", resolution=16, conserve_volume=True).ripples
-    sensor, geom = ripples["target"].sensor("end", "velocity", 1000.0), data.geom("target")
+    sensor = ripples["target"].sensor("end", "velocity", 1000.0)
+    geom = data.geom("target")
     world = sensor.points @ geom.xmat.reshape(3, 3).T + geom.xpos
     assert np.linalg.norm(world - data.site("end").xpos) < 0.02
     ripples.poke("target", [1, 0, -0.3], 0.01, 0.1)

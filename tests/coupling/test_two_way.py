@@ -14,7 +14,14 @@ from ripple_sim.coupling import support_point
 GRAVITY = 9.81
 
 
-def ring(two_way: bool, speed=2.0, target: str = "", mass: float = 0.2, gap: float = -1e-4, gravity: float = GRAVITY):
+def ring(
+    two_way: bool,
+    speed=2.0,
+    target: str = "",
+    mass: float = 0.2,
+    gap: float = -1e-4,
+    gravity: float = GRAVITY,
+):
     """Let a ring run to a ball on a block, or above it: heights, and over time both momenta and the speed under it."""
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.001" gravity="0 0 {-gravity}"/><worldbody>
@@ -23,13 +30,17 @@ def ring(two_way: bool, speed=2.0, target: str = "", mass: float = 0.2, gap: flo
         <body name="ball" pos="0 0 {0.05 + gap}"><freejoint/><geom name="ball" size="0.05" mass="{mass}"/></body>
         </worldbody></mujoco>"""
     )
-    run = Run(model, "block", material=Material(speed=1.0, density=20.0), resolution=48, two_way=two_way)
-    data, waves = run.data, run.ripples["block"]
+    run = Run(
+        model, "block", material=Material(speed=1.0, density=20.0), resolution=48, two_way=two_way
+    )
+    data = run.data
+    waves = run.ripples["block"]
     # a ring on its way to the ball
     place = waves.atlas.positions
     away = np.hypot(place[..., 0], place[..., 1])
     waves.velocity = speed * np.exp(-(((away - 0.12) / 0.03) ** 2)) * (place[..., 2] > 0.19)
-    heights, total = [], []
+    heights = []
+    total = []
     while data.time < 0.3:
         run.step()
         joints = data.qvel[2::6] if target else data.qvel[2:3]
@@ -52,7 +63,8 @@ def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
 def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
     _, total = ring(two_way=True)
     time, ball, surface, _ = total.T
-    # gravity is all that acts from outside: no springs, no damping. Until 0.1 s no long contact has a deficit.
+    # gravity is all that acts from outside: no springs, no damping. Until 0.1 s no long contact has
+    # a deficit.
     early = time < 0.1
     start = surface[0] + ball[0] + 0.2 * GRAVITY * time[0]
     sums = surface + ball + 0.2 * GRAVITY * time
@@ -71,7 +83,8 @@ def test_free_target_recoils() -> None:
 
 def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
     _, total = ring(two_way=True, speed=3.0, mass=0.001)
-    fastest, surface = total[:, 1].max() / 0.001, total[:, 3].max()
+    fastest = total[:, 1].max() / 0.001
+    surface = total[:, 3].max()
     assert 0.5 * surface < fastest < surface
 
 
@@ -86,7 +99,8 @@ def touching(geoms: str, gravity: float = -GRAVITY, **options: object) -> Run:
 
 def pushed(force: Callable[[mujoco.MjData], None]) -> tuple[mujoco.MjData, Ripples]:
     """A ball on a block whose surface comes up, and the same forces of others at each step."""
-    run, highest = touching('<geom size="0.05" mass="0.2"/>', density=20.0, conserve_volume=True), 0.0
+    run = touching('<geom size="0.05" mass="0.2"/>', density=20.0, conserve_volume=True)
+    highest = 0.0
     run.ripples["block"].velocity = np.ones((6, 16, 16))
     run.data.xfrc_applied[1] = FORCE
     for _ in range(100):
@@ -182,20 +196,27 @@ def geom_model(kind: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
 @pytest.mark.parametrize("kind", GEOMS)
 def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
     model, data = geom_model(kind)
-    rotation, origin = data.geom_xmat[0].reshape(3, 3), data.geom_xpos[0]
-    rng, geom = np.random.default_rng(3), np.zeros(1, dtype=np.int32)
+    rotation = data.geom_xmat[0].reshape(3, 3)
+    origin = data.geom_xpos[0]
+    rng = np.random.default_rng(3)
+    geom = np.zeros(1, dtype=np.int32)
 
     def height(point: np.ndarray, direction: np.ndarray) -> float:
         """Of what a ray against the direction through a point meets first; -inf if nothing."""
         start = point + 3.0 * direction
-        away = mujoco.mj_ray(model, data, origin + rotation @ start, -rotation @ direction, None, 1, -1, geom)
+        away = mujoco.mj_ray(
+            model, data, origin + rotation @ start, -rotation @ direction, None, 1, -1, geom
+        )
         return float(start @ direction) - away if away >= 0 else -np.inf
 
     for direction in rng.standard_normal((20, 3)):
         direction /= np.linalg.norm(direction)
         farthest = support_point(model, 0, direction)
         aside = rng.uniform(-0.5, 0.5, (200, 3))
-        assert max(height(farthest + offset, direction) for offset in aside) <= farthest @ direction + 1e-3
+        assert (
+            max(height(farthest + offset, direction) for offset in aside)
+            <= farthest @ direction + 1e-3
+        )
         # and it is a point of the geom: a ray just inside its rim meets it
         assert height(0.999 * farthest, direction) == pytest.approx(farthest @ direction, abs=5e-3)
 
@@ -204,4 +225,6 @@ def test_middle_of_a_face_that_lies_flat() -> None:
     down = np.array([0.005, -0.004, -1.0])
     np.testing.assert_allclose(support_point(geom_model("box")[0], 0, down), [0, 0, -0.1])
     np.testing.assert_allclose(support_point(geom_model("cylinder")[0], 0, down), [0, 0, -0.3])
-    np.testing.assert_allclose(support_point(geom_model("capsule")[0], 0, np.array([0.0, 1.0, 0.01])), [0, 0.1, 0.001])
+    np.testing.assert_allclose(
+        support_point(geom_model("capsule")[0], 0, np.array([0.0, 1.0, 0.01])), [0, 0.1, 0.001]
+    )

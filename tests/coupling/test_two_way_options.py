@@ -43,16 +43,22 @@ def test_every_solver_of_mujoco_finds_the_same_forces_and_makes_no_energy(cone: 
     others = [("CG", "sparse", 5), *itertools.product(["PGS"], ["dense", "sparse"], [0, 5])]
     for solver, jacobian, noslip in others:
         flag = "disable" if jacobian == "dense" else "enable"
-        text = f'solver="{solver}" jacobian="{jacobian}" cone="{cone}" noslip_iterations="{noslip}">'
+        text = (
+            f'solver="{solver}" jacobian="{jacobian}" cone="{cone}" noslip_iterations="{noslip}">'
+        )
         run, most, given = falling(text + f'<flag island="{flag}"/>')
         assert most < 1.001, text
         assert given == pytest.approx(impulse, rel=0.01), text
-        np.testing.assert_allclose(run.data.qpos[[2, 9]], newton.data.qpos[[2, 9]], atol=1e-4, err_msg=text)
+        np.testing.assert_allclose(
+            run.data.qpos[[2, 9]], newton.data.qpos[[2, 9]], atol=1e-4, err_msg=text
+        )
     assert impulse > 0.05
 
 
 def test_runge_kutta_is_refused_when_it_is_given_and_when_it_is_chosen_later() -> None:
-    run = coupled('integrator="Euler">', '<body pos="0 0 0.05"><freejoint/><geom size="0.05"/></body>', LIGHT)
+    run = coupled(
+        'integrator="Euler">', '<body pos="0 0 0.05"><freejoint/><geom size="0.05"/></body>', LIGHT
+    )
     run.step()
     run.model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     with pytest.raises(SceneError, match='"RK4"'):
@@ -79,13 +85,17 @@ def places_without_sleep() -> np.ndarray:
 
 
 @pytest.mark.parametrize("sleep", ["", 'sleep="init"'])
-def test_a_stack_sleeps_in_its_dimple_and_presses_on(sleep: str, places_without_sleep: np.ndarray) -> None:
+def test_a_stack_sleeps_in_its_dimple_and_presses_on(
+    sleep: str, places_without_sleep: np.ndarray
+) -> None:
     run = stack("enable", sleep)
     assert (run.data.tree_asleep >= 0).all()
     assert places_without_sleep[0] < 0.047
     np.testing.assert_allclose(run.data.qpos[[2, 9]], places_without_sleep, atol=5e-4)
     place = run.data.qpos.copy()
-    forces = [sum(hit.impulse for hit in hits) / 0.002 for hits in run.until(AT_REST + 0.05).hits[-25:]]
+    forces = [
+        sum(hit.impulse for hit in hits) / 0.002 for hits in run.until(AT_REST + 0.05).hits[-25:]
+    ]
     np.testing.assert_allclose(forces, 2.5 * GRAVITY, rtol=0.03)
     np.testing.assert_array_equal(run.data.qpos, place)
 

@@ -48,23 +48,35 @@ for number in range(settings["frames"]):
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    table = 'model = "scene.xml"\nduration = 0.1\n[[ripple]]\ngeom = "egg"\nresolution = 8\nlook = "jelly"\n'
+    table = (
+        'model = "scene.xml"\nduration = 0.1\n[[ripple]]\ngeom = "egg"\nresolution = 8\nlook '
+        "= "
+        '"jelly"\n'
+    )
     write_scene(tmp_path, MODEL, table + "material = {speed = 0.3, density = 1000.0}\n")
     return tmp_path
 
 
-def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, fails: int = -1, version: str = "5 0 1") -> None:
+def stand_in(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, fails: int = -1, version: str = "5 0 1"
+) -> None:
     program = folder / "blender"
     told = str(folder / "told.json")
-    program.write_text(STAND_IN.format(python=sys.executable, told=told, fails=fails, version=version))
+    program.write_text(
+        STAND_IN.format(python=sys.executable, told=told, fails=fails, version=version)
+    )
     program.chmod(0o755)
     monkeypatch.setenv(PYTHON, str(program))
 
 
-def test_frames_come_back_in_order_and_tone_mapped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_come_back_in_order_and_tone_mapped(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     stand_in(folder, monkeypatch)
     options = VideoOptions(size=(64, 36), fps=20)
-    summary = render_cycles(load_scene(folder / "scene.toml"), folder / "frames", options, samples=4)
+    summary = render_cycles(
+        load_scene(folder / "scene.toml"), folder / "frames", options, samples=4
+    )
     shown = [np.asarray(Image.open(file)) for file in sorted((folder / "frames").glob("*.png"))]
     assert summary.frames == len(shown) == 2
     assert not shown[0].any()
@@ -79,7 +91,9 @@ def test_the_stage_keeps_what_preview_surfaces_have_no_word_for(folder: Path) ->
 
     from ripple_sim import ExportOptions, export_scene
 
-    export_scene(load_scene(folder / "scene.toml"), folder / "run.usda", ExportOptions(fps=20, duration=0.05))
+    export_scene(
+        load_scene(folder / "scene.toml"), folder / "run.usda", ExportOptions(fps=20, duration=0.05)
+    )
     stage = Usd.Stage.Open(str(folder / "run.usda"))
     prims = [prim for prim in stage.Traverse() if prim.HasAttribute("userProperties:translucency")]
     kept = {prim.GetAttribute("userProperties:translucency").Get() for prim in prims}
@@ -90,7 +104,9 @@ def test_the_stage_keeps_what_preview_surfaces_have_no_word_for(folder: Path) ->
 
 
 @pytest.mark.filterwarnings("ignore:MuJoCo. Insufficient arena memory")
-def test_what_mujoco_says_of_the_first_frame_is_ours(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_mujoco_says_of_the_first_frame_is_ours(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ball = '<body pos="1 0 1"><freejoint/><geom size="0.1"/></body>'
     small = MODEL.replace("<mujoco>", '<mujoco><size memory="300K"/>')
     (folder / "scene.xml").write_text(small.replace("</worldbody>", f"{40 * ball}</worldbody>"))
@@ -98,12 +114,17 @@ def test_what_mujoco_says_of_the_first_frame_is_ours(folder: Path, monkeypatch: 
     mujoco.set_mju_user_warning(None)
     stand_in(folder, monkeypatch, fails=0)
     monkeypatch.chdir(folder)
-    with pytest.warns(RippleWarning, match="MuJoCo: Too many contacts"), pytest.raises(VideoError, match="frame 0"):
+    with (
+        pytest.warns(RippleWarning, match="MuJoCo: Too many contacts"),
+        pytest.raises(VideoError, match="frame 0"),
+    ):
         render_cycles(scene, folder / "frames", VideoOptions(size=(64, 36), fps=20, duration=0.05))
     assert not (folder / "MUJOCO_LOG.TXT").exists()
 
 
-def test_a_blender_that_fails_leaves_no_video(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_blender_that_fails_leaves_no_video(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     stand_in(folder, monkeypatch, fails=1)
     options = VideoOptions(size=(64, 36), fps=20)
     with pytest.raises(VideoError, match=r"ended before frame 1 with status 1: out of memory"):
@@ -125,7 +146,9 @@ def test_options_of_ours_alone_are_refused(given: dict, said: str, tmp_path: Pat
         check_cycles(VideoOptions(**given), tmp_path / "a.webp")
 
 
-def test_a_blender_that_cannot_be_used_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_blender_that_cannot_be_used_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refused(said: str) -> None:
         with pytest.raises(VideoError, match=said) as refusal:
             check_cycles(VideoOptions(), tmp_path / "a.mp4")
@@ -141,5 +164,7 @@ def test_a_blender_that_cannot_be_used_is_named(tmp_path: Path, monkeypatch: pyt
     refused(r"cannot import bpy: ImportError: libSM\.so\.6")
     monkeypatch.delenv(PYTHON)
     monkeypatch.setitem(sys.modules, "bpy", None)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "bpy" else object())
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name: None if name == "bpy" else object()
+    )
     refused(r"pip install 'ripple-sim\[cycles\]'")

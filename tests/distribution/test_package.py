@@ -23,7 +23,18 @@ def wheel(tmp_path_factory) -> set[str]:
     source.mkdir()
     for name in (*FOLDERS, "pyproject.toml", "README.md", "LICENSE"):
         (source / name).symlink_to(ROOT / name)
-    ended("-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", folder, source, check=True)
+    ended(
+        "-m",
+        "pip",
+        "wheel",
+        "-q",
+        "--no-deps",
+        "--no-build-isolation",
+        "-w",
+        folder,
+        source,
+        check=True,
+    )
     with zipfile.ZipFile(next(folder.glob("*.whl"))) as archive:
         return set(archive.namelist())
 
@@ -53,7 +64,16 @@ def test_nothing_else_becomes_a_top_level_name(wheel):
 
 def test_waves_need_nothing_of_posix_and_videos_no_viewer(tmp_path):
     """So contacts make waves on Windows, too."""
-    words = ["render", "sphere", "-o", str(tmp_path / "a.mp4"), "--size", "32x24", "--duration", "0.02"]
+    words = [
+        "render",
+        "sphere",
+        "-o",
+        str(tmp_path / "a.mp4"),
+        "--size",
+        "32x24",
+        "--duration",
+        "0.02",
+    ]
     code = f"""if True:
         import sys, mujoco
         posix = ("fcntl", "grp", "resource")

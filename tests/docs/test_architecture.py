@@ -27,7 +27,9 @@ def plots() -> Iterator[SimpleNamespace]:
 def test_walk_on_the_page_is_that_of_the_source(plots) -> None:
     page = PAGE.read_text(encoding="utf-8")
     walk = re.findall(r"^\d+\. `([\w/]+\.py)`", page, re.MULTILINE)
-    assert walk == plots.structure.walk(), "write it anew: python examples/plots/structure.py --docs"
+    assert walk == plots.structure.walk(), (
+        "write it anew: python examples/plots/structure.py --docs"
+    )
 
 
 def test_there_are_no_cycles_between_modules(plots) -> None:
@@ -38,16 +40,22 @@ def test_there_are_no_cycles_between_modules(plots) -> None:
 
 @pytest.mark.parametrize("page", [PAGE, ROOT / "CONTRIBUTING.md"], ids=lambda each: each.stem)
 def test_every_file_that_a_page_names_exists(page: Path) -> None:
-    named = re.findall(r"`(?:python )?((?:examples|tests|ripple_sim|solver)/[\w/]+\.py)", page.read_text("utf-8"))
+    named = re.findall(
+        r"`(?:python )?((?:examples|tests|ripple_sim|solver)/[\w/]+\.py)", page.read_text("utf-8")
+    )
     assert len(named) >= 5
     assert not [path for path in named if not (ROOT / path).is_file()]
 
 
 def test_the_drawing_has_the_arrows_of_the_source(plots) -> None:
-    drawn = re.search(r"<dc:description>(.*?)</dc:description>", DRAWING.read_text(encoding="utf-8"), re.DOTALL)
+    drawn = re.search(
+        r"<dc:description>(.*?)</dc:description>", DRAWING.read_text(encoding="utf-8"), re.DOTALL
+    )
     assert drawn is not None
     advice = "draw it anew: python examples/plots/architecture.py --docs"
-    assert drawn[1].split(", ") == plots.architecture.summary(plots.architecture.arrows()[0]), advice
+    assert drawn[1].split(", ") == plots.architecture.summary(plots.architecture.arrows()[0]), (
+        advice
+    )
 
 
 def test_the_drawing_is_drawn(plots, tmp_path: Path) -> None:
@@ -60,18 +68,25 @@ def test_the_drawing_is_drawn(plots, tmp_path: Path) -> None:
 TREE = {
     "ripple_sim/__init__.pyi": "from .coupling.ripples import Ripples as Ripples\n",
     "ripple_sim/simulation.py": "from ripple_sim import Ripples\n",
-    "ripple_sim/coupling/ripples.py": "from ripple_sim.solver import Material\nfrom . import load\n",
+    "ripple_sim/coupling/ripples.py": (
+        "from ripple_sim.solver import Material\nfrom . import load\n"
+    ),
     "ripple_sim/coupling/load.py": "def late():\n    from .ripples import Ripples\n",
     "solver/__init__.pyi": "from .operator.material import Material as Material\n",
     "solver/operator/material.py": "import numpy\nimport ripple_sim.solver.errors\n",
     "solver/errors.py": "",
     "scenes/__init__.py": "",
 }
-MATERIAL, ERRORS = "ripple_sim.solver.operator.material", "ripple_sim.solver.errors"
-RIPPLES, LOAD, SIMULATION = "ripple_sim.coupling.ripples", "ripple_sim.coupling.load", "ripple_sim.simulation"
+MATERIAL = "ripple_sim.solver.operator.material"
+ERRORS = "ripple_sim.solver.errors"
+RIPPLES = "ripple_sim.coupling.ripples"
+LOAD = "ripple_sim.coupling.load"
+SIMULATION = "ripple_sim.simulation"
 
 
-def test_imports_are_those_of_the_modules_that_names_come_from_and_cycles_are_found(plots, tmp_path: Path) -> None:
+def test_imports_are_those_of_the_modules_that_names_come_from_and_cycles_are_found(
+    plots, tmp_path: Path
+) -> None:
     for name, text in TREE.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -80,7 +95,11 @@ def test_imports_are_those_of_the_modules_that_names_come_from_and_cycles_are_fo
     imports = {name: set(module.imports) for name, module in modules.items()}
     # the first by way of ripple_sim/__init__.pyi, the second inside a function
     assert (imports[SIMULATION], imports[LOAD]) == ({RIPPLES}, {RIPPLES})
-    assert (imports[RIPPLES], imports[MATERIAL], imports[ERRORS]) == ({MATERIAL, LOAD}, {ERRORS}, set())
+    assert (imports[RIPPLES], imports[MATERIAL], imports[ERRORS]) == (
+        {MATERIAL, LOAD},
+        {ERRORS},
+        set(),
+    )
     assert plots.imports.cycles(imports) == [[LOAD, RIPPLES]]
     rooms = plots.imports.grouped(modules, {name: plots.imports.room(name) for name in modules})
     assert rooms["ripple_sim.coupling"] == {"ripple_sim.solver.operator"}

@@ -1,7 +1,8 @@
 """The code keeps to the words of docs/glossary.md: words that it has given up appear in no name.
 
-Names are all identifiers of Python and GLSL files and the names of the files themselves, taken apart into words at
-underscores and capitals. To retire a word, add it to INSTEAD; where it means something else, say so in ALLOWED.
+Names are all identifiers of Python and GLSL files and the names of the files themselves, taken
+apart into words at underscores and capitals. To retire a word, add it to INSTEAD; where it means
+something else, say so in ALLOWED.
 """
 
 import io
@@ -20,19 +21,31 @@ unsupported: undrawn; visual: piece pieces; transparent visual: clear_body; halo
 tunnelling: speed_check check_speeds; flex collider: shell shells; target: ripple_surface; ripple renderer: pictures;
 shutter times: moments; render settings: job; double buffering: pipeline; prefetch: ahead; resources: owned;
 octahedral encoding: folded unfolded; unpack: parted; tone mapping: development developed; shadow bias: lift"""
-RETIRED = {word: each.split(":")[0] for each in re.split(r";\s", INSTEAD) for word in each.split(":")[1].split()}
+RETIRED = {
+    word: each.split(":")[0]
+    for each in re.split(r";\s", INSTEAD)
+    for word in each.split(":")[1].split()
+}
 
 # Retired words that stay: the beginning of the path, the words, and why.
 ALLOWED = [
     ("solver/layouts/", "ring", "the one-ring of a vertex"),
-    ("solver/layouts/sphere_map/", "carried", "area of collapsed vertices, which the kept ones stand for"),
+    (
+        "solver/layouts/sphere_map/",
+        "carried",
+        "area of collapsed vertices, which the kept ones stand for",
+    ),
     ("solver/layouts/", "ahead", "a trial step of the descent"),
     ("solver/layouts/", "folded", "a triangle or a texel that the map turns over"),
     ("solver/texels/texel_mesh.py", "folded", "a texel whose neighbours turn over"),
     ("solver/mesh/", "folded", "a polygon that turns over"),
     ("solver/", "piece pieces", "parts of a triangle, cut at the edges of the cube"),
     ("ripple_sim/cli/", "shell", "bash, zsh, fish"),
-    ("ripple_sim/coupling/", "shell", "MuJoCo's: the outside of a soft flex, and the inertia of a hollow mesh"),
+    (
+        "ripple_sim/coupling/",
+        "shell",
+        "MuJoCo's: the outside of a soft flex, and the inertia of a hollow mesh",
+    ),
     ("ripple_sim/scene/bodies", "shell", "likewise"),
     ("ripple_sim/render/", "shell", "the round outside of a primitive, sized apart from its core"),
     ("ripple_sim/video/", "ahead", "how many frames one stage may be in front of the next"),
@@ -49,12 +62,18 @@ def names(path: Path) -> Iterator[str]:
             if token.type == tokenize.NAME:
                 yield token.string
     else:
-        yield from re.findall(r"[A-Za-z_]\w*", re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL))
+        yield from re.findall(
+            r"[A-Za-z_]\w*", re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL)
+        )
 
 
 def words(name: str) -> str:
     """The words of a name, in lower case, each between underscores: ClearBody is _clear_body_."""
-    return "_" + "_".join(each.lower() for each in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)) + "_"
+    return (
+        "_"
+        + "_".join(each.lower() for each in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name))
+        + "_"
+    )
 
 
 def test_no_name_has_a_retired_word() -> None:
@@ -66,9 +85,14 @@ def test_no_name_has_a_retired_word() -> None:
             place = path.relative_to(ROOT).as_posix()
             for name in set(names(path)):
                 for word in re.findall("(?<=_)(?:" + "|".join(RETIRED) + ")(?=_)", words(name)):
-                    if not any(place.startswith(start) and word in stays.split() for start, stays, _ in ALLOWED):
+                    if not any(
+                        place.startswith(start) and word in stays.split()
+                        for start, stays, _ in ALLOWED
+                    ):
                         found.add(f"{place}: {name} (say {RETIRED[word]})")
-    assert not found, "\n".join(["names with words that docs/glossary.md has given up:", *sorted(found)])
+    assert not found, "\n".join(
+        ["names with words that docs/glossary.md has given up:", *sorted(found)]
+    )
 
 
 def test_the_glossary_has_the_words_that_are_said_instead() -> None:
@@ -79,7 +103,8 @@ def test_the_glossary_has_the_words_that_are_said_instead() -> None:
 
 
 def test_every_entry_of_the_glossary_is_explained_and_in_order() -> None:
-    entries, section = [], ""
+    entries = []
+    section = ""
     for line in GLOSSARY.read_text(encoding="utf-8").splitlines():
         if line.startswith("## "):
             section = line

@@ -41,7 +41,9 @@ def objects() -> list[str]:
             continue  # extras, which may be missing; their own tests import them
         if path.endswith(".errors"):
             module = importlib.import_module(path)
-            found += [f"{path}.{name}" for name, value in vars(module).items() if inspect.isclass(value)]
+            found += [
+                f"{path}.{name}" for name, value in vars(module).items() if inspect.isclass(value)
+            ]
         else:
             found.append(path)
     return found
@@ -75,11 +77,17 @@ def test_parameters_that_share_a_line_share_a_default(path: str) -> None:
         except (TypeError, ValueError):
             continue
         for line in re.findall(r"^(\w+(?:, \w+)+) : ", inspect.getdoc(each) or "", re.MULTILINE):
-            defaults = {str(parameters[name].default) for name in line.split(", ") if name in parameters}
-            assert len(defaults) <= 1, f"{path}: {line} have the defaults {', '.join(sorted(defaults))}"
+            defaults = {
+                str(parameters[name].default) for name in line.split(", ") if name in parameters
+            }
+            assert len(defaults) <= 1, (
+                f"{path}: {line} have the defaults {', '.join(sorted(defaults))}"
+            )
 
 
-@pytest.mark.parametrize("entry", [SceneFile, *dict.fromkeys(TABLES.values())], ids=lambda entry: entry.__name__)
+@pytest.mark.parametrize(
+    "entry", [SceneFile, *dict.fromkeys(TABLES.values())], ids=lambda entry: entry.__name__
+)
 def test_every_key_of_a_scene_file_has_a_text(entry: type[msgspec.Struct]) -> None:
     texts = hook("scene_tables").key_texts(entry)
     assert not [field.name for field in msgspec.structs.fields(entry) if not texts.get(field.name)]
@@ -114,13 +122,17 @@ def test_links_of_the_readme_lead_to_files_and_stay_inside_the_documentation() -
     assert not [link for link in inside if not (DOCS / link).is_file()]
 
 
-QUOTED = re.findall(r"(?<![*\w])\*([^*|]+)\*(?![*\w])", (DOCS / "troubleshooting.md").read_text(encoding="utf-8"))
+QUOTED = re.findall(
+    r"(?<![*\w])\*([^*|]+)\*(?![*\w])", (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+)
 
 
 @pytest.fixture(scope="module")
 def messages() -> str:
     """The source, with strings that go on in the next line in one piece."""
-    files = [file for name in ("ripple_sim", "solver") for file in (DOCS.parent / name).rglob("*.py")]
+    files = [
+        file for name in ("ripple_sim", "solver") for file in (DOCS.parent / name).rglob("*.py")
+    ]
     source = "\n".join(file.read_text(encoding="utf-8") for file in files)
     return re.sub(r'"\s*\n\s*f?"', "", source).replace("{MARK}", MARK)
 

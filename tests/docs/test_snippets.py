@@ -1,8 +1,9 @@
 """What the pages say can be typed in: every block of code runs, every command and every file that is named is there.
 
-Blocks of a page run in their order, in one folder and one Python namespace, as a reader would type them. A block with
-a title is a file of that name. TOML without a title is added to the page's last scene file, or, where the page has
-none, is a scene file of its own. Clips are small and short, whatever size the page asks for.
+Blocks of a page run in their order, in one folder and one Python namespace, as a reader would type
+them. A block with a title is a file of that name. TOML without a title is added to the page's last
+scene file, or, where the page has none, is a scene file of its own. Clips are small and short,
+whatever size the page asks for.
 """
 
 import importlib.util
@@ -142,7 +143,9 @@ class Reader:
         if program == "make":
             assert re.search(rf"^{rest[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
         elif Path(program).name == "pip":
-            extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+            extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+                "optional-dependencies"
+            ]
             assert set(re.findall(r"\[(\w+)\]", rest[-1])) <= set(extras)
         elif Path(program).name == "python":
             assert (ROOT / rest[0]).is_file()
@@ -162,12 +165,18 @@ def small(words: list[str]) -> list[str]:
         return [*words, "--limit", "1", "--workers", "1", "--keep-free", "0.01"]
     if words[0] not in CLIPS:
         return [*words, "--resolution", "16"] if words[0] == "atlas" else words
-    kept = [word for i, word in enumerate(words) if word not in SMALL and (i == 0 or words[i - 1] not in SMALL)]
+    kept = [
+        word
+        for i, word in enumerate(words)
+        if word not in SMALL and (i == 0 or words[i - 1] not in SMALL)
+    ]
     return [*kept, *(word for option in SMALL.items() for word in option)]
 
 
 @pytest.mark.filterwarnings("error::ripple_sim.errors.RippleWarning")
-@pytest.mark.parametrize("page", named([page for page in PAGES if any(b.language for b in blocks(page))]))
+@pytest.mark.parametrize(
+    "page", named([page for page in PAGES if any(b.language for b in blocks(page))])
+)
 def test_the_code_of_a_page_runs_from_top_to_bottom(opengl: None, page: Path, folder: Path) -> None:
     reader = Reader(folder)
     for block in blocks(page):

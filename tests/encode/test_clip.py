@@ -10,9 +10,20 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from ripple_sim.encode import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips, join_gif, join_webp
+from ripple_sim.encode import (
+    H264,
+    LOSSLESS,
+    VP9,
+    Clip,
+    Codec,
+    Stream,
+    join_clips,
+    join_gif,
+    join_webp,
+)
 
-WIDTH, HEIGHT = 48, 32
+WIDTH = 48
+HEIGHT = 32
 STREAM = Stream(WIDTH, HEIGHT, 24)
 
 
@@ -27,14 +38,19 @@ def encode(path: Path, codec: Codec, frames: np.ndarray, stream: Stream = STREAM
 def in_parts(folder: Path, codec: Codec, frames: np.ndarray, counts: list[int], stream: Stream):
     """Clips of so many frames each, with the number of their first."""
     first = np.cumsum([0, *counts]).tolist()
-    return [(encode(folder / f"{a}.part", codec, frames[a:b], stream), a) for a, b in itertools.pairwise(first)]
+    return [
+        (encode(folder / f"{a}.part", codec, frames[a:b], stream), a)
+        for a, b in itertools.pairwise(first)
+    ]
 
 
 def decode(path: Path) -> tuple[list[np.ndarray], list[Fraction]]:
     """Frames, and their times [s]."""
     with av.open(str(path)) as container:
         images = list(container.decode(video=0))
-    return [image.to_ndarray(format="rgb24") for image in images], [image.pts * image.time_base for image in images]
+    return [image.to_ndarray(format="rgb24") for image in images], [
+        image.pts * image.time_base for image in images
+    ]
 
 
 def pictures(path: Path, mode: str = "RGB") -> list[np.ndarray]:
@@ -44,7 +60,9 @@ def pictures(path: Path, mode: str = "RGB") -> list[np.ndarray]:
 
 def plain(colors: list) -> np.ndarray:
     """Frames of one colour, or one grey, each."""
-    return np.array(colors, np.uint8).reshape(len(colors), 1, 1, -1) * np.ones((HEIGHT, WIDTH, 3), np.uint8)
+    return np.array(colors, np.uint8).reshape(len(colors), 1, 1, -1) * np.ones(
+        (HEIGHT, WIDTH, 3), np.uint8
+    )
 
 
 def striped(count: int) -> np.ndarray:
@@ -63,7 +81,9 @@ def test_the_lossless_codec_keeps_noise_bit_for_bit(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("codec", [H264, VP9, LOSSLESS], ids=["mp4", "webm", "mkv"])
 @pytest.mark.parametrize("fps", [1, 24, 59, 240])
-def test_joined_clips_are_one_stream_with_every_frame_at_its_time(tmp_path: Path, codec: Codec, fps: int) -> None:
+def test_joined_clips_are_one_stream_with_every_frame_at_its_time(
+    tmp_path: Path, codec: Codec, fps: int
+) -> None:
     """Matroska and WebM round times to milliseconds, a quarter of a frame at 240 frames a second."""
     levels = [20, 60, 100, 140, 180, 220]
     parts = in_parts(tmp_path, codec, plain(levels), [3, 2, 1], Stream(WIDTH, HEIGHT, fps))
@@ -77,7 +97,9 @@ def test_joined_clips_are_one_stream_with_every_frame_at_its_time(tmp_path: Path
 
 @pytest.mark.parametrize("content", [b"", b"no video at all" * 20], ids=["empty", "garbage"])
 @pytest.mark.parametrize("codec", [H264, LOSSLESS], ids=["mp4", "gif"])
-def test_a_broken_clip_is_an_error_and_no_shorter_video(tmp_path: Path, codec: Codec, content: bytes) -> None:
+def test_a_broken_clip_is_an_error_and_no_shorter_video(
+    tmp_path: Path, codec: Codec, content: bytes
+) -> None:
     parts = [*in_parts(tmp_path, codec, plain([10, 200]), [2], STREAM), (tmp_path / "broken", 2)]
     (tmp_path / "broken").write_bytes(content)
     with pytest.raises(av.FFmpegError):
@@ -90,7 +112,9 @@ def test_a_broken_clip_is_an_error_and_no_shorter_video(tmp_path: Path, codec: C
 
 
 @pytest.mark.parametrize("counts", [[1], [5], [4, 3], [2, 2, 1]])
-def test_few_colours_of_a_gif_come_back_exactly_however_it_is_cut_into_clips(tmp_path: Path, counts: list[int]) -> None:
+def test_few_colours_of_a_gif_come_back_exactly_however_it_is_cut_into_clips(
+    tmp_path: Path, counts: list[int]
+) -> None:
     frames = striped(sum(counts))
     join_gif(in_parts(tmp_path, LOSSLESS, frames, counts, STREAM), tmp_path / "whole.gif", STREAM)
     np.testing.assert_array_equal(pictures(tmp_path / "whole.gif"), frames)
@@ -100,7 +124,9 @@ def test_few_colours_of_a_gif_come_back_exactly_however_it_is_cut_into_clips(tmp
 def test_a_gif_lasts_as_long_as_its_frames_and_repeats(tmp_path: Path, fps: int) -> None:
     """GIF counts in hundredths of a second, which must not add up."""
     stream = Stream(WIDTH, HEIGHT, fps)
-    join_gif(in_parts(tmp_path, LOSSLESS, striped(11), [6, 5], stream), tmp_path / "whole.gif", stream)
+    join_gif(
+        in_parts(tmp_path, LOSSLESS, striped(11), [6, 5], stream), tmp_path / "whole.gif", stream
+    )
     with Image.open(tmp_path / "whole.gif") as image:
         assert image.info["loop"] == 0
         shown = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
@@ -124,7 +150,8 @@ def stills(folder: Path, frames: np.ndarray, **settings: object) -> list[Path]:
 
 def chunks(content: bytes) -> list[tuple[bytes, bytes]]:
     assert struct.unpack_from("<4sI4s", content) == (b"RIFF", len(content) - 8, b"WEBP")
-    at, found = 12, []
+    at = 12
+    found = []
     while at < len(content):
         name, size = struct.unpack_from("<4sI", content, at)
         found.append((name, content[at + 8 : at + 8 + size]))
@@ -143,9 +170,13 @@ def test_whole_milliseconds_do_not_drift(tmp_path: Path, fps: int) -> None:
     assert np.abs(np.cumsum(shown) - 1000 * np.arange(1, 101) / fps).max() <= 0.5
 
 
-@pytest.mark.parametrize("settings", [{}, {"lossless": False, "quality": 88}], ids=["lossless", "lossy"])
+@pytest.mark.parametrize(
+    "settings", [{}, {"lossless": False, "quality": 88}], ids=["lossless", "lossy"]
+)
 @pytest.mark.parametrize("seen", [None, 0, 2], ids=["no frame", "the first", "the last"])
-def test_opacity_is_announced_when_any_frame_has_it(tmp_path: Path, settings: dict, seen: int | None) -> None:
+def test_opacity_is_announced_when_any_frame_has_it(
+    tmp_path: Path, settings: dict, seen: int | None
+) -> None:
     frames = noise(3, 20, 18, 4)
     frames[..., 3] = 255
     if seen is not None:
@@ -173,9 +204,13 @@ def test_metadata_of_a_still_stays_out_of_the_animation(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("channels", [3, 4])
 @pytest.mark.parametrize("size", [(16, 16), (33, 17), (300, 20)])
-def test_lossless_webp_frames_come_back_bit_for_bit(tmp_path: Path, size: tuple[int, int], channels: int) -> None:
+def test_lossless_webp_frames_come_back_bit_for_bit(
+    tmp_path: Path, size: tuple[int, int], channels: int
+) -> None:
     frames = noise(4, *size, channels)
     join_webp(stills(tmp_path, frames), tmp_path / "whole", Stream(*size, 25))
     with Image.open(tmp_path / "whole") as image:
         assert (image.size, image.n_frames, image.info["loop"]) == (size, 4, 0)
-    np.testing.assert_array_equal(pictures(tmp_path / "whole", "RGBA" if channels == 4 else "RGB"), frames)
+    np.testing.assert_array_equal(
+        pictures(tmp_path / "whole", "RGBA" if channels == 4 else "RGB"), frames
+    )

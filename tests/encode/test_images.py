@@ -24,7 +24,8 @@ from ripple_sim.render.visuals import shapes as meshes
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
 
-WIDTH, HEIGHT = 64, 48
+WIDTH = 64
+HEIGHT = 48
 FRONT = Camera((0.0, 0.0, 0.0), 5.0, 70.0, -20.0, 40.0)
 BODIES = """<body pos="1 0 0"><geom type="box" size=".3 .3 .5" rgba=".1 .2 .7 1"/></body>
 <body pos="-1 0 .2"><geom size=".4" rgba=".8 .3 .1 1"/></body>"""
@@ -59,7 +60,9 @@ def render(bodies: str = BODIES, asset: str = "", **options) -> np.ndarray:
 
 @pytest.mark.usefixtures("exr")
 @pytest.mark.parametrize("channels", [3, 4])
-def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(tmp_path: Path, channels: int) -> None:
+def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(
+    tmp_path: Path, channels: int
+) -> None:
     import OpenEXR
 
     rng = np.random.default_rng(3)
@@ -89,7 +92,9 @@ def test_bytes_for_the_screen_are_no_linear_light(exr: None, tmp_path: Path) -> 
 
 def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(exr: None, tmp_path: Path) -> None:
     """Half a frame of noise cannot be packed into less than it is: the file's end is cut off."""
-    said = written_until_full(tmp_path / "frames", 60 * 60 * 3 * 2 - 1000, 60, 60, 1, frame_format="exr")
+    said = written_until_full(
+        tmp_path / "frames", 60 * 60 * 3 * 2 - 1000, 60, 60, 1, frame_format="exr"
+    )
     assert said == f"cannot write the video {tmp_path / 'frames'}: File too large\n"
     assert list(tmp_path.iterdir()) == []
 
@@ -99,11 +104,14 @@ def test_without_openexr_the_extra_is_named(tmp_path: Path, capsys, monkeypatch)
     options = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     assert cli.main(["render", "duck", *options]) == 2
     assert "pip install 'ripple-sim[exr]'" in capsys.readouterr().err
-    assert cli.main(["render", "missing", *options]) == 2  # what is asked for comes before what the machine lacks
+    # what is asked for comes before what the machine lacks
+    assert cli.main(["render", "missing", *options]) == 2
     assert "missing" in capsys.readouterr().err
 
 
-def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(exr: None, scene: Scene, tmp_path: Path, capsys):
+def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(
+    exr: None, scene: Scene, tmp_path: Path, capsys
+):
     frames = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     for option in (["--overlay", "time"], ["--compare", "paper"]):
         assert cli.main(["render", "duck", *frames, *option]) == 2
@@ -114,21 +122,44 @@ def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(exr: None, s
     assert not (tmp_path / "frames").exists()
 
 
-def test_the_command_writes_a_folder_over_older_frames(exr: None, scene: Scene, tmp_path: Path) -> None:
+def test_the_command_writes_a_folder_over_older_frames(
+    exr: None, scene: Scene, tmp_path: Path
+) -> None:
     render_video(scene, tmp_path / "frames", VideoOptions(size=(WIDTH, HEIGHT), fps=30))
-    command = ["render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "frames"), "--frame-format", "exr"]
-    assert cli.main([*command, "--size", f"{WIDTH}x{HEIGHT}", "--fps", "30", "--duration", "0.1"]) == 0
-    assert sorted(contents(tmp_path / "frames")) == [f"frame_{number:05d}.exr" for number in range(3)]
+    command = [
+        "render",
+        str(tmp_path / "scene.toml"),
+        "-o",
+        str(tmp_path / "frames"),
+        "--frame-format",
+        "exr",
+    ]
+    assert (
+        cli.main([*command, "--size", f"{WIDTH}x{HEIGHT}", "--fps", "30", "--duration", "0.1"]) == 0
+    )
+    assert sorted(contents(tmp_path / "frames")) == [
+        f"frame_{number:05d}.exr" for number in range(3)
+    ]
 
 
-def test_an_interrupted_render_goes_on_to_the_same_frames(exr: None, scene: Scene, tmp_path: Path) -> None:
+def test_an_interrupted_render_goes_on_to_the_same_frames(
+    exr: None, scene: Scene, tmp_path: Path
+) -> None:
     options = {**OPTIONS, "transparent": True}
     render_video(scene, tmp_path / "whole", VideoOptions(**options))
     with pytest.raises(KeyboardInterrupt):
-        render_video(scene, tmp_path / "broken", VideoOptions(**options), progress=interrupting_at(8))
+        render_video(
+            scene, tmp_path / "broken", VideoOptions(**options), progress=interrupting_at(8)
+        )
     with pytest.raises(VideoError, match="the frame format was exr and now is png"):
-        render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **{**options, "frame_format": "png"}))
-    assert render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **options)).frames == 12
+        render_video(
+            scene,
+            tmp_path / "broken",
+            VideoOptions(resume=True, **{**options, "frame_format": "png"}),
+        )
+    assert (
+        render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **options)).frames == 12
+    )
     assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
 
 
@@ -136,14 +167,17 @@ def test_the_tone_curve_makes_the_picture_of_linear_light(opengl: None) -> None:
     light = render(BODIES + FLOOR, samples=1, linear=True)
     picture = render(BODIES + FLOOR, samples=1)
     assert (light.dtype, light.shape) == (np.float16, picture.shape)
-    # half a step of dithering, half a step of rounding, what half floats leave out, and that the smooth background is
-    # interpolated before the curve or after it
+    # half a step of dithering, half a step of rounding, what half floats leave out, and that the
+    # smooth background is interpolated before the curve or after it
     assert np.abs(255 * tone_mapped(light.astype(float)) - picture).max() < 1.6
 
 
 def test_highlights_keep_what_the_screen_cannot_show(opengl: None) -> None:
     metal = '<asset><material name="m" metallic="1" roughness=".2"/></asset>'
-    light, picture = (render('<geom size="1" material="m"/>', metal, samples=1, linear=way) for way in (True, False))
+    light, picture = (
+        render('<geom size="1" material="m"/>', metal, samples=1, linear=way)
+        for way in (True, False)
+    )
     white = picture.min(axis=-1) >= 245
     assert white.sum() > 20
     assert light[white].min() > 1 and light[white].max() > 10
@@ -153,21 +187,31 @@ def test_highlights_keep_what_the_screen_cannot_show(opengl: None) -> None:
 def test_reflections_and_clear_bodies_are_mixed_in_linear_light(opengl: None) -> None:
     def floor(reflectance: float) -> np.ndarray:
         asset = f'<asset><material name="f" rgba=".5 .5 .5 1" reflectance="{reflectance}"/></asset>'
-        return render(BODIES + FLOOR.replace("/>", ' material="f"/>'), asset, linear=True).astype(float)
+        return render(BODIES + FLOOR.replace("/>", ' material="f"/>'), asset, linear=True).astype(
+            float
+        )
 
     def ball(opacity: float) -> np.ndarray:
-        return render(f'<geom size="1" rgba=".8 .3 .1 {opacity}"/>', samples=1, linear=True).astype(float)
+        return render(f'<geom size="1" rgba=".8 .3 .1 {opacity}"/>', samples=1, linear=True).astype(
+            float
+        )
 
-    for less, half, more in ([floor(r) for r in (0.25, 0.5, 0.75)], [ball(a) for a in (0.0, 0.5, 1.0)]):
+    for less, half, more in (
+        [floor(r) for r in (0.25, 0.5, 0.75)],
+        [ball(a) for a in (0.0, 0.5, 1.0)],
+    ):
         assert np.abs(more - less).max() > 0.2
         np.testing.assert_allclose(half, (less + more) / 2, atol=1e-3)
 
 
 def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background(opengl: None) -> None:
     """The frame is the cut-out over the empty scene, by the compositor's rule: a + (1 - alpha) b."""
-    whole, empty = (render(bodies, linear=True).astype(float) for bodies in (BODIES, "<geom size='1e-3'/>"))
+    whole, empty = (
+        render(bodies, linear=True).astype(float) for bodies in (BODIES, "<geom size='1e-3'/>")
+    )
     cut_out = render(linear=True, alpha=True).astype(float)
-    light, opacity = cut_out[..., :3], cut_out[..., 3:]
+    light = cut_out[..., :3]
+    opacity = cut_out[..., 3:]
     assert (opacity.min(), opacity.max()) == (0, 1)
     edges = (opacity[..., 0] > 0) & (opacity[..., 0] < 1)
     assert edges.sum() > 50
@@ -176,7 +220,9 @@ def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background(open
 
 
 def test_fields_and_grids_are_refused_in_linear_light(opengl: None) -> None:
-    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'
+    )
     ball = meshes.ball(8)
     for paint in ({"heatmap_colors": color_table()}, {"grid": 4}):
         surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell, 8), "clay", **paint)
@@ -185,7 +231,11 @@ def test_fields_and_grids_are_refused_in_linear_light(opengl: None) -> None:
 
 
 DEPTH = np.linspace(1, 2, 12, dtype=np.float32).reshape(3, 4)
-PASSES = {"depth": DEPTH, "flow": np.stack([DEPTH, -DEPTH], axis=-1), "segmentation": np.ones((3, 4), np.uint32)}
+PASSES = {
+    "depth": DEPTH,
+    "flow": np.stack([DEPTH, -DEPTH], axis=-1),
+    "segmentation": np.ones((3, 4), np.uint32),
+}
 
 
 def pass_files(video: Path, form: str = "npz", geoms: Mapping[int, str] | None = None) -> PassFiles:
@@ -237,7 +287,8 @@ def test_unknown_passes_and_foreign_files_are_refused(tmp_path: Path) -> None:
         check_passes(tmp_path / "clip.mp4", ("depth",), "png", overwrite=False)
     pass_files(tmp_path / "clip.mp4").write(0, PASSES)
     check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=False)
-    with pytest.raises(VideoError, match=r"those of clip\.mp4"):  # which came between the check and the first frame
+    # which came between the check and the first frame
+    with pytest.raises(VideoError, match=r"those of clip\.mp4"):
         pass_files(tmp_path / "clip.webm")
     foreign = tmp_path / "clip.passes" / "passes_00001.npz"
     foreign.write_bytes(b"mine")

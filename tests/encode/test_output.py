@@ -61,7 +61,9 @@ def test_the_limits_themselves_and_default_rates_are_valid(tmp_path: Path) -> No
         ("/proc/clip.mp4", (1280, 720), 60, "cannot write /proc"),
     ],
 )
-def test_what_cannot_be_written_is_refused_beforehand(tmp_path: Path, name: str, size: tuple, fps: int, message: str):
+def test_what_cannot_be_written_is_refused_beforehand(
+    tmp_path: Path, name: str, size: tuple, fps: int, message: str
+):
     (tmp_path / "a_file").write_text("mine")
     (tmp_path / "a_folder.mp4").mkdir()
     (tmp_path / "photos").mkdir()
@@ -73,7 +75,9 @@ def test_what_cannot_be_written_is_refused_beforehand(tmp_path: Path, name: str,
     assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.parametrize("name", ["frame_0000.png", "frame_00000.jpg", "frame_00000.png.bak", ".frame_00000.png", "a"])
+@pytest.mark.parametrize(
+    "name", ["frame_0000.png", "frame_00000.jpg", "frame_00000.png.bak", ".frame_00000.png", "a"]
+)
 def test_a_folder_that_holds_anything_but_frames_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "frame_00000.png").touch()
     (tmp_path / "frame_100000.exr").touch()
@@ -84,7 +88,9 @@ def test_a_folder_that_holds_anything_but_frames_is_refused(tmp_path: Path, name
     assert len(list(tmp_path.iterdir())) == 3
 
 
-def test_a_link_to_a_folder_of_frames_is_refused_before_anything_is_rendered(tmp_path: Path) -> None:
+def test_a_link_to_a_folder_of_frames_is_refused_before_anything_is_rendered(
+    tmp_path: Path,
+) -> None:
     """The finished folder takes the place of the older one by renaming, which a link does not allow."""
     (tmp_path / "older").mkdir()
     (tmp_path / "frames").symlink_to(tmp_path / "older")
@@ -93,8 +99,11 @@ def test_a_link_to_a_folder_of_frames_is_refused_before_anything_is_rendered(tmp
     check_output(tmp_path / "older", 64, 48, 25)
 
 
-def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(tmp_path: Path) -> None:
-    frame, folder = np.zeros((16, 16, 3), np.uint8), tmp_path / "frames"
+def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(
+    tmp_path: Path,
+) -> None:
+    frame = np.zeros((16, 16, 3), np.uint8)
+    folder = tmp_path / "frames"
     with open_writer(folder, width=16, height=16, fps=25) as writer:
         writer.write(frame)
     refused = pytest.raises(EncodingError, match=r"holds other files \(notes\.txt\)")
@@ -104,18 +113,25 @@ def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(tmp
     assert sorted(path.name for path in folder.iterdir()) == ["frame_00000.png", "notes.txt"]
 
 
-def test_frames_beyond_the_highest_level_of_h264_are_refused_where_others_hold_them(tmp_path: Path) -> None:
+def test_frames_beyond_the_highest_level_of_h264_are_refused_where_others_hold_them(
+    tmp_path: Path,
+) -> None:
     check_output(tmp_path / "clip.mp4", 8192, 4352, 25)
-    with pytest.raises(VideoError, match=r"8192x8192; \.mp4 is H\.264.*or write \.webm, \.gif, \.webp or a folder"):
+    with pytest.raises(
+        VideoError, match=r"8192x8192; \.mp4 is H\.264.*or write \.webm, \.gif, \.webp or a folder"
+    ):
         check_output(tmp_path / "clip.mp4", 8192, 8192, 25)
     for name in ("clip.webm", "clip.gif", "clip.webp", "frames"):
         check_output(tmp_path / name, 8192, 8192, 25)
 
 
 @pytest.mark.parametrize(
-    "name", ["a:b.mp4", "pipe:1.mp4", "concat:x.mp4", "file:z.gif", "%d.webm", "http:x.webp", "-.mp4"]
+    "name",
+    ["a:b.mp4", "pipe:1.mp4", "concat:x.mp4", "file:z.gif", "%d.webm", "http:x.webp", "-.mp4"],
 )
-def test_no_name_is_taken_for_a_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_no_name_is_taken_for_a_protocol(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     with open_writer(name, width=16, height=16, fps=25) as writer:
         writer.write(np.zeros((16, 16, 3), np.uint8))

@@ -20,7 +20,9 @@ from ripple_sim.encode import FRAMES_IN_CLIP, FrameWriter, open_writer
 from ripple_sim.errors import VideoError
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
-FRAMES, SIZE, FPS = 2 * FRAMES_IN_CLIP + 10, (64, 48), 25
+FRAMES = 2 * FRAMES_IN_CLIP + 10
+SIZE = (64, 48)
+FPS = 25
 SETTINGS = {"the scene": "a moving square"}
 DIGEST = "0123456789abcdef" * 2
 # Writes all the videos one behind the other, and goes on with those that are not whole.
@@ -44,14 +46,20 @@ for ending in {ENDINGS!r}:
 
 
 def start(folder: Path) -> subprocess.Popen:
-    process = subprocess.Popen([sys.executable, "-c", PROGRAM, folder], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, folder], stdout=subprocess.PIPE, text=True
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     return process
 
 
-def write(path: Path, first: int, last: int, settings: dict = SETTINGS, resume: bool = True) -> FrameWriter:
-    with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, settings=settings, resume=resume) as writer:
+def write(
+    path: Path, first: int, last: int, settings: dict = SETTINGS, resume: bool = True
+) -> FrameWriter:
+    with open_writer(
+        path, width=SIZE[0], height=SIZE[1], fps=FPS, settings=settings, resume=resume
+    ) as writer:
         for number in range(first, last):
             writer.write(np.full((SIZE[1], SIZE[0], 3), number, np.uint8))
         if last < FRAMES:
@@ -68,7 +76,8 @@ def interrupted(tmp_path) -> Path:
 
 
 def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
-    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    whole = tmp_path / "whole"
+    broken = tmp_path / "broken"
     begun = time.perf_counter()
     assert start(whole).wait() == 0
     longest = (time.perf_counter() - begun) / 6
@@ -84,21 +93,28 @@ def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
         for clip in broken.glob("*.part/frames/[!.]*"):  # what is left plays
             if clip.suffix in (".mp4", ".webm", ".mkv"):
                 with av.open(str(clip)) as container:
-                    assert sum(1 for _ in container.decode(video=0)) in (FRAMES_IN_CLIP, FRAMES % FRAMES_IN_CLIP)
+                    assert sum(1 for _ in container.decode(video=0)) in (
+                        FRAMES_IN_CLIP,
+                        FRAMES % FRAMES_IN_CLIP,
+                    )
             else:
                 with Image.open(clip) as image:
                     image.load()
     assert start(broken).wait() == 0
     assert kills > 3
     assert contents(broken) == contents(whole)
-    assert sorted(path.name for path in broken.iterdir()) == sorted(f"clip{ending}" for ending in ENDINGS)
+    assert sorted(path.name for path in broken.iterdir()) == sorted(
+        f"clip{ending}" for ending in ENDINGS
+    )
 
 
 def test_an_interrupted_video_says_what_is_left(tmp_path):
     with pytest.raises(KeyboardInterrupt) as ending:
         write(tmp_path / "clip.mp4", 0, 60)
     part = tmp_path / "clip.mp4.part"
-    assert ending.value.__notes__ == [f"{FRAMES_IN_CLIP} frames are kept in {part}; --resume carries on from there"]
+    assert ending.value.__notes__ == [
+        f"{FRAMES_IN_CLIP} frames are kept in {part}; --resume carries on from there"
+    ]
     assert [path.name for path in (part / "frames").iterdir()] == ["frames_00000-00047.mp4"]
 
 
@@ -123,7 +139,9 @@ def test_what_a_kill_left_of_a_finished_video_is_begun_anew(interrupted):
 
 def test_resuming_with_other_settings_is_refused_and_harms_nothing(interrupted):
     before = contents(interrupted.parent)
-    with pytest.raises(VideoError, match=r"the scene was a moving square and now is a ball; .* leave --resume out"):
+    with pytest.raises(
+        VideoError, match=r"the scene was a moving square and now is a ball; .* leave --resume out"
+    ):
         write(interrupted, 48, FRAMES, settings={"the scene": "a ball"})
     with pytest.raises(VideoError, match="the length was None and now is 3"):
         write(interrupted, 48, FRAMES, settings={**SETTINGS, "the length": 3})
@@ -134,7 +152,9 @@ def test_a_simulation_that_comes_out_otherwise_is_refused_and_harms_nothing(tmp_
     path = tmp_path / "clip.mp4"
 
     def go(digest: str) -> None:
-        with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, settings=SETTINGS, resume=True) as writer:
+        with open_writer(
+            path, width=SIZE[0], height=SIZE[1], fps=FPS, settings=SETTINGS, resume=True
+        ) as writer:
             writer.check_state(0, DIGEST)
             writer.check_state(16, digest)
             for _ in range(writer.frames, 60):
@@ -145,7 +165,9 @@ def test_a_simulation_that_comes_out_otherwise_is_refused_and_harms_nothing(tmp_
         go(DIGEST)
     with (path.with_name("clip.mp4.part") / "states.txt").open("a") as file:
         file.write("32 0123")  # cut off by a kill
-    with pytest.raises(VideoError, match="at frame 16 the simulation is not in the state it was in before"):
+    with pytest.raises(
+        VideoError, match="at frame 16 the simulation is not in the state it was in before"
+    ):
         go(DIGEST[::-1])
     with pytest.raises(KeyboardInterrupt):
         go(DIGEST)
@@ -168,4 +190,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
     assert said.startswith(f"cannot write the video {path}: ")
     assert "File too large" in said and said.count("\n") == 1
     left = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert all(path.name in ("settings.json", "states.txt") or path.name.startswith("frame") for path in left)
+    assert all(
+        path.name in ("settings.json", "states.txt") or path.name.startswith("frame")
+        for path in left
+    )

@@ -13,7 +13,9 @@ from ripple_sim.encode import FORMATS, Format, Segments, Stream, open_writer
 from ripple_sim.encode.writer import QUEUE_FRAMES
 from ripple_sim.errors import EncodingError, SimulationError, VideoError
 
-WIDTH, HEIGHT, FPS = 96, 64, 25
+WIDTH = 96
+HEIGHT = 64
+FPS = 25
 SIZE = {"width": WIDTH, "height": HEIGHT, "fps": FPS}
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 
@@ -21,7 +23,9 @@ ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 def frames(count: int) -> list[np.ndarray]:
     """A smooth background in which a bright square moves two pixels a frame."""
     row, column = np.mgrid[:HEIGHT, :WIDTH]
-    background = np.stack([60 + column, 40 + 2 * row, np.full_like(row, 90)], axis=-1).astype(np.uint8)
+    background = np.stack([60 + column, 40 + 2 * row, np.full_like(row, 90)], axis=-1).astype(
+        np.uint8
+    )
     result = []
     for number in range(count):
         frame = background.copy()
@@ -59,7 +63,9 @@ def test_frames_come_back_in_order_and_in_their_colours(tmp_path, ending):
 
 
 @pytest.mark.parametrize("ending", [".mp4", ".webm"])
-@pytest.mark.parametrize("colour", [(200, 40, 40), (40, 200, 40), (40, 40, 200), (255, 255, 255), (0, 0, 0)])
+@pytest.mark.parametrize(
+    "colour", [(200, 40, 40), (40, 200, 40), (40, 40, 200), (255, 255, 255), (0, 0, 0)]
+)
 def test_a_plain_colour_survives_bt709(tmp_path, ending, colour):
     path = tmp_path / f"plain{ending}"
     with open_writer(path, **SIZE) as writer:
@@ -68,13 +74,21 @@ def test_a_plain_colour_survives_bt709(tmp_path, ending, colour):
         stream = container.streams.video[0]
         image = next(container.decode(video=0))
         assert (stream.codec_context.colorspace, stream.codec_context.color_range) == (1, 1)
-        # Converted by hand, so that the tags and the pixels are checked against the standard and not each other.
+        # Converted by hand, so that the tags and the pixels are checked against the standard and
+        # not each other.
         y, u, v = (
-            float(np.frombuffer(plane, np.uint8).reshape(plane.height, -1)[plane.height // 2, plane.width // 2])
+            float(
+                np.frombuffer(plane, np.uint8).reshape(plane.height, -1)[
+                    plane.height // 2, plane.width // 2
+                ]
+            )
             for plane in image.planes
         )
-    luma, blue, red = (y - 16) / 219, (u - 128) / 224, (v - 128) / 224
-    r, b = luma + 2 * (1 - 0.2126) * red, luma + 2 * (1 - 0.0722) * blue
+    luma = (y - 16) / 219
+    blue = (u - 128) / 224
+    red = (v - 128) / 224
+    r = luma + 2 * (1 - 0.2126) * red
+    b = luma + 2 * (1 - 0.0722) * blue
     g = (luma - 0.2126 * r - 0.0722 * b) / 0.7152
     assert np.abs(255 * np.array([r, g, b]) - colour).max() <= 4
 
@@ -91,7 +105,9 @@ def test_mp4_is_what_browsers_play(tmp_path):
 
 
 def test_transparent_frames_keep_their_opacity_in_a_folder(tmp_path):
-    frame = np.arange(4 * HEIGHT * WIDTH, dtype=np.uint32).astype(np.uint8).reshape(HEIGHT, WIDTH, 4)
+    frame = (
+        np.arange(4 * HEIGHT * WIDTH, dtype=np.uint32).astype(np.uint8).reshape(HEIGHT, WIDTH, 4)
+    )
     with open_writer(tmp_path / "frames", **SIZE, transparent=True) as writer:
         writer.write(frame)
     np.testing.assert_array_equal(read(tmp_path / "frames")[0], frame)
@@ -99,7 +115,8 @@ def test_transparent_frames_keep_their_opacity_in_a_folder(tmp_path):
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_the_same_frames_give_the_same_bytes(tmp_path, ending):
-    # WIDTH is no multiple of 128, where x264's macroblock tree is not deterministic; it takes a few tries to show.
+    # WIDTH is no multiple of 128, where x264's macroblock tree is not deterministic; it takes a few
+    # tries to show.
     contents = set()
     for name in "abcdef":
         path = tmp_path / f"{name}{ending}"
@@ -111,14 +128,19 @@ def test_the_same_frames_give_the_same_bytes(tmp_path, ending):
 
 @pytest.mark.parametrize("settings", [None, {"a": 1}])
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_an_error_while_rendering_leaves_nothing_but_the_video_that_was_there(tmp_path, ending, settings):
+def test_an_error_while_rendering_leaves_nothing_but_the_video_that_was_there(
+    tmp_path, ending, settings
+):
     """What would fail again leaves nothing to resume; without settings nobody could tell what the rest belongs to."""
     older = [tmp_path / "clip.mp4"] if ending == ".mp4" else []
     for path in older:
         path.write_bytes(b"yesterday's")
     error = SimulationError if settings else KeyboardInterrupt
     path = tmp_path / f"clip{ending}"
-    with pytest.raises(error), open_writer(path, **SIZE, settings=settings, overwrite=True) as writer:
+    with (
+        pytest.raises(error),
+        open_writer(path, **SIZE, settings=settings, overwrite=True) as writer,
+    ):
         for frame in frames(QUEUE_FRAMES + 2):  # more than can wait: of single images one is stored
             writer.write(frame)
         raise error
@@ -169,7 +191,8 @@ def gate(monkeypatch) -> Gate:
 
 
 def test_rendering_waits_for_a_slow_encoder(tmp_path, gate):
-    writer, frame = open_writer(tmp_path / "clip.mp4", **SIZE), frames(1)[0]
+    writer = open_writer(tmp_path / "clip.mp4", **SIZE)
+    frame = frames(1)[0]
 
     def render() -> None:
         for _ in range(100):
@@ -191,9 +214,13 @@ def test_rendering_waits_for_a_slow_encoder(tmp_path, gate):
 def test_after_an_error_of_the_encoder_whole_segments_can_be_resumed(tmp_path, gate, fails_at):
     gate.open.set()
     gate._fails_at = fails_at
-    path, options = tmp_path / "clip.mp4", {**SIZE, "settings": {"a": 1}}
+    path = tmp_path / "clip.mp4"
+    options = {**SIZE, "settings": {"a": 1}}
     path.touch()
-    with pytest.raises(EncodingError, match=r"clip\.mp4: no space left"), open_writer(path, **options) as writer:
+    with (
+        pytest.raises(EncodingError, match=r"clip\.mp4: no space left"),
+        open_writer(path, **options) as writer,
+    ):
         for _ in range(1000):  # more than the queue holds: it must not block for ever
             writer.write(frames(1)[0])
     assert path.read_bytes() == b""
@@ -203,14 +230,17 @@ def test_after_an_error_of_the_encoder_whole_segments_can_be_resumed(tmp_path, g
         writer.write(frames(1)[0])
 
 
-def test_an_error_while_joining_leaves_the_older_video_and_every_segment(tmp_path, gate, monkeypatch):
+def test_an_error_while_joining_leaves_the_older_video_and_every_segment(
+    tmp_path, gate, monkeypatch
+):
     def torn(segments: Segments, path: Path, stream: Stream) -> None:
         path.write_text("half")
         raise OSError(28, "No space left on device")
 
     gate.open.set()
     monkeypatch.setitem(FORMATS, ".mp4", dataclasses.replace(FORMATS[".mp4"], join=torn))
-    path, options = tmp_path / "clip.mp4", {**SIZE, "settings": {"a": 1}, "overwrite": True}
+    path = tmp_path / "clip.mp4"
+    options = {**SIZE, "settings": {"a": 1}, "overwrite": True}
     path.write_bytes(b"older")
     with pytest.raises(EncodingError, match="No space"), open_writer(path, **options) as writer:
         for _ in range(5):
@@ -223,10 +253,17 @@ def test_an_error_while_joining_leaves_the_older_video_and_every_segment(tmp_pat
 
 @pytest.mark.parametrize(
     "frame",
-    [np.zeros((WIDTH, HEIGHT, 3), np.uint8), np.zeros((HEIGHT, WIDTH, 4), np.uint8), np.zeros((HEIGHT, WIDTH, 3))],
+    [
+        np.zeros((WIDTH, HEIGHT, 3), np.uint8),
+        np.zeros((HEIGHT, WIDTH, 4), np.uint8),
+        np.zeros((HEIGHT, WIDTH, 3)),
+    ],
 )
 def test_a_frame_of_another_shape_or_type_is_refused(tmp_path, frame):
-    with pytest.raises(VideoError, match="uint8"), open_writer(tmp_path / "clip.mp4", **SIZE) as writer:
+    with (
+        pytest.raises(VideoError, match="uint8"),
+        open_writer(tmp_path / "clip.mp4", **SIZE) as writer,
+    ):
         writer.write(frame)
     assert list(tmp_path.iterdir()) == []
 

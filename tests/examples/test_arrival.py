@@ -1,6 +1,7 @@
 """Times of arrival: against exact geodesics, and the same for the same object however it lies, is scaled or meshed.
 
-The bump's wave on the plane is that of another way to compute it: Poisson's integral of the initial value problem.
+The bump's wave on the plane is that of another way to compute it: Poisson's integral of the initial
+value problem.
 """
 
 from pathlib import Path
@@ -25,7 +26,8 @@ def test_front_on_a_sphere_arrives_at_the_distance() -> None:
     probes = np.random.default_rng(0).standard_normal((500, 3))
     probes /= np.linalg.norm(probes, axis=1, keepdims=True)
     distance = np.arccos(np.clip(probes @ pole, -1, 1))
-    probes, distance = probes[(distance > 0.7) & (distance < 2.2)], distance[(distance > 0.7) & (distance < 2.2)]
+    probes = probes[(distance > 0.7) & (distance < 2.2)]
+    distance = distance[(distance > 0.7) & (distance < 2.2)]
     times = fronts.front_and_crest(*fronts.waves_of(atlas, pole, probes, width, 2.2))
     for time, expected in zip(times, fronts.plane_arrival(distance / width), strict=True):
         assert np.abs(time / (expected * width) - 1).max() < 0.015
@@ -46,9 +48,12 @@ def test_waves_arrive_in_time_on_a_body_with_limbs() -> None:
 @pytest.mark.parametrize("name", ["spot.obj", "bunny.off", "elephant.obj"])
 def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
     atlas = build_atlas(load_mesh(known_mesh(f"good/{name}")), 96, cache=False)
-    errors = [fronts.arrival(atlas, source).error() for source in fronts.spread_sources(atlas.mesh, 3)]
+    errors = [
+        fronts.arrival(atlas, source).error() for source in fronts.spread_sources(atlas.mesh, 3)
+    ]
     assert np.mean([error.front_median for error in errors]) < 0.01
-    # a crest lags by what texels disperse, and by what limbs and furrows bend, however narrow the texels
+    # a crest lags by what texels disperse, and by what limbs and furrows bend, however narrow the
+    # texels
     assert np.mean([error.crest_median for error in errors]) < 0.012
     assert np.mean([error.front_under_3_percent for error in errors]) > 0.88
 
@@ -57,7 +62,9 @@ def test_same_object_otherwise_presented_has_the_same_times() -> None:
     V, F = limbed()
     mesh = Mesh.from_arrays(V, F)
     atlas = build_atlas(mesh, 64, cache=False)
-    source, width, reach = mesh.V[100], fronts.ideal_width(atlas), 1.2 * float(np.ptp(mesh.V))
+    source = mesh.V[100]
+    width = fronts.ideal_width(atlas)
+    reach = 1.2 * float(np.ptp(mesh.V))
     points = mesh.V[::7]
 
     def times(other: Atlas, rotation: np.ndarray, scale: float) -> np.ndarray:
@@ -86,7 +93,8 @@ def test_same_object_otherwise_presented_has_the_same_times() -> None:
 
 
 def test_waves_arrive_in_time_on_any_surface_and_not_on_its_other_parts() -> None:
-    ring, drum = torus(24), moved(disk(12), (3, 0, 0))
+    ring = torus(24)
+    drum = moved(disk(12), (3, 0, 0))
     atlas = build_atlas(joined(ring, drum), 64, cache=False, layout="patches")
     sources = fronts.spread_sources(atlas.mesh, 3)
     assert max(sources) < len(ring.V)  # on the larger part
@@ -112,12 +120,16 @@ def test_calibration_finds_the_factor_of_a_known_speed(atlas: Atlas, operator: s
     source = fronts.spread_sources(atlas.mesh, 1)[0]
     as_it_is = fronts.arrival(atlas, source, operator)
     slow = fronts.arrival(atlas, source, operator, speed=0.7)
-    assert fronts.speed_factor([slow]) == pytest.approx(fronts.speed_factor([as_it_is]) / 0.7, rel=5e-3)
+    assert fronts.speed_factor([slow]) == pytest.approx(
+        fronts.speed_factor([as_it_is]) / 0.7, rel=5e-3
+    )
 
 
 def test_table_has_our_operator_and_its_rivals() -> None:
     rows = fronts.arrivals({}, resolution=N, sources=1)["limbed"]
-    paint, calibrated, conformal = rows["dynamic-paint"], rows[fronts.CALIBRATED], rows[fronts.CONFORMAL]
+    paint = rows["dynamic-paint"]
+    calibrated = rows[fronts.CALIBRATED]
+    conformal = rows[fronts.CONFORMAL]
     # on a grid of squares the sum over 8 neighbours is twice the Laplacian
     assert calibrated["speed factor"] == pytest.approx(np.sqrt(1 / 2), rel=0.1)
     assert calibrated["front_median"] < paint["front_median"] / 2
@@ -129,7 +141,9 @@ def test_table_has_our_operator_and_its_rivals() -> None:
 def test_a_mesh_with_a_handle_has_no_sphere_map_and_all_else(tmp_path: Path) -> None:
     ring = torus(16)
     trimesh.Trimesh(ring.V, ring.F, process=False).export(tmp_path / "ring.obj")
-    rows = fronts.arrivals({"ring": load_mesh(tmp_path / "ring.obj")}, resolution=24, sources=1)["ring"]
+    rows = fronts.arrivals({"ring": load_mesh(tmp_path / "ring.obj")}, resolution=24, sources=1)[
+        "ring"
+    ]
     assert rows.pop(fronts.CONFORMAL) is None
     assert len(rows) == 5
     for name, row in rows.items():
@@ -145,18 +159,24 @@ def bump(middle: float, width: float = 0.3, height: float = 1.0) -> np.ndarray:
 
 
 def test_the_first_of_two_crests_counts_though_the_second_is_higher() -> None:
-    [front], [crest] = fronts.front_and_crest(TIMES, (bump(1.0, 0.1, 0.5) + bump(3.0, 0.1))[:, None])
+    [front], [crest] = fronts.front_and_crest(
+        TIMES, (bump(1.0, 0.1, 0.5) + bump(3.0, 0.1))[:, None]
+    )
     assert crest == pytest.approx(1.0, abs=1e-4)
     assert front == pytest.approx(1.0 - 0.1 * np.sqrt(2 * np.log(2)), abs=1e-3)
 
 
 @pytest.mark.parametrize(("height", "expected"), [(0.15, 3.0), (0.25, 1.0)])
-def test_a_ripple_below_a_fifth_of_the_strongest_is_no_crest(height: float, expected: float) -> None:
+def test_a_ripple_below_a_fifth_of_the_strongest_is_no_crest(
+    height: float, expected: float
+) -> None:
     _, [crest] = fronts.front_and_crest(TIMES, (bump(1.0, 0.1, height) + bump(3.0, 0.1))[:, None])
     assert crest == pytest.approx(expected, abs=1e-3)
 
 
-@pytest.mark.parametrize("signal", [np.zeros(401), -bump(2.0), TIMES, -TIMES], ids=["zero", "trough", "rise", "fall"])
+@pytest.mark.parametrize(
+    "signal", [np.zeros(401), -bump(2.0), TIMES, -TIMES], ids=["zero", "trough", "rise", "fall"]
+)
 def test_without_a_crest_there_is_no_time(signal: np.ndarray) -> None:
     for [time] in fronts.front_and_crest(TIMES, signal[:, None]):
         assert np.isnan(time)

@@ -30,10 +30,18 @@ SMALL: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "sphere_on_film.py": ({"STEP": 4e-5, "RESOLUTIONS": (16,)}, {}, "greatest depth 0."),
     "benchmarks/finite_guard.py": ({"TIMES": 3}, {}, "| 256 |"),
     "benchmarks/loops.py": ({}, {}, "1.0000"),
-    "benchmarks/export.py": ({"RESOLUTION": 16, "TRIANGLES": 1000, "WARM_UP": 1}, {"frames": 3}, "frames a second"),
+    "benchmarks/export.py": (
+        {"RESOLUTION": 16, "TRIANGLES": 1000, "WARM_UP": 1},
+        {"frames": 3},
+        "frames a second",
+    ),
 }
-PICTURES = "own_loop several_targets robot_arm painted_speed own_deformation gymnasium_ant gymnasium_humanoid"
-# Waves of an example are no higher than its objects allow, and it does nothing else that the package warns of.
+PICTURES = (
+    "own_loop several_targets robot_arm painted_speed own_deformation gymnasium_ant "
+    "gymnasium_humanoid"
+)
+# Waves of an example are no higher than its objects allow, and it does nothing else that the
+# package warns of.
 without_warnings = pytest.mark.filterwarnings("error::ripple_sim.errors.RippleWarning")
 
 
@@ -103,7 +111,9 @@ def test_a_part_of_the_paper_is_made(folder: Path, imported) -> None:
     ],
 )
 def test_a_plot_is_written(name: str, options: dict[str, Any], folder: Path, imported) -> None:
-    picture = np.asarray(Image.open(imported(f"plots/{name}.py").make(folder, **options)).convert("RGB"))
+    picture = np.asarray(
+        Image.open(imported(f"plots/{name}.py").make(folder, **options)).convert("RGB")
+    )
     assert picture.shape[1] > 900
     assert picture.std() > 10
 
@@ -111,9 +121,14 @@ def test_a_plot_is_written(name: str, options: dict[str, Any], folder: Path, imp
 @without_warnings
 @pytest.mark.parametrize(
     ("name", "arguments"),
-    [*((name, "") for name in PICTURES.split()), ("batch_impulses", "--scenes 2 --seconds 0.6 --workers 1")],
+    [
+        *((name, "") for name in PICTURES.split()),
+        ("batch_impulses", "--scenes 2 --seconds 0.6 --workers 1"),
+    ],
 )
-def test_an_example_makes_its_picture(name: str, arguments: str, folder: Path, imported, monkeypatch, capsys) -> None:
+def test_an_example_makes_its_picture(
+    name: str, arguments: str, folder: Path, imported, monkeypatch, capsys
+) -> None:
     monkeypatch.setattr(sys, "argv", [name, *arguments.split()])
     imported(f"{name}.py").main()
     assert f"out/{name}.png" in capsys.readouterr().out
@@ -123,18 +138,24 @@ def test_an_example_makes_its_picture(name: str, arguments: str, folder: Path, i
 
 def test_a_ring_on_gelatine_comes_when_the_exact_one_does(imported) -> None:
     plot = imported("plots/gelatine_ring.py")
-    texels, (modulus, _) = 96, plot.MEASURED["gelatine-5"]
+    texels = 96
+    (modulus, _) = plot.MEASURED["gelatine-5"]
     speed = plot.RAYLEIGH * np.sqrt(modulus / plot.DENSITY)
-    times, distances = np.linspace(0, 0.2 / speed, 151)[1:], plot.SIDE / texels * np.arange(texels // 2)
+    times = np.linspace(0, 0.2 / speed, 151)[1:]
+    distances = plot.SIDE / texels * np.arange(texels // 2)
     exact = plot.exact_ring(modulus, distances, times)
     ours, long = (plot.spread("gelatine-5", texels, times, short) for short in (True, False))
-    due, came, late = (plot.leading_crest(each, distances, times, speed)[0] for each in (exact, ours, long))
+    due, came, late = (
+        plot.leading_crest(each, distances, times, speed)[0] for each in (exact, ours, long)
+    )
     np.testing.assert_allclose(came, due, rtol=0.04)
     assert np.abs(came / due - 1).mean() < 0.5 * np.abs(late / due - 1).mean()
 
 
 def test_mujocos_renderer_ours_and_a_plotter_end_without_a_crash(opengl: None) -> None:
-    result = ended(EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista", timeout=300)
+    result = ended(
+        EXAMPLES / "benchmarks" / "exit_order.py", "mujoco", "ours", "pyvista", timeout=300
+    )
     assert "| mujoco, ours, pyvista | 0 | 0 |" in result.stdout
     assert result.returncode == 0, result.stderr
 
@@ -142,7 +163,8 @@ def test_mujocos_renderer_ours_and_a_plotter_end_without_a_crash(opengl: None) -
 @without_warnings
 def test_the_mesh_that_any_mesh_writes_is_displaced(folder: Path, imported) -> None:
     imported("any_mesh.py").main()
-    mesh, written = load_mesh(LIMBED_FILE), trimesh.load(folder / "out" / "any_mesh.ply", process=False)
+    mesh = load_mesh(LIMBED_FILE)
+    written = trimesh.load(folder / "out" / "any_mesh.ply", process=False)
     moved = written.vertices - mesh.V
     along = (moved * mesh.vertex_normals).sum(axis=1)
     assert np.allclose(moved, along[:, None] * mesh.vertex_normals, atol=1e-6)
@@ -161,7 +183,10 @@ def test_the_notebook_runs_from_top_to_bottom(folder: Path, monkeypatch, capsys)
         if cell["cell_type"] == "code":
             source = "".join(cell["source"])
             # the video takes longest
-            exec(re.sub(r"size=.*?, duration=[\d.]+", "size=(64, 48), fps=10, duration=0.3", source), names)
+            exec(
+                re.sub(r"size=.*?, duration=[\d.]+", "size=(64, 48), fps=10, duration=0.3", source),
+                names,
+            )
     assert "highest ripple" in capsys.readouterr().out
     assert shown == ["sphere.mp4"]
     assert (folder / "sphere.mp4").stat().st_size > 1000

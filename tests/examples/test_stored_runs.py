@@ -13,7 +13,8 @@ from waveforms import rows
 from ripple_sim.solver import build_atlas, load_mesh
 
 ROOT = Path(__file__).parents[2]
-DOCS, LIMBED = ROOT / "docs", ROOT / "scenes" / "meshes" / "limbed.obj"
+DOCS = ROOT / "docs"
+LIMBED = ROOT / "scenes" / "meshes" / "limbed.obj"
 RUNS = {path.stem: path.read_text("utf-8") for path in sorted((DOCS / "runs").glob("*.txt"))}
 PAGES = {
     "plates": "validation.md",
@@ -40,14 +41,19 @@ def test_eigenvalues_are_of_todays_operator(name: str) -> None:
 
 
 def test_eigenvalues_of_a_polyhedron_are_of_todays_sphere_map() -> None:
-    lines, mesh = RUNS["polyhedra"].partition("limbed.obj")[2].splitlines()[1:3], load_mesh(LIMBED)
+    lines = RUNS["polyhedra"].partition("limbed.obj")[2].splitlines()[1:3]
+    mesh = load_mesh(LIMBED)
     errors = errors_against(of_polyhedron(mesh, 1), build_atlas(mesh, 32))
-    assert [errors.mean(), errors.max()] == pytest.approx([float(line.split()[3]) for line in lines], rel=0.03)
+    assert [errors.mean(), errors.max()] == pytest.approx(
+        [float(line.split()[3]) for line in lines], rel=0.03
+    )
 
 
 def test_quadratic_elements_have_the_eigenvalues_of_a_flat_square() -> None:
     case = cases()["square, free"]
-    np.testing.assert_allclose(of_polyhedron(case.mesh(), 0)[1:], np.sort(case.exact)[1:20], rtol=5e-5)
+    np.testing.assert_allclose(
+        of_polyhedron(case.mesh(), 0)[1:], np.sort(case.exact)[1:20], rtol=5e-5
+    )
 
 
 def test_waveforms_are_those_of_finite_elements() -> None:
@@ -61,9 +67,14 @@ def test_levels_of_a_pulsating_sphere_are_of_todays_sound() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["free [Hz], NAFEMS FV12", "cantilever, lambda^2, Barton", "disk, clamped, lambda^2, Leissa"]
+    "name",
+    ["free [Hz], NAFEMS FV12", "cantilever, lambda^2, Barton", "disk, clamped, lambda^2, Leissa"],
 )
 def test_frequencies_of_plates_are_of_todays_operator(name: str) -> None:
-    stored = RUNS["plates"].partition(f"\n{name}")[2].splitlines()[1].removeprefix("  N = 32").split()
+    stored = (
+        RUNS["plates"].partition(f"\n{name}")[2].splitlines()[1].removeprefix("  N = 32").split()
+    )
     plate = PLATES[name]
-    np.testing.assert_allclose(frequencies(plate, atlas_of(plate, 32)), np.array(stored, float), rtol=1e-3)
+    np.testing.assert_allclose(
+        frequencies(plate, atlas_of(plate, 32)), np.array(stored, float), rtol=1e-3
+    )

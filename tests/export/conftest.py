@@ -46,7 +46,9 @@ def scene(scene_file: Path) -> Scene:
 @pytest.fixture(scope="module")
 def ripples() -> Ripples:
     model = mujoco.MjModel.from_xml_string(MJCF)
-    return Ripples(model, {"egg": Material(speed=0.3, density=1500.0)}, resolution=12, backend="cpu")
+    return Ripples(
+        model, {"egg": Material(speed=0.3, density=1500.0)}, resolution=12, backend="cpu"
+    )
 
 
 @pytest.fixture

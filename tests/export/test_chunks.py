@@ -17,7 +17,8 @@ from pxr import Usd, UsdGeom, UsdValidation
 
 # 11 frames: three chunks, the last of which is short
 OPTIONS = ExportOptions(fps=250, duration=0.044, tessellation="own", chunk=4)
-SURFACE, STONE = "/World/bodies/nest/egg", "/World/bodies/stone"
+SURFACE = "/World/bodies/nest/egg"
+STONE = "/World/bodies/stone"
 ATTRIBUTES = ("GetPointsAttr", "GetNormalsAttr", "GetVelocitiesAttr", "GetExtentAttr")
 
 
@@ -33,7 +34,10 @@ def sampled(path: Path, time: float) -> list[np.ndarray]:
     stone, surface = (stage.GetPrimAtPath(each) for each in (STONE, SURFACE))
     mesh = UsdGeom.Mesh(surface)
     frames = [np.array(getattr(mesh, name)().Get(time), dtype=float) for name in ATTRIBUTES]
-    return frames + [np.array(UsdGeom.Xformable(each).ComputeLocalToWorldTransform(time)) for each in (stone, surface)]
+    return frames + [
+        np.array(UsdGeom.Xformable(each).ComputeLocalToWorldTransform(time))
+        for each in (stone, surface)
+    ]
 
 
 def files(path: Path) -> dict[str, bytes]:
@@ -41,7 +45,9 @@ def files(path: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("name", ["run.usdc", "run.usda"])
-def test_chunks_hold_the_run_also_between_their_frames(scene: Scene, whole: Path, tmp_path: Path, name: str) -> None:
+def test_chunks_hold_the_run_also_between_their_frames(
+    scene: Scene, whole: Path, tmp_path: Path, name: str
+) -> None:
     path = tmp_path / name
     assert export_scene(scene, path, OPTIONS).frames == 11
     assert {each.name for each in tmp_path.iterdir()} == {name, "run.chunks", "run.textures"}
@@ -58,7 +64,9 @@ def test_chunks_hold_the_run_also_between_their_frames(scene: Scene, whole: Path
     assert [error.GetErrorAsString() for error in errors] == []
 
 
-def test_a_killed_export_continues_to_the_same_files(scene: Scene, scene_file: Path, tmp_path: Path) -> None:
+def test_a_killed_export_continues_to_the_same_files(
+    scene: Scene, scene_file: Path, tmp_path: Path
+) -> None:
     export_scene(scene, path := tmp_path / "once" / "run.usdc", OPTIONS)
     again = tmp_path / "again" / "run.usdc"
     code = f"""
@@ -79,7 +87,9 @@ export_scene(load_scene({str(scene_file)!r}), Path({str(again)!r}), {OPTIONS!r},
         export_scene(scene, again, dataclasses.replace(OPTIONS, chunk=5, resume=True))
     export_scene(scene, again, dataclasses.replace(OPTIONS, resume=True))
     assert files(again) == files(path)
-    assert [(again.with_name("run.chunks") / each.name).stat().st_mtime_ns for each in kept] == times
+    assert [
+        (again.with_name("run.chunks") / each.name).stat().st_mtime_ns for each in kept
+    ] == times
     assert not again.with_name("run.usdc.part").exists()
     for time in (0, 3.5, 7, 9.5):
         assert all(map(np.array_equal, sampled(again, time), sampled(path, time)))
@@ -98,7 +108,9 @@ def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) 
     with pytest.raises(RippleError, match="not in the state"):
         export_scene(scene, path, dataclasses.replace(OPTIONS, resume=True), on_step=change)
     (path.with_name("run.usdc.part") / "frames" / "frames_00000-00003.usdc").write_bytes(b"")
-    with pytest.raises(RippleError, match=r"run\.usdc: frames_00000-00003\.usdc is damaged; leave --resume out"):
+    with pytest.raises(
+        RippleError, match=r"run\.usdc: frames_00000-00003\.usdc is damaged; leave --resume out"
+    ):
         export_scene(scene, path, dataclasses.replace(OPTIONS, resume=True))
     assert export_scene(scene, path, OPTIONS).frames == 11
 
@@ -112,7 +124,9 @@ def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) 
         ("run.usdc", {"chunk": None, "resume": True}, "add --chunk"),
     ],
 )
-def test_what_cannot_be_is_refused_before_it_is_simulated(scene, tmp_path, name: str, options: dict, message: str):
+def test_what_cannot_be_is_refused_before_it_is_simulated(
+    scene, tmp_path, name: str, options: dict, message: str
+):
     with pytest.raises(RippleError, match=message):
         export_scene(scene, tmp_path / name, dataclasses.replace(OPTIONS, **options))
     assert not list(tmp_path.iterdir())

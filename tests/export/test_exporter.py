@@ -21,19 +21,25 @@ def export(ripples: Ripples, path: Path, **options: Any) -> None:
 
 @pytest.mark.parametrize("name", ["run.obj", "run", ".usdc"])
 def test_unknown_endings_name_the_valid_ones(ripples: Ripples, tmp_path: Path, name: str) -> None:
-    with pytest.raises(RippleError, match=r"\.usdc, \.usda, \.usdz, \.zarr, \.html, \.csv, \.parquet"):
+    with pytest.raises(
+        RippleError, match=r"\.usdc, \.usda, \.usdz, \.zarr, \.html, \.csv, \.parquet"
+    ):
         export(ripples, tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
-def test_missing_packages_are_named(ripples: Ripples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_packages_are_named(
+    ripples: Ripples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(RippleError, match=r"pip install 'ripple-sim\[usd\]'"):
         export(ripples, tmp_path / "run.usdc")
 
 
 @pytest.mark.parametrize("name", ["run.usdc", "run.usda", "run.usdz", "run.csv", "run.parquet"])
-def test_files_from_here_are_replaced_and_others_only_when_told_to(ripples: Ripples, tmp_path: Path, name: str) -> None:
+def test_files_from_here_are_replaced_and_others_only_when_told_to(
+    ripples: Ripples, tmp_path: Path, name: str
+) -> None:
     path = tmp_path / name
     export(ripples, path)
     export(ripples, path)
@@ -65,7 +71,9 @@ def test_folders_of_other_things_are_never_replaced(ripples: Ripples, tmp_path: 
     assert [each.name for each in tmp_path.iterdir()] == ["run.textures"]
 
 
-def test_nothing_is_left_after_an_exception_and_an_earlier_file_stays(ripples: Ripples, tmp_path: Path) -> None:
+def test_nothing_is_left_after_an_exception_and_an_earlier_file_stays(
+    ripples: Ripples, tmp_path: Path
+) -> None:
     export(ripples, path := tmp_path / "run.usdc")
     before = path.read_bytes()
     data = mujoco.MjData(ripples.model)
@@ -79,18 +87,28 @@ def test_nothing_is_left_after_an_exception_and_an_earlier_file_stays(ripples: R
 
 
 def test_a_file_without_frames_is_refused(ripples: Ripples, tmp_path: Path) -> None:
-    with pytest.raises(RippleError, match="at least one"), Exporter(ripples.model, ripples, tmp_path / "run.usdc"):
+    with (
+        pytest.raises(RippleError, match="at least one"),
+        Exporter(ripples.model, ripples, tmp_path / "run.usdc"),
+    ):
         pass
     assert not list(tmp_path.iterdir())
 
 
-def test_a_page_says_once_that_it_shows_an_orthographic_camera_in_perspective(tmp_path: Path) -> None:
+def test_a_page_says_once_that_it_shows_an_orthographic_camera_in_perspective(
+    tmp_path: Path,
+) -> None:
     xml = """<mujoco><worldbody><geom name="ball" size=".3"/><camera name="flat" pos="0 -2 0" xyaxes="1 0 0 0 0 1"
         projection="orthographic" fovy="1"/></worldbody></mujoco>"""
     model, data = posed(xml)
-    ripples = Ripples(model, {"ball": Material(speed=1.0, density=1.0)}, resolution=8, backend="cpu")
+    ripples = Ripples(
+        model, {"ball": Material(speed=1.0, density=1.0)}, resolution=8, backend="cpu"
+    )
     page = Exporter(model, ripples, tmp_path / "run.html", camera="flat")
-    with page as exporter, pytest.warns(RippleWarning, match="the page shows the camera in perspective") as told:
+    with (
+        page as exporter,
+        pytest.warns(RippleWarning, match="the page shows the camera in perspective") as told,
+    ):
         exporter.write(data)
         exporter.write(data)
     assert len(told) == 1

@@ -16,7 +16,8 @@ HEADER = "frame,time [s],geom,other,x [m],y [m],z [m],impulse [N s],chart,row,co
 
 def run(ripples: Ripples, path: Path, **options: Any) -> list[dict[str, Any]]:
     """Export a run, and return what was at each frame."""
-    data, seen = mujoco.MjData(ripples.model), []
+    data = mujoco.MjData(ripples.model)
+    seen = []
     ripples.reset()
     with Exporter(ripples.model, ripples, path, **options) as exporter:
         for _ in range(FRAMES):
@@ -24,12 +25,18 @@ def run(ripples: Ripples, path: Path, **options: Any) -> list[dict[str, Any]]:
             exporter.write(data)
             waves = ripples["egg"]
             fields = {"height": waves.height, "velocity": waves.velocity, "energy": waves.energy()}
-            bodies = {"time": data.time, "position": data.xpos.copy(), "impulses": list(ripples.last_impulses)}
+            bodies = {
+                "time": data.time,
+                "position": data.xpos.copy(),
+                "impulses": list(ripples.last_impulses),
+            }
             seen.append(fields | bodies)
     return seen
 
 
-def test_xarray_opens_a_run_in_one_line_with_units_and_coordinates(ripples: Ripples, tmp_path: Path) -> None:
+def test_xarray_opens_a_run_in_one_line_with_units_and_coordinates(
+    ripples: Ripples, tmp_path: Path
+) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("zarr")
     path = tmp_path / "run.zarr"
@@ -44,16 +51,22 @@ def test_xarray_opens_a_run_in_one_line_with_units_and_coordinates(ripples: Ripp
     assert fields.position.sel(body="stone", axis="z")[-1] == seen[-1]["position"][2, 2]
     assert fields.velocity_egg.attrs["units"] == "m/s"
     assert np.array_equal(fields.x_egg, ripples["egg"].atlas.positions[..., 0])
-    assert np.array_equal(fields.impulse_impulse, [hit.impulse for each in seen for hit in each["impulses"]])
+    assert np.array_equal(
+        fields.impulse_impulse, [hit.impulse for each in seen for hit in each["impulses"]]
+    )
     assert fields.sizes["impulse"] > 0
 
 
-def test_texels_of_a_surface_that_moves_have_their_places_over_time(ripples: Ripples, tmp_path: Path) -> None:
+def test_texels_of_a_surface_that_moves_have_their_places_over_time(
+    ripples: Ripples, tmp_path: Path
+) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("zarr")
     model = ripples.model
     ripples = Ripples(model, {"egg": Material(speed=0.3)}, resolution=4, backend="cpu")
-    data, waves, seen = mujoco.MjData(model), ripples["egg"], []
+    data = mujoco.MjData(model)
+    waves = ripples["egg"]
+    seen = []
     with Exporter(model, ripples, tmp_path / "run.zarr") as exporter:
         for frame in range(FRAMES):
             if frame >= 5:
@@ -84,5 +97,8 @@ def test_a_table_has_a_row_for_each_impulse(ripples: Ripples, tmp_path: Path, na
         table = pytest.importorskip("pyarrow.parquet").read_table(path)
         assert table.schema.field("impulse").metadata[b"unit"] == b"N s"
         found = table.to_pylist()
-        rows = [(row["frame"], row["other"], row["impulse"], [row[axis] for axis in "xyz"]) for row in found]
+        rows = [
+            (row["frame"], row["other"], row["impulse"], [row[axis] for axis in "xyz"])
+            for row in found
+        ]
     assert rows == [(frame, hit.other, hit.impulse, list(hit.point)) for frame, hit in expected]

@@ -102,7 +102,11 @@ def images_of(renderer, data):
 
 def scene():
     model, data = posed(XML)
-    return model, data, Ripples(model, {"target": Material(density=10.0)}, resolution=8, backend="cpu")
+    return (
+        model,
+        data,
+        Ripples(model, {"target": Material(density=10.0)}, resolution=8, backend="cpu"),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +132,9 @@ def drawn():
 
 
 @pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
-def test_what_is_written_into_the_model_is_seen_at_the_next_frame_and_what_is_undone_too(drawn, change):
+def test_what_is_written_into_the_model_is_seen_at_the_next_frame_and_what_is_undone_too(
+    drawn, change
+):
     before, after = drawn
     now, expected, undone = after(change)
     for one, other in ((now, expected), (undone, before)):

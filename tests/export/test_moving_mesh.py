@@ -41,15 +41,20 @@ def height_at(atlas: Atlas, field: np.ndarray, point: np.ndarray) -> float:
 
 
 def test_own_vertices_are_raised_by_the_spline_along_the_smooth_normals(atlas: Atlas) -> None:
-    mesh, field = MovingMesh(atlas, "own", limit=False), smooth_field(atlas, 0.05)
+    mesh = MovingMesh(atlas, "own", limit=False)
+    field = smooth_field(atlas, 0.05)
     shape = mesh.shape(field, 2 * field)
-    V, F = atlas.mesh.V, atlas.mesh.F
+    V = atlas.mesh.V
+    F = atlas.mesh.F
     normals = smooth_normals(V, F)
     size = np.ptp(V, axis=0).max()
     for face in range(0, len(F), max(len(F) // 20, 1)):
-        vertex, point = F[face, 0], mesh.F[face, 0]
+        vertex = F[face, 0]
+        point = mesh.F[face, 0]
         height = height_at(atlas, field, V[vertex])
-        assert np.abs(shape.points[point] - (V[vertex] + height * normals[vertex])).max() < 1e-6 * size
+        assert (
+            np.abs(shape.points[point] - (V[vertex] + height * normals[vertex])).max() < 1e-6 * size
+        )
         assert np.abs(shape.velocities[point] - 2 * height * normals[vertex]).max() < 1e-6 * size
         assert shape.height[point] == pytest.approx(height, abs=1e-6)
 
@@ -67,20 +72,27 @@ def test_refined_meshes_stay_closed_and_no_edge_is_longer_than_about_a_texel(atl
 
 
 def test_normals_tip_against_the_gradient_of_the_height() -> None:
-    atlas, amplitude = sphere_atlas(1.0, 48), 0.02
+    atlas = sphere_atlas(1.0, 48)
+    amplitude = 0.02
     mesh = MovingMesh(atlas, triangles=24_000)
     x, _, z = np.moveaxis(atlas.positions, -1, 0)
     field = (amplitude * x * z).astype(np.float32)
-    shape, still = mesh.shape(field, field), mesh.shape(0 * field, field).normals
+    shape = mesh.shape(field, field)
+    still = mesh.shape(0 * field, field).normals
     out = mesh.rest / np.linalg.norm(mesh.rest, axis=1, keepdims=True)
     wave = amplitude * out[:, 0] * out[:, 2]
     np.testing.assert_allclose(shape.height, wave, atol=2e-3 * amplitude)
-    np.testing.assert_allclose(np.linalg.norm(shape.points - mesh.rest, axis=1), np.abs(wave), atol=3e-3 * amplitude)
+    np.testing.assert_allclose(
+        np.linalg.norm(shape.points - mesh.rest, axis=1), np.abs(wave), atol=3e-3 * amplitude
+    )
     # gradient on the unit sphere of a x z: the plane gradient (z, 0, x) a without its radial part
     gradient = amplitude * np.stack([out[:, 2], np.zeros(len(out)), out[:, 0]], axis=1)
     tipped = still - gradient + np.einsum("ij,ij->i", gradient, out)[:, None] * out
     tipped /= np.linalg.norm(tipped, axis=1, keepdims=True)
-    assert np.linalg.norm(shape.normals - tipped, axis=1).max() < 0.02 * np.linalg.norm(tipped - still, axis=1).max()
+    assert (
+        np.linalg.norm(shape.normals - tipped, axis=1).max()
+        < 0.02 * np.linalg.norm(tipped - still, axis=1).max()
+    )
     corners = mesh.rest[mesh.F]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (np.einsum("ij,ij->i", facing, corners.mean(axis=1)) > 0).all()
@@ -90,9 +102,11 @@ def test_normals_tip_against_the_gradient_of_the_height() -> None:
 def test_velocities_are_the_rates_of_the_points_also_where_heights_are_bent(limit: bool) -> None:
     atlas = sphere_atlas(1.0, 16)
     waves = WaveSolver(atlas, Material(speed=1.0), backend="cpu")
-    waves.height, waves.velocity = smooth_field(atlas, 0.5), smooth_field(atlas, 0.3)
+    waves.height = smooth_field(atlas, 0.5)
+    waves.velocity = smooth_field(atlas, 0.3)
     mesh = MovingMesh(atlas, "refined", limit=limit)
-    step, shapes = 1e-3, []
+    step = 1e-3
+    shapes = []
     for _ in range(3):
         waves.step(step)
         shapes.append(mesh.shape(waves.height, waves.velocity))

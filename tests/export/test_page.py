@@ -18,13 +18,25 @@ from mujoco_models import forwarded
 from PIL import Image
 from scipy import ndimage
 
-from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, Scene, Simulation, export_scene
+from ripple_sim import (
+    Exporter,
+    ExportOptions,
+    Material,
+    RippleRenderer,
+    Ripples,
+    Scene,
+    Simulation,
+    export_scene,
+)
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.encode import made_here
 from ripple_sim.export import MovingMesh
 from ripple_sim.render.surfaces import memory_order
 
-SIZE, FPS, FRAMES, SEEN = (320, 180), 100, 20, 18
+SIZE = (320, 180)
+FPS = 100
+FRAMES = 20
+SEEN = 18
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +74,10 @@ def opened(browser: Any, page: Path) -> Iterator[Any]:
     tab.set_default_timeout(1000 * PATIENCE)  # [ms]
     faults: list[str] = []
     tab.on("pageerror", lambda error: faults.append(str(error)))
-    tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)
+    tab.on(
+        "request",
+        lambda request: faults.append(request.url) if request.url.startswith("http") else None,
+    )
     tab.goto(page.as_uri())
     yield tab
     assert faults == []
@@ -82,7 +97,9 @@ def pixels(tab: Any) -> np.ndarray:
 
 
 def image_of(uri: str) -> np.ndarray:
-    return np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.split(",")[1]))).convert("RGB")).astype(int)
+    return np.asarray(
+        Image.open(io.BytesIO(base64.b64decode(uri.split(",")[1]))).convert("RGB")
+    ).astype(int)
 
 
 def test_triangles_and_vertices_lie_close_to_their_neighbours_in_order() -> None:
@@ -90,7 +107,9 @@ def test_triangles_and_vertices_lie_close_to_their_neighbours_in_order() -> None
     x, y = np.divmod(np.arange(900), 30)
     points = np.stack([x, y, 0 * x], axis=1)[shuffled := rng.permutation(900)].astype(float)
     corner = np.arange(900).reshape(30, 30)[:-1, :-1].ravel()
-    F = np.argsort(shuffled)[np.concatenate([corner[:, None] + [0, 30, 31], corner[:, None] + [0, 31, 1]])]
+    F = np.argsort(shuffled)[
+        np.concatenate([corner[:, None] + [0, 30, 31], corner[:, None] + [0, 31, 1]])
+    ]
     F = F[rng.permutation(len(F))]
     renumbered, vertices, triangles = memory_order(F, points)
     assert np.array_equal(points[vertices][renumbered], points[F[triangles]])
@@ -107,12 +126,17 @@ def test_a_page_is_one_file_that_asks_for_nothing_else(page: Path) -> None:
 
 
 def test_a_pages_lamps_have_highlights_as_weak_as_ours(page: Path) -> None:
-    (meta,) = re.findall(r'<script type="application/json" id="meta">(.+)</script>', page.read_text())
+    (meta,) = re.findall(
+        r'<script type="application/json" id="meta">(.+)</script>', page.read_text()
+    )
     gloss = [lamp["gloss"] for lamp in json.loads(meta)["light"]["lamps"]]
-    assert gloss == [pytest.approx(0.137, abs=1e-3), 1]  # sRGB 0.1 over 0.3, as light; the headlight's
+    # sRGB 0.1 over 0.3, as light; the headlight's
+    assert gloss == [pytest.approx(0.137, abs=1e-3), 1]
 
 
-def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp_path: Path) -> None:
+def test_in_a_notebook_a_complete_page_plays(
+    scene: Scene, ripples: Ripples, tmp_path: Path
+) -> None:
     with Exporter(scene.model, ripples, tmp_path / "run.html") as exporter:
         exporter.write(forwarded(scene.model))
         assert "not complete" in exporter._repr_html_()
@@ -121,7 +145,9 @@ def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp
     assert html.unescape(shown.split('"')[1]) == (tmp_path / "run.html").read_text()
 
 
-def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Ripples, tmp_path: Path) -> None:
+def test_players_show_inside_the_page_of_a_notebook(
+    browser: Any, ripples: Ripples, tmp_path: Path
+) -> None:
     """Of an exporter, and of a renderer what it rendered last."""
     data = forwarded(ripples.model)
     with Exporter(ripples.model, ripples, tmp_path / "run.html", size=SIZE) as exporter:
@@ -130,7 +156,9 @@ def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Rippl
     assert renderer._repr_html_() is None
     ours = renderer.render(data)
     notebook = tmp_path / "notebook.html"
-    notebook.write_text(f"<!DOCTYPE html><body>{exporter._repr_html_()}{renderer._repr_html_()}</body>")
+    notebook.write_text(
+        f"<!DOCTYPE html><body>{exporter._repr_html_()}{renderer._repr_html_()}</body>"
+    )
     with opened(browser, notebook) as tab:
         assert len(tab.frames) == 3
         for frame in tab.frames[1:]:
@@ -145,7 +173,9 @@ def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Rippl
 
 def test_the_browser_has_every_height_to_half_a_step(shown: Any, ours: tuple) -> None:
     assert shown.evaluate("ripplePlayer.player.frames.count") == FRAMES
-    steps = shown.evaluate(f"ripplePlayer.player.frames.get({SEEN}).then(f => Array.from(f.steps[0]))")
+    steps = shown.evaluate(
+        f"ripplePlayer.player.frames.get({SEEN}).then(f => Array.from(f.steps[0]))"
+    )
     step = shown.evaluate("ripplePlayer.player.meta.steps[0]")
     assert np.abs(ours[2]).max() > 20 * step
     assert np.abs(np.array(steps) * step - ours[2]).max() < 0.51 * step
@@ -166,34 +196,47 @@ def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> N
     assert (changed & ~egg).sum() < 0.05 * egg.sum()
 
 
-def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(browser, soft_model, tmp_path):
+def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
+    browser, soft_model, tmp_path
+):
     data = forwarded(soft_model)
-    waves, looks = Material(speed=0.3, density=1500.0), {"egg": "rubber", "jelly": "jelly"}
+    waves = Material(speed=0.3, density=1500.0)
+    looks = {"egg": "rubber", "jelly": "jelly"}
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")
     with Exporter(soft_model, ripples, tmp_path / "run.html", size=SIZE, looks=looks) as exporter:
         exporter.write(data)
     renderer = RippleRenderer(soft_model, ripples, width=SIZE[0], height=SIZE[1], looks=looks)
     with opened(browser, tmp_path / "run.html") as tab:
-        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })")
+        tab.evaluate(
+            "ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })"
+        )
         shown = pixels(tab)
         difference = np.abs(shown - renderer.render(data))
         assert difference.mean() < 1.4  # of 255; hard shadows and jagged edges are farther away
         assert (difference.max(axis=2) > 40).mean() < 1.5e-3
         floor = "ripplePlayer.player.drawing.floor"
-        drawn = f"(ripplePlayer.player.redraw(), {floor}.shadowed.reduce((sum, each) => sum + each))"
+        drawn = (
+            f"(ripplePlayer.player.redraw(), {floor}.shadowed.reduce((sum, each) => sum + each))"
+        )
         assert 0 < tab.evaluate(drawn) < tab.evaluate(f"0.1 * {floor}.shadowed.length")
         low, high = tab.evaluate(f"{floor}.bare")
         assert (-1 < low < 1) and high == 1
-        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(1); }}, {floor}.leaves = () => [-1, 1])")
+        tab.evaluate(
+            f"({floor}.shade = () => {{ {floor}.shadowed.fill(1); }}, {floor}.leaves = () => [-1, "
+            f"1])"
+        )
         tab.evaluate("ripplePlayer.player.redraw()")
         assert np.abs(pixels(tab) - shown).max() <= 1
-        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(0); }}, {floor}.leaves = () => null)")
+        tab.evaluate(
+            f"({floor}.shade = () => {{ {floor}.shadowed.fill(0); }}, {floor}.leaves = () => null)"
+        )
         tab.evaluate("ripplePlayer.player.redraw()")
         assert (np.abs(pixels(tab) - shown).max(axis=2) > 30).sum() > 100
 
 
 def test_the_floor_is_lit_right_up_to_what_stands_on_it(browser: Any, tmp_path: Path) -> None:
-    floor, drum = '<geom type="plane" size="9 9 1"/>', '<geom name="drum" type="cylinder" size="1 .3" pos="0 0 .3"/>'
+    floor = '<geom type="plane" size="9 9 1"/>'
+    drum = '<geom name="drum" type="cylinder" size="1 .3" pos="0 0 .3"/>'
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{floor}{drum}</worldbody></mujoco>")
     data = forwarded(model)
     ripples = Ripples(model, {"drum": Material()}, resolution=16, backend="cpu")
@@ -202,7 +245,9 @@ def test_the_floor_is_lit_right_up_to_what_stands_on_it(browser: Any, tmp_path: 
     ours = RippleRenderer(model, ripples, width=960, height=540).render(data).astype(float)
     with opened(browser, tmp_path / "run.html") as tab:
         tab.set_viewport_size({"width": 960, "height": 540})
-        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })")
+        tab.evaluate(
+            "ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })"
+        )
         darker = (ours - pixels(tab)).max(axis=2)
     lit = ndimage.binary_erosion(np.abs(ours - ours[-1, 0]).max(axis=2) < 12, iterations=2)
     assert darker[lit].max() < 13  # of 255
@@ -221,7 +266,10 @@ def test_a_drag_turns_the_camera_and_the_button_brings_it_back(shown: Any) -> No
 
 
 def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
-    search = "for (let i = 0; ; i++) if ((await ripplePlayer.player.frames.get(i)).arrows.length) return i;"
+    search = (
+        "for (let i = 0; ; i++) if ((await ripplePlayer.player.frames.get(i)).arrows.length) "
+        "return i;"
+    )
     hit = shown.evaluate(f"(async () => {{ {search} }})()")
     shown.evaluate(f"ripplePlayer.player.show({hit})")
     before = pixels(shown)
@@ -240,30 +288,40 @@ def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
     shown.click("#play")
 
 
-def test_the_browser_has_moving_surfaces(browser: Any, soft_model: mujoco.MjModel, tmp_path: Path) -> None:
+def test_the_browser_has_moving_surfaces(
+    browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
+) -> None:
     """A soft body that moves from the first frame, and a geom that is moved by hand within the second chunk."""
-    data, waves = mujoco.MjData(soft_model), Material(speed=0.3, density=1500.0)
+    data = mujoco.MjData(soft_model)
+    waves = Material(speed=0.3, density=1500.0)
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")
     meshes = {name: MovingMesh(ripples[name].rest, triangles=16_000) for name in ripples}
-    rest, seen = ripples["egg"].rest.mesh.V, {}
+    rest = ripples["egg"].rest.mesh.V
+    seen = {}
     with Exporter(soft_model, ripples, tmp_path / "run.html", size=SIZE) as exporter:
         for frame in range(20):
             if frame >= 18:
-                ripples["egg"].move(rest * [1.1, 1.0, 1.0 - 0.01 * frame] + 0.02 * np.sin(9 * rest[:, [1, 2, 0]]))
+                ripples["egg"].move(
+                    rest * [1.1, 1.0, 1.0 - 0.01 * frame] + 0.02 * np.sin(9 * rest[:, [1, 2, 0]])
+                )
             ripples["egg"].add_height(0.001 * ripples["egg"].atlas.normals[..., 0])
             ripples.mj_step(data, nstep=10)
             exporter.write(data)
             for name in ripples:
-                height, V = ripples[name].height, ripples.vertices(name, data)
+                height = ripples[name].height
+                V = ripples.vertices(name, data)
                 seen[frame, name] = meshes[name].shape(height, height, V).points
     with opened(browser, tmp_path / "run.html") as tab:
         tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; })")
         for number, name in enumerate(ripples):
             mesh = meshes[name]
-            order, size = memory_order(mesh.F, mesh.rest)[1], np.ptp(mesh.rest, axis=0).max()
+            order = memory_order(mesh.F, mesh.rest)[1]
+            size = np.ptp(mesh.rest, axis=0).max()
             for frame in (17, 18, 19, 3):
                 tab.evaluate(f"ripplePlayer.player.show({frame})")
-                points = tab.evaluate(f"Array.from(ripplePlayer.player.drawing.parts[{number}].data[0])")
+                points = tab.evaluate(
+                    f"Array.from(ripplePlayer.player.drawing.parts[{number}].data[0])"
+                )
                 expected = seen[frame, name][order]
                 assert np.abs(np.reshape(points, (-1, 3)) - expected).max() < 1e-4 * size
             assert np.abs(seen[19, name] - seen[3, name]).max() > 0.02 * size  # it moves

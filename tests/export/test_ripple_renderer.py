@@ -50,23 +50,34 @@ def test_waves_that_no_picture_showed_are_told_of_at_the_end(egg, impulse, lines
     with warnings.catch_warnings(record=True, action="always") as told:
         renderer.close()
         renderer.close()
-    assert ["no wave on 'egg' was higher than a pixel" in str(each.message) for each in told] == [True] * lines
+    assert ["no wave on 'egg' was higher than a pixel" in str(each.message) for each in told] == [
+        True
+    ] * lines
 
 
 def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):
     model, data, ripples, renderer = egg
     camera = Camera(lookat=(0, 0, 0), distance=2.0, azimuth=90.0, elevation=-20.0)
     first = renderer.render(data, camera)
-    assert np.array_equal(first, RippleRenderer(model, ripples, width=96, height=72).render(data, camera))
+    assert np.array_equal(
+        first, RippleRenderer(model, ripples, width=96, height=72).render(data, camera)
+    )
     red, green, blue = first[30:42, 42:54].mean(axis=(0, 1))
     assert red > 1.5 * max(green, blue)
 
 
-def test_cameras_are_given_as_to_mujocos_renderer_and_without_one_it_is_the_free_one_of_the_model(egg):
+def test_cameras_are_given_as_to_mujocos_renderer_and_without_one_it_is_the_free_one_of_the_model(
+    egg,
+):
     model, data, ripples, renderer = egg
     free = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, free)
-    ours = Camera(lookat=tuple(model.stat.center), distance=1.5 * model.stat.extent, azimuth=90.0, elevation=-45.0)
+    ours = Camera(
+        lookat=tuple(model.stat.center),
+        distance=1.5 * model.stat.extent,
+        azimuth=90.0,
+        elevation=-45.0,
+    )
     for camera, same in ((0, "side"), (-1, None), (free, None), (ours, None)):
         assert np.array_equal(renderer.render(data, camera), renderer.render(data, same))
     with pytest.raises(RippleError, match="camera is list; valid are"):
@@ -80,20 +91,38 @@ def test_the_camera_of_the_scene_is_that_of_the_picture_however_it_was_given(egg
     fixed = Camera.from_mjcf(model, data, "side")
     tracking = mujoco.MjvCamera()
     tracking.type = mujoco.mjtCamera.mjCAMERA_TRACKING
-    tracking.trackbodyid, tracking.distance = 0, 3.0
+    tracking.trackbodyid = 0
+    tracking.distance = 3.0
     seen = {}
     ours = Camera(lookat=(0.1, 0.2, 0.3), distance=2.0, azimuth=20.0, elevation=-30.0, fovy=33.0)
-    given = {"name": "side", "id": 0, "numpy": np.int64(0), "fixed": fixed, "ours": ours, "tracking": tracking}
+    given = {
+        "name": "side",
+        "id": 0,
+        "numpy": np.int64(0),
+        "fixed": fixed,
+        "ours": ours,
+        "tracking": tracking,
+    }
     for kind, camera in given.items():
         renderer.update_scene(data, camera)
         pair = renderer.scene.camera
         eye = np.mean([each.pos for each in pair], axis=0)
-        seen[kind] = [*eye, *pair[0].forward, *pair[0].up, pair[0].frustum_top, pair[0].frustum_near]
+        seen[kind] = [
+            *eye,
+            *pair[0].forward,
+            *pair[0].up,
+            pair[0].frustum_top,
+            pair[0].frustum_near,
+        ]
     for kind in ("id", "numpy", "fixed"):
         np.testing.assert_allclose(seen[kind], seen["name"], atol=1e-6)
     assert seen["ours"][:3] == pytest.approx(ours.pose().position, abs=1e-6)
-    assert seen["ours"][9] / seen["ours"][10] == pytest.approx(np.tan(np.radians(33.0 / 2)), rel=1e-5)
-    assert seen["tracking"][:3] == pytest.approx(tracking.lookat - 3.0 * np.array(seen["tracking"][3:6]), abs=1e-5)
+    assert seen["ours"][9] / seen["ours"][10] == pytest.approx(
+        np.tan(np.radians(33.0 / 2)), rel=1e-5
+    )
+    assert seen["tracking"][:3] == pytest.approx(
+        tracking.lookat - 3.0 * np.array(seen["tracking"][3:6]), abs=1e-5
+    )
 
 
 def test_cameras_that_are_not_there_are_refused_in_mujocos_words(egg):
@@ -133,7 +162,10 @@ def test_a_model_in_which_another_geom_would_ripple_is_refused(egg):
     _, _, ripples, _ = egg
     egg_geom = '<geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" rgba="0.9 0.1 0.1 1"/>'
     for changed, what in (
-        ('<geom name="box" type="box" size="1 1 1"/>' + egg_geom, "another body_parentid|another geom_"),
+        (
+            '<geom name="box" type="box" size="1 1 1"/>' + egg_geom,
+            "another body_parentid|another geom_",
+        ),
         (egg_geom.replace("0.4", "0.5"), "another geom_size"),
         (egg_geom.replace('"egg"', '"other"'), "another names of geoms"),
     ):
@@ -148,7 +180,11 @@ def test_a_copy_of_the_model_is_drawn_in_its_own_colour_or_else_grey_or_as_a_nam
 
     def middle(*color: float, **looks: str) -> np.ndarray:
         changed.geom_rgba[0] = [*color, 1.0]
-        return RippleRenderer(changed, ripples, 72, 96, looks=looks).render(data)[30:42, 42:54].mean(axis=(0, 1))
+        return (
+            RippleRenderer(changed, ripples, 72, 96, looks=looks)
+            .render(data)[30:42, 42:54]
+            .mean(axis=(0, 1))
+        )
 
     changed.body_mass[0] = 2.0
     red, _, blue = middle(0.1, 0.1, 0.9)
@@ -161,7 +197,8 @@ def test_a_copy_of_the_model_is_drawn_in_its_own_colour_or_else_grey_or_as_a_nam
 def mujocos(tmp_path_factory):
     """What `mujoco.Renderer` draws; it takes over the context of its process."""
     file = tmp_path_factory.mktemp("mujocos") / "drawn.npz"
-    program, environment = Path(unrippled.__file__), {**os.environ, "MUJOCO_GL": "egl"}
+    program = Path(unrippled.__file__)
+    environment = {**os.environ, "MUJOCO_GL": "egl"}
     subprocess.run([sys.executable, program, file], env=environment, check=True, timeout=100)
     with np.load(file) as drawn:
         return dict(drawn)
@@ -173,14 +210,20 @@ def test_without_ripples_depth_and_segmentation_are_mujocos(mujocos, name):
     ripples = Ripples(model, {"target": Material()}, resolution=16, backend="cpu")
     with RippleRenderer(model, ripples, *unrippled.SIZE) as renderer:
         depth, segmentation = unrippled.drawn(renderer, data, name)
-    theirs, objects = mujocos[f"depth {name}"], mujocos[f"segmentation {name}"]
+    theirs = mujocos[f"depth {name}"]
+    objects = mujocos[f"segmentation {name}"]
     assert (depth.dtype, segmentation.dtype) == (np.float32, np.int32)
-    for one, other in ((segmentation, objects), (objects, segmentation)):  # silhouettes within a pixel
+    # silhouettes within a pixel
+    for one, other in ((segmentation, objects), (objects, segmentation)):
         around = [np.roll(other, shift, axis=(0, 1)) for shift in np.ndindex(3, 3)]
-        near = np.any([np.all(np.roll(each, (-1, -1), axis=(0, 1)) == one, axis=2) for each in around], axis=0)
+        near = np.any(
+            [np.all(np.roll(each, (-1, -1), axis=(0, 1)) == one, axis=2) for each in around], axis=0
+        )
         assert near.all()
     code = segmentation[..., 0] + 1000 * segmentation[..., 1]
-    inside = (minimum_filter(code, 3) == maximum_filter(code, 3)) & (segmentation == objects).all(axis=2)
+    inside = (minimum_filter(code, 3) == maximum_filter(code, 3)) & (segmentation == objects).all(
+        axis=2
+    )
     seen = inside & (code >= 0)
     assert seen.sum() > 100
     np.testing.assert_allclose(depth[seen], theirs[seen], rtol=1e-5, atol=1e-3)
@@ -193,12 +236,15 @@ def test_lights_and_surroundings_are_mujocos(mujocos, name):
     model, data = unrippled.lit_state(name)
     with RippleRenderer(model, Ripples(model, {}), *unrippled.SIZE) as renderer:
         colours, shown = unrippled.lit_frame(renderer, data, name)
-    theirs, there = mujocos[f"colours {name}"].astype(float), mujocos[f"shown {name}"]
+    theirs = mujocos[f"colours {name}"].astype(float)
+    there = mujocos[f"shown {name}"]
     same = (shown == there).all(axis=2)
     around = same & (shown[..., 0] == -1)
     assert same.mean() > 0.99
     if around.any():
-        np.testing.assert_allclose(colours[around].mean(axis=0), theirs[around].mean(axis=0), atol=3.0)
+        np.testing.assert_allclose(
+            colours[around].mean(axis=0), theirs[around].mean(axis=0), atol=3.0
+        )
     if name in ("headlight", "lamp", "no skybox"):
         assert not colours[around].any()
     if name in ("haze", "fog"):
@@ -208,7 +254,9 @@ def test_lights_and_surroundings_are_mujocos(mujocos, name):
     for geom in set(there[same][:, 0].tolist()) - {
         -1
     }:  # light adds up in linear light here, so that what faces it aslant is brighter
-        ours, other = (each[same & (shown[..., 0] == geom)].mean(axis=0) for each in (colours, theirs))
+        ours, other = (
+            each[same & (shown[..., 0] == geom)].mean(axis=0) for each in (colours, theirs)
+        )
         np.testing.assert_allclose(ours, other, atol=60.0)
         assert (ours[other < 1.0] < 8.0).all()  # no light of a colour that the lamps lack
 
@@ -226,7 +274,9 @@ def test_the_studio_lights_on_demand_and_flags_that_it_lacks_are_told(egg):
     np.testing.assert_array_equal(seen["studio"], seen["auto"])  # the model has no <light>
     assert not seen["model"][0, 0].any()
     assert seen["studio"][0, 0].min() > 50
-    with pytest.raises(RippleError, match="lighting is 'disco'; valid are 'auto', 'model', 'studio'"):
+    with pytest.raises(
+        RippleError, match="lighting is 'disco'; valid are 'auto', 'model', 'studio'"
+    ):
         RippleRenderer(model, ripples, 72, 96, lighting="disco")
 
 
@@ -277,7 +327,8 @@ def test_a_program_written_for_mujocos_renderer_runs(egg):
         assert (renderer.model, renderer.height, renderer.width) == (model, 30, 40)
         renderer.update_scene(data)
         assert renderer.scene.ngeom == 1
-        colours, given = renderer.render(), np.zeros((30, 40, 3))
+        colours = renderer.render()
+        given = np.zeros((30, 40, 3))
         assert renderer.render(out=given) is given
         assert np.array_equal(given, colours)
         renderer.enable_depth_rendering()
@@ -289,7 +340,11 @@ def test_a_program_written_for_mujocos_renderer_runs(egg):
         assert renderer.render().shape == (30, 40, 2)
         renderer.disable_segmentation_rendering()
         assert np.array_equal(renderer.render(), colours)
-        for camera, message in (("top", "no camera 'top'"), (1, "no camera 1"), (-2, "no camera -2")):
+        for camera, message in (
+            ("top", "no camera 'top'"),
+            (1, "no camera 1"),
+            (-2, "no camera -2"),
+        ):
             with pytest.raises(ValueError, match=message):
                 renderer.update_scene(data, camera)
     renderer.close()
@@ -305,7 +360,12 @@ def test_before_the_first_scene_there_is_nothing_to_see(egg):
         depth = renderer.render()
         renderer.enable_segmentation_rendering()
         segmentation = renderer.render()
-    assert (colours.shape, colours.dtype, depth.shape, depth.dtype) == ((30, 40, 3), np.uint8, (30, 40), np.float32)
+    assert (colours.shape, colours.dtype, depth.shape, depth.dtype) == (
+        (30, 40, 3),
+        np.uint8,
+        (30, 40),
+        np.float32,
+    )
     assert (segmentation.shape, segmentation.dtype) == ((30, 40, 2), np.int32)
     assert not colours.any() and (segmentation == -1).all()
     np.testing.assert_allclose(depth, model.vis.map.zfar * model.stat.extent)
@@ -319,18 +379,29 @@ SHOWN = """<mujoco><statistic meansize=".3"/><worldbody><geom name="egg" size=".
 def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
     model, data = posed(SHOWN)
     ripples = Ripples(model, {"egg": Material()}, resolution=8)
-    kinds, option = mujoco.mjtObj, mujoco.MjvOption()
+    kinds = mujoco.mjtObj
+    option = mujoco.MjvOption()
     with RippleRenderer(model, ripples, 60, 80) as renderer:
 
         def seen() -> set[tuple[int, int]]:
             renderer.update_scene(data, scene_option=option)
-            return {tuple(each) for each in renderer.render().reshape(-1, 2).tolist() if each[0] >= 0}
+            return {
+                tuple(each) for each in renderer.render().reshape(-1, 2).tolist() if each[0] >= 0
+            }
 
         renderer.enable_segmentation_rendering()
-        body, egg, hidden = (2, int(kinds.mjOBJ_GEOM)), (0, int(kinds.mjOBJ_GEOM)), (1, int(kinds.mjOBJ_GEOM))
+        body = (2, int(kinds.mjOBJ_GEOM))
+        egg = (0, int(kinds.mjOBJ_GEOM))
+        hidden = (1, int(kinds.mjOBJ_GEOM))
         assert seen() == {egg, body}
         option.geomgroup[4] = option.sitegroup[3] = option.flags[mujoco.mjtVisFlag.mjVIS_JOINT] = 1
-        assert seen() == {egg, body, hidden, (0, int(kinds.mjOBJ_SITE)), (0, int(kinds.mjOBJ_JOINT))}
+        assert seen() == {
+            egg,
+            body,
+            hidden,
+            (0, int(kinds.mjOBJ_SITE)),
+            (0, int(kinds.mjOBJ_JOINT)),
+        }
         option.flags[mujoco.mjtVisFlag.mjVIS_STATIC] = 0  # the egg, too
         assert seen() == {body, (0, int(kinds.mjOBJ_JOINT))}
         option = mujoco.MjvOption()
@@ -343,7 +414,10 @@ def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
         with pytest.warns(RippleWarning) as told:
             renderer.update_scene(data, scene_option=option)
             renderer.render()
-        lost = {"not drawn: labels; all else of the scene is", "the scene's flags have no effect: mjRND_WIREFRAME"}
+        lost = {
+            "not drawn: labels; all else of the scene is",
+            "the scene's flags have no effect: mjRND_WIREFRAME",
+        }
         assert {str(each.message).split("; those")[0] for each in told} == lost
         with warnings.catch_warnings(action="error"):
             renderer.render()
@@ -352,9 +426,12 @@ def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
 def test_geoms_that_are_added_to_the_scene_are_seen(egg):
     _, data, _, renderer = egg
     renderer.update_scene(data, "side")
-    plain, scene = renderer.render().astype(int), renderer.scene
-    arrow, rgba = scene.geoms[scene.ngeom], np.array([0, 0, 1, 1], np.float32)
-    kind, zero = mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3)
+    plain = renderer.render().astype(int)
+    scene = renderer.scene
+    arrow = scene.geoms[scene.ngeom]
+    rgba = np.array([0, 0, 1, 1], np.float32)
+    kind = mujoco.mjtGeom.mjGEOM_ARROW
+    zero = np.zeros(3)
     mujoco.mjv_initGeom(arrow, kind, zero, zero, np.eye(3).ravel(), rgba)
     mujoco.mjv_connector(arrow, kind, 0.05, np.array([0, -0.5, -0.3]), np.array([0, -0.5, 3.9]))
     scene.ngeom += 1
@@ -366,7 +443,8 @@ def test_geoms_that_are_added_to_the_scene_are_seen(egg):
     assert np.array_equal(renderer.render(), plain)
 
 
-# a link as models of robots have it: parts of several materials that are seen, and over them what collides
+# a link as models of robots have it: parts of several materials that are seen, and over them what
+# collides
 LINK = """<mujoco><option timestep="0.002"/><compiler inertiafromgeom="true"/>
   <default><geom density="800"/>
     <default class="visual"><geom type="mesh" contype="0" conaffinity="0" group="1" mass="0"/></default>
@@ -384,7 +462,8 @@ LINK = """<mujoco><option timestep="0.002"/><compiler inertiafromgeom="true"/>
 
 def test_a_robots_link_in_parts_ripples_under_what_collides_for_it_and_is_seen_where_that_is_hidden():
     model = mujoco.MjModel.from_xml_string(LINK)
-    data, hit = mujoco.MjData(model), Material.suited(size=0.4, hit=(0.4, 2.0))
+    data = mujoco.MjData(model)
+    hit = Material.suited(size=0.4, hit=(0.4, 2.0))
     ripples = Ripples(model, {"link/0": hit}, resolution=24, backend="cpu")
     option = mujoco.MjvOption()
     given = []

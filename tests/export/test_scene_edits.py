@@ -18,7 +18,8 @@ from ripple_sim import Material, RippleRenderer, Ripples
 def mujocos(tmp_path_factory):
     """What `mujoco.Renderer` draws; it takes over the context of its process."""
     file = tmp_path_factory.mktemp("mujocos") / "drawn.npz"
-    program, environment = Path(edited_scenes.__file__), {**os.environ, "MUJOCO_GL": "egl"}
+    program = Path(edited_scenes.__file__)
+    environment = {**os.environ, "MUJOCO_GL": "egl"}
     subprocess.run([sys.executable, program, file], env=environment, check=True, timeout=100)
     with np.load(file) as drawn:
         return dict(drawn)
@@ -28,7 +29,9 @@ def mujocos(tmp_path_factory):
 def flat():
     """A renderer whose target has no waves, and its data."""
     model, data = edited_scenes.state()
-    with RippleRenderer(model, Ripples(model, {"target": Material()}, resolution=16), *edited_scenes.SIZE) as renderer:
+    with RippleRenderer(
+        model, Ripples(model, {"target": Material()}, resolution=16), *edited_scenes.SIZE
+    ) as renderer:
         yield renderer, data
 
 
@@ -100,7 +103,9 @@ def test_waves_ride_on_their_geom_to_where_the_scene_has_it():
             renderer.disable_segmentation_rendering()
             renderer.enable_depth_rendering()
             centre = np.array(place) - data.camera("c").xpos
-            nearest.append(-centre @ data.camera("c").xmat.reshape(3, 3)[:, 2] - renderer.render()[mask].min())
+            nearest.append(
+                -centre @ data.camera("c").xmat.reshape(3, 3)[:, 2] - renderer.render()[mask].min()
+            )
     np.testing.assert_allclose(nearest, 0.5, atol=0.01)  # radius 0.4 m, and the waves
 
 
@@ -123,9 +128,16 @@ def test_the_scene_stays_as_the_program_wrote_it(flat):
     scene = renderer.scene
     added = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(
-        added, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.2), np.zeros(3), np.eye(3).ravel(), np.ones(4, np.float32)
+        added,
+        mujoco.mjtGeom.mjGEOM_SPHERE,
+        np.full(3, 0.2),
+        np.zeros(3),
+        np.eye(3).ravel(),
+        np.ones(4, np.float32),
     )
-    added.objid, added.objtype, added.segid = 5, 3, 9
+    added.objid = 5
+    added.objtype = 3
+    added.segid = 9
     scene.ngeom += 1
     renderer.render()
     assert (added.objid, added.objtype, added.segid) == (5, 3, 9)

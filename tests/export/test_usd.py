@@ -20,24 +20,37 @@ from ripple_sim.scene import CameraEntry, Scene
 pxr = pytest.importorskip("pxr")
 from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdValidation  # noqa: E402
 
-FRAMES, FPS = 6, 500
+FRAMES = 6
+FPS = 500
 SURFACE = "/World/bodies/nest/egg"
 
 
 @pytest.fixture(scope="module", params=[".usdc", ".usda", ".usdz"])
-def run(request: pytest.FixtureRequest, ripples: Ripples, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def run(
+    request: pytest.FixtureRequest, ripples: Ripples, tmp_path_factory: pytest.TempPathFactory
+) -> Any:
     """A stage, and what was at each frame: points, velocities, and the stone's pose."""
     path = tmp_path_factory.mktemp("run") / f"run{request.param}"
-    model, data = ripples.model, forwarded(ripples.model)
+    model = ripples.model
+    data = forwarded(ripples.model)
     ripples.reset()
-    mesh, seen = MovingMesh(ripples["egg"].atlas), []
+    mesh = MovingMesh(ripples["egg"].atlas)
+    seen = []
     camera = CameraEntry(name="side", aperture=0.02, focus=1.5, shutter=180.0)
     with Exporter(model, ripples, path, fps=FPS, camera=camera) as exporter:
         for _ in range(FRAMES):
             ripples.mj_step(data, nstep=2)
             exporter.write(data)
             shape = mesh.shape(ripples["egg"].height, ripples["egg"].velocity)
-            seen.append((shape.points, shape.velocities, data.xpos.copy(), data.xmat.copy(), data.geom_xpos.copy()))
+            seen.append(
+                (
+                    shape.points,
+                    shape.velocities,
+                    data.xpos.copy(),
+                    data.xmat.copy(),
+                    data.geom_xpos.copy(),
+                )
+            )
     return Usd.Stage.Open(str(path)), seen
 
 
@@ -58,7 +71,8 @@ def test_stage_is_valid_in_metres_with_z_up_and_a_time_code_a_frame(run: Any) ->
     assert stage.GetDefaultPrim().GetPath() == "/World"
     path = stage.GetRootLayer().realPath
     packed = zipfile.ZipFile(path).infolist() if path.endswith(".usdz") else []
-    assert all(file.date_time[0] == 1980 for file in packed)  # the same bytes whenever it is written
+    # the same bytes whenever it is written
+    assert all(file.date_time[0] == 1980 for file in packed)
 
 
 def test_points_and_velocities_are_ours_at_every_frame_to_a_millionth(run: Any) -> None:
@@ -70,19 +84,26 @@ def test_points_and_velocities_are_ours_at_every_frame_to_a_millionth(run: Any) 
         assert np.abs(np.array(mesh.GetVelocitiesAttr().Get(frame)) - velocities).max() < 1e-6
         assert len(mesh.GetNormalsAttr().Get(frame)) == len(points)
     assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
-    indices, counts = mesh.GetFaceVertexIndicesAttr().Get(), mesh.GetFaceVertexCountsAttr().Get()
+    indices = mesh.GetFaceVertexIndicesAttr().Get()
+    counts = mesh.GetFaceVertexCountsAttr().Get()
     assert UsdGeom.Mesh.ValidateTopology(indices, counts, len(seen[0][0]))[0]
 
 
 def test_bodies_and_surfaces_stand_where_mujoco_has_them(run: Any) -> None:
     stage, seen = run
-    stone, egg = 2, 1
+    stone = 2
+    egg = 1
     for frame, (_, _, xpos, xmat, geom_xpos) in enumerate(seen):
         world = at(stage, "/World/bodies/stone", frame)
         assert np.abs(world[:3, 3] - xpos[stone]).max() < 1e-9
         assert np.abs(world[:3, :3] - xmat[stone].reshape(3, 3)).max() < 1e-9
         assert np.abs(at(stage, SURFACE, frame)[:3, 3] - geom_xpos[egg]).max() < 1e-9
-    assert stage.GetPrimAtPath("/World/bodies/nest").GetAttribute("xformOp:translate").GetNumTimeSamples() == 1
+    assert (
+        stage.GetPrimAtPath("/World/bodies/nest")
+        .GetAttribute("xformOp:translate")
+        .GetNumTimeSamples()
+        == 1
+    )
 
 
 def test_camera_has_the_angle_of_view_the_lens_and_the_shutter(run: Any) -> None:
@@ -108,7 +129,9 @@ CAMERAS = """<mujoco><worldbody><geom name="ball" size=".3"/>
 def test_cameras_of_all_projections_see_what_ours_see(name: str, tmp_path: Path) -> None:
     model = mujoco.MjModel.from_xml_string(CAMERAS)
     data = forwarded(model)
-    ripples = Ripples(model, {"ball": Material(speed=1.0, density=1.0)}, resolution=8, backend="cpu")
+    ripples = Ripples(
+        model, {"ball": Material(speed=1.0, density=1.0)}, resolution=8, backend="cpu"
+    )
     with Exporter(model, ripples, tmp_path / "run.usda", camera=name, size=(320, 240)) as exporter:
         exporter.write(data)
     stage = Usd.Stage.Open(str(tmp_path / "run.usda"))
@@ -123,7 +146,8 @@ def test_lamps_light_the_middle_as_strongly_as_ours(run: Any) -> None:
     lamps = [UsdLux.LightAPI(prim) for prim in stage.Traverse() if prim.HasAPI(UsdLux.LightAPI)]
     gloss = {lamp.GetPrim().GetTypeName(): lamp.GetSpecularAttr().Get() for lamp in lamps}
     weak = pytest.approx(0.137, abs=1e-3)  # sRGB 0.1 over 0.3, as light
-    assert gloss == {"DistantLight": 1, "DomeLight": 1, "SphereLight": weak}  # headlight, ambient light, spot lamp
+    # headlight, ambient light, spot lamp
+    assert gloss == {"DistantLight": 1, "DomeLight": 1, "SphereLight": weak}
     (far,) = (prim for prim in stage.Traverse() if prim.GetTypeName() == "DistantLight")
     degrees = np.degrees(far.GetAttribute("userProperties:angle").Get())  # which Blender doubles
     assert degrees == pytest.approx(UsdLux.DistantLight(far).GetAngleAttr().Get())
@@ -138,11 +162,21 @@ def test_looks_and_textures_are_bound(run: Any) -> None:
 
     assert surface(SURFACE).GetInput("roughness").Get() == pytest.approx(0.36)  # rubber
     assert tuple(surface("/World/bodies/stone/stone").GetInput("diffuseColor").Get()) == (1, 0, 0)
-    image = surface("/World/bodies/world/floor").GetInput("diffuseColor").GetConnectedSources()[0][0].source
+    image = (
+        surface("/World/bodies/world/floor")
+        .GetInput("diffuseColor")
+        .GetConnectedSources()[0][0]
+        .source
+    )
     file = UsdShade.Shader(image.GetPrim()).GetInput("file").Get()
     assert file.resolvedPath
-    st = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/World/bodies/world/floor")).GetPrimvar("st").ComputeFlattened()
-    assert np.ptp(np.array(st), axis=0) == pytest.approx([4, 4])  # the image repeats as often as the MJCF says
+    st = (
+        UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/World/bodies/world/floor"))
+        .GetPrimvar("st")
+        .ComputeFlattened()
+    )
+    # the image repeats as often as the MJCF says
+    assert np.ptp(np.array(st), axis=0) == pytest.approx([4, 4])
 
 
 def test_velocities_of_a_scene_are_the_rates_of_its_points(scene: Scene, tmp_path: Path) -> None:
@@ -151,7 +185,9 @@ def test_velocities_of_a_scene_are_the_rates_of_its_points(scene: Scene, tmp_pat
     summary = export_scene(scene, path, options)
     stage = Usd.Stage.Open(str(path))
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(SURFACE))
-    points = np.array([mesh.GetPointsAttr().Get(frame) for frame in range(summary.frames)], dtype=float)
+    points = np.array(
+        [mesh.GetPointsAttr().Get(frame) for frame in range(summary.frames)], dtype=float
+    )
     velocities = np.array([mesh.GetVelocitiesAttr().Get(frame) for frame in range(summary.frames)])
     assert summary.frames == 40
     differences = (points[2:] - points[:-2]) * 250 / 2  # a second of the file
@@ -161,7 +197,8 @@ def test_velocities_of_a_scene_are_the_rates_of_its_points(scene: Scene, tmp_pat
     assert quiet.max() < 0.01 * peak
 
 
-SEEN, SURFACES = 7, ("egg", "jelly")
+SEEN = 7
+SURFACES = ("egg", "jelly")
 # the vertices in the world of every mesh at every frame
 READ = """
 import sys
@@ -188,13 +225,16 @@ np.savez(sys.argv[2], **found)
 
 
 @pytest.mark.parametrize("chunk", [None, 3])
-def test_blender_has_our_vertices_at_every_frame(soft_model: mujoco.MjModel, tmp_path: Path, chunk: int | None) -> None:
+def test_blender_has_our_vertices_at_every_frame(
+    soft_model: mujoco.MjModel, tmp_path: Path, chunk: int | None
+) -> None:
     """Also of a soft body, and of a run in chunks."""
     try:
         python = python_with_bpy()
     except RippleError as error:
         pytest.skip(str(error))
-    data, waves = mujoco.MjData(soft_model), Material(speed=0.3, density=1500.0)
+    data = mujoco.MjData(soft_model)
+    waves = Material(speed=0.3, density=1500.0)
     ripples = Ripples(soft_model, dict.fromkeys(SURFACES, waves), resolution=8, backend="cpu")
     x, y, _ = np.moveaxis(ripples["egg"].atlas.normals, -1, 0)
     ripples["egg"].height = 0.02 * np.sin(5 * x) * np.cos(4 * y)
@@ -203,10 +243,13 @@ def test_blender_has_our_vertices_at_every_frame(soft_model: mujoco.MjModel, tmp
         for _ in range(SEEN):
             ripples.mj_step(data, nstep=8)
             exporter.write(data)
-            rotation, position = data.geom("egg").xmat.reshape(3, 3), data.geom("egg").xpos
+            rotation = data.geom("egg").xmat.reshape(3, 3)
+            position = data.geom("egg").xpos
             for name in SURFACES:
                 mesh = exporter._source.mesh(name)
-                points = mesh.shape(ripples[name].height, ripples[name].velocity, ripples.vertices(name, data)).points
+                points = mesh.shape(
+                    ripples[name].height, ripples[name].velocity, ripples.vertices(name, data)
+                ).points
                 seen[name].append(points @ rotation.T + position if name == "egg" else points)
     arguments = [tmp_path / "run.usdc", tmp_path / "found.npz", SEEN, *SURFACES]
     subprocess.run([python, "-c", READ, *map(str, arguments)], check=True, capture_output=True)

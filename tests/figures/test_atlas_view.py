@@ -19,7 +19,9 @@ def test_stretch_is_one_on_a_sphere_and_even_on_average(animal):
     # area-weighted quantiles agree with those of the mesh's triangles
     order = np.argsort(stretch.ravel())
     share = np.cumsum(animal.areas.ravel()[order]) / animal.areas.sum()
-    assert stretch.ravel()[order][np.searchsorted(share, 0.5)] == pytest.approx(animal.quality()["q50"], abs=0.05)
+    assert stretch.ravel()[order][np.searchsorted(share, 0.5)] == pytest.approx(
+        animal.quality()["q50"], abs=0.05
+    )
 
 
 def test_pictures_show_the_texel_that_lies_there():
@@ -45,7 +47,9 @@ def test_squares_stand_side_by_side_with_every_texel_in_its_place():
     assert image.shape == (200, 300, 4)
     side = 88
     for chart, (top, left) in ((0, (0, 0)), (2, (0, 2)), (4, (1, 1))):
-        pixel = image[top * pitch + side - 1 - int(2.5 / 8 * side), left * pitch + int(5.5 / 8 * side)]
+        pixel = image[
+            top * pitch + side - 1 - int(2.5 / 8 * side), left * pitch + int(5.5 / 8 * side)
+        ]
         np.testing.assert_allclose(pixel[:3], colors[chart, 2, 5], atol=1e-9)
     assert image[150, 250, 3] == 0
 
@@ -53,7 +57,9 @@ def test_squares_stand_side_by_side_with_every_texel_in_its_place():
 @pytest.mark.parametrize("texels", [polygon(5, 4), polygon(7, 4), square(4)])
 def test_charts_that_meet_have_different_colours(texels):
     colors = chart_colors(texels.topology)
-    meet = (texels.topology.corners[:, None, :, None] == texels.topology.corners[None, :, None, :]).any(axis=(2, 3))
+    meet = (
+        texels.topology.corners[:, None, :, None] == texels.topology.corners[None, :, None, :]
+    ).any(axis=(2, 3))
     different = np.abs(colors[:, None] - colors[None]).max(axis=2) > 0.05
     assert (different | ~meet | np.eye(len(colors), dtype=bool)).all()
 
@@ -63,7 +69,8 @@ def test_an_open_surface_is_painted_on_both_sides():
     colors = np.broadcast_to([0.9, 0.2, 0.1], (1, 8, 8, 3))
     for elevation in (60.0, -60.0):
         image = AtlasPainter(atlas, colors).mesh(View(elevation=elevation, up="z"), 40)
-        red, green = image[image[..., 3] > 0.99][:, 0].mean(), image[image[..., 3] > 0.99][:, 1].mean()
+        red = image[image[..., 3] > 0.99][:, 0].mean()
+        green = image[image[..., 3] > 0.99][:, 1].mean()
         assert red > 2 * green
         assert red > 0.4
 
@@ -84,7 +91,10 @@ def test_a_picture_that_fails_on_the_way_leaves_the_older_one(monkeypatch, tmp_p
     save_plot(Figure(), path)
     older = path.read_bytes()
     assert older.startswith(b"\x89PNG")
-    for failure, said in ((OSError(28, "No space left on device"), "No space"), (KeyboardInterrupt("by hand"), "hand")):
+    for failure, said in (
+        (OSError(28, "No space left on device"), "No space"),
+        (KeyboardInterrupt("by hand"), "hand"),
+    ):
 
         def half(self, place, failure=failure, **options):
             Path(place).write_bytes(older[: len(older) // 2])
@@ -93,4 +103,6 @@ def test_a_picture_that_fails_on_the_way_leaves_the_older_one(monkeypatch, tmp_p
         monkeypatch.setattr(Figure, "savefig", half)
         with pytest.raises((AtlasError, KeyboardInterrupt), match=said):
             save_plot(Figure(), path)
-        assert [(each.name, each.read_bytes()) for each in tmp_path.iterdir()] == [(path.name, older)]
+        assert [(each.name, each.read_bytes()) for each in tmp_path.iterdir()] == [
+            (path.name, older)
+        ]

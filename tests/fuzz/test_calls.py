@@ -48,18 +48,44 @@ def test_any_arguments_of_what_makes_something(name: str, a: Any, b: Any, c: Any
 def test_any_arguments_of_what_acts_on_waves(name: str, a: Any, b: Any, c: Any, dt: float) -> None:
     waves = WaveSolver(ATLAS, backend="cpu")
     with np.errstate(all="ignore"):
-        calls = (lambda: ACTIONS[name](waves, a, b, c), lambda: waves.step(dt), lambda: waves.height)
+        calls = (
+            lambda: ACTIONS[name](waves, a, b, c),
+            lambda: waves.step(dt),
+            lambda: waves.height,
+        )
         results = [outcome(call) for call in calls]
     if not any(isinstance(result, Exception) for result in results):
         assert np.isfinite(waves.height).all()
 
 
 OPTIONS = [
-    *("-o", "--output", "--size", "--fps", "--duration", "--resolution", "--seed", "--backend", "--layout"),
-    *("--overlay", "--overwrite", "--resume", "--port", "--host", "--json", "--help", "--up", "--bodies"),
+    *(
+        "-o",
+        "--output",
+        "--size",
+        "--fps",
+        "--duration",
+        "--resolution",
+        "--seed",
+        "--backend",
+        "--layout",
+    ),
+    *(
+        "--overlay",
+        "--overwrite",
+        "--resume",
+        "--port",
+        "--host",
+        "--json",
+        "--help",
+        "--up",
+        "--bodies",
+    ),
     *("--shutter", "--", "-", "-x"),
 ]
-WORDS = st.one_of(st.sampled_from(OPTIONS), NUMBERS.map(lambda value: str(value)[:300]), TEXTS, st.just("sphere"))
+WORDS = st.one_of(
+    st.sampled_from(OPTIONS), NUMBERS.map(lambda value: str(value)[:300]), TEXTS, st.just("sphere")
+)
 
 
 @pytest.fixture(autouse=True, scope="module")

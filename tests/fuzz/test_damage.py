@@ -43,7 +43,9 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @fuzzed_by(25)
 @given(DAMAGES)
-def test_damaged_atlases_in_the_cache_are_made_anew_and_damaged_files_refused(cache: Path, damages: list) -> None:
+def test_damaged_atlases_in_the_cache_are_made_anew_and_damaged_files_refused(
+    cache: Path, damages: list
+) -> None:
     whole = [load_atlas(file) for file in sorted(cache.iterdir())]
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(home))
@@ -51,8 +53,12 @@ def test_damaged_atlases_in_the_cache_are_made_anew_and_damaged_files_refused(ca
         damage(home / "ripple-sim", damages)
         for file in (home / "ripple-sim").glob("*.npz"):
             found = outcome(lambda file=file: load_atlas(file))
-            assert isinstance(found, RippleError) or any(np.array_equal(found.areas, each.areas) for each in whole)
-        assert {each.areas.tobytes() for each in atlases()} == {each.areas.tobytes() for each in whole}
+            assert isinstance(found, RippleError) or any(
+                np.array_equal(found.areas, each.areas) for each in whole
+            )
+        assert {each.areas.tobytes() for each in atlases()} == {
+            each.areas.tobytes() for each in whole
+        }
 
 
 CACHES = [kernel(function)._cache for function in (lambda x: x + 1, changed, damage)]
@@ -97,15 +103,26 @@ def batches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def read_all(folder: Path) -> None:
     scenes = outcome(lambda: load_batch(folder))
     for scene in () if isinstance(scenes, RippleError) else scenes:
-        for read in (scene.names, scene.facts, scene.times, scene.positions, scene.heights, scene.impulses):
+        for read in (
+            scene.names,
+            scene.facts,
+            scene.times,
+            scene.positions,
+            scene.heights,
+            scene.impulses,
+        ):
             outcome(read)
         for many in (scene.frames, scene.passes):
             outcome(lambda many=many: list(many()))
 
 
 @fuzzed_by(25)
-@given(st.sampled_from(sorted(STORES)), DAMAGES, st.sampled_from(["", "--status", "--retry-failed"]))
-def test_a_damaged_batch_goes_on_or_is_refused(batches: Path, name: str, damages: list, flag: str) -> None:
+@given(
+    st.sampled_from(sorted(STORES)), DAMAGES, st.sampled_from(["", "--status", "--retry-failed"])
+)
+def test_a_damaged_batch_goes_on_or_is_refused(
+    batches: Path, name: str, damages: list, flag: str
+) -> None:
     with home_of_others() as home:
         shutil.copytree(batches / name, home / "out")
         damage(home / "out", damages)
@@ -144,7 +161,9 @@ def outputs(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
             assert command(*words(name)) == 0
             (home / "out").rename(home / f"{name} whole")
             with pytest.MonkeyPatch.context() as interrupted:
-                interrupted.setattr(render, "frame_progress", lambda *_: contextlib.nullcontext(interrupting_at(3)))
+                interrupted.setattr(
+                    render, "frame_progress", lambda *_: contextlib.nullcontext(interrupting_at(3))
+                )
                 assert cli.main([*map(str, words(name))]) == 130
             (home / "out").mkdir(exist_ok=True)
             (home / "out").rename(home / f"{name} half")
@@ -152,10 +171,20 @@ def outputs(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 
 @fuzzed_by(25)
-@given(st.sampled_from(sorted(JOBS)), st.sampled_from(["whole", "half"]), DAMAGES, st.sampled_from(["", "--overwrite"]))
-def test_damaged_outputs_are_replaced_or_refused(outputs: Path, name: str, state: str, damages: list, flag: str):
-    assume(not flag or all(kind != "link" for _, kind, _ in damages))  # --overwrite replaces what a link leads to
-    resumed = ["--resume"] if state == "half" and (JOBS[name][0] == "render" or name == "usda") else []
+@given(
+    st.sampled_from(sorted(JOBS)),
+    st.sampled_from(["whole", "half"]),
+    DAMAGES,
+    st.sampled_from(["", "--overwrite"]),
+)
+def test_damaged_outputs_are_replaced_or_refused(
+    outputs: Path, name: str, state: str, damages: list, flag: str
+):
+    # --overwrite replaces what a link leads to
+    assume(not flag or all(kind != "link" for _, kind, _ in damages))
+    resumed = (
+        ["--resume"] if state == "half" and (JOBS[name][0] == "render" or name == "usda") else []
+    )
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         patch.chdir(home)
         write_files(home)

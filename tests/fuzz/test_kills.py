@@ -29,7 +29,14 @@ JOBS = {  # the first of them in the tests, all by `make fuzz`
 }
 # a process is forked from one that has imported all, so that most moments lie in the work
 CONTEXT = multiprocessing.get_context("forkserver")
-LOADED = ["batch.worker", "cli.main", "export.fields", "export.page", "export.usd", "figures.atlas_plot"]
+LOADED = [
+    "batch.worker",
+    "cli.main",
+    "export.fields",
+    "export.page",
+    "export.usd",
+    "figures.atlas_plot",
+]
 
 
 def finish(home: Path, words: str, kill: int = 0, after: float = 300) -> tuple[int, float]:
@@ -64,8 +71,12 @@ def made(folder: Path) -> dict[str, bytes]:
 
 def write_inputs(home: Path) -> None:
     write_files(home)
-    (home / "plan.toml").write_text(PLAN.replace("count = 5", "count = 2").replace("[64, 48]", "[16, 16]"))
-    (home / "ball.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    (home / "plan.toml").write_text(
+        PLAN.replace("count = 5", "count = 2").replace("[64, 48]", "[16, 16]")
+    )
+    (home / "ball.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
 
 
 Whole = Callable[[str], tuple[float, dict[str, bytes]]]
@@ -91,7 +102,8 @@ def undisturbed(opengl: None) -> Iterator[Whole]:
 
 @pytest.mark.parametrize("seed", range(EXAMPLES // 50 or 4))
 def test_a_job_that_is_killed_and_run_again(undisturbed: Whole, seed: int) -> None:
-    chance, name = random.Random(seed), list(JOBS)[seed % len(JOBS)]
+    chance = random.Random(seed)
+    name = list(JOBS)[seed % len(JOBS)]
     kills = chance.choices([signal.SIGKILL, signal.SIGTERM, signal.SIGINT], k=chance.choice([1, 2]))
     seconds, expected = undisturbed(name)
     with home_of_others() as home:

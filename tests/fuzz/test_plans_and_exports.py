@@ -16,12 +16,41 @@ from ripple_sim.batch import Plan, RunOptions, Variation, plan as plans, read_pl
 from ripple_sim.errors import RippleError
 
 TABLE = tomllib.loads(PLAN + 'video = "none"\n')
-KEYS = ["camera.azimuth", "camera.lookat[1]", "ripple[egg].material.speed", "ripple[egg].look", "ripple.geom"]
-ATTRIBUTES = ["geom[stone].mass", "geom[*].size", "geom.pos[2]", "body[grain].quat", "option.timestep", "light.name"]
-KINDS = ["uniform", "log_uniform", "normal", "integers", "choice", "orientation", "constant", "weights", "length"]
+KEYS = [
+    "camera.azimuth",
+    "camera.lookat[1]",
+    "ripple[egg].material.speed",
+    "ripple[egg].look",
+    "ripple.geom",
+]
+ATTRIBUTES = [
+    "geom[stone].mass",
+    "geom[*].size",
+    "geom.pos[2]",
+    "body[grain].quat",
+    "option.timestep",
+    "light.name",
+]
+KINDS = [
+    "uniform",
+    "log_uniform",
+    "normal",
+    "integers",
+    "choice",
+    "orientation",
+    "constant",
+    "weights",
+    "length",
+]
 OPTIONS = ["apply", "together", "limits"]
-LIKELY = st.lists(st.floats(0.1, 2) | fuzzing.NUMBERS, min_size=2, max_size=3) | st.integers(0, 3) | fuzzing.VALUES
-DRAWN = st.dictionaries(st.sampled_from([*KINDS, *OPTIONS]), LIKELY, min_size=1, max_size=2) | LIKELY
+LIKELY = (
+    st.lists(st.floats(0.1, 2) | fuzzing.NUMBERS, min_size=2, max_size=3)
+    | st.integers(0, 3)
+    | fuzzing.VALUES
+)
+DRAWN = (
+    st.dictionaries(st.sampled_from([*KINDS, *OPTIONS]), LIKELY, min_size=1, max_size=2) | LIKELY
+)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -38,9 +67,18 @@ def tried(home: Path) -> None:
         plan = read_plan(home / "plan.toml")
         scenes = [Variation(plan, number).load()[0] for number in range(2)]
         options = plans.options_of(plan.store)
-        seconds = max(scene.duration for scene in scenes) if options.duration is None else options.duration
+        seconds = (
+            max(scene.duration for scene in scenes)
+            if options.duration is None
+            else options.duration
+        )
         steps = seconds / min(scene.model.opt.timestep for scene in scenes)
-        if steps < 50 and plan.store.fps * seconds < 9 and max(options.size) <= 64 and plan.store.video == "none":
+        if (
+            steps < 50
+            and plan.store.fps * seconds < 9
+            and max(options.size) <= 64
+            and plan.store.video == "none"
+        ):
             run_batch(plan, home / "out", RunOptions(limit=1, keep_free=0))
         return plan
 
@@ -58,7 +96,11 @@ def test_a_plan_with_any_value_anywhere(place: tuple, value: Any) -> None:
 
 
 @fuzzed
-@given(st.sampled_from(["vary", "model"]), st.sampled_from([*KEYS, "duration", *ATTRIBUTES]) | fuzzing.TEXTS, DRAWN)
+@given(
+    st.sampled_from(["vary", "model"]),
+    st.sampled_from([*KEYS, "duration", *ATTRIBUTES]) | fuzzing.TEXTS,
+    DRAWN,
+)
 def test_a_plan_that_draws_anything(part: str, key: str, drawn: Any) -> None:
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
         write_files(home)
@@ -108,6 +150,8 @@ def test_an_export_with_any_options_twice(output: str, words: list[tuple], forei
         for _ in range(2):
             before = contents(home)
             given = [word for each in words if each != ("--overwrite",) for word in each]
-            if fuzzing.command("export", "scene.toml", "-o", output, "--fps", 20, "--duration", 0.1, *given):
+            if fuzzing.command(
+                "export", "scene.toml", "-o", output, "--fps", 20, "--duration", 0.1, *given
+            ):
                 assert contents(home) == before
             assert not [each for each in home.rglob("*") if each.name.endswith(".part")]

@@ -19,7 +19,9 @@ TABLE: dict[str, Any] = {
     "model": "scene.xml",
     "duration": 1.0,
     "camera": {"lookat": [0.0, 0.0, 0.0], "distance": 2.0},
-    "ripple": [{"geom": "g", "material": {"speed": 1.0}, "still": [{"point": [0, 0, 1], "radius": 0.1}]}],
+    "ripple": [
+        {"geom": "g", "material": {"speed": 1.0}, "still": [{"point": [0, 0, 1], "radius": 0.1}]}
+    ],
     "drop": [{"body": "b", "time": 0.1}],
     "poke": [{"geom": "g", "time": 0.2, "point": [0, 0, 1], "impulse": 1.0, "radius": 0.1}],
 }
@@ -33,18 +35,25 @@ look = "rubber"
 [ripple.material]
 speed = 0.6
 """
-MODEL = '<mujoco><option {}/><worldbody><body name="b"><freejoint/><geom name="g" {}/></body></worldbody>{}</mujoco>'
+MODEL = (
+    '<mujoco><option {}/><worldbody><body name="b"><freejoint/><geom name="g" '
+    "{}/></body></worldbody>{}</mujoco>"
+)
 
 
 @fuzzed
 @given(st.sampled_from(places(TABLE)[1:]), VALUES)
 def test_a_table_with_any_value_anywhere(place: tuple, value: Any) -> None:
-    assert isinstance(outcome(lambda: parse_scene(put(TABLE, place, value), "scene.toml")), SceneFile | SceneError)
+    assert isinstance(
+        outcome(lambda: parse_scene(put(TABLE, place, value), "scene.toml")), SceneFile | SceneError
+    )
 
 
 @fuzzed
 @given(CHANGES)
-def test_a_file_with_any_bytes_anywhere(tmp_path_factory: pytest.TempPathFactory, changes: list) -> None:
+def test_a_file_with_any_bytes_anywhere(
+    tmp_path_factory: pytest.TempPathFactory, changes: list
+) -> None:
     folder = tmp_path_factory.getbasetemp() / "changed"
     folder.mkdir(exist_ok=True)
     path = write_scene(folder, MODEL.format("", 'type="sphere" size="1"', ""), "")
@@ -54,9 +63,15 @@ def test_a_file_with_any_bytes_anywhere(tmp_path_factory: pytest.TempPathFactory
 
 OPTIONS = st.sampled_from(["timestep", "gravity", "integrator", "cone", "iterations", "impratio"])
 SOLVERS = NUMBERS.map(str) | st.sampled_from(["RK4", "elliptic", "0 0 nan", "a"])
-NAMES = st.sampled_from(["type", "size", "mass", "density", "pos", "quat", "solref", "friction", "condim", "rgba"])
-SHAPES = NUMBERS.map(str) | st.sampled_from(["sphere", "box", "mesh", "0 0 0 0", "1 1 1", "nan 0 0", "plane", "sdf"])
-KEYS = st.lists(NUMBERS, max_size=9).map(lambda row: f'<keyframe><key qpos="{" ".join(map(str, row))}"/></keyframe>')
+NAMES = st.sampled_from(
+    ["type", "size", "mass", "density", "pos", "quat", "solref", "friction", "condim", "rgba"]
+)
+SHAPES = NUMBERS.map(str) | st.sampled_from(
+    ["sphere", "box", "mesh", "0 0 0 0", "1 1 1", "nan 0 0", "plane", "sdf"]
+)
+KEYS = st.lists(NUMBERS, max_size=9).map(
+    lambda row: f'<keyframe><key qpos="{" ".join(map(str, row))}"/></keyframe>'
+)
 
 
 def written(attributes: dict[str, str]) -> str:
@@ -64,8 +79,14 @@ def written(attributes: dict[str, str]) -> str:
 
 
 @fuzzed
-@given(st.dictionaries(OPTIONS, SOLVERS, max_size=3), st.dictionaries(NAMES, SHAPES, max_size=4), KEYS | st.just(""))
-def test_a_model_with_any_numbers(tmp_path_factory: pytest.TempPathFactory, option: dict, geom: dict, key: str) -> None:
+@given(
+    st.dictionaries(OPTIONS, SOLVERS, max_size=3),
+    st.dictionaries(NAMES, SHAPES, max_size=4),
+    KEYS | st.just(""),
+)
+def test_a_model_with_any_numbers(
+    tmp_path_factory: pytest.TempPathFactory, option: dict, geom: dict, key: str
+) -> None:
     folder: Path = tmp_path_factory.getbasetemp() / "model"
     folder.mkdir(exist_ok=True)
     model = MODEL.format(written(option), written({"size": "1", **geom}), key)
@@ -86,7 +107,9 @@ def check_mesh(found: object) -> None:
 
 @fuzzed
 @given(st.sampled_from(["obj", "off", "ply", "stl", "glb"]), CHANGES, st.floats(0.2, 1))
-def test_a_mesh_with_any_bytes_and_any_end(tmp_path_factory: Any, kind: str, changes: list, part: float) -> None:
+def test_a_mesh_with_any_bytes_and_any_end(
+    tmp_path_factory: Any, kind: str, changes: list, part: float
+) -> None:
     path: Path = tmp_path_factory.getbasetemp() / f"fuzzed.{kind}"
     trimesh.creation.icosphere(subdivisions=1).export(path)
     content = changed(path.read_bytes(), changes)

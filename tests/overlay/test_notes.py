@@ -9,10 +9,26 @@ from ripple_sim.errors import SceneError
 from ripple_sim.overlay import Limit, curve
 
 # Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB
-DEUTAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
-PROTAN = np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]])
+DEUTAN = np.array(
+    [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ]
+)
+PROTAN = np.array(
+    [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ]
+)
 RGB_TO_XYZ = np.array(
-    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.0721750],
+        [0.0193339, 0.1191920, 0.9503041],
+    ]
 )
 
 
@@ -48,7 +64,9 @@ def test_signs_are_told_apart_by_every_eye(vision: np.ndarray) -> None:
 
 def test_colors_of_values() -> None:
     table = overlay.color_table()
-    np.testing.assert_array_equal(overlay.colors([-3.0, -2.0, 0.0, 1.0, 2.0], 2.0), table[[0, 0, 256, 384, 512]])
+    np.testing.assert_array_equal(
+        overlay.colors([-3.0, -2.0, 0.0, 1.0, 2.0], 2.0), table[[0, 0, 256, 384, 512]]
+    )
 
 
 def test_comparison_names_its_baselines() -> None:
@@ -59,10 +77,20 @@ def test_comparison_names_its_baselines() -> None:
 
 
 def test_grid_has_a_readable_number_of_cells() -> None:
-    assert [overlay.grid_spacing(n) for n in (8, 16, 24, 32, 96, 128, 256)] == [1, 1, 1, 2, 4, 8, 16]
+    assert [overlay.grid_spacing(n) for n in (8, 16, 24, 32, 96, 128, 256)] == [
+        1,
+        1,
+        1,
+        2,
+        4,
+        8,
+        16,
+    ]
 
 
-@pytest.mark.parametrize("frames", [1, 7, overlay.MOST_POINTS, overlay.MOST_POINTS + 1, 50 * overlay.MOST_POINTS + 3])
+@pytest.mark.parametrize(
+    "frames", [1, 7, overlay.MOST_POINTS, overlay.MOST_POINTS + 1, 50 * overlay.MOST_POINTS + 3]
+)
 def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
     values = np.random.default_rng(frames).random(frames)
     at, kept = curve(values, frames)
@@ -74,10 +102,13 @@ def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
 
 
 def test_limit_grows_to_round_numbers_and_never_shrinks() -> None:
-    limit, seen = Limit(floor=0.0007), []
+    limit = Limit(floor=0.0007)
+    seen = []
     assert limit.value == limit.goal == 0.0008
     rng = np.random.default_rng(3)
-    for magnitude_now in np.concatenate([0.0003 * rng.random(20), 0.0013 * np.ones(40), 0.0004 * rng.random(40)]):
+    for magnitude_now in np.concatenate(
+        [0.0003 * rng.random(20), 0.0013 * np.ones(40), 0.0004 * rng.random(40)]
+    ):
         seen.append(limit.follow(magnitude_now, 1 / 60))
     assert seen[19] == 0.0008
     assert seen[-1] == limit.goal == 0.0015
@@ -110,6 +141,16 @@ def test_limit_with_a_memory_overlooks_what_is_short() -> None:
 
 def test_numbers_are_short() -> None:
     assert [overlay.round_up(x) for x in (0.001, 0.0011, 2.1, 81)] == [0.001, 0.0015, 3, 100]
-    assert [overlay.number(x) for x in (-20.0, 0.0, 2.5, -0.0)] == ["\N{MINUS SIGN}20", "0", "2.5", "0"]
-    assert [overlay.readable(x, "m")[1] for x in (2e-6, 0.02, 0.001, 3.0)] == ["\N{MICRO SIGN}m", "mm", "mm", "m"]
+    assert [overlay.number(x) for x in (-20.0, 0.0, 2.5, -0.0)] == [
+        "\N{MINUS SIGN}20",
+        "0",
+        "2.5",
+        "0",
+    ]
+    assert [overlay.readable(x, "m")[1] for x in (2e-6, 0.02, 0.001, 3.0)] == [
+        "\N{MICRO SIGN}m",
+        "mm",
+        "mm",
+        "m",
+    ]
     assert overlay.readable(0.02, "m")[0] * 0.02 == pytest.approx(20)

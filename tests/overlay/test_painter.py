@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from ripple_sim.coupling import Energy
-from ripple_sim.overlay import EnergyPlot, Layout, Notes, Painter, Sprite, draw_arrow, marks as patch_module, number
+from ripple_sim.overlay import (
+    EnergyPlot,
+    Layout,
+    Notes,
+    Painter,
+    Sprite,
+    draw_arrow,
+    marks as patch_module,
+    number,
+)
 from ripple_sim.scene import parse_request
 
 
@@ -77,7 +86,9 @@ def notes(time: float = 1.0, marks: float = 1.0) -> Notes:
 
 def painted(words: list[str], content: Notes, channels: int = 3, **options: object) -> np.ndarray:
     frame = np.full((*SIZE[::-1], channels), 90, np.uint8)
-    Painter(parse_request(words), Layout(*SIZE), **{"duration": 5.0, "spacing": 8, **options}).paint(frame, content)
+    Painter(
+        parse_request(words), Layout(*SIZE), **{"duration": 5.0, "spacing": 8, **options}
+    ).paint(frame, content)
     return frame
 
 
@@ -104,7 +115,9 @@ def test_all_together_are_those_in_other_corners_alone() -> None:
     [([], {}, notes()), (["grid"], {"spacing": 0}, notes()), (["contacts"], {}, notes(marks=0.0))],
     ids=["no request", "grids that differ", "no contact yet"],
 )
-def test_nothing_is_drawn_where_there_is_nothing_to_tell(words: list[str], options: dict, content: Notes) -> None:
+def test_nothing_is_drawn_where_there_is_nothing_to_tell(
+    words: list[str], options: dict, content: Notes
+) -> None:
     assert (painted(words, content, **options) == 90).all()
 
 
@@ -115,7 +128,8 @@ def test_the_clock_of_a_long_video_has_fewer_decimals(duration: float, same: boo
 
 
 def test_panels_of_one_corner_lie_below_one_another() -> None:
-    both, clock = painted(["time", "grid"], notes()), painted(["time"], notes())
+    both = painted(["time", "grid"], notes())
+    clock = painted(["time"], notes())
     under = np.nonzero((both != clock).any(axis=(1, 2)))[0]
     assert under.min() > np.nonzero((clock != 90).any(axis=(1, 2)))[0].max()
 
@@ -129,18 +143,26 @@ def test_energy_plot_draws_values_at_their_height_and_grows_with_time() -> None:
         plot.draw([(np.linspace(0, until, 300), np.full(300, value))], 2.0, 2.0).over(frame, 0, 0)
         return (frame[..., 2].astype(int) - frame[..., 0]) > 80
 
-    low, middle, high = (np.flatnonzero(curve(value, 10.0)[:, 200]).mean() for value in (0.5, 1.0, 1.5))
+    low, middle, high = (
+        np.flatnonzero(curve(value, 10.0)[:, 200]).mean() for value in (0.5, 1.0, 1.5)
+    )
     assert low > middle > high
     assert low - middle == pytest.approx(middle - high, abs=1.0)
-    quarter, half, whole = (np.flatnonzero(curve(1.0, until).any(axis=0)).max() for until in (2.5, 5.0, 10.0))
+    quarter, half, whole = (
+        np.flatnonzero(curve(1.0, until).any(axis=0)).max() for until in (2.5, 5.0, 10.0)
+    )
     assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)
 
 
 def test_the_ledger_is_written_of_one_run_and_not_of_two() -> None:
-    plain, content = notes(), dataclasses.replace(notes(), ledgers=[Energy(2.0, 1.0)])
+    plain = notes()
+    content = dataclasses.replace(notes(), ledgers=[Energy(2.0, 1.0)])
     other = dataclasses.replace(content, ledgers=[Energy(2.0, 3.0)])
-    one, two = painted(["energy"], content), painted(["energy"], other)
+    one = painted(["energy"], content)
+    two = painted(["energy"], other)
     assert (one != two).any()
     assert (one != painted(["energy"], plain)).any()
     titles = {"titles": [("one", ""), ("two", "")]}
-    np.testing.assert_array_equal(painted(["energy"], content, **titles), painted(["energy"], other, **titles))
+    np.testing.assert_array_equal(
+        painted(["energy"], content, **titles), painted(["energy"], other, **titles)
+    )

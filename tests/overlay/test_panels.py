@@ -36,7 +36,9 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, 
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_the_ledger_stands_beside_nothing_else_or_is_left_out(size: tuple[int, int], written: list) -> None:
+def test_the_ledger_stands_beside_nothing_else_or_is_left_out(
+    size: tuple[int, int], written: list
+) -> None:
     layout = Layout(*size)
     bare, plot = (overlay.EnergyPlot(layout, 4.0, ledger=each) for each in (False, True))
     curve = np.linspace(0, 3, 50), np.ones(50)
@@ -55,7 +57,8 @@ def test_the_ledger_stands_beside_nothing_else_or_is_left_out(size: tuple[int, i
 @pytest.mark.parametrize("size", SIZES)
 def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], written: list) -> None:
     layout = Layout(*size)
-    times, taken = np.linspace(0, 3, 200), np.zeros(size[::-1], int)
+    times = np.linspace(0, 3, 200)
+    taken = np.zeros(size[::-1], int)
     plot = overlay.EnergyPlot(layout, 4.0, ["ripple-sim", "Dynamic Paint"])
     panels = {
         "top left": overlay.label("t = 12.34 s", layout.em, "slow"),
@@ -79,16 +82,21 @@ def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], writ
 @pytest.mark.parametrize("size", [(320, 180), (1280, 720)])
 def test_a_comparison_fits(size: tuple[int, int], written: list) -> None:
     titles = [overlay.TITLES["fem"], overlay.TITLES["dynamic-paint"]]
-    painter = Painter(parse_request(NAMES[1:]), Layout(*size), duration=5.0, spacing=8, titles=titles)
+    painter = Painter(
+        parse_request(NAMES[1:]), Layout(*size), duration=5.0, spacing=8, titles=titles
+    )
     curve = np.linspace(0, 5, 9), np.ones(9)
     panels = painter._panels(Notes(1.0, [], SCALE, [], SCALE, [curve, curve], SCALE))
     left, middle, right = (panels[corner][0].width for corner in ("top left", "top", "top right"))
     assert max(left, right) + middle / 2 < size[0] / 2 - Layout(*size).margin
     assert panels["bottom left"][0].width + panels["bottom right"][0].width < size[0]
     plot = panels["bottom right"][0]
-    heading = [box for box in written if box[4].height == plot.height and box[3] < 2 * Layout(*size).em]
+    heading = [
+        box for box in written if box[4].height == plot.height and box[3] < 2 * Layout(*size).em
+    ]
     lines = sorted(box[:3:2] for box in heading)
-    assert len(lines) == (2 if size[0] < 400 else 4)  # title, unit, and the names where there is room
+    # title, unit, and the names where there is room
+    assert len(lines) == (2 if size[0] < 400 else 4)
     for (_, end), (begin, _) in itertools.pairwise(lines):
         assert end < begin
 
@@ -136,13 +144,19 @@ def placed(marks: list[Mark], body: str = "", largest: float = 1.0) -> list:
     return overlay.place_marks(marks, largest, LAYOUT, FRONT, *posed(EMPTY.format(body)))
 
 
-def mark(impulse: float, axis: tuple = (1, 0, 0), place: tuple = (0, 0, 0), **fields: float) -> Mark:
+def mark(
+    impulse: float, axis: tuple = (1, 0, 0), place: tuple = (0, 0, 0), **fields: float
+) -> Mark:
     return Mark(np.array(place, float), np.array(axis, float), impulse, **fields)
 
 
-@pytest.mark.parametrize(("impulse", "length"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (1.4, 1.4), (9.0, 1.5)])
+@pytest.mark.parametrize(
+    ("impulse", "length"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (1.4, 1.4), (9.0, 1.5)]
+)
 @pytest.mark.parametrize("distance", [0.0, 40.0])
-def test_an_arrow_is_as_long_as_its_impulse_at_any_distance(impulse: float, length: float, distance: float) -> None:
+def test_an_arrow_is_as_long_as_its_impulse_at_any_distance(
+    impulse: float, length: float, distance: float
+) -> None:
     [(tip, tail, _)] = placed([mark(2 * impulse, place=(0, distance, 0))], largest=2.0)
     np.testing.assert_allclose(tip, [320, 240], atol=1e-9)
     np.testing.assert_allclose(tail, [320 + length * LAYOUT.arrow_length, 240], atol=1e-9)
@@ -164,9 +178,13 @@ def test_hidden_parts_are_faint_and_fading_marks_fainter() -> None:
 
 @pytest.mark.parametrize("channels", [3, 4])
 @pytest.mark.parametrize("shift", [(0, 0), (-30, 20), (1000, 0), (0, -1000)])
-def test_a_mark_over_the_border_is_the_one_on_a_larger_frame_cut(shift: tuple[int, int], channels: int) -> None:
-    layout, opacity = Layout(1280, 720), np.ones(9)
-    tip, tail = np.array([40.3, 30.6]), np.array([-20.0, 60.0])
+def test_a_mark_over_the_border_is_the_one_on_a_larger_frame_cut(
+    shift: tuple[int, int], channels: int
+) -> None:
+    layout = Layout(1280, 720)
+    opacity = np.ones(9)
+    tip = np.array([40.3, 30.6])
+    tail = np.array([-20.0, 60.0])
     small, large = (np.full((*size, channels), 200, np.uint8) for size in ((60, 80), (3060, 3080)))
     overlay.draw_marks(small, [(tip + shift, tail + shift, opacity)], layout)
     overlay.draw_marks(large, [(tip + shift + 1500, tail + shift + 1500, opacity)], layout)
@@ -186,7 +204,9 @@ class Still:
         self.data = SimpleNamespace(model=SimpleNamespace(ngeom=1), **pose)
         self.impulses: list[Impulse] = []
 
-    def touch(self, impulse: float, texel: tuple[int, int, int] = (0, 4, 4), other: str = "stone") -> Impulse:
+    def touch(
+        self, impulse: float, texel: tuple[int, int, int] = (0, 4, 4), other: str = "stone"
+    ) -> Impulse:
         point = self.data.geom_xpos[0] + self.turn @ self.atlas.positions[texel]
         return Impulse("ball", other, point, impulse, texel)
 
@@ -204,7 +224,12 @@ def test_a_mark_stands_on_the_risen_surface_in_the_world() -> None:
 
 def test_contacts_in_one_place_add_up_and_others_are_apart_the_weakest_first() -> None:
     still = Still()
-    still.impulses = [still.touch(1.0), still.touch(2.0), still.touch(0.0, (1, 4, 4)), still.touch(0.5, other="leaf")]
+    still.impulses = [
+        still.touch(1.0),
+        still.touch(2.0),
+        still.touch(0.0, (1, 4, 4)),
+        still.touch(0.5, other="leaf"),
+    ]
     still.impulses.append(still.touch(0.7, (3, 2, 2)))
     found = overlay.ContactMarks(still, 1 / 60).follow()
     assert [mark.impulse for mark in found] == pytest.approx([0.5, 0.7, 3.0])
@@ -216,16 +241,23 @@ SCENE = """<mujoco><worldbody><geom type="box" size=".5 .5 .5"/>
 
 
 @pytest.mark.parametrize("size", [(640, 480), (480, 640), (33, 17)])
-def test_points_on_the_ray_through_a_pixel_come_back_to_it_and_those_behind_to_none(size: tuple[int, int]) -> None:
+def test_points_on_the_ray_through_a_pixel_come_back_to_it_and_those_behind_to_none(
+    size: tuple[int, int],
+) -> None:
     pose = CAMERA.pose()
     up = np.tan(np.radians(pose.fovy) / 2)
     for pixel in np.random.default_rng(0).uniform(0, size, (20, 2)):
         # from the angle of view alone
-        x, y = (2 * pixel[0] / size[0] - 1) * up * size[0] / size[1], (1 - 2 * pixel[1] / size[1]) * up
+        x = (2 * pixel[0] / size[0] - 1) * up * size[0] / size[1]
+        y = (1 - 2 * pixel[1] / size[1]) * up
         points = pose.position + np.array([[0.1], [3.0], [400.0]]) * (pose.rotation @ [x, y, -1.0])
-        np.testing.assert_allclose(Projection(pose, *size).pixels(points), np.tile(pixel, (3, 1)), rtol=1e-9)
+        np.testing.assert_allclose(
+            Projection(pose, *size).pixels(points), np.tile(pixel, (3, 1)), rtol=1e-9
+        )
     behind = pose.position + np.array([[1.0], [0.0], [-1.0]]) * pose.rotation[:, 2]
-    np.testing.assert_array_equal(np.isnan(Projection(pose, *size).pixels(behind)).all(axis=1), [True, True, False])
+    np.testing.assert_array_equal(
+        np.isnan(Projection(pose, *size).pixels(behind)).all(axis=1), [True, True, False]
+    )
 
 
 @pytest.mark.parametrize(("group", "seen"), [(0, False), (2, False), (3, True)])

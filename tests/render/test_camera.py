@@ -39,26 +39,37 @@ def default_camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
         (1, lambda model: mujoco_camera("FIXED", fixedcamid=1)),
         ("side", lambda model: mujoco_camera("FIXED", fixedcamid=0)),
         (mujoco_camera(), lambda model: mujoco_camera()),
-        (mujoco_camera(orthographic=1), lambda model: mujoco_camera(orthographic=1)),  # the model's word counts there
+        # the model's word counts there
+        (mujoco_camera(orthographic=1), lambda model: mujoco_camera(orthographic=1)),
         (Camera((0.3, -0.2, 0.1), 2.5, 37.0, -28.0, 35.0), lambda model: mujoco_camera(**FREE)),
-        (mujoco_camera("TRACKING", trackbodyid=1), lambda model: mujoco_camera("TRACKING", trackbodyid=1)),
+        (
+            mujoco_camera("TRACKING", trackbodyid=1),
+            lambda model: mujoco_camera("TRACKING", trackbodyid=1),
+        ),
         (mujoco_camera("FIXED", fixedcamid=1), lambda model: mujoco_camera("FIXED", fixedcamid=1)),
     ],
     ids=["-1", "id", "name", "free", "free with a flag", "ours", "tracking", "fixed"],
 )
-def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look_and_open_as_mujocos(given, theirs):
+def test_cameras_of_all_kinds_and_what_mujocos_renderer_takes_for_one_stand_look_and_open_as_mujocos(
+    given, theirs
+):
     model = mujoco.MjModel.from_xml_string(MJCF)
     data = mujoco.MjData(model)
     data.qpos[:] = [0.5, 0.4, 2.0, 0.8, 0.0, 0.6, 0.0]
     mujoco.mj_forward(model, data)
-    scene, option, everything = mujoco.MjvScene(model, maxgeom=50), mujoco.MjvOption(), mujoco.mjtCatBit.mjCAT_ALL
+    scene = mujoco.MjvScene(model, maxgeom=50)
+    option = mujoco.MjvOption()
+    everything = mujoco.mjtCatBit.mjCAT_ALL
     mujoco.mjv_updateScene(model, data, option, None, theirs(model), everything, scene)
-    eyes, seen = [np.array(eye.pos, dtype=float) for eye in scene.camera], scene.camera[0]
+    eyes = [np.array(eye.pos, dtype=float) for eye in scene.camera]
+    seen = scene.camera[0]
     pose = render.find_viewpoint(model, data, given).pose()
     np.testing.assert_allclose(pose.position, np.mean(eyes, axis=0), atol=1e-6)
     np.testing.assert_allclose(-pose.rotation[:, 2], seen.forward, atol=1e-6)
     np.testing.assert_allclose(pose.rotation[:, 1], seen.up, atol=1e-6)
-    assert np.tan(np.radians(pose.fovy / 2)) == pytest.approx(seen.frustum_top / seen.frustum_near, rel=1e-5)
+    assert np.tan(np.radians(pose.fovy / 2)) == pytest.approx(
+        seen.frustum_top / seen.frustum_near, rel=1e-5
+    )
 
 
 @pytest.mark.parametrize(
@@ -118,8 +129,12 @@ def test_balls_within_reach_are_those_that_it_touches() -> None:
 
 
 def test_the_srgb_curve_has_known_values_and_an_inverse() -> None:
-    np.testing.assert_allclose(srgb_to_linear([0.0, 0.04045, 0.5, 1.0]), [0.0, 0.0031308, 0.21404, 1.0], atol=1e-5)
-    np.testing.assert_allclose(linear_to_srgb([0.0, 0.18, 0.5, 1.0]), [0.0, 0.46136, 0.73536, 1.0], atol=1e-5)
+    np.testing.assert_allclose(
+        srgb_to_linear([0.0, 0.04045, 0.5, 1.0]), [0.0, 0.0031308, 0.21404, 1.0], atol=1e-5
+    )
+    np.testing.assert_allclose(
+        linear_to_srgb([0.0, 0.18, 0.5, 1.0]), [0.0, 0.46136, 0.73536, 1.0], atol=1e-5
+    )
     values = np.linspace(0.0, 1.0, 4001)
     np.testing.assert_allclose(linear_to_srgb(srgb_to_linear(values)), values, atol=1e-7)
     np.testing.assert_allclose(srgb_to_linear(linear_to_srgb(values)), values, atol=1e-7)
@@ -131,7 +146,9 @@ SIZE = (200, 120)
 def pose(seed: int, lens: tuple[float, float] = (0.0, 0.0), **others: object) -> Pose:
     rotation, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     rotation[:, 0] *= np.sign(np.linalg.det(rotation))
-    return dataclasses.replace(Pose(np.array([0.3, -0.2, 0.5]), rotation, 2.0, 50.0, lens, 2.0), **others)
+    return dataclasses.replace(
+        Pose(np.array([0.3, -0.2, 0.5]), rotation, 2.0, 50.0, lens, 2.0), **others
+    )
 
 
 def pixels(points: np.ndarray, camera: Pose) -> np.ndarray:
@@ -148,8 +165,11 @@ OFF_CENTRE = {"centre": (0.4, -0.2), "half_width": 0.6}
 @pytest.mark.parametrize("lens", [(0.0, 0.0), (0.2, -0.1)])
 @pytest.mark.parametrize("others", [{}, OFF_CENTRE, PARALLEL, PARALLEL | OFF_CENTRE])
 def test_box_holds_the_ball(lens: tuple[float, float], others: dict[str, object]) -> None:
-    camera, random = pose(1, lens, **others), np.random.default_rng(2)
-    local = np.stack([random.uniform(-2, 2, 40), random.uniform(-2, 2, 40), random.uniform(-6, -1, 40)], axis=1)
+    camera = pose(1, lens, **others)
+    random = np.random.default_rng(2)
+    local = np.stack(
+        [random.uniform(-2, 2, 40), random.uniform(-2, 2, 40), random.uniform(-6, -1, 40)], axis=1
+    )
     radii = random.uniform(0.05, 0.6, 40)
     centres = camera.eye + local @ camera.rotation.T
     directions = random.normal(size=(500, 3))
@@ -161,8 +181,11 @@ def test_box_holds_the_ball(lens: tuple[float, float], others: dict[str, object]
 
 
 @pytest.mark.parametrize("others", [{}, OFF_CENTRE, PARALLEL, PARALLEL | OFF_CENTRE])
-def test_points_in_focus_stay_in_the_frame_wherever_on_the_lens_the_eye_is_and_rays_end_at_points(others) -> None:
-    middle, aside = pose(1, **others), pose(1, (0.2, -0.1), **others)
+def test_points_in_focus_stay_in_the_frame_wherever_on_the_lens_the_eye_is_and_rays_end_at_points(
+    others,
+) -> None:
+    middle = pose(1, **others)
+    aside = pose(1, (0.2, -0.1), **others)
     points = np.random.default_rng(6).normal(size=(20, 3))
     depth = (points - middle.position) @ middle.rotation[:, 2] + 2.0
     in_focus = points - depth[:, None] * middle.rotation[:, 2]
@@ -185,21 +208,32 @@ def test_the_near_plane_moves_on_to_the_first_ball_ahead_and_no_farther(others) 
     assert (near, far) == (pytest.approx(3.5, rel=0.02), 100.0)
     assert near < 3.5
     about = np.array([[*camera.position, 1.0]])
-    assert camera.planes_about(np.concatenate([balls, about])) == camera.planes_about(balls[:0]) == (0.001, 100.0)
+    assert (
+        camera.planes_about(np.concatenate([balls, about]))
+        == camera.planes_about(balls[:0])
+        == (0.001, 100.0)
+    )
     assert dataclasses.replace(camera, clip=None).planes_about(balls) == (0.02 * 2.0, 200.0 * 2.0)
 
 
-def test_where_only_perspective_can_be_shown_it_has_the_same_height_in_focus_with_one_warning() -> None:
-    plain, parallel = pose(1), pose(1, **PARALLEL)
+def test_where_only_perspective_can_be_shown_it_has_the_same_height_in_focus_with_one_warning() -> (
+    None
+):
+    plain = pose(1)
+    parallel = pose(1, **PARALLEL)
     assert plain.in_perspective(1.5, "the page") is plain
     with pytest.warns(RippleWarning, match="the page shows the camera in perspective") as told:
         shown = parallel.in_perspective(1.5, "the page")
     assert len(told) == 1
     assert shown.is_plain(1.5)
-    assert shown.pixel_height(parallel.distance, 100) == pytest.approx(parallel.pixel_height(5.0, 100))
+    assert shown.pixel_height(parallel.distance, 100) == pytest.approx(
+        parallel.pixel_height(5.0, 100)
+    )
 
 
-def test_the_whole_frame_for_a_ball_about_the_eye_or_an_infinite_one_and_nothing_for_one_behind() -> None:
+def test_the_whole_frame_for_a_ball_about_the_eye_or_an_infinite_one_and_nothing_for_one_behind() -> (
+    None
+):
     camera = pose(4)
     behind = camera.eye + 2.0 * camera.rotation[:, 2]
     centres = np.stack([camera.eye, camera.eye + camera.rotation[:, 0], behind])
@@ -216,14 +250,16 @@ def projected(matrix, points):
 @pytest.mark.parametrize("fovy", [5.0, 45.0, 120.0])
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 16 / 9])
 def test_corners_of_the_frustum_are_corners_of_clip_space(fovy, aspect):
-    near, far = 0.3, 70.0
+    near = 0.3
+    far = 70.0
     half = np.tan(np.radians(fovy) / 2) * np.array([aspect, 1.0])
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     depth = np.where(corners[:, 2] < 0, near, far)
     points = np.column_stack([corners[:, :2] * half * depth[:, None], -depth])
     shown, w = projected(render.perspective(fovy, aspect, near, far), points)
     np.testing.assert_allclose(shown, corners, atol=1e-12)
-    np.testing.assert_allclose(w, depth)  # what attributes are divided by is the distance along the axis
+    # what attributes are divided by is the distance along the axis
+    np.testing.assert_allclose(w, depth)
 
 
 @pytest.mark.parametrize(("half_width", "depth"), [(1.0, 2.0), (0.02, 7.0), (30.0, 0.5)])
@@ -246,24 +282,36 @@ SENSED = """<mujoco><statistic center="0 0 0" extent="3"/><worldbody><geom size=
 
 def in_opengl(camera: mujoco.MjvGLCamera, aspect: float, points: np.ndarray) -> np.ndarray:
     """Points in clip space as glFrustum and glOrtho define it, by OpenGL's manual."""
-    bottom, top, near, far = (float(getattr(camera, f"frustum_{name}")) for name in ("bottom", "top", "near", "far"))
+    bottom, top, near, far = (
+        float(getattr(camera, f"frustum_{name}")) for name in ("bottom", "top", "near", "far")
+    )
     half = float(camera.frustum_width) or aspect * (top - bottom) / 2
-    left, right = camera.frustum_center - half, camera.frustum_center + half
-    forward, up = np.array(camera.forward, float), np.array(camera.up, float)
+    left = camera.frustum_center - half
+    right = camera.frustum_center + half
+    forward = np.array(camera.forward, float)
+    up = np.array(camera.up, float)
     x, y, z = np.stack([np.cross(forward, up), up, -forward]) @ (points - camera.pos).T
     if camera.orthographic:
         clip = [(2 * x - right - left) / (right - left), (2 * y - top - bottom) / (top - bottom)]
         return np.stack([*clip, -(2 * z + far + near) / (far - near)], axis=1)
-    clip = [(2 * near * x + (right + left) * z) / (right - left), (2 * near * y + (top + bottom) * z) / (top - bottom)]
-    return np.stack([*clip, (-(far + near) * z - 2 * far * near) / (far - near)], axis=1) / -z[:, None]
+    clip = [
+        (2 * near * x + (right + left) * z) / (right - left),
+        (2 * near * y + (top + bottom) * z) / (top - bottom),
+    ]
+    return (
+        np.stack([*clip, (-(far + near) * z - 2 * far * near) / (far - near)], axis=1) / -z[:, None]
+    )
 
 
 @pytest.mark.parametrize("name", ["plain", "orthographic", "off centre", "two focal lengths"])
-def test_cameras_of_all_projections_show_points_and_clip_where_opengl_does_with_mujocos_frustum(name):
+def test_cameras_of_all_projections_show_points_and_clip_where_opengl_does_with_mujocos_frustum(
+    name,
+):
     model = mujoco.MjModel.from_xml_string(SENSED)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    scene, aspect = mujoco.MjvScene(), SIZE[0] / SIZE[1]
+    scene = mujoco.MjvScene()
+    aspect = SIZE[0] / SIZE[1]
     mujoco.mjv_updateCamera(model, data, render.mujoco_camera(model, name), scene)
     points = np.random.default_rng(3).normal(size=(30, 3))
     theirs = in_opengl(mujoco.mjv_averageCamera(*scene.camera), aspect, points)
@@ -293,7 +341,9 @@ def test_points_of_a_depth_image_lie_where_their_pixels_are(name):
 
 
 def test_scenes_whose_camera_sees_nothing_are_refused():
-    with pytest.raises(SceneError, match="the scene's camera sees nothing: its frustum is 0 m to 0 m high"):
+    with pytest.raises(
+        SceneError, match="the scene's camera sees nothing: its frustum is 0 m to 0 m high"
+    ):
         render.pose_of_scene(mujoco.MjvScene().camera, 1.0)
 
 
@@ -325,6 +375,13 @@ def test_a_camera_on_a_moving_link_is_about_its_robot_and_one_that_turns_to_a_bo
         <camera name="aimed" mode="targetbody" target="base"/><camera name="still"/></worldbody></mujoco>""")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    away = {name: render.find_viewpoint(model, data, name).distance for name in ("wrist", "aimed", "still")}
+    away = {
+        name: render.find_viewpoint(model, data, name).distance
+        for name in ("wrist", "aimed", "still")
+    }
     middle = 9 * np.sqrt(3)
-    assert away == {"wrist": pytest.approx(1.5), "aimed": pytest.approx(3.0), "still": pytest.approx(middle)}
+    assert away == {
+        "wrist": pytest.approx(1.5),
+        "aimed": pytest.approx(3.0),
+        "still": pytest.approx(middle),
+    }

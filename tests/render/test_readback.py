@@ -18,25 +18,35 @@ from ripple_sim.solver.gl import GLContext
 from ripple_sim.video import Film, VideoOptions, render_video as rendering
 from ripple_sim.video.render_video import render_video
 
-TILES = '<texture name="tiles" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".1 .2 .3" width="8" height="8"/>'
+TILES = (
+    '<texture name="tiles" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".1 .2 .3" '
+    'width="8" height="8"/>'
+)
 MIRROR = '<material name="floor" texture="tiles" texrepeat="5 5" reflectance=".4"/>'
 REFLECTING = FLOOR.replace("rgba=", 'material="floor" rgba=')
 GLASS = '<geom type="box" size=".4 .05 .4" pos=".2 -.6 .5" rgba=".2 .4 .8 .4"/>'
 WATER = '<geom name="water" type="sphere" size=".5" pos="-.6 0 .6"/>'
-REST = BALL + GLASS + WATER  # lit by the studio's single light, whose shaders are the quickest to compile
+# lit by the studio's single light, whose shaders are the quickest to compile
+REST = BALL + GLASS + WATER
 
 # every pass, every format of a frame, and the background both at once and from a coarse one
 SCENES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "smooth background": (FLOOR + REST, "", {}),
     "mirror": (REFLECTING + REST, TILES + MIRROR, {}),
-    "transparent, linear, one sample": (FLOOR + REST, "", {"alpha": True, "linear": True, "samples": 0}),
+    "transparent, linear, one sample": (
+        FLOOR + REST,
+        "",
+        {"alpha": True, "linear": True, "samples": 0},
+    ),
 }
 
 
 def renderer_of(gl, name: str) -> tuple[Renderer, mujoco.MjData]:
     body, asset, options = SCENES[name]
     model, data = posed(f"<mujoco><asset>{asset}</asset><worldbody>{body}</worldbody></mujoco>")
-    return Renderer(gl, model, {model.geom("water").id: ball_surface("water")}, size=SIZE, **options), data
+    return Renderer(
+        gl, model, {model.geom("water").id: ball_surface("water")}, size=SIZE, **options
+    ), data
 
 
 def drawn(renderer: Renderer, data: mujoco.MjData) -> list[np.ndarray]:
@@ -53,7 +63,9 @@ def assert_same(found: list[np.ndarray], expected: list[np.ndarray]) -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_any_frame_is_as_the_first_whatever_was_in_memory_or_in_the_last(gl, name: str, monkeypatch):
+def test_any_frame_is_as_the_first_whatever_was_in_memory_or_in_the_last(
+    gl, name: str, monkeypatch
+):
     renderer, data = renderer_of(gl, name)
     with renderer:
         expected = drawn(renderer, data)
@@ -70,7 +82,8 @@ def test_any_frame_is_as_the_first_whatever_was_in_memory_or_in_the_last(gl, nam
         def create_filled(resources: Resources, method: str, depth: float = depth) -> Any:
             def created(*arguments: Any, **options: Any) -> Any:
                 made = create(resources, method)(*arguments, **options)
-                if isinstance(made, moderngl.Buffer) or len(arguments) < 3:  # of others the third is what they hold
+                # of others the third is what they hold
+                if isinstance(made, moderngl.Buffer) or len(arguments) < 3:
                     with gl as ctx:
                         fill(ctx, made, depth, "reserve" in options)
                 return made
@@ -97,7 +110,9 @@ def fill(ctx: moderngl.Context, made: Any, depth: float, empty: bool) -> None:
         target.release()
 
 
-LONE_BALL = '<mujoco><worldbody><geom type="sphere" size="1" rgba="1 .5 .2 .6"/></worldbody></mujoco>'
+LONE_BALL = (
+    '<mujoco><worldbody><geom type="sphere" size="1" rgba="1 .5 .2 .6"/></worldbody></mujoco>'
+)
 
 
 @pytest.fixture
@@ -112,7 +127,9 @@ def views(count: int) -> list[Camera]:
 
 @pytest.mark.parametrize("alpha", [False, True])
 @pytest.mark.parametrize("driver", ["software", "gpu"])
-def test_frames_come_back_in_order_however_many_are_on_their_way(gl, request, driver: str, alpha: bool) -> None:
+def test_frames_come_back_in_order_however_many_are_on_their_way(
+    gl, request, driver: str, alpha: bool
+) -> None:
     model, data = posed(LONE_BALL)
     renderer = Renderer(gl, model, {}, size=(70, 50), alpha=alpha)
     expected = [renderer.render(data, {}, camera) for camera in views(5)]
@@ -146,18 +163,32 @@ def test_colours_are_divided_by_opacity(gl) -> None:
 
 
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
-@pytest.mark.parametrize("options", [{"overlay": ["height", "contacts"], "compare": "paper"}, {"supersample": 2}])
+@pytest.mark.parametrize(
+    "options", [{"overlay": ["height", "contacts"], "compare": "paper"}, {"supersample": 2}]
+)
 @pytest.mark.usefixtures("gl", "gpu")
-def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(tmp_path, monkeypatch, backend, options):
-    scene = egg_scene(tmp_path, '<geom type="plane" size="2 2 1" pos="0 0 -0.25"/>', duration=0.4, density=20.0)
+def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(
+    tmp_path, monkeypatch, backend, options
+):
+    scene = egg_scene(
+        tmp_path, '<geom type="plane" size="2 2 1" pos="0 0 -0.25"/>', duration=0.4, density=20.0
+    )
     done: list[int] = []
     render_all = Film.render_all
     for order in ("ahead", "in turn"):
         if order == "in turn":
-            monkeypatch.setattr(Film, "render_all", lambda self, shots, ahead: render_all(self, shots))
-            monkeypatch.setattr(rendering, "prefetched", lambda shots, waiting: contextlib.nullcontext(shots))
+            monkeypatch.setattr(
+                Film, "render_all", lambda self, shots, ahead: render_all(self, shots)
+            )
+            monkeypatch.setattr(
+                rendering, "prefetched", lambda shots, waiting: contextlib.nullcontext(shots)
+            )
         asked = VideoOptions(size=(64, 48), fps=30, backend=backend, **options)
-        render_video(scene, tmp_path / order, asked, progress=lambda frames, total: done.append(frames))
+        render_video(
+            scene, tmp_path / order, asked, progress=lambda frames, total: done.append(frames)
+        )
     assert done == 2 * list(range(1, 13))
-    for one, other in zip(*(sorted((tmp_path / order).iterdir()) for order in ("ahead", "in turn")), strict=True):
+    for one, other in zip(
+        *(sorted((tmp_path / order).iterdir()) for order in ("ahead", "in turn")), strict=True
+    ):
         assert one.read_bytes() == other.read_bytes()

@@ -19,7 +19,9 @@ LONE_BALL = '<mujoco><worldbody><geom name="target" type="sphere" size="1"/></wo
 def make(gl, xml=LONE_BALL, surface=None, size=SIZE, **options):
     model, data = posed(xml)
     target = model.geom("target").id
-    renderer = Renderer(gl, model, {target: surface or ball_surface("clay", 1.0, N)}, size=size, **options)
+    renderer = Renderer(
+        gl, model, {target: surface or ball_surface("clay", 1.0, N)}, size=size, **options
+    )
     return renderer, data, target
 
 
@@ -55,16 +57,26 @@ def test_constant_height_shades_as_flat(gl):
 
 
 def test_a_slope_that_faces_the_light_is_brighter(gl):
-    """The key light stands on the left. A height that grows to the right turns the surface towards it."""
+    """The key light stands on the left.
+
+    A height that grows to the right turns the surface towards it.
+    """
     renderer, data, target = make(gl)
     slope = np.array([0.5, 0.0, 0.0])
-    tilted = height_map_of(lambda d: np.zeros(d.shape[:3]), lambda d: slope - (d @ slope)[..., None] * d)
+    tilted = height_map_of(
+        lambda d: np.zeros(d.shape[:3]), lambda d: slope - (d @ slope)[..., None] * d
+    )
     middle = np.s_[80:100, 110:130]
-    flat, lit = (renderer.render(data, {target: r}, FRONT)[middle].mean() for r in (constant_height_map(0.0), tilted))
+    flat, lit = (
+        renderer.render(data, {target: r}, FRONT)[middle].mean()
+        for r in (constant_height_map(0.0), tilted)
+    )
     assert lit > flat + 20
 
 
-@pytest.mark.parametrize("direction", [(1, 1, 0), (1, 0, 1), (0, 1, -1), (1, 1, 1), (-1, 1, -1), (-1, -1, 1)], ids=str)
+@pytest.mark.parametrize(
+    "direction", [(1, 1, 0), (1, 0, 1), (0, 1, -1), (1, 1, 1), (-1, 1, -1), (-1, -1, 1)], ids=str
+)
 def test_ripples_run_on_across_cube_edges_and_corners(gl, direction):
     """Close up, neighbouring pixels differ no more at an edge or a corner of the cube than in a face's middle."""
     slope = np.array([0.11, -0.07, 0.05])
@@ -73,7 +85,8 @@ def test_ripples_run_on_across_cube_edges_and_corners(gl, direction):
 
     def steps(d) -> float:
         d = np.array(d, dtype=float) / np.linalg.norm(d)
-        azimuth, elevation = np.degrees(np.arctan2(-d[1], -d[0])), np.degrees(np.arcsin(-d[2]))
+        azimuth = np.degrees(np.arctan2(-d[1], -d[0]))
+        elevation = np.degrees(np.arcsin(-d[2]))
         camera = Camera(tuple(d), 0.8, azimuth, elevation, 30.0)
         frame = renderer.render(data, {target: height_map}, camera).astype(int)
         # second differences: a smooth gradient has none, a kink or a crack has
@@ -81,7 +94,9 @@ def test_ripples_run_on_across_cube_edges_and_corners(gl, direction):
         return max(bends)
 
     middle = max(
-        steps(np.array(direction) * m) for m in ((1, 0, 0), (0, 1, 0), (0, 0, 1)) if np.any(direction * np.array(m))
+        steps(np.array(direction) * m)
+        for m in ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+        if np.any(direction * np.array(m))
     )
     assert steps(direction) <= middle + 2
 
@@ -89,18 +104,26 @@ def test_ripples_run_on_across_cube_edges_and_corners(gl, direction):
 def test_height_maps_of_different_resolutions_stay_apart(gl):
     """Targets that swell each by its own height cover what balls of these radii cover."""
     balls = "<geom size='.5' pos='-.8 0 0'/><geom size='.5' pos='.8 0 0'/>"
-    (model, data), ball = posed(f"<mujoco><worldbody>{balls}</worldbody></mujoco>"), shapes.ball(16)
-    resolutions, heights = (8, 20), (0.25, 0.1)
+    (model, data) = posed(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
+    ball = shapes.ball(16)
+    resolutions = (8, 20)
+    heights = (0.25, 0.1)
 
     def frame(radii: list[float], swell: tuple[float, float]) -> np.ndarray:
-        surfaces, height_maps = {}, {}
+        surfaces = {}
+        height_maps = {}
         for geom, n in enumerate(resolutions):
-            surfaces[geom] = Surface(radii[geom] * ball.shell, ball.faces, cube_charts(ball.shell, n), "clay")
-            height_maps[geom] = np.full((6, n + 2, n + 2, 4), [0, 0, 0, swell[geom]], dtype=np.float32)
+            surfaces[geom] = Surface(
+                radii[geom] * ball.shell, ball.faces, cube_charts(ball.shell, n), "clay"
+            )
+            height_maps[geom] = np.full(
+                (6, n + 2, n + 2, 4), [0, 0, 0, swell[geom]], dtype=np.float32
+            )
         with Renderer(gl, model, surfaces, size=(203, 151)) as renderer:
             return renderer.render(data, height_maps, Camera((0, 0, 0), 4.0, 90.0, 0.0)).astype(int)
 
-    swollen, larger = frame([0.5, 0.5], heights), frame([0.5 + h for h in heights], (0.0, 0.0))
+    swollen = frame([0.5, 0.5], heights)
+    larger = frame([0.5 + h for h in heights], (0.0, 0.0))
     assert (np.abs(swollen - larger).max(axis=2) > 24).mean() < 2e-3
     assert (np.abs(swollen - frame([0.5, 0.5], (0.0, 0.0))).max(axis=2) > 24).mean() > 0.02
 
@@ -148,10 +171,18 @@ def similarity(a, b):
     def blur(x):
         return gaussian_filter(x, (1.5, 1.5, 0.0), truncate=3.5)
 
-    mean_a, mean_b = blur(a), blur(b)
-    var_a, var_b, both = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2, blur(a * b) - mean_a * mean_b
-    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-    ssim = (2 * mean_a * mean_b + c1) * (2 * both + c2) / ((mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2))
+    mean_a = blur(a)
+    mean_b = blur(b)
+    var_a = blur(a * a) - mean_a**2
+    var_b = blur(b * b) - mean_b**2
+    both = blur(a * b) - mean_a * mean_b
+    c1 = (0.01 * 255) ** 2
+    c2 = (0.03 * 255) ** 2
+    ssim = (
+        (2 * mean_a * mean_b + c1)
+        * (2 * both + c2)
+        / ((mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2))
+    )
     return float(ssim.mean())
 
 

@@ -11,7 +11,15 @@ from drawn import BALL, FLOOR
 from shader_functions import evaluated
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render import Camera, Pose, Renderer, fitted, srgb_cube, srgb_texture, srgb_to_linear
+from ripple_sim.render import (
+    Camera,
+    Pose,
+    Renderer,
+    fitted,
+    srgb_cube,
+    srgb_texture,
+    srgb_to_linear,
+)
 from ripple_sim.render.targets import FramePass, GBuffer, Readback
 
 
@@ -25,7 +33,11 @@ def test_renderers_leave_nothing_behind(gl):
         gc.collect()
         with gl:
             left = [each for each in made if type(each.mglo).__name__ != "InvalidObject"]
-            programs = {each.glo for each in left if isinstance(each, moderngl.Program | moderngl.ComputeShader)}
+            programs = {
+                each.glo
+                for each in left
+                if isinstance(each, moderngl.Program | moderngl.ComputeShader)
+            }
             return len(left) - len(programs), programs
 
     gc.collect()  # the programs of earlier tests' renderers must not come in between
@@ -78,7 +90,9 @@ SHINY = """<mujoco><asset><material name="shiny" reflectance=".4" rgba=".8 .8 .8
     ("owner", "name", "moments"),
     [(FramePass, "run", (2, 5, 8)), (GBuffer, "clear", (2,)), (Readback, "fetch", (1,))],
 )
-def test_after_an_interrupted_frame_the_next_is_right_also_in_other_renderers(gl, monkeypatch, owner, name, moments):
+def test_after_an_interrupted_frame_the_next_is_right_also_in_other_renderers(
+    gl, monkeypatch, owner, name, moments
+):
     """As after Ctrl-C in a notebook: masks, scissors or the reflection's winding are set for a while."""
     model = mujoco.MjModel.from_xml_string(SHINY)
     data = mujoco.MjData(model)
@@ -86,7 +100,10 @@ def test_after_an_interrupted_frame_the_next_is_right_also_in_other_renderers(gl
     camera = Camera((0.0, 0.0, 0.5), 4.0, 90.0, -10.0, 40.0)
     elsewhere = Camera((0.0, 0.0, 0.5), 3.0, 60.0, -10.0, 40.0)
     function = getattr(owner, name)
-    with Renderer(gl, model, {}, size=(32, 24)) as renderer, Renderer(gl, model, {}, size=(16, 12)) as other:
+    with (
+        Renderer(gl, model, {}, size=(32, 24)) as renderer,
+        Renderer(gl, model, {}, size=(16, 12)) as other,
+    ):
         expected, of_other = (each.render(data, {}, camera) for each in (renderer, other))
         assert np.ptp(expected)
         for moment in moments:
@@ -102,7 +119,9 @@ def test_after_an_interrupted_frame_the_next_is_right_also_in_other_renderers(gl
             with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
                 patch.setattr(owner, name, interrupt)
                 renderer.render(data, {}, elsewhere)
-            np.testing.assert_array_equal(renderer.render(data, {}, camera), expected, err_msg=f"{name}, call {moment}")
+            np.testing.assert_array_equal(
+                renderer.render(data, {}, camera), expected, err_msg=f"{name}, call {moment}"
+            )
             np.testing.assert_array_equal(other.render(data, {}, camera), of_other)
 
 
@@ -115,19 +134,24 @@ ASPECT = 1.6
 def test_rays_lead_where_the_matrix_projects(frame, pose):
     """A point along the ray of a place in the frame is drawn at that place."""
     frame.set_camera(pose, ASPECT)
-    values = {name: frame.values[name].astype(np.float64) for name in ("eye", "ray", "ray_right", "ray_up")}
+    values = {
+        name: frame.values[name].astype(np.float64)
+        for name in ("eye", "ray", "ray_right", "ray_up")
+    }
     matrix = frame.values["view_projection"].astype(np.float64).T
     for x, y in np.random.default_rng(0).uniform(-1, 1, (20, 2)):
         way = values["ray"][:3] + x * values["ray_right"][:3] + y * values["ray_up"][:3]
         for distance in (0.2, 3.0, 40.0):
             clip = matrix @ [*(values["eye"][:3] + distance * way), 1.0]
             np.testing.assert_allclose(clip[:2] / clip[3], [x, y], atol=2e-5)
-            assert clip[3] == pytest.approx(distance, rel=1e-5)  # a metre along the axis for each of the ray
+            # a metre along the axis for each of the ray
+            assert clip[3] == pytest.approx(distance, rel=1e-5)
 
 
 def test_clip_planes_lie_before_and_behind_the_focus(frame):
     frame.set_camera(POSE, ASPECT)
-    near, far = frame.values["ray"][3], frame.values["ray_right"][3]
+    near = frame.values["ray"][3]
+    far = frame.values["ray_right"][3]
     assert 0 < near < POSE.distance < far
     matrix = frame.values["view_projection"].T.astype(np.float64)
     for plane, depth in ((near, -1), (far, 1)):
@@ -146,11 +170,17 @@ def test_shaders_read_what_was_set(gl, frame, pose):
     points = np.column_stack([np.random.default_rng(2).normal(size=(50, 3)), np.ones(50)])
     file = "glsl/frame.glsl"
     expected = points @ frame.values["view_projection"].astype(np.float64)
-    np.testing.assert_allclose(evaluated(gl, file, "view_projection * x", points), expected, atol=1e-3)
+    np.testing.assert_allclose(
+        evaluated(gl, file, "view_projection * x", points), expected, atol=1e-3
+    )
     one = np.zeros((1, 1))
-    np.testing.assert_allclose(evaluated(gl, file, "zenith", one), [[0.1, 0.2, 0.3, 0.0]], rtol=1e-6)
+    np.testing.assert_allclose(
+        evaluated(gl, file, "zenith", one), [[0.1, 0.2, 0.3, 0.0]], rtol=1e-6
+    )
     np.testing.assert_allclose(evaluated(gl, file, "counts", one), [[3, 4, 5, 6]])
-    np.testing.assert_allclose(evaluated(gl, file, "vec4(focus.xyz, eye.w)", one)[0, 3], pose.distance, rtol=1e-6)
+    np.testing.assert_allclose(
+        evaluated(gl, file, "vec4(focus.xyz, eye.w)", one)[0, 3], pose.distance, rtol=1e-6
+    )
 
 
 SAMPLE = """#version 430
@@ -167,11 +197,14 @@ void main() {
 
 def sampled(resources, texture, places, kind="2D") -> np.ndarray:
     """Colours [k, 3] at texture coordinates or directions, with the mipmap level as their fourth number."""
-    source = SAMPLE.replace("SAMPLER", f"sampler{kind}").replace("COORDINATES", "xy" if kind == "2D" else "xyz")
+    source = SAMPLE.replace("SAMPLER", f"sampler{kind}").replace(
+        "COORDINATES", "xy" if kind == "2D" else "xyz"
+    )
     places = np.asarray(places, dtype=np.float32)
     with resources.gl as ctx:
         shader = ctx.compute_shader(source)
-        given, got = ctx.buffer(places.tobytes()), ctx.buffer(reserve=places.nbytes)
+        given = ctx.buffer(places.tobytes())
+        got = ctx.buffer(reserve=places.nbytes)
         given.bind_to_storage_buffer(0)
         got.bind_to_storage_buffer(1)
         texture.use(0)
@@ -213,16 +246,22 @@ def test_faces_of_a_cube_lie_below_one_another(resources):
     faces = np.random.default_rng(2).integers(0, 256, (6, 3), dtype=np.uint8)
     pixels = np.repeat(faces, 16, axis=0).reshape(24, 4, 3)
     ways = np.concatenate([np.stack([axis, -axis]) for axis in np.eye(3)])
-    got = sampled(resources, srgb_cube(resources, pixels), np.column_stack([ways, np.zeros(6)]), "Cube")
+    got = sampled(
+        resources, srgb_cube(resources, pixels), np.column_stack([ways, np.zeros(6)]), "Cube"
+    )
     np.testing.assert_allclose(got, srgb_to_linear(faces / 255), atol=0.01)
 
 
-def test_a_texture_larger_than_the_drivers_largest_is_scaled_down_and_that_is_said(resources) -> None:
+def test_a_texture_larger_than_the_drivers_largest_is_scaled_down_and_that_is_said(
+    resources,
+) -> None:
     with resources.gl as ctx:
         largest = ctx.info["GL_MAX_TEXTURE_SIZE"]
     pixels = np.zeros((2, largest + 100, 3), np.uint8)
     pixels[:, : largest // 2] = 200
-    with pytest.warns(RippleWarning, match=rf"a texture of {largest + 100}x2 pixels is larger than the {largest}"):
+    with pytest.warns(
+        RippleWarning, match=rf"a texture of {largest + 100}x2 pixels is larger than the {largest}"
+    ):
         texture = srgb_texture(resources, pixels)
     assert texture.size == (largest, 2)
     pixels = np.zeros((40, 80, 3), np.uint8)

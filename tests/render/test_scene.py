@@ -83,15 +83,22 @@ def test_bounds_of_shadow_casters_stay_the_same_as_a_target_turns(gl, scene, mod
 
 @pytest.mark.parametrize("shape", [(6, 8, 8, 4), (6, 10, 10), (5, 10, 10, 4)])
 def test_a_height_map_of_another_shape_is_refused(gl, scene, data, shape):
-    with pytest.raises(RippleError, match=r"geom 0 has shape .* valid is \[6, 10, 10, 4\]"), gl as ctx:
+    with (
+        pytest.raises(RippleError, match=r"geom 0 has shape .* valid is \[6, 10, 10, 4\]"),
+        gl as ctx,
+    ):
         scene.update(ctx, data, {0: np.zeros(shape, np.float32)}, POSE)
 
 
 def test_no_light_in_the_mjcf_means_the_studio_and_both_can_be_asked_for(gl):
     dark = "<headlight active='0'/>"
     sun = SUN.format(1.0, "true")
-    np.testing.assert_array_equal(frame_of(gl, FLOOR + BALL), frame_of(gl, FLOOR + BALL, lighting="studio"))
-    np.testing.assert_array_equal(frame_of(gl, FLOOR + BALL + sun), frame_of(gl, FLOOR + BALL + sun, lighting="model"))
+    np.testing.assert_array_equal(
+        frame_of(gl, FLOOR + BALL), frame_of(gl, FLOOR + BALL, lighting="studio")
+    )
+    np.testing.assert_array_equal(
+        frame_of(gl, FLOOR + BALL + sun), frame_of(gl, FLOOR + BALL + sun, lighting="model")
+    )
     assert frame_of(gl, FLOOR + BALL, visual=dark, lighting="model").mean() < 40
     with pytest.raises(RippleError, match=r"'dusk'.*'auto', 'model', 'studio'"):
         frame_of(gl, FLOOR, lighting="dusk")
@@ -100,7 +107,9 @@ def test_no_light_in_the_mjcf_means_the_studio_and_both_can_be_asked_for(gl):
 def test_a_scene_lit_by_a_spot_alone_is_dark_all_round(gl):
     spot = SPOT.format(0.0, 0.0).replace('exponent="1"', 'exponent="20"')
     dark = frame_of(gl, FLOOR + BALL + spot, visual='<headlight active="0"/>', camera=FRONT)
-    light = frame_of(gl, FLOOR + BALL + SUN.format(0.0, "true"), visual='<headlight active="0"/>', camera=FRONT)
+    light = frame_of(
+        gl, FLOOR + BALL + SUN.format(0.0, "true"), visual='<headlight active="0"/>', camera=FRONT
+    )
     assert dark[:10].mean() < 20 < 80 < light[:10].mean()
     assert dark.max() > 100
 

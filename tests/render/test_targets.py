@@ -14,20 +14,26 @@ def directions() -> np.ndarray:
     """Random unit vectors, and those on the folds of the octahedron."""
     free = np.random.default_rng(3).normal(size=(4000, 3))
     fold = free[:500] * [1, 1, 0]
-    octants = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], float)
+    octants = np.array(
+        [[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z],
+        float,
+    )
     all_of_them = np.concatenate([free, fold, fold[:, [0, 2, 1]], fold[:, [2, 0, 1]], octants])
     return all_of_them / np.linalg.norm(all_of_them, axis=1, keepdims=True)
 
 
 def test_octahedral_codes_fill_the_unit_square_and_directions_come_back(gl):
     """From sixteen bits, too: a step of the code turns a normal by less than a hundredth of a degree."""
-    given, encode = directions(), "octahedral_encode(x.xyz)"
+    given = directions()
+    encode = "octahedral_encode(x.xyz)"
     code = evaluated(gl, FILE, f"vec4({encode}, 0.0, 0.0)", given)[:, :2]
     assert 0.0 <= code.min() <= code.max() <= 1.0
     filled, *_ = np.histogram2d(*code.T, bins=8, range=[[0, 1], [0, 1]])
     assert filled.min() > 0
     codes = encode, f"round({BITS}.0 * {encode}) / {BITS}.0"
-    exact, rounded = (evaluated(gl, FILE, f"vec4(octahedral_decode({each}), 0.0)", given)[:, :3] for each in codes)
+    exact, rounded = (
+        evaluated(gl, FILE, f"vec4(octahedral_decode({each}), 0.0)", given)[:, :3] for each in codes
+    )
     np.testing.assert_allclose(exact, given, atol=2e-6)
     assert np.degrees(2 * np.arcsin(np.linalg.norm(rounded - given, axis=1).max() / 2)) < 0.01
 
@@ -55,4 +61,6 @@ def test_every_number_of_an_object_comes_back_with_its_side(gl, inner):
 def test_there_are_as_many_samples_as_the_driver_has_and_at_least_one(gl, resources, wanted, got):
     with gl as ctx:
         most = ctx.max_samples
-    assert GBuffer(resources, (4, 3), wanted).samples == (max(most, 1) if got is None else min(got, max(most, 1)))
+    assert GBuffer(resources, (4, 3), wanted).samples == (
+        max(most, 1) if got is None else min(got, max(most, 1))
+    )

@@ -43,20 +43,27 @@ def drawn() -> Iterator[NDArray]:
     heights = 0.02 * np.sin(20 * atlas.positions[..., 0] + 9 * atlas.positions[..., 2])
     height_map = HeightMap(atlas.texels)(heights.astype(np.float32))
     camera = Camera((0.0, 0.0, 0.4), 2.4, 60.0, -20.0)
-    for look, sky, reflectance in (("rubber", "2d", 0.0), ("water", "2d", 0.0), ("model", "skybox", 0.4)):
+    for look, sky, reflectance in (
+        ("rubber", "2d", 0.0),
+        ("water", "2d", 0.0),
+        ("model", "skybox", 0.4),
+    ):
         model, data = posed(MODEL.format(sky=sky, reflectance=reflectance))
         surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), look)
         with Renderer(shared_context(), model, {1: surface}, size=(200, 160)) as renderer:
             yield renderer.render(data, {1: height_map}, camera)
             image = renderer.surfaces(data, {1: height_map}, camera)
-            yield np.concatenate([image.depth[..., None], image.normal, image.height[..., None]], axis=2)
+            yield np.concatenate(
+                [image.depth[..., None], image.normal, image.height[..., None]], axis=2
+            )
 
 
 class Without:
     """A context without some functions: who calls one ends the process."""
 
     def __init__(self, context: Any, names: set[str]) -> None:
-        self._context, self._names = context, names
+        self._context = context
+        self._names = names
 
     def load_opengl_function(self, name: str) -> int:
         return 0 if name in self._names else self._context.load(name)
@@ -73,12 +80,16 @@ class Without:
 
 def draw_in_old_opengl(path: str) -> None:
     """Write what is drawn without functions later than OpenGL 4.1, in a process whose shaders are no later either."""
-    later = [importlib.import_module(f"OpenGL.raw.GL.VERSION.GL_4_{minor}") for minor in range(2, 7)]
+    later = [
+        importlib.import_module(f"OpenGL.raw.GL.VERSION.GL_4_{minor}") for minor in range(2, 7)
+    ]
     names = {name for each in later for name in dir(each) if name.startswith("gl")}
     create = moderngl.create_context
 
     def older(require: int, standalone: bool, backend: str, **settings: object) -> moderngl.Context:
-        context = glcontext.get_backend_by_name(backend)(mode="standalone", glversion=require, **settings)
+        context = glcontext.get_backend_by_name(backend)(
+            mode="standalone", glversion=require, **settings
+        )
         return create(require=require, standalone=standalone, context=Without(context, names))
 
     moderngl.create_context = older
@@ -95,8 +106,18 @@ def mesa(gl: GLContext) -> None:
 
 
 def test_frames_of_an_older_opengl_are_the_same(mesa: None, tmp_path: Path) -> None:
-    code = "import sys; sys.path[:0] = sys.argv[2:]; import test_versions as here; here.draw_in_old_opengl(sys.argv[1])"
-    done = ended("-c", code, tmp_path / "frames.npz", Path(__file__).parent, *sys.path, env={**os.environ, **OLDER})
+    code = (
+        "import sys; sys.path[:0] = sys.argv[2:]; import test_versions as here; "
+        "here.draw_in_old_opengl(sys.argv[1])"
+    )
+    done = ended(
+        "-c",
+        code,
+        tmp_path / "frames.npz",
+        Path(__file__).parent,
+        *sys.path,
+        env={**os.environ, **OLDER},
+    )
     assert done.returncode == 0, done.stderr
     with np.load(tmp_path / "frames.npz") as frames:
         assert not frames["computes"]
@@ -116,4 +137,6 @@ def test_waves_in_compute_shaders_are_refused_and_auto_takes_the_cpu(mesa: None)
     """
     done = ended("-c", code, env={**os.environ, **OLDER})
     assert done.stdout == "cpu\n"
-    assert done.stderr.splitlines()[-1].endswith("has OpenGL 4.1; backend 'gl' needs 4.3: take backend 'cpu'")
+    assert done.stderr.splitlines()[-1].endswith(
+        "has OpenGL 4.1; backend 'gl' needs 4.3: take backend 'cpu'"
+    )

@@ -13,7 +13,15 @@ from PIL import Image
 from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.scene import UP_AXES, Scene, check_scene, drop_scene, mesh_image, paint_target, usual_up
+from ripple_sim.scene import (
+    UP_AXES,
+    Scene,
+    check_scene,
+    drop_scene,
+    mesh_image,
+    paint_target,
+    usual_up,
+)
 from ripple_sim.scene.events import Events, Script
 from ripple_sim.scenes.shapes import peanut
 from ripple_sim.simulation import Simulation
@@ -45,7 +53,9 @@ Z_TO_Y = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     ("name", "turn", "up"),
     [("a.stl", None, None), ("a.obj", Z_TO_Y, None), ("a.obj", None, "z"), ("a.stl", Z_TO_Y, "y")],
 )
-def test_the_tip_of_a_cone_is_a_metre_above_the_floor(tmp_path, name: str, turn: list | None, up: str | None) -> None:
+def test_the_tip_of_a_cone_is_a_metre_above_the_floor(
+    tmp_path, name: str, turn: list | None, up: str | None
+) -> None:
     scene = drop_scene(cone(tmp_path, name, turn), bodies=0, up=up)
     V = vertices(scene)
     np.testing.assert_allclose(V.min(axis=0), [-1 / 3, -1 / 3, 0], atol=1e-4)
@@ -101,7 +111,9 @@ def test_a_sheet_of_one_triangle_or_of_two_lies_down_above_the_floor(tmp_path, m
     corners = vertices(scene)[target_mesh(scene.model, scene.model.geom("target").id).F]
     assert len(corners) == 1 + bool(more)
     np.testing.assert_allclose(corners[..., 2], 0.25, atol=1e-6)
-    np.testing.assert_allclose(np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1), 1, atol=1e-6)
+    np.testing.assert_allclose(
+        np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1), 1, atol=1e-6
+    )
 
 
 def test_bodies_drop_on_the_edge_of_an_upright_sheet_that_is_not_seen_from_above(tmp_path) -> None:
@@ -112,7 +124,8 @@ def test_bodies_drop_on_the_edge_of_an_upright_sheet_that_is_not_seen_from_above
     np.testing.assert_allclose(np.abs(places[:, :2]), [[0.5, 0]] * 3, atol=1e-6)
 
 
-RED, BLUE = (230, 20, 20), (20, 20, 230)
+RED = (230, 20, 20)
+BLUE = (20, 20, 230)
 
 
 def half_and_half(path: Path) -> Path:
@@ -135,7 +148,9 @@ def textured_obj(path: Path, head: str = "", before_faces: str = "") -> Path:
 
 def test_the_picture_is_named_by_the_material_library(tmp_path):
     half_and_half(tmp_path / "coat of paint.png")
-    materials = "newmtl other\nmap_Kd slot_scratch.png\nnewmtl skin\nKd 1 1 1\nmap_Kd coat of paint.png\n"
+    materials = (
+        "newmtl other\nmap_Kd slot_scratch.png\nnewmtl skin\nKd 1 1 1\nmap_Kd coat of paint.png\n"
+    )
     (tmp_path / "p.mtl").write_text(materials)
     picture = mesh_image(textured_obj(tmp_path / "p.obj", "mtllib p.mtl", "usemtl skin"))
     assert (tuple(picture[0, 0]), tuple(picture[-1, 0])) == (RED, BLUE)
@@ -152,7 +167,9 @@ def test_two_images_are_not_mixed_up(tmp_path):
 
 def test_the_image_of_a_glb_is_inside_it(tmp_path):
     V, F = peanut()
-    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.open(half_and_half(tmp_path / "x.png")))
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=Image.open(half_and_half(tmp_path / "x.png"))
+    )
     visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(V), 2)), material=material)
     trimesh.Trimesh(V, F, visual=visual, process=False).export(tmp_path / "p.glb")
     assert tuple(mesh_image(tmp_path / "p.glb")[0, 0]) == RED
@@ -169,7 +186,9 @@ def test_a_dropped_on_mesh_wears_its_image_or_the_colours_of_its_vertices(opengl
     else:
         mesh = textured_obj(tmp_path / "p.obj")
         half_and_half(tmp_path / ("p_texture.png" if how == "named" else "paint.png"))
-        scene = drop_scene(mesh, bodies=0, up="y", texture=None if how == "named" else tmp_path / "paint.png")
+        scene = drop_scene(
+            mesh, bodies=0, up="y", texture=None if how == "named" else tmp_path / "paint.png"
+        )
     model = scene.model
     assert model.mat_texid[model.geom("target").matid[0], mujoco.mjtTextureRole.mjTEXROLE_RGB] == 0
     simulation = Simulation(scene, fps=10, resolution=16, backend="cpu")
@@ -186,18 +205,25 @@ PIXELS = np.random.default_rng(0).integers(0, 256, (3, 5, 3), dtype=np.uint8)
 
 def textured_cube(folder) -> tuple[mujoco.MjSpec, Mesh]:
     """A cube whose texture coordinates are its x and z, and a model with it as its target."""
-    V, F = trimesh.creation.box(extents=(1, 1, 1)).vertices + 0.5, trimesh.creation.box().faces
+    V = trimesh.creation.box(extents=(1, 1, 1)).vertices + 0.5
+    F = trimesh.creation.box().faces
     lines = [f"v {x} {y} {z}" for x, y, z in V] + [f"vt {x} {z}" for x, _, z in V]
     lines += ["f " + " ".join(f"{i + 1}/{i + 1}" for i in face) for face in F]
     (folder / "cube.obj").write_text("\n".join(lines))
-    mesh, spec = load_mesh(folder / "cube.obj"), mujoco.MjSpec()
+    mesh = load_mesh(folder / "cube.obj")
+    spec = mujoco.MjSpec()
     spec.add_mesh(name="target", uservert=mesh.V.ravel(), userface=mesh.F.ravel())
     spec.worldbody.add_geom(name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="target")
     return spec, mesh
 
 
-def test_the_image_that_is_asked_for_reaches_the_model_bit_for_bit_and_the_right_way_up(tmp_path) -> None:
-    """MuJoCo counts v from the upper edge of the image. Another image beside the mesh is not taken."""
+def test_the_image_that_is_asked_for_reaches_the_model_bit_for_bit_and_the_right_way_up(
+    tmp_path,
+) -> None:
+    """MuJoCo counts v from the upper edge of the image.
+
+    Another image beside the mesh is not taken.
+    """
     spec, mesh = textured_cube(tmp_path)
     Image.fromarray(PIXELS).save(tmp_path / "image.png")
     Image.fromarray(255 - PIXELS).save(tmp_path / "cube_texture.png")
@@ -206,12 +232,16 @@ def test_the_image_that_is_asked_for_reaches_the_model_bit_for_bit_and_the_right
     assert (model.tex_height[0], model.tex_width[0], model.tex_nchannel[0]) == PIXELS.shape
     np.testing.assert_array_equal(model.tex_data.reshape(PIXELS.shape), PIXELS)
     material = model.geom("target").matid[0]
-    assert model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB] == model.texture("target").id
+    assert (
+        model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB] == model.texture("target").id
+    )
     rotation = np.zeros(9)
     mujoco.mju_quat2Mat(rotation, model.mesh_quat[0])
     corners = model.mesh_texcoord[model.mesh_facetexcoord]
     places = (model.mesh_vert @ rotation.reshape(3, 3).T + model.mesh_pos[0])[model.mesh_face]
-    np.testing.assert_allclose(corners, np.stack([places[..., 0], 1 - places[..., 2]], axis=-1), atol=1e-6)
+    np.testing.assert_allclose(
+        corners, np.stack([places[..., 0], 1 - places[..., 2]], axis=-1), atol=1e-6
+    )
 
 
 def test_without_an_image_or_without_coordinates_the_model_stays_plain(tmp_path) -> None:
@@ -222,13 +252,23 @@ def test_without_an_image_or_without_coordinates_the_model_stays_plain(tmp_path)
     Image.fromarray(PIXELS).save(tmp_path / "cube_texture.png")
     paint_target(spec, bare, tmp_path / "cube.obj", None)
     assert spec.compile().ntex == 0
-    with pytest.raises(SceneError, match=r"cannot be shown on '.*cube.obj', which has no texture coordinates: choose"):
+    with pytest.raises(
+        SceneError,
+        match=r"cannot be shown on '.*cube.obj', which has no texture coordinates: choose",
+    ):
         paint_target(spec, bare, tmp_path / "cube.obj", tmp_path / "cube_texture.png")
 
 
 @pytest.mark.parametrize(
     ("name", "up"),
-    [("a.stl", "z"), ("A.STL", "z"), ("a.stl.obj", "y"), ("a.glb", "y"), ("stl", "y"), ("b.stl/a.ply", "y")],
+    [
+        ("a.stl", "z"),
+        ("A.STL", "z"),
+        ("a.stl.obj", "y"),
+        ("a.glb", "y"),
+        ("stl", "y"),
+        ("b.stl/a.ply", "y"),
+    ],
 )
 def test_printers_files_stand_on_z_and_others_on_y(name: str, up: str) -> None:
     assert usual_up(name) == usual_up(Path("there") / name) == up
@@ -268,22 +308,31 @@ def stranger(request, tmp_path_factory) -> Scene:
 
 
 def test_at_least_four_of_six_bodies_hit_a_mesh_of_any_shape_within_three_seconds(stranger) -> None:
-    model, data, hits = stranger.model, mujoco.MjData(stranger.model), set()
-    script, target = Script(model, stranger.events, ["target"]), model.geom("target").id
+    model = stranger.model
+    data = mujoco.MjData(stranger.model)
+    hits = set()
+    script = Script(model, stranger.events, ["target"])
+    target = model.geom("target").id
     while data.time < 3:
         script.apply(data, {})
         mujoco.mj_step(model, data)
         # the target is a geom, or its flex
-        pairs = [np.where(np.array(contact.flex) >= 0, target, contact.geom) for contact in data.contact]
+        pairs = [
+            np.where(np.array(contact.flex) >= 0, target, contact.geom) for contact in data.contact
+        ]
         hits |= {int(pair[pair != target][0]) for pair in pairs if target in pair}
     assert len(hits - {model.geom("floor").id}) >= 4
 
 
-def test_a_mesh_of_any_shape_fills_the_picture_and_every_hit_sends_rings_that_are_seen(opengl, stranger) -> None:
+def test_a_mesh_of_any_shape_fills_the_picture_and_every_hit_sends_rings_that_are_seen(
+    opengl, stranger
+) -> None:
     """Seen is what changes 30 pixels of 640 x 360 by 10 of 255 about a hit, 0.2 s after it."""
     first, second, *_ = stranger.events.drop
     events = Events(drop=[first, msgspec.structs.replace(second, time=0.35)])
-    simulation = Simulation(dataclasses.replace(stranger, events=events), fps=10, resolution=24, backend="cpu")
+    simulation = Simulation(
+        dataclasses.replace(stranger, events=events), fps=10, resolution=24, backend="cpu"
+    )
     source = FrameSource(simulation, width=320, height=180)
     hits: dict[str, tuple[int, np.ndarray]] = {}
     for snapshot in snapshots(simulation, 12):
@@ -292,7 +341,9 @@ def test_a_mesh_of_any_shape_fills_the_picture_and_every_hit_sends_rings_that_ar
         due = [point for number, point in hits.values() if snapshot.number == number + 2]
         if snapshot.number and not due:
             continue
-        flat = dataclasses.replace(snapshot, height_maps={"target": 0 * snapshot.height_maps["target"]})
+        flat = dataclasses.replace(
+            snapshot, height_maps={"target": 0 * snapshot.height_maps["target"]}
+        )
         sighting = source.sighting(flat)
         target = sighting.image.target >= 0
         if not snapshot.number:

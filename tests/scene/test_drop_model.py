@@ -26,7 +26,9 @@ def compiled(bodies: int, seed: int) -> tuple[mujoco.MjModel, list[DropEntry]]:
 def test_bodies_drop_from_above_the_open_surface_one_after_the_other() -> None:
     _, drops = compiled(30, 0)
     places = np.array([drop.position for drop in drops])
-    assert (np.hypot(*places[:, :2].T) <= 0.5).all(), "over the round plate, not beside it in its bounding box"
+    assert (np.hypot(*places[:, :2].T) <= 0.5).all(), (
+        "over the round plate, not beside it in its bounding box"
+    )
     assert ((places[:, 2] >= 1.8 - 1e-5) & (places[:, 2] <= 2.2 + 1e-5)).all()
     assert np.ptp(places[:, :2], axis=0).min() > 0.5, "all over the plate"
     times = np.array([drop.time for drop in drops])
@@ -37,9 +39,13 @@ def test_bodies_drop_from_above_the_open_surface_one_after_the_other() -> None:
 def test_no_body_drops_into_the_one_before_on_a_narrow_post() -> None:
     post = trimesh.creation.box((0.06, 0.06, 1.0))
     for seed in range(5):
-        _, drops = drop_model(post.vertices + 0.5, post.faces, ["sphere"] * 12, np.random.default_rng(seed))
+        _, drops = drop_model(
+            post.vertices + 0.5, post.faces, ["sphere"] * 12, np.random.default_rng(seed)
+        )
         times, heights = np.array([(drop.time, drop.position[2]) for drop in drops]).T
-        assert (np.diff(heights) + 9.81 / 2 * np.diff(times) ** 2 > 0.19).all(), "it has fallen by more than its size"
+        assert (np.diff(heights) + 9.81 / 2 * np.diff(times) ** 2 > 0.19).all(), (
+            "it has fallen by more than its size"
+        )
         assert heights.max() <= 2.2
 
 
@@ -63,7 +69,9 @@ def test_a_scene_with_few_bodies_or_none_compiles(bodies: int) -> None:
 
 
 def test_the_seed_decides_everything() -> None:
-    (one, drops), (same, same_drops), (other, _) = compiled(6, 1), compiled(6, 1), compiled(6, 2)
+    (one, drops) = compiled(6, 1)
+    (same, same_drops) = compiled(6, 1)
+    (other, _) = compiled(6, 2)
     assert drops == same_drops
     for name in ("geom_size", "geom_rgba", "body_quat"):
         np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
@@ -97,11 +105,19 @@ def varied(**entry: object) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
 
 
 BEFORE = mujoco.MjModel.from_xml_string(MJCF)
-ALL = {"position": 0.2, "orientation": True, "size": (0.5, 2.0), "mass": (0.5, 2.0), "shapes": list(BODY_SHAPES)}
+ALL = {
+    "position": 0.2,
+    "orientation": True,
+    "size": (0.5, 2.0),
+    "mass": (0.5, 2.0),
+    "shapes": list(BODY_SHAPES),
+}
 
 
 def test_the_same_seed_gives_the_same_model_and_another_seed_another() -> None:
-    (one, shifts), (same, _), (other, _) = varied(**ALL, seed=1), varied(**ALL, seed=1), varied(**ALL, seed=2)
+    (one, shifts) = varied(**ALL, seed=1)
+    (same, _) = varied(**ALL, seed=1)
+    (other, _) = varied(**ALL, seed=2)
     for name in ("body_pos", "body_quat", "body_mass", "geom_size", "geom_type"):
         np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
         if name != "geom_type":
@@ -127,11 +143,15 @@ def test_bodies_move_by_their_shifts_which_stay_within_the_range(seed: int) -> N
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_mass_goes_with_its_factor_and_with_the_size_only_where_a_density_is_given(seed: int) -> None:
+def test_mass_goes_with_its_factor_and_with_the_size_only_where_a_density_is_given(
+    seed: int,
+) -> None:
     model, _ = varied(size=(0.5, 2.0), mass=(3.0, 3.0), seed=seed)
     factor = model.geom("stone").size[0] / 0.1
     assert 0.5 <= factor <= 2.0
-    assert model.body("stone").mass[0] == pytest.approx(3 * factor**3 * BEFORE.body("stone").mass[0])
+    assert model.body("stone").mass[0] == pytest.approx(
+        3 * factor**3 * BEFORE.body("stone").mass[0]
+    )
     assert model.body("brick").mass[0] == pytest.approx(3 * 2)
     factors = model.geom("brick").size / BEFORE.geom("brick").size
     np.testing.assert_allclose(factors, factors[0])
@@ -139,13 +159,17 @@ def test_mass_goes_with_its_factor_and_with_the_size_only_where_a_density_is_giv
 
 def test_factors_are_spread_evenly_over_their_logarithms() -> None:
     """Half and double are equally likely: the mean logarithm is 0."""
-    factors = [varied(size=(0.5, 2.0), seed=seed)[0].geom("stone").size[0] / 0.1 for seed in range(200)]
+    factors = [
+        varied(size=(0.5, 2.0), seed=seed)[0].geom("stone").size[0] / 0.1 for seed in range(200)
+    ]
     assert np.mean(np.log2(factors)) == pytest.approx(0, abs=0.12)
     assert np.std(np.log2(factors)) == pytest.approx(2 / np.sqrt(12), rel=0.1)
 
 
 def test_orientations_cover_all_directions_even_where_the_mjcf_gives_angles() -> None:
-    quaternions = np.array([varied(orientation=True, seed=seed)[0].body("stone").quat for seed in range(200)])
+    quaternions = np.array(
+        [varied(orientation=True, seed=seed)[0].body("stone").quat for seed in range(200)]
+    )
     np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1)
     np.testing.assert_allclose(quaternions.T @ quaternions / 200, np.eye(4) / 4, atol=0.08)
 
@@ -160,15 +184,24 @@ def test_only_the_bodies_that_are_named_vary() -> None:
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        ({"bodies": ["post"]}, r"\[random\] names the body 'post'; the model's free bodies are stone, brick"),
-        ({"size": (0.0, 1.0)}, r"size is \[0.0, 1.0\]; valid are two positive factors, the lower one first"),
+        (
+            {"bodies": ["post"]},
+            r"\[random\] names the body 'post'; the model's free bodies are stone, brick",
+        ),
+        (
+            {"size": (0.0, 1.0)},
+            r"size is \[0.0, 1.0\]; valid are two positive factors, the lower one first",
+        ),
         ({"mass": (2.0, 1.0)}, r"mass is \[2.0, 1.0\]"),
         ({"mass": (1.0, np.inf)}, r"mass is \[1.0, inf\]"),
         ({"size": (np.nan, 1.0)}, r"size is \[nan, 1.0\]"),
         ({"position": -0.1}, "position is -0.1 m; valid is 0 or greater"),
         ({"position": np.nan}, "position is nan"),
         ({"seed": -1}, "seed is -1; valid is 0 or greater"),
-        ({"shapes": ["box", "cone"]}, "shape 'cone'; valid are sphere, box, capsule, ellipsoid, cylinder"),
+        (
+            {"shapes": ["box", "cone"]},
+            "shape 'cone'; valid are sphere, box, capsule, ellipsoid, cylinder",
+        ),
     ],
 )
 def test_invalid_entries_are_named_with_what_is_valid(entry: dict, message: str) -> None:

@@ -48,7 +48,9 @@ def written(folder: Path, toml: str = TOML) -> Path:
     return folder / "pond.toml"
 
 
-def test_the_model_lies_relative_to_the_scene_file_wherever_it_is_read_from(tmp_path, monkeypatch) -> None:
+def test_the_model_lies_relative_to_the_scene_file_wherever_it_is_read_from(
+    tmp_path, monkeypatch
+) -> None:
     path = written(tmp_path)
     monkeypatch.chdir(tmp_path / "models")
     for name in (path, str(path), "../pond.toml"):
@@ -90,24 +92,35 @@ def test_an_edit_comes_after_chance_and_before_the_model_is_compiled(tmp_path) -
     assert not np.allclose(seen, [0, 0, 1])
 
 
-@pytest.mark.parametrize(("name", "advice"), [("egg.OBJ", "`ripple-sim drop`"), ("scene.xml", "as its `model`")])
-def test_a_mesh_or_a_model_in_place_of_a_scene_is_told_as_such(tmp_path, name: str, advice: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "advice"), [("egg.OBJ", "`ripple-sim drop`"), ("scene.xml", "as its `model`")]
+)
+def test_a_mesh_or_a_model_in_place_of_a_scene_is_told_as_such(
+    tmp_path, name: str, advice: str
+) -> None:
     (tmp_path / name).write_text("v 0 0 0")
     with pytest.raises(SceneError, match=f"{name}.*, not a scene; .*{advice}"):
         load_scene(tmp_path / name)
 
 
 def test_missing_scenes_and_models_are_told_apart_from_folders(tmp_path) -> None:
-    with pytest.raises(SceneError, match=r"there is no scene .*; shipped scenes are .*duck.*path of a TOML file"):
+    with pytest.raises(
+        SceneError, match=r"there is no scene .*; shipped scenes are .*duck.*path of a TOML file"
+    ):
         load_scene(tmp_path)
-    with pytest.raises(SceneError, match=r"none.xml' does not exist; `model` names it, relative to the scene file"):
+    with pytest.raises(
+        SceneError, match=r"none.xml' does not exist; `model` names it, relative to the scene file"
+    ):
         load_model(tmp_path / "none.xml")
     with pytest.raises(SceneError, match="is not a file"):
         load_model(tmp_path)
 
 
 def test_mujocos_reason_is_told_in_one_line_and_other_errors_pass() -> None:
-    with pytest.raises(SceneError, match=r"^MuJoCo refuses 'a\.xml': first second$") as error, refusal_of("'a.xml'"):
+    with (
+        pytest.raises(SceneError, match=r"^MuJoCo refuses 'a\.xml': first second$") as error,
+        refusal_of("'a.xml'"),
+    ):
         raise ValueError("first\n   second\n")
     assert isinstance(error.value.__cause__, ValueError)
     with pytest.raises(KeyError), refusal_of("'a.xml'"):
@@ -119,8 +132,12 @@ LINK = """<mujoco><worldbody><body name="link">
 <body name="ball" pos="0 0 0.36"><freejoint/><geom name="ball" size="0.05"/></body></worldbody></mujoco>"""
 
 
-def test_a_scene_names_geoms_by_their_place_and_those_that_collide_for_a_target(tmp_path: Path) -> None:
-    target = 'model = "scene.xml"\n[[ripple]]\ngeom = "link/0"\nresolution = 8\ncontacts = ["core"]\n'
+def test_a_scene_names_geoms_by_their_place_and_those_that_collide_for_a_target(
+    tmp_path: Path,
+) -> None:
+    target = (
+        'model = "scene.xml"\n[[ripple]]\ngeom = "link/0"\nresolution = 8\ncontacts = ["core"]\n'
+    )
     poke = '[[poke]]\ngeom = "link/0"\ntime = 0.0\npoint = [0, 0, 0.3]\nimpulse = 0.1\n'
     simulation = Simulation(load_scene(write_scene(tmp_path, LINK, target + poke)), backend="cpu")
     assert list(simulation.ripples) == ["shell"]
@@ -130,8 +147,12 @@ def test_a_scene_names_geoms_by_their_place_and_those_that_collide_for_a_target(
 
 
 def test_collision_geoms_that_cannot_be_are_named_when_the_scene_is_read(tmp_path: Path) -> None:
-    path = write_scene(tmp_path, LINK, 'model = "scene.xml"\n[[ripple]]\ngeom = "shell"\ncontacts = ["ball"]\n')
-    with pytest.raises(RippleError, match="names geom 'ball' on body 'ball', which moves by itself"):
+    path = write_scene(
+        tmp_path, LINK, 'model = "scene.xml"\n[[ripple]]\ngeom = "shell"\ncontacts = ["ball"]\n'
+    )
+    with pytest.raises(
+        RippleError, match="names geom 'ball' on body 'ball', which moves by itself"
+    ):
         load_scene(path)
 
 
@@ -146,7 +167,9 @@ def _no_hang() -> Iterator[None]:
 
 
 def ball_scene(folder: Path, model: str) -> Path:
-    return write_scene(folder, f"<mujoco>{model}</mujoco>", 'model = "scene.xml"\n[[ripple]]\ngeom = "ball"\n')
+    return write_scene(
+        folder, f"<mujoco>{model}</mujoco>", 'model = "scene.xml"\n[[ripple]]\ngeom = "ball"\n'
+    )
 
 
 @pytest.mark.parametrize(
@@ -169,7 +192,9 @@ def test_a_fifo_anywhere_in_a_model_is_refused(tmp_path: Path, model: str) -> No
 
 
 def test_includes_that_go_round_and_broken_ones_are_left_to_mujoco(tmp_path: Path) -> None:
-    (tmp_path / "a.xml").write_text('<mujoco><include file="a.xml"/><include file="b.xml"/></mujoco>')
+    (tmp_path / "a.xml").write_text(
+        '<mujoco><include file="a.xml"/><include file="b.xml"/></mujoco>'
+    )
     (tmp_path / "b.xml").write_text("<mujoco")
     check_files(tmp_path / "a.xml")
     with pytest.raises(SceneError, match="MuJoCo refuses"):
@@ -180,11 +205,18 @@ def test_includes_that_go_round_and_broken_ones_are_left_to_mujoco(tmp_path: Pat
 @pytest.mark.parametrize(
     ("count", "seconds"), [("20 20 20", 5.7), ("24 24 24", 25), ("125 120", 32), ("30 30 30", 133)]
 )
-def test_a_flex_that_mujoco_takes_long_to_set_up_is_told_of(tmp_path: Path, count: str, seconds: float) -> None:
-    (tmp_path / "flex.xml").write_text(f'<mujoco><worldbody><flexcomp name="f" count="{count}"/></worldbody></mujoco>')
+def test_a_flex_that_mujoco_takes_long_to_set_up_is_told_of(
+    tmp_path: Path, count: str, seconds: float
+) -> None:
+    (tmp_path / "flex.xml").write_text(
+        f'<mujoco><worldbody><flexcomp name="f" count="{count}"/></worldbody></mujoco>'
+    )
     with warnings.catch_warnings(record=True) as told:
         check_files(tmp_path / "flex.xml")
-    said = [int(re.search(r"MuJoCo takes about (\d+) s to set up", str(each.message))[1]) for each in told]
+    said = [
+        int(re.search(r"MuJoCo takes about (\d+) s to set up", str(each.message))[1])
+        for each in told
+    ]
     assert said == ([pytest.approx(seconds, rel=0.2)] if seconds > 10 else [])
     assert all(each.category is RippleWarning for each in told)
 
@@ -196,17 +228,33 @@ KEY = '<keyframe><key/><key name="start" {}/></keyframe>'
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        *((f'<option timestep="{step}"/>', STEP) for step in ("0", "-0.002", "inf", "nan", "1e300")),
+        *(
+            (f'<option timestep="{step}"/>', STEP)
+            for step in ("0", "-0.002", "inf", "nan", "1e300")
+        ),
         (KEY.format('qpos="1 2"'), r"keyframe 'start' .* has 2 positions \(qpos\); valid are 7"),
-        (KEY.format('qvel="0 0 nan 0 0 0"'), "keyframe 'start' of .* holds NaN or inf; valid are finite numbers"),
-        ('<keyframe><key/><key qpos="0 0 nan 1 0 0 0"/></keyframe>', "keyframe 1 of .* valid are finite numbers"),
-        ('<size memory="100000000G"/>', r'allocate memory; name in the MJCF how much .* <size memory="4G"/>'),
+        (
+            KEY.format('qvel="0 0 nan 0 0 0"'),
+            "keyframe 'start' of .* holds NaN or inf; valid are finite numbers",
+        ),
+        (
+            '<keyframe><key/><key qpos="0 0 nan 1 0 0 0"/></keyframe>',
+            "keyframe 1 of .* valid are finite numbers",
+        ),
+        (
+            '<size memory="100000000G"/>',
+            r'allocate memory; name in the MJCF how much .* <size memory="4G"/>',
+        ),
     ],
 )
-def test_a_model_with_a_senseless_setting_is_refused(tmp_path: Path, setting: str, message: str) -> None:
+def test_a_model_with_a_senseless_setting_is_refused(
+    tmp_path: Path, setting: str, message: str
+) -> None:
     with pytest.raises(SceneError, match=message):
         load_scene(ball_scene(tmp_path, setting + BALL))
-    assert load_scene(ball_scene(tmp_path, BALL + KEY.format('qpos="0 0 2 1 0 0 0"'))).model.nkey == 2
+    assert (
+        load_scene(ball_scene(tmp_path, BALL + KEY.format('qpos="0 0 2 1 0 0 0"'))).model.nkey == 2
+    )
 
 
 def test_a_scene_file_that_is_a_fifo_is_named_as_what_it_is(tmp_path: Path) -> None:
@@ -215,7 +263,9 @@ def test_a_scene_file_that_is_a_fifo_is_named_as_what_it_is(tmp_path: Path) -> N
         load_scene(tmp_path / "scene.toml")
 
 
-def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(tmp_path, monkeypatch, capfd) -> None:
+def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(
+    tmp_path, monkeypatch, capfd
+) -> None:
     monkeypatch.chdir(tmp_path)
     path = ball_scene(tmp_path, f'<option magnetic="nan 0 0"/>{BALL}')
     with pytest.warns(RippleWarning, match="MuJoCo: XML contains a 'NaN'"):
@@ -230,6 +280,8 @@ def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(tmp_path, mon
 @pytest.mark.parametrize("reference", ["&#0;", "&#x00;"])
 def test_names_with_a_nul_are_refused_rather_than_cut(tmp_path: Path, reference: str) -> None:
     model = tmp_path / "model.xml"
-    model.write_text(f'<mujoco><worldbody>\n<geom name="e{reference}gg" size="1"/></worldbody></mujoco>')
+    model.write_text(
+        f'<mujoco><worldbody>\n<geom name="e{reference}gg" size="1"/></worldbody></mujoco>'
+    )
     with pytest.raises(SceneError, match=r"model\.xml.* line 2, .*NUL"):
         check_files(model)

@@ -8,12 +8,21 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError, Simulation
-from ripple_sim.scene import LAWS, MaterialChange, MaterialEntry, PresetEntry, load_scene, parse_scene
+from ripple_sim.scene import (
+    LAWS,
+    MaterialChange,
+    MaterialEntry,
+    PresetEntry,
+    load_scene,
+    parse_scene,
+)
 from ripple_sim.solver import texture_map
 
 
 def material_of(table: dict) -> Material:
-    scene = parse_scene({"model": "m.xml", "ripple": [{"geom": "g", "material": table}]}, "scene.toml")
+    scene = parse_scene(
+        {"model": "m.xml", "ripple": [{"geom": "g", "material": table}]}, "scene.toml"
+    )
     return scene.ripple[0].material.material()
 
 
@@ -24,12 +33,24 @@ def material_of(table: dict) -> Material:
         ({"speed": 2, "density": 5.0}, Material(speed=2.0, density=5.0)),
         ({"tightening": 1.0}, Material(tightening=1.0)),
         ({"preset": "jelly"}, Material.jelly()),
-        ({"preset": {"name": "suited", "size": 2.0, "hit": [0.5, 4.0]}}, Material.suited(2.0, (0.5, 4.0))),
-        ({"preset": {"name": "layer", "modulus": 2e3, "thickness": 0.02}}, Material.layer(2e3, thickness=0.02)),
+        (
+            {"preset": {"name": "suited", "size": 2.0, "hit": [0.5, 4.0]}},
+            Material.suited(2.0, (0.5, 4.0)),
+        ),
+        (
+            {"preset": {"name": "layer", "modulus": 2e3, "thickness": 0.02}},
+            Material.layer(2e3, thickness=0.02),
+        ),
         ({"preset": "gelatine-7"}, Material.preset("gelatine-7")),
-        ({"preset": {"name": "drum-skin", "tension": 4500.0}}, Material.preset("drum-skin", tension=4500.0)),
+        (
+            {"preset": {"name": "drum-skin", "tension": 4500.0}},
+            Material.preset("drum-skin", tension=4500.0),
+        ),
         ({"preset": "plate"}, Material.plate()),
-        ({"preset": {"name": "membrane", "tension": 8.0, "density": 2.0}}, Material.membrane(8.0, 2.0)),
+        (
+            {"preset": {"name": "membrane", "tension": 8.0, "density": 2.0}},
+            Material.membrane(8.0, 2.0),
+        ),
         ({"preset": {"name": "dent", "yield_height": 0.01}}, Material.dent(0.01)),
         # beside the preset stand the wave equation's own coefficients, in their own units
         (
@@ -49,7 +70,14 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"preset": "foam"}, "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, suited, g"),
+        (
+            {"preset": "foam"},
+            (
+                "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, water, "
+                "suited, "
+                "g"
+            ),
+        ),
         (
             {"preset": {"name": "membrane", "modulus": 1.0}},
             "no parameter 'modulus'; valid are tension, density, damping",
@@ -62,7 +90,10 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
         ),
         ({"preset": {"modulus": 1.0}}, "missing required field `name`"),
         ({"preset": 3}, "Expected `str | object | null`"),
-        ({"preset": {"name": "jelly", "modulus": float("inf")}}, "ripple.material.preset.modulus is inf"),
+        (
+            {"preset": {"name": "jelly", "modulus": float("inf")}},
+            "ripple.material.preset.modulus is inf",
+        ),
     ],
 )
 def test_wrong_presets_are_refused_with_what_is_valid(table: dict, message: str) -> None:
@@ -72,15 +103,22 @@ def test_wrong_presets_are_refused_with_what_is_valid(table: dict, message: str)
 
 @pytest.mark.parametrize("name", ["tightening", "deep"])
 def test_what_is_the_same_everywhere_takes_no_map(name: str) -> None:
-    with pytest.raises(RippleError, match=rf"Expected `float \| null`, got `str` - at `ripple\[0\].material.{name}`"):
+    with pytest.raises(
+        RippleError,
+        match=rf"Expected `float \| null`, got `str` - at `ripple\[0\].material.{name}`",
+    ):
         material_of({name: "map.png"})
 
 
 def test_entries_have_the_coefficients_and_parameters_of_the_solver() -> None:
-    coefficients = {each.name for each in dataclasses.fields(Material) if isinstance(each.default, float)}
+    coefficients = {
+        each.name for each in dataclasses.fields(Material) if isinstance(each.default, float)
+    }
     assert set(MaterialChange.__struct_fields__) == coefficients
     assert set(MaterialEntry.__struct_fields__) == coefficients | {"preset"}
-    parameters = {name for law in LAWS for name in inspect.signature(getattr(Material, law)).parameters}
+    parameters = {
+        name for law in LAWS for name in inspect.signature(getattr(Material, law)).parameters
+    }
     assert set(PresetEntry.__struct_fields__) == parameters | {"name"}
 
 
@@ -103,7 +141,9 @@ def test_eyes_of_the_face_stay_still() -> None:
 
 def test_coefficients_are_numbers_paths_or_tables() -> None:
     table = {"speed": "s.png", "damping": {"map": "d.png", "high": 5.0}, "bending": 0.2}
-    content = parse_scene({"model": "a.xml", "ripple": [{"geom": "a", "material": table}]}, "scene.toml")
+    content = parse_scene(
+        {"model": "a.xml", "ripple": [{"geom": "a", "material": table}]}, "scene.toml"
+    )
     maps = content.ripple[0].material.located(Path("folder")).maps()
     assert set(maps) == {"speed", "damping"}
     assert maps["damping"].map == str(Path("folder") / "d.png")

@@ -25,12 +25,15 @@ def model() -> mujoco.MjModel:
 
 def script(model: mujoco.MjModel, *entries: DropEntry | ThrowEntry | PlaceEntry) -> Script:
     kinds = {"drop": DropEntry, "throw": ThrowEntry, "place": PlaceEntry}
-    events = {name: [each for each in entries if type(each) is kind] for name, kind in kinds.items()}
+    events = {
+        name: [each for each in entries if type(each) is kind] for name, kind in kinds.items()
+    }
     return Script(model, Events(**events), ())
 
 
 def run(model: mujoco.MjModel, entries: list, seconds: float) -> mujoco.MjData:
-    data, motions = mujoco.MjData(model), script(model, *entries)
+    data = mujoco.MjData(model)
+    motions = script(model, *entries)
     while data.time < seconds - 1e-9:
         motions.apply(data, {})
         mujoco.mj_step(model, data)
@@ -47,12 +50,16 @@ def velocity(data: mujoco.MjData, name: str) -> np.ndarray:
     """Angular and linear velocity of a body in the world."""
     found = np.zeros(6)
     mujoco.mj_forward(data.model, data)
-    mujoco.mj_objectVelocity(data.model, data, mujoco.mjtObj.mjOBJ_BODY, data.model.body(name).id, found, 0)
+    mujoco.mj_objectVelocity(
+        data.model, data, mujoco.mjtObj.mjOBJ_BODY, data.model.body(name).id, found, 0
+    )
     return found
 
 
 @pytest.mark.parametrize("entry", [DropEntry, ThrowEntry])
-def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(model, entry: type) -> None:
+def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(
+    model, entry: type
+) -> None:
     turn = (0.5, -1.5, 2.0, 1.0)
     motion = {"velocity": (4, 5, 6), "angular_velocity": (-1, 2, 3)}
     data = applied(model, entry("stone", 0.0, position=(1, 2, 3), orientation=turn, **motion))
@@ -76,7 +83,9 @@ def test_a_placed_body_is_at_rest_and_only_it_is_touched(model) -> None:
     script(model, PlaceEntry("brick", 0.0, position=(7, 8, 9))).apply(data, {})
     address = int(model.jnt_dofadr[model.body("brick").jntadr[0]])
     assert not data.qvel[address : address + 6].any()
-    np.testing.assert_array_equal(np.delete(data.qvel, range(address, address + 6)), before[:address])
+    np.testing.assert_array_equal(
+        np.delete(data.qvel, range(address, address + 6)), before[:address]
+    )
 
 
 def test_a_body_waits_at_home_for_its_drop_and_then_falls_freely(model) -> None:
@@ -114,16 +123,27 @@ def test_a_time_within_round_off_of_a_step_belongs_to_it(model) -> None:
             DropEntry("rock", 0.0),
             r"\[\[drop\]\] names the body 'rock'; the model's bodies are post, wall, stone, brick",
         ),
-        (ThrowEntry("post", 0.0, (0, 0, 1)), r"\[\[throw\]\] .* 'post', which has no <freejoint/>; valid are free"),
+        (
+            ThrowEntry("post", 0.0, (0, 0, 1)),
+            r"\[\[throw\]\] .* 'post', which has no <freejoint/>; valid are free",
+        ),
         (DropEntry("wall", 0.0), "'wall', which has no <freejoint/>; only free bodies can drop"),
         (PlaceEntry("stone", np.nan, (0, 0, 0)), "time nan s; valid is 0 or greater"),
         (PlaceEntry("stone", np.inf, (0, 0, 0)), "time inf s; valid is 0 or greater"),
-        (PlaceEntry("stone", -0.1, (0, 0, 0)), r"\[\[place\]\] of 'stone' has time -0.1 s; valid is 0 or greater"),
-        (DropEntry("stone", 0.0, orientation=(0, 0, 0, 0)), "orientation .*; valid is w x y z, not 0"),
+        (
+            PlaceEntry("stone", -0.1, (0, 0, 0)),
+            r"\[\[place\]\] of 'stone' has time -0.1 s; valid is 0 or greater",
+        ),
+        (
+            DropEntry("stone", 0.0, orientation=(0, 0, 0, 0)),
+            "orientation .*; valid is w x y z, not 0",
+        ),
         (DropEntry("stone", 0.0, orientation=(np.nan, 0, 0, 1)), "valid is w x y z, not 0"),
     ],
 )
-def test_entries_that_cannot_be_carried_out_are_refused_at_once(model, entry: object, message: str) -> None:
+def test_entries_that_cannot_be_carried_out_are_refused_at_once(
+    model, entry: object, message: str
+) -> None:
     with pytest.raises(SceneError, match=message):
         script(model, entry)
 
@@ -151,7 +171,11 @@ def simulation(folder: Path, script: str, **options) -> Simulation:
 
 def test_a_target_keeps_its_volume_unless_its_scene_says_not(tmp_path: Path) -> None:
     poke = '[[poke]]\ngeom = "egg"\ntime = 0\npoint = [0.3, 0, 0]\nimpulse = 0.02\n'
-    for line, conserves in (("", True), ("conserve_volume = true\n", True), ("conserve_volume = false\n", False)):
+    for line, conserves in (
+        ("", True),
+        ("conserve_volume = true\n", True),
+        ("conserve_volume = false\n", False),
+    ):
         run = simulation(tmp_path, line + poke)
         run.advance_frame()
         waves = run.ripples["egg"]
@@ -196,7 +220,8 @@ def test_still_disc_carries_no_waves(tmp_path: Path) -> None:
     around = np.abs(waves.height[(distance > 0.1) & (distance < 0.14)]).max()
     assert around > 0
     assert not waves.height[distance < 0.03].any()
-    assert np.abs(waves.height[distance < 0.07]).max() < 0.1 * around  # at this resolution a texel is 30 mm wide
+    # at this resolution a texel is 30 mm wide
+    assert np.abs(waves.height[distance < 0.07]).max() < 0.1 * around
 
 
 def test_hook_is_called_before_every_step(tmp_path: Path) -> None:

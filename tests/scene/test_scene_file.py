@@ -23,14 +23,29 @@ def changed(**entries: object) -> dict:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        (changed(colour=1), "scene file 'a.toml': unknown key 'colour'; valid are model, ripple, duration"),
-        (changed(ripple=[{"geom": "egg"}, {"geo": "b"}]), r"unknown key 'geo' in \[ripple\]; valid are geom, resol"),
-        (changed(ripple=[{"geom": "a", "still": [{"r": 1}]}]), r"unknown key 'r' in \[ripple.still\]; valid are point"),
+        (
+            changed(colour=1),
+            "scene file 'a.toml': unknown key 'colour'; valid are model, ripple, duration",
+        ),
+        (
+            changed(ripple=[{"geom": "egg"}, {"geo": "b"}]),
+            r"unknown key 'geo' in \[ripple\]; valid are geom, resol",
+        ),
+        (
+            changed(ripple=[{"geom": "a", "still": [{"r": 1}]}]),
+            r"unknown key 'r' in \[ripple.still\]; valid are point",
+        ),
         ({"ripple": []}, "Object missing required field `model`"),
-        (changed(ripple={"geom": "egg"}), r"\[ripple\] is one table, where there may be several; write \[\[ripple\]\]"),
+        (
+            changed(ripple={"geom": "egg"}),
+            r"\[ripple\] is one table, where there may be several; write \[\[ripple\]\]",
+        ),
         (changed(ripple=[{"geom": "a", "still": {"radius": 1}}]), r"write \[\[ripple.still\]\]"),
         (changed(camera={"lookat": [1, 2]}), "length 3.* at `camera.lookat`"),
-        (changed(poke=[{"geom": "egg", "time": "now"}]), r"Expected `float`, got `str` - at `poke\[0\].time`"),
+        (
+            changed(poke=[{"geom": "egg", "time": "now"}]),
+            r"Expected `float`, got `str` - at `poke\[0\].time`",
+        ),
         (changed(throw=[{"body": "stone", "time": 0}]), "missing required field `velocity`"),
         (changed(duration=True), "Expected `float`, got `bool` - at `duration`"),
     ],
@@ -42,12 +57,17 @@ def test_mistakes_are_named_with_file_place_and_what_is_valid(table: dict, messa
     assert "$" not in str(error.value)
 
 
-@pytest.mark.parametrize("number", [float("nan"), float("inf"), float("-inf"), 1.1e12, -(10**13), 10**400])
+@pytest.mark.parametrize(
+    "number", [float("nan"), float("inf"), float("-inf"), 1.1e12, -(10**13), 10**400]
+)
 def test_numbers_without_sense_are_refused_wherever_they_are(number: float) -> None:
     for place, table in (
         ("duration", changed(duration=number)),
         ("camera.lookat", changed(camera={"lookat": [0.0, number, 0.0]})),
-        ("ripple.still.radius", changed(ripple=[{"geom": "egg", "still": [{"point": [0, 0, 0], "radius": number}]}])),
+        (
+            "ripple.still.radius",
+            changed(ripple=[{"geom": "egg", "still": [{"point": [0, 0, 0], "radius": number}]}]),
+        ),
     ):
         with pytest.raises(SceneError, match=rf"{place} is .*; valid are numbers up to 1e\+12"):
             scene.parse_scene(table, "a.toml")
@@ -58,7 +78,10 @@ def test_images_are_found_beside_the_scene_file_and_given_paths_stay() -> None:
     entry = RippleEntry(geom="egg", still_map="still.png")
     assert entry.located(Path("/there")).still_map == str(Path("/there/still.png"))
     assert entry.still_map == "still.png"
-    assert RippleEntry(geom="egg", still_map="/here/still.png").located(Path("/there")).still_map == "/here/still.png"
+    assert (
+        RippleEntry(geom="egg", still_map="/here/still.png").located(Path("/there")).still_map
+        == "/here/still.png"
+    )
     assert RippleEntry(geom="egg").located(Path("/there")) == RippleEntry(geom="egg")
 
 
@@ -91,8 +114,14 @@ def test_what_the_model_has_and_the_optics_allow_is_accepted(entry: dict) -> Non
     [
         ({"name": "ear"}, "no camera 'ear'; its cameras are eye, side$"),
         ({"name": ""}, "no camera ''; its cameras are eye, side$"),
-        ({"track": "pebble"}, "no body 'pebble' for the camera to track; its bodies are world, stone$"),
-        ({"focus": "moon"}, "nothing 'moon' .* bodies are world, stone; its geoms are egg, pebble$"),
+        (
+            {"track": "pebble"},
+            "no body 'pebble' for the camera to track; its bodies are world, stone$",
+        ),
+        (
+            {"focus": "moon"},
+            "nothing 'moon' .* bodies are world, stone; its geoms are egg, pebble$",
+        ),
         ({"focus": 0.0}, "focus is 0.0; valid is more than 0 m"),
         ({"focus": -2.0}, "focus is -2.0"),
         ({"focus": np.inf}, "focus is inf"),
@@ -104,7 +133,9 @@ def test_what_the_model_has_and_the_optics_allow_is_accepted(entry: dict) -> Non
         ({"exposures": scene.MAX_EXPOSURES + 1}, "number of exposures is 1025"),
     ],
 )
-def test_what_cannot_be_is_named_with_its_value_and_what_is_valid(entry: dict, message: str) -> None:
+def test_what_cannot_be_is_named_with_its_value_and_what_is_valid(
+    entry: dict, message: str
+) -> None:
     with pytest.raises(SceneError, match=message):
         scene.check_camera(MODEL, CameraEntry(**entry))
 
@@ -118,7 +149,16 @@ EGG = RippleEntry(geom="egg")
 
 def checked(*targets: RippleEntry, **others: object) -> None:
     scene.check_scene(
-        Scene(**{"name": "s", "model": EGGS, "targets": targets, "camera": CameraEntry(), "duration": 1.0, **others})
+        Scene(
+            **{
+                "name": "s",
+                "model": EGGS,
+                "targets": targets,
+                "camera": CameraEntry(),
+                "duration": 1.0,
+                **others,
+            }
+        )
     )
 
 
@@ -128,13 +168,17 @@ def still(radius: float) -> RippleEntry:
 
 def test_a_scene_without_mistakes_passes() -> None:
     checked(EGG, RippleEntry(geom="pea", color=(0, 0.5, 1)))
-    checked(EGG, duration=scene.MAX_DURATION - 1.0, overlay=("height=0.02", "time"), lighting="studio")
+    checked(
+        EGG, duration=scene.MAX_DURATION - 1.0, overlay=("height=0.02", "time"), lighting="studio"
+    )
     checked(still(0.01))
 
 
 def test_an_event_after_the_end_is_told_of() -> None:
     poke = scene.PokeEntry("egg", 1.0, (0, 0, 0.1), 1.0)
-    with pytest.warns(RippleWarning, match=r"a \[\[poke\]\] at 1 s is not before the scene's end, 1 s; give"):
+    with pytest.warns(
+        RippleWarning, match=r"a \[\[poke\]\] at 1 s is not before the scene's end, 1 s; give"
+    ):
         checked(EGG, events=Events(poke=[poke]))
 
 
@@ -142,37 +186,70 @@ def test_an_event_after_the_end_is_told_of() -> None:
     ("targets", "others", "message"),
     [
         ((), {}, r"scene 's' has no \[\[ripple\]\] entry; name at least one geom"),
-        ((EGG,), {"duration": 0.0}, "duration is 0.0 s; valid is a positive number, less than 86400"),
+        (
+            (EGG,),
+            {"duration": 0.0},
+            "duration is 0.0 s; valid is a positive number, less than 86400",
+        ),
         ((EGG,), {"duration": float("nan")}, "duration is nan"),
         ((EGG,), {"duration": float(scene.MAX_DURATION)}, "duration is 86400.0"),
         ((EGG, EGG), {}, r"geom 'egg' has two \[\[ripple\]\] entries; valid is one"),
         ((RippleEntry(geom="leg"),), {}, "no geom 'leg'; its geoms are 'egg', 'floor', 'pea'"),
         ((RippleEntry(geom="floor"),), {}, "geom 'floor' is a plane, which cannot ripple"),
-        ((RippleEntry(geom="egg", look="lead"),), {}, "look 'lead' does not exist; valid are .*rubber"),
-        ((RippleEntry(geom="egg", layout="octahedron"),), {}, "layout .octahedron. does not exist; valid are auto"),
+        (
+            (RippleEntry(geom="egg", look="lead"),),
+            {},
+            "look 'lead' does not exist; valid are .*rubber",
+        ),
+        (
+            (RippleEntry(geom="egg", layout="octahedron"),),
+            {},
+            "layout .octahedron. does not exist; valid are auto",
+        ),
         (
             (RippleEntry(geom="egg", rim="bent"),),
             {},
             "rim 'bent' does not exist; valid are free, supported, clamped, fixed",
         ),
-        ((RippleEntry(geom="egg", color=(0, 0, 1.1)),), {}, "color of geom 'egg' is .*three numbers from 0 to 1"),
+        (
+            (RippleEntry(geom="egg", color=(0, 0, 1.1)),),
+            {},
+            "color of geom 'egg' is .*three numbers from 0 to 1",
+        ),
         ((RippleEntry(geom="egg", color=(0, float("nan"), 1)),), {}, "three numbers from 0 to 1"),
         ((RippleEntry(geom="egg", material=scene.MaterialEntry(speed=-1.0)),), {}, "speed is -1"),
         ((EGG,), {"overlay": ("depth",)}, "no overlay 'depth'; valid are height, velocity"),
         ((EGG,), {"lighting": "dark"}, "lighting is 'dark'; valid are .*'auto'"),
         ((EGG,), {"camera": CameraEntry(name="eye")}, "no camera 'eye'; its cameras are none"),
-        ((EGG,), {"events": Events(drop=[scene.DropEntry("egg", 0.0)])}, r"\[\[drop\]\] names the body 'egg'"),
+        (
+            (EGG,),
+            {"events": Events(drop=[scene.DropEntry("egg", 0.0)])},
+            r"\[\[drop\]\] names the body 'egg'",
+        ),
         (
             (EGG,),
             {"events": Events(poke=[scene.PokeEntry("pea", 0.0, (0, 0, 0), 1.0)])},
             "'pea', which does not ripple; the rippling geoms are 'egg'",
         ),
-        ((RippleEntry(geom="egg", still_map="/none.png"),), {}, "ripple.still_map names the image '/none.png', which"),
-        ((RippleEntry(geom="egg", still_map="/"),), {}, "valid is the path of an image relative to the scene file"),
-        *(((still(radius),), {}, f"radius {radius} m; valid is above 0") for radius in (0.0, -1.0, np.inf, np.nan)),
+        (
+            (RippleEntry(geom="egg", still_map="/none.png"),),
+            {},
+            "ripple.still_map names the image '/none.png', which",
+        ),
+        (
+            (RippleEntry(geom="egg", still_map="/"),),
+            {},
+            "valid is the path of an image relative to the scene file",
+        ),
+        *(
+            ((still(radius),), {}, f"radius {radius} m; valid is above 0")
+            for radius in (0.0, -1.0, np.inf, np.nan)
+        ),
     ],
 )
-def test_each_mistake_is_named_with_its_value_and_what_is_valid(targets, others: dict, message: str) -> None:
+def test_each_mistake_is_named_with_its_value_and_what_is_valid(
+    targets, others: dict, message: str
+) -> None:
     with pytest.raises(RippleError, match=message):
         checked(*targets, **others)
 
@@ -198,12 +275,18 @@ velocity = [0.5, 0.0, 0.0]
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("speed = 0.5", "sped = 0.5", r"unknown key 'sped' in \[ripple.material\]; valid are speed, damping"),
+        (
+            "speed = 0.5",
+            "sped = 0.5",
+            r"unknown key 'sped' in \[ripple.material\]; valid are speed, damping",
+        ),
         ('geom = "egg"', 'geom = "eg"', "its geoms are 'floor', 'egg', 'stone'"),
         ('body = "stone"', 'body = "rock"', "bodies are stone"),
     ],
 )
-def test_a_file_is_checked_in_itself_against_its_model_and_in_its_events(tmp_path, old, new, message) -> None:
+def test_a_file_is_checked_in_itself_against_its_model_and_in_its_events(
+    tmp_path, old, new, message
+) -> None:
     with pytest.raises(RippleError, match=message) as error:
         scene.load_scene(write_scene(tmp_path, MJCF, TOML.replace(old, new)))
     assert "\n" not in str(error.value)
@@ -211,7 +294,9 @@ def test_a_file_is_checked_in_itself_against_its_model_and_in_its_events(tmp_pat
 
 @pytest.mark.parametrize("fps", [24, 60, 1000])
 def test_a_whole_number_of_physics_steps_makes_a_frame(tmp_path: Path, fps: int) -> None:
-    simulation = Simulation(scene.load_scene(write_scene(tmp_path, MJCF, TOML)), fps=fps, backend="cpu")
+    simulation = Simulation(
+        scene.load_scene(write_scene(tmp_path, MJCF, TOML)), fps=fps, backend="cpu"
+    )
     for _ in range(5):
         simulation.advance_frame()
     assert simulation.data.time == pytest.approx(5 / fps, rel=1e-9)
@@ -235,7 +320,9 @@ def test_through_camera_changes_the_camera_alone_and_not_the_scene_itself() -> N
 def test_exposure_replaces_what_is_given_and_leaves_what_is_none() -> None:
     before = filmed(azimuth=12.0, shutter=90.0, aperture=0.1, exposures=8)
     after = scene.with_exposure(before, shutter=180, aperture=None, focus="stone", exposures=None)
-    assert after.camera == CameraEntry(azimuth=12.0, shutter=180.0, aperture=0.1, focus="stone", exposures=8)
+    assert after.camera == CameraEntry(
+        azimuth=12.0, shutter=180.0, aperture=0.1, focus="stone", exposures=8
+    )
     assert scene.with_exposure(before).camera == before.camera
     assert scene.with_exposure(before, aperture=0.0).camera.aperture == 0.0, "0 is a value"
 
@@ -248,11 +335,17 @@ def test_exposure_replaces_what_is_given_and_leaves_what_is_none() -> None:
         ({}, {"shutter": 400}, "shutter angle is 400"),
         ({}, {"focus": 1.0}, "a focus needs a lens: give the camera an aperture of more than 0 m"),
         ({"shutter": 180.0}, {"focus": "stone"}, "a focus needs a lens"),
-        ({}, {"exposures": 16}, "all 16 exposures would be the same: give the camera a shutter angle"),
+        (
+            {},
+            {"exposures": 16},
+            "all 16 exposures would be the same: give the camera a shutter angle",
+        ),
         ({"shutter": 180.0}, {"shutter": 0.0, "exposures": 2}, "all 2 exposures would be the same"),
     ],
 )
-def test_an_exposure_without_effect_or_sense_is_refused(camera: dict, changes: dict, message: str) -> None:
+def test_an_exposure_without_effect_or_sense_is_refused(
+    camera: dict, changes: dict, message: str
+) -> None:
     with pytest.raises(SceneError, match=message):
         scene.with_exposure(filmed(**camera), **changes)
 
@@ -303,5 +396,7 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str, said: str) -> No
 
 def test_dots_in_numbers_paths_and_comments_are_no_keys(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
-    path.write_text(f"# {'.' * 300}\n# {'. ' * 300}\na = [{', '.join(['0.5'] * 300)}]\nb.c = '../../x.y'\n")
+    path.write_text(
+        f"# {'.' * 300}\n# {'. ' * 300}\na = [{', '.join(['0.5'] * 300)}]\nb.c = '../../x.y'\n"
+    )
     assert scene.read_toml(path, "plan") == {"a": [0.5] * 300, "b": {"c": "../../x.y"}}

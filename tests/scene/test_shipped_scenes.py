@@ -11,7 +11,9 @@ import pytest
 from ripple_sim import Simulation, load_scene
 from ripple_sim.scenes import shapes
 
-NAMES = "animal arm drum duck finger heavy jelly kick pair pretzel rolling skull sphere teapot terrain"
+NAMES = (
+    "animal arm drum duck finger heavy jelly kick pair pretzel rolling skull sphere teapot terrain"
+)
 
 
 @pytest.mark.parametrize("name", NAMES.split())
@@ -19,14 +21,18 @@ def test_targets_are_hit_and_ripple_visibly(name: str) -> None:
     scene = load_scene(name)
     with warnings.catch_warnings(action="error"):
         simulation = Simulation(scene, fps=30, resolution=32, backend="cpu")
-        hit, highest, end = set(), dict.fromkeys(simulation.ripples, 0.0), min(scene.duration, 1.6)
+        hit = set()
+        highest = dict.fromkeys(simulation.ripples, 0.0)
+        end = min(scene.duration, 1.6)
         while simulation.data.time < end:
             simulation.advance_frame()
             if hit != set(highest):
                 hit |= {impulse.geom for impulse in simulation.impulses}
                 end = min(end, simulation.data.time + 0.6) if hit == set(highest) else end
             for target in highest:
-                highest[target] = max(highest[target], float(np.abs(simulation.ripples[target].height).max()))
+                highest[target] = max(
+                    highest[target], float(np.abs(simulation.ripples[target].height).max())
+                )
     assert hit == set(highest)
     for target, height in highest.items():
         size = float(np.ptp(simulation.ripples[target].atlas.mesh.V, axis=0).max())
@@ -56,7 +62,8 @@ def load(name):
 
 def pressing(model, data, target):
     """Geoms that press on the target now, each with its normal force [N]."""
-    wrench, forces = np.zeros(6), {}
+    wrench = np.zeros(6)
+    forces = {}
     for index, contact in enumerate(data.contact):
         if target in contact.geom and contact.efc_address >= 0:
             mujoco.mj_contactForce(model, data, index, wrench)
@@ -72,7 +79,8 @@ def duck_rain():
     V, F = shapes.duck()
     target = model.geom("duck").id
     toys = [g for g in range(model.ngeom) if model.geom(g).bodyid.item() > 0]
-    first, inside = {}, 0
+    first = {}
+    inside = 0
     for step in range(2500):
         velocity = data.qvel.reshape(-1, 6)[:, :3].copy()
         mujoco.mj_step(model, data)
@@ -106,7 +114,8 @@ def test_no_toy_gets_into_the_duck_and_all_end_on_the_floor(duck_rain):
 def test_duck_stands_where_its_mesh_file_says():
     model, data = load("duck")
     mujoco.mj_kinematics(model, data)
-    geom, mesh = model.geom("duck").id, model.mesh("duck")
+    geom = model.geom("duck").id
+    mesh = model.mesh("duck")
     start = mesh.vertadr.item()
     local = model.mesh_vert[start : start + mesh.vertnum.item()]
     world = local @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]

@@ -16,8 +16,12 @@ from ripple_sim.scene import InsideEntry, evaluate, load_inside, load_scene
 from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.operator import STIFF
 
-RADIUS, CORE, SHIFT = 0.5, 0.3, 0.08  # m; the core is shifted towards the body's x
-MODULUS, DENSITY = 500.0, 1000.0
+# m; the core is shifted towards the body's x
+RADIUS = 0.5
+CORE = 0.3
+SHIFT = 0.08
+MODULUS = 500.0
+DENSITY = 1000.0
 VOXEL = 0.05
 
 MJCF = f"""<mujoco><worldbody><body pos="3 0 0" euler="0 0 90">
@@ -59,8 +63,10 @@ def folder(tmp_path: Path) -> Path:
 def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside: str) -> None:
     simulation = simulation_of(folder, TOML + f"[[ripple.inside]]\n{inside}\n")
     waves = simulation.ripples["egg"]
-    middle = simulation.ripples.to_geom("egg", [SHIFT, 2.0, 0.0])  # where the core is in the frame of the geom
-    to, n = middle - waves.atlas.positions, -waves.atlas.normals
+    # where the core is in the frame of the geom
+    middle = simulation.ripples.to_geom("egg", [SHIFT, 2.0, 0.0])
+    to = middle - waves.atlas.positions
+    n = -waves.atlas.normals
     near = (to * n).sum(axis=-1)
     exact = near - np.sqrt(CORE**2 - (to**2).sum(axis=-1) + near**2)
     thickness = np.sqrt(STIFF * MODULUS / DENSITY / waves.material.stiffness)
@@ -71,9 +77,13 @@ def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside:
 
 def test_limits_hold(folder: Path) -> None:
     toml = TOML.replace("resolution = 24", "resolution = 24\nthickness_limits = [0.15, 0.25]")
-    simulation = simulation_of(folder, toml + "[[ripple.inside]]\nmesh = 'core.stl'\nscale = 1e-3\n")
+    simulation = simulation_of(
+        folder, toml + "[[ripple.inside]]\nmesh = 'core.stl'\nscale = 1e-3\n"
+    )
     density = np.asarray(simulation.ripples["egg"].material.density)
-    assert [density.min(), density.max()] == pytest.approx([0.665 * DENSITY * limit for limit in (0.15, 0.25)])
+    assert [density.min(), density.max()] == pytest.approx(
+        [0.665 * DENSITY * limit for limit in (0.15, 0.25)]
+    )
 
 
 @pytest.mark.parametrize(
@@ -96,7 +106,10 @@ def test_senseless_entries_are_refused(entry: dict, message: str) -> None:
     ("toml", "message"),
     [
         (TOML.replace("preset", "#"), r"needs a layer; write preset = \{name = 'layer'"),
-        (TOML.replace('"layer", modulus = 500', '"plate", modulus = 500'), "not the preset 'plate'"),
+        (
+            TOML.replace('"layer", modulus = 500', '"plate", modulus = 500'),
+            "not the preset 'plate'",
+        ),
         (TOML.replace("resolution = 24", "thickness_limits = [2, 1]"), "the least first"),
     ],
     ids=["without-preset", "no-layer", "limits"],
@@ -115,7 +128,8 @@ def test_files_are_told_apart_by_their_endings(folder: Path) -> None:
     assert np.ptp(V[:, 0]) == pytest.approx(4 * CORE, rel=0.02)
 
 
-X, Y = np.linspace(-1, 1, 12).reshape(3, 4), np.linspace(0, 2, 12).reshape(3, 4)
+X = np.linspace(-1, 1, 12).reshape(3, 4)
+Y = np.linspace(0, 2, 12).reshape(3, 4)
 NAMES = {"x": X, "y": Y, "z": 0 * X}
 
 
@@ -127,8 +141,14 @@ NAMES = {"x": X, "y": Y, "z": 0 * X}
         (" -x**2 / 4 ", -(X**2) / 4),
         ("2**-x % 1", 2**-X % 1),
         ("0.02 * exp(-(x**2 + y**2) / 0.1**2)", 0.02 * np.exp(-(X**2 + Y**2) / 0.01)),
-        ("sin(2*pi*x) * cos(y) + tan(z) + atan2(y, x)", np.sin(2 * np.pi * X) * np.cos(Y) + np.arctan2(Y, X)),
-        ("where(hypot(x, y) < 0.5, 1, minimum(x, y))", np.where(np.hypot(X, Y) < 0.5, 1, np.minimum(X, Y))),
+        (
+            "sin(2*pi*x) * cos(y) + tan(z) + atan2(y, x)",
+            np.sin(2 * np.pi * X) * np.cos(Y) + np.arctan2(Y, X),
+        ),
+        (
+            "where(hypot(x, y) < 0.5, 1, minimum(x, y))",
+            np.where(np.hypot(X, Y) < 0.5, 1, np.minimum(X, Y)),
+        ),
         ("maximum(sqrt(abs(x)), log(1 + y))", np.maximum(np.sqrt(np.abs(X)), np.log(1 + Y))),
     ],
 )
@@ -171,7 +191,9 @@ def test_an_expression_is_of_the_position_in_the_frame_of_the_body(tmp_path: Pat
     np.testing.assert_allclose(waves.height, 0.01 * (z + 2 * x) * y, atol=1e-6)
 
 
-def test_a_reset_brings_the_shape_back_and_a_saved_field_begins_where_it_was(tmp_path: Path) -> None:
+def test_a_reset_brings_the_shape_back_and_a_saved_field_begins_where_it_was(
+    tmp_path: Path,
+) -> None:
     simulation = simulated(tmp_path, "expression = '0.01 * x'")
     begun = simulation.ripples["egg"].height
     for _ in range(20):
@@ -181,7 +203,9 @@ def test_a_reset_brings_the_shape_back_and_a_saved_field_begins_where_it_was(tmp
     np.save(tmp_path / "moved.npy", moved)
     simulation.reset()
     np.testing.assert_array_equal(simulation.ripples["egg"].height, begun)
-    np.testing.assert_allclose(simulated(tmp_path, "field = 'moved.npy'").ripples["egg"].height, moved, atol=1e-8)
+    np.testing.assert_allclose(
+        simulated(tmp_path, "field = 'moved.npy'").ripples["egg"].height, moved, atol=1e-8
+    )
 
 
 def test_an_image_is_taken_in_the_mesh_s_own_coordinates(tmp_path: Path) -> None:
@@ -190,8 +214,11 @@ def test_an_image_is_taken_in_the_mesh_s_own_coordinates(tmp_path: Path) -> None
     lines = [f"v {x} {y} {z}\nvt {x} {y}" for x, y, z in V]
     lines += [f"f {a}/{a} {b}/{b} 5/5" for a, b in ((1, 2), (2, 3), (3, 4), (4, 1))]
     (tmp_path / "square.obj").write_text("\n".join(lines))
-    Image.fromarray(np.repeat(np.arange(2, 256, 4, dtype=np.uint8)[None], 4, axis=0)).save(tmp_path / "ramp.png")
-    mesh, geom = "<mesh name='m' file='square.obj' inertia='shell'/>", "<geom name='egg' type='mesh' mesh='m'/>"
+    Image.fromarray(np.repeat(np.arange(2, 256, 4, dtype=np.uint8)[None], 4, axis=0)).save(
+        tmp_path / "ramp.png"
+    )
+    mesh = "<mesh name='m' file='square.obj' inertia='shell'/>"
+    geom = "<geom name='egg' type='mesh' mesh='m'/>"
     model = f"<mujoco><asset>{mesh}</asset><worldbody>{geom}</worldbody></mujoco>"
     (tmp_path / "square.xml").write_text(model)
     heights = []
@@ -226,7 +253,9 @@ def test_senseless_shapes_are_refused(tmp_path: Path, height: str, message: str)
 
 def plate(folder: Path, rim: str) -> Simulation:
     """A steel plate of 1 x 0.4 m that lies along the y axis of its body, at rest."""
-    x, y = (each.ravel() for each in np.meshgrid(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.2, 4)))
+    x, y = (
+        each.ravel() for each in np.meshgrid(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.2, 4))
+    )
     corner = (np.arange(3)[:, None] * 6 + np.arange(5)).ravel()
     F = np.concatenate([corner[:, None] + [0, 1, 7], corner[:, None] + [0, 7, 6]])
     trimesh.Trimesh(np.stack([x, y, 0 * x], axis=1), F, process=False).export(folder / "plate.obj")
@@ -242,15 +271,20 @@ def plate(folder: Path, rim: str) -> Simulation:
 
 def test_rims_are_what_they_are_said_to_be_where_the_conditions_hold(tmp_path: Path) -> None:
     running = plate(tmp_path, '{clamped = "y < 1.51", supported = "where(y > 2.49, 1, y < 1.6)"}')
-    waves, data = running.ripples["plate"], running.data
+    waves = running.ripples["plate"]
+    data = running.data
     mujoco.mj_forward(running.model, data)
     geom = running.model.geom("plate").id
 
     def conditions(points: np.ndarray) -> np.ndarray:
-        y = (points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[:, 1]  # its body is at the origin
+        # its body is at the origin
+        y = (points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])[:, 1]
         return np.select([y < 1.51, (y > 2.49) | (y < 1.6)], ["clamped", "supported"], "free")
 
-    same, free = (WaveSolver(waves.atlas, waves.material, rim=rim, backend="cpu") for rim in (conditions, "free"))
+    same, free = (
+        WaveSolver(waves.atlas, waves.material, rim=rim, backend="cpu")
+        for rim in (conditions, "free")
+    )
     for each in (waves, same, free):
         each.add_impulse((0.1, 0.05, 0.0), 1e-3, 0.1)
         each.step(0.08)
@@ -264,7 +298,10 @@ def test_rims_are_what_they_are_said_to_be_where_the_conditions_hold(tmp_path: P
         ('"loose"', "rim 'loose' does not exist; valid are free, supported, clamped, fixed"),
         ('{fixed = "x < 0"}', "rim 'fixed' does not exist; valid are free, supported, clamped"),
         ('{clamped = "x < "}', "'x < ' is not valid"),
-        ('{clamped = "y < 1"}', r"nowhere on its rims; they lie from \[-0.2, 1.5, 0.0\] to \[0.2, 2.5, 0.0\] m"),
+        (
+            '{clamped = "y < 1"}',
+            r"nowhere on its rims; they lie from \[-0.2, 1.5, 0.0\] to \[0.2, 2.5, 0.0\] m",
+        ),
     ],
 )
 def test_rims_that_cannot_be_are_refused(tmp_path: Path, rim: str, message: str) -> None:
@@ -273,6 +310,8 @@ def test_rims_that_cannot_be_are_refused(tmp_path: Path, rim: str, message: str)
 
 
 def test_a_closed_surface_has_no_rims_by_region(folder: Path) -> None:
-    toml = TOML.replace("resolution = 24", "resolution = 8\nlayout = 'patches'\nrim = {clamped = 'x < 0'}")
+    toml = TOML.replace(
+        "resolution = 24", "resolution = 8\nlayout = 'patches'\nrim = {clamped = 'x < 0'}"
+    )
     with pytest.raises(SceneError, match="it is closed; leave rim out"):
         simulation_of(folder, toml)

@@ -64,7 +64,9 @@ def test_the_drums_wall_is_a_closed_tube_that_faces_outwards_and_stands_on_the_f
     assert V[:, 2].min() == 0
 
 
-@pytest.mark.parametrize(("path", "genus", "rims"), [(vessels.TEAPOT_FILE, [1, 0], 3), (vessels.PRETZEL_FILE, [3], 0)])
+@pytest.mark.parametrize(
+    ("path", "genus", "rims"), [(vessels.TEAPOT_FILE, [1, 0], 3), (vessels.PRETZEL_FILE, [3], 0)]
+)
 def test_vessels_have_their_handles_and_rims_and_no_slivers(path, genus, rims) -> None:
     mesh = load_mesh(path)
     assert not mesh.notes
@@ -75,7 +77,9 @@ def test_vessels_have_their_handles_and_rims_and_no_slivers(path, genus, rims) -
 
 def test_a_ball_cut_open_ends_at_the_plane() -> None:
     ball = sphere((0.0, 0.0, 0.0), 0.5)
-    V, F = vessels.opened(ball, *polygonise(ball, ((-0.6,) * 3, (0.6,) * 3), 0.05), (0.0, 0.0, 0.2), (0, 0, 1), 0.05)
+    V, F = vessels.opened(
+        ball, *polygonise(ball, ((-0.6,) * 3, (0.6,) * 3), 0.05), (0.0, 0.0, 0.2), (0, 0, 1), 0.05
+    )
     rim = np.unique(igl.boundary_facets(F)[0])
     np.testing.assert_allclose(V[rim, 2], 0.2, atol=2e-4)
     np.testing.assert_allclose(np.linalg.norm(V, axis=1), 0.5, atol=2e-3)
@@ -99,7 +103,9 @@ def meshes() -> tuple[Atlas, np.ndarray]:
     return atlas, thickness_map(atlas, load_mesh(head.FOLDER / "skull.obj"), LIMITS)
 
 
-def test_bone_is_near_under_the_forehead_and_deep_under_cheek_and_nose(meshes: tuple[Atlas, np.ndarray]) -> None:
+def test_bone_is_near_under_the_forehead_and_deep_under_cheek_and_nose(
+    meshes: tuple[Atlas, np.ndarray],
+) -> None:
     forehead, cheek, nose = at(*meshes, PLACES)
     assert forehead < 0.035
     assert cheek > 3 * forehead
@@ -107,13 +113,20 @@ def test_bone_is_near_under_the_forehead_and_deep_under_cheek_and_nose(meshes: t
     assert meshes[1].min() > 0.015  # it is inside everywhere
 
 
-def test_a_scan_of_the_head_alone_gives_the_same_thickness_within_a_voxel(meshes: tuple[Atlas, np.ndarray]) -> None:
+def test_a_scan_of_the_head_alone_gives_the_same_thickness_within_a_voxel(
+    meshes: tuple[Atlas, np.ndarray],
+) -> None:
     values, origin = head.head_volume(VOXEL)
-    skin, bone = (Volume(values, level, VOXEL, origin) for level in (head.SKIN_THRESHOLD, head.BONE_THRESHOLD))
+    skin, bone = (
+        Volume(values, level, VOXEL, origin) for level in (head.SKIN_THRESHOLD, head.BONE_THRESHOLD)
+    )
     atlas = build_atlas(Mesh.from_arrays(*skin.surface()), 24, cache=False)
     thickness = thickness_map(atlas, bone, LIMITS)
     assert np.abs(at(atlas, thickness, PLACES) - at(*meshes, PLACES)).max() < VOXEL
-    difference = np.abs(thickness - at(*meshes, atlas.positions.reshape(-1, 3)).reshape(thickness.shape))
-    # sides of nose and ears have the far end of the head below them, or nothing, by a degree of the normal
+    difference = np.abs(
+        thickness - at(*meshes, atlas.positions.reshape(-1, 3)).reshape(thickness.shape)
+    )
+    # sides of nose and ears have the far end of the head below them, or nothing, by a degree of the
+    # normal
     assert np.quantile(difference, 0.9) < VOXEL
     assert np.median(difference) < 0.2 * VOXEL

@@ -33,7 +33,8 @@ def test_shapes_are_sound_closed_of_genus_zero_and_have_no_slivers(shape):
     assert mesh.closed and mesh.genus.tolist() == [0]
     assert signed_volume(V, F) > 0
     assert np.degrees(igl.internal_angles(V, F)).min() > 15
-    normals, corners = igl.per_face_normals(V, F, np.zeros(3)), igl.per_vertex_normals(V, F)[F]
+    normals = igl.per_face_normals(V, F, np.zeros(3))
+    corners = igl.per_vertex_normals(V, F)[F]
     assert np.einsum("ij,ikj->ik", normals, corners).min() > 0, "a triangle is folded over"
 
 
@@ -43,7 +44,9 @@ def test_duck_stands_on_the_floor_and_is_as_large_as_promised():
     assert V[:, 2].min() == 0.0
     assert np.ptp(V[:, 0]) == pytest.approx(1.0, abs=0.1)
     on_the_floor = V[V[:, 2] < 1e-3]
-    assert np.all(np.ptp(on_the_floor[:, :2], axis=0) > [0.3, 0.15]), "it has no flat bottom to stand on"
+    assert np.all(np.ptp(on_the_floor[:, :2], axis=0) > [0.3, 0.15]), (
+        "it has no flat bottom to stand on"
+    )
 
 
 def test_polygonised_ball_converges_to_the_ball_at_second_order():

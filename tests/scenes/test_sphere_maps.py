@@ -24,12 +24,18 @@ def meshes() -> list[Mesh]:
             if is_soft(scene.model, geom):
                 continue
             mesh = target_mesh(scene.model, geom)
-            if mesh.closed and mesh.genus.tolist() == [0] and TARGET_TYPES[scene.model.geom_type[geom]] != "sphere":
+            if (
+                mesh.closed
+                and mesh.genus.tolist() == [0]
+                and TARGET_TYPES[scene.model.geom_type[geom]] != "sphere"
+            ):
                 found.append(mesh)
     return found
 
 
-def test_every_target_of_the_cube_layout_has_one_and_there_are_no_others(meshes: list[Mesh]) -> None:
+def test_every_target_of_the_cube_layout_has_one_and_there_are_no_others(
+    meshes: list[Mesh],
+) -> None:
     assert {sphere_map_path(mesh) for mesh in meshes} == set(FOLDER.glob("*.npy"))
 
 
@@ -39,7 +45,8 @@ def test_they_are_certified(meshes: list[Mesh]) -> None:
 
 
 def test_they_are_those_of_today(meshes: list[Mesh]) -> None:
-    # they may differ in round-off, and so in their vertices, but not in how evenly they spread the area
+    # they may differ in round-off, and so in their vertices, but not in how evenly they spread the
+    # area
     mesh = min(meshes, key=lambda mesh: len(mesh.V))
     maps = shipped_sphere_map(mesh), progressive_sphere_map(mesh.V, mesh.F)
     shipped, made = (np.std(stretch(mesh.V, mesh.F, each)) for each in maps)

@@ -27,8 +27,12 @@ def keep(name: str, *, age: float, size: int = 1_000_000) -> Path:
     return path
 
 
-def test_what_was_used_longest_ago_goes_first_and_what_has_just_been_made_stays_though_too_large(monkeypatch) -> None:
-    old, older, newest = keep("old", age=20), keep("older", age=10), keep("newest", age=30)
+def test_what_was_used_longest_ago_goes_first_and_what_has_just_been_made_stays_though_too_large(
+    monkeypatch,
+) -> None:
+    old = keep("old", age=20)
+    older = keep("older", age=10)
+    newest = keep("newest", age=30)
     monkeypatch.setenv(cache.LIMIT, "2")
     cache.mark_used(older)
     cache.make_room(newest)
@@ -62,9 +66,13 @@ def test_the_files_of_others_stay(folder: Path, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("limit", ["much", "-1", "nan", "inf"])
-def test_a_limit_that_is_no_size_is_refused_before_anything_is_made(limit: str, ball_mesh: Mesh, monkeypatch) -> None:
+def test_a_limit_that_is_no_size_is_refused_before_anything_is_made(
+    limit: str, ball_mesh: Mesh, monkeypatch
+) -> None:
     monkeypatch.setenv(cache.LIMIT, limit)
-    with pytest.raises(RippleError, match=f"{cache.LIMIT} is '{limit}'; valid is a number of megabytes"):
+    with pytest.raises(
+        RippleError, match=f"{cache.LIMIT} is '{limit}'; valid is a number of megabytes"
+    ):
         build_atlas(ball_mesh, 8)
 
 
@@ -78,11 +86,15 @@ def test_a_file_that_another_process_removes_is_no_error(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("home", [None, "/proc/no/home"])
-def test_without_a_home_results_are_kept_in_a_private_folder(home: str | None, tmp_path: Path, monkeypatch) -> None:
+def test_without_a_home_results_are_kept_in_a_private_folder(
+    home: str | None, tmp_path: Path, monkeypatch
+) -> None:
     """A service, or a container with a foreign user: neither HOME nor an entry in passwd, or one that is not there."""
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("ripple_sim.solver.cache._private_folder", cache._private_folder.__wrapped__)
+    monkeypatch.setattr(
+        "ripple_sim.solver.cache._private_folder", cache._private_folder.__wrapped__
+    )
     if home is None:
         monkeypatch.delenv("HOME", raising=False)
         monkeypatch.setattr("pwd.getpwuid", lambda uid: {}[uid])
@@ -157,7 +169,8 @@ def test_what_is_made_from_an_object_is_made_once_and_kept_while_the_object_live
         made.append(weakref.ref(result := Thing()))
         return result
 
-    first, second = Thing(), Thing()
+    first = Thing()
+    second = Thing()
     assert make(first) is make(first)
     assert make(second) is not make(first)
     assert len(made) == 2

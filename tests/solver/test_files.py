@@ -15,7 +15,16 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.scene import check_files, load_image, mesh_image
-from ripple_sim.solver import AtlasError, HeightMap, Mesh, RippleError, SolverError, WaveSolver, load_mesh, sphere_atlas
+from ripple_sim.solver import (
+    AtlasError,
+    HeightMap,
+    Mesh,
+    RippleError,
+    SolverError,
+    WaveSolver,
+    load_mesh,
+    sphere_atlas,
+)
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.images import read_image
 from ripple_sim.solver.layouts import build_atlas
@@ -36,18 +45,28 @@ def address_space(more: int) -> Iterator[None]:
 
 
 def test_an_atlas_that_cannot_fit_is_refused_at_once() -> None:
-    said = r"resolution 2048 takes 5\.03 GB of memory, but the limit of the address space \(ulimit -v, .* leaves 0\.06"
-    mesh = Mesh.from_arrays(np.eye(4)[:, :3], np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]))
+    said = (
+        r"resolution 2048 takes 5\.03 GB of memory, but the limit of the address space "
+        r"\(ulimit "
+        r"-v, .* leaves 0\.06"
+    )
+    mesh = Mesh.from_arrays(
+        np.eye(4)[:, :3], np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    )
     with address_space(64_000_000):
         for make in (lambda: build_atlas(mesh, 2048), lambda: sphere_atlas(resolution=2048)):
-            with pytest.raises(AtlasError, match=f"{said} GB; take a lower resolution, or allow more"):
+            with pytest.raises(
+                AtlasError, match=f"{said} GB; take a lower resolution, or allow more"
+            ):
                 make()
 
 
 def test_waves_and_height_maps_that_cannot_fit_are_refused() -> None:
     atlas = sphere_atlas(resolution=240)
     with address_space(35_000_000):
-        with pytest.raises(SolverError, match=r"a wave solver of 345,600 texels takes 0\.10 GB .* lower resolution"):
+        with pytest.raises(
+            SolverError, match=r"a wave solver of 345,600 texels takes 0\.10 GB .* lower resolution"
+        ):
             WaveSolver(atlas, backend="cpu")
         with pytest.raises(SolverError, match=r"the height map of 345,600 texels takes 0\.04 GB"):
             HeightMap(atlas.texels)
@@ -59,7 +78,9 @@ def test_frames_that_cannot_fit_are_refused(opengl: None) -> None:
     from ripple_sim.render import Renderer
     from ripple_sim.solver.gl import shared_context
 
-    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
+    )
     gl = shared_context()
     if gl.software:
         message = r"frames of 4096x4096 pixels takes 1\.48 GB .* take smaller frames"
@@ -79,7 +100,10 @@ def test_a_mesh_file_that_cannot_fit_is_refused(tmp_path: Path) -> None:
 
 def machine(root: Path, **files: str) -> Path:
     """A folder like that of a machine's root, with some of the files that tell of memory."""
-    for name, text in {"proc/meminfo": "MemAvailable: 3000000 kB\nSwapFree: 0 kB\n", **files}.items():
+    for name, text in {
+        "proc/meminfo": "MemAvailable: 3000000 kB\nSwapFree: 0 kB\n",
+        **files,
+    }.items():
         path = root / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
@@ -112,7 +136,9 @@ def test_the_limits_of_cgroups_and_of_those_above_count(version: str, tmp_path: 
         assert least == (200_000_000, "the memory limit of the cgroup (1.00 GB)")
 
 
-def test_where_nothing_is_known_nothing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_nothing_is_known_nothing_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert list(rooms(tmp_path)) == []
     monkeypatch.setattr("ripple_sim.solver.memory.rooms", lambda: iter(()))
     require_memory(SolverError, 1e15, "this", "do that")
@@ -127,13 +153,16 @@ def test_a_file_appears_at_the_end_and_nothing_else_stays(tmp_path: Path) -> Non
     with atomic_write(path) as unfinished:
         unfinished.write_bytes(b"whole")
         assert not path.exists()
-        assert unfinished.parent == path.parent  # on the same file system, so that renaming is one step
+        # on the same file system, so that renaming is one step
+        assert unfinished.parent == path.parent
     assert path.read_bytes() == b"whole"
     assert names(path.parent) == ["a.bin"]
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
-def test_an_old_file_stays_as_it_was_where_writing_fails(tmp_path: Path, error: type[BaseException]) -> None:
+def test_an_old_file_stays_as_it_was_where_writing_fails(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
     path = tmp_path / "a.bin"
     path.write_bytes(b"old")
 
@@ -168,7 +197,9 @@ def png(width: int, height: int) -> bytes:
     """A file of a few hundred bytes that says it has so many pixels."""
     head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
-    packed = [struct.pack(f">I4s{len(x)}sI", len(x), kind, x, zlib.crc32(kind + x)) for kind, x in chunks]
+    packed = [
+        struct.pack(f">I4s{len(x)}sI", len(x), kind, x, zlib.crc32(kind + x)) for kind, x in chunks
+    ]
     return b"\x89PNG\r\n\x1a\n" + b"".join(packed)
 
 
@@ -179,7 +210,9 @@ def glb(path: Path, image: bytes) -> Path:
     Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)).save(small)
     with Image.open(small) as texture:
         material = trimesh.visual.material.PBRMaterial(baseColorTexture=texture)
-        ball.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(ball.vertices), 2)), material=material)
+        ball.visual = trimesh.visual.TextureVisuals(
+            uv=np.zeros((len(ball.vertices), 2)), material=material
+        )
         content = ball.export(file_type="glb")
     begin = content.index(b"\x89PNG")
     path.write_bytes(content[:begin] + image + content[begin + len(image) :])
@@ -194,7 +227,9 @@ def with_coordinates() -> Any:
 
 def model(path: Path) -> Path:
     xml = path.with_name("model.xml")
-    xml.write_text(f'<mujoco><asset><texture name="t" type="2d" file="{path.name}"/></asset></mujoco>')
+    xml.write_text(
+        f'<mujoco><asset><texture name="t" type="2d" file="{path.name}"/></asset></mujoco>'
+    )
     return xml
 
 
@@ -203,38 +238,52 @@ READERS: dict[str, Callable[[Path], object]] = {
     "map of a material": lambda path: texture_map(with_coordinates(), path, 0.0, 1.0),
     "texture of a model": lambda path: check_files(model(path)),
     "image in a GLB": lambda path: mesh_image(glb(path.with_name("ball.glb"), path.read_bytes())),
-    "image of a look": lambda path: read_image(RippleError, path, "texture image", lambda mode: "RGB"),
+    "image of a look": lambda path: read_image(
+        RippleError, path, "texture image", lambda mode: "RGB"
+    ),
 }
 
 
 @pytest.mark.parametrize("reader", READERS)
-def test_a_decompression_bomb_is_refused_wherever_images_are_read(reader: str, tmp_path: Path) -> None:
+def test_a_decompression_bomb_is_refused_wherever_images_are_read(
+    reader: str, tmp_path: Path
+) -> None:
     (tmp_path / "bomb.png").write_bytes(png(20_000, 20_000))
     message = r"cannot be read: Image size \(400000000 pixels\) exceeds limit of 178956970"
     with pytest.raises(RippleError, match=message):
         READERS[reader](tmp_path / "bomb.png")
 
 
-def test_a_jpeg_beyond_the_limit_is_read_at_a_smaller_scale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, slope = tmp_path / "large.jpg", np.linspace(0, 255, 400)[None, :, None]
+def test_a_jpeg_beyond_the_limit_is_read_at_a_smaller_scale(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "large.jpg"
+    slope = np.linspace(0, 255, 400)[None, :, None]
     image = Image.fromarray(np.broadcast_to(slope, (200, 400, 3)).astype(np.uint8))
     image.save(path)
-    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 3000)  # twice as many are the limit: a quarter of each side
+    # twice as many are the limit: a quarter of each side
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 3000)
     pixels = load_image(path)
     assert pixels.shape == (50, 100, 3)
     np.testing.assert_allclose(pixels[25, :, 0], slope.reshape(100, 4).mean(axis=1), atol=2)
     for refused, options in (("large.jpg", {"progressive": True}), ("large.png", {})):
         image.save(tmp_path / refused, **options)
-        with pytest.raises(RippleError, match=r"80000 pixels\) exceeds limit of 6000 .* JPEG \(baseline\)"):
+        with pytest.raises(
+            RippleError, match=r"80000 pixels\) exceeds limit of 6000 .* JPEG \(baseline\)"
+        ):
             load_image(tmp_path / refused)
 
 
-def test_an_image_that_does_not_fit_into_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_image_that_does_not_fit_into_memory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from ripple_sim.solver import memory
 
     (tmp_path / "large.png").write_bytes(png(10_000, 10_000))
     monkeypatch.setattr(memory, "rooms", lambda: iter([(5e8, "a small machine")]))
-    with pytest.raises(SolverError, match=r"large\.png' of 10000x10000 pixels takes 1\.20 GB .* leaves 0\.50"):
+    with pytest.raises(
+        SolverError, match=r"large\.png' of 10000x10000 pixels takes 1\.20 GB .* leaves 0\.50"
+    ):
         read_image(SolverError, tmp_path / "large.png", "image", lambda mode: "RGB")
 
 

@@ -26,16 +26,22 @@ def quotient(a, b):
 @kernel
 def compensated_sum(x):
     """Kahan's sum, whose correction fast-math would strike out."""
-    total, lost = 0.0, 0.0
+    total = 0.0
+    lost = 0.0
     for each in x:
         small = each - lost
         grown = total + small
-        total, lost = grown, (grown - total) - small
+        lost = (grown - total) - small
+        total = grown
     return total
 
 
-@pytest.mark.parametrize(("a", "b", "expected"), [(1.0, 0.0, np.inf), (-1.0, 0.0, -np.inf), (0.0, 0.0, np.nan)])
-def test_division_by_zero_follows_numpy_and_raises_nothing(a: float, b: float, expected: float) -> None:
+@pytest.mark.parametrize(
+    ("a", "b", "expected"), [(1.0, 0.0, np.inf), (-1.0, 0.0, -np.inf), (0.0, 0.0, np.nan)]
+)
+def test_division_by_zero_follows_numpy_and_raises_nothing(
+    a: float, b: float, expected: float
+) -> None:
     np.testing.assert_equal(quotient(a, b), expected)
 
 
@@ -105,7 +111,8 @@ def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     """Imports a module of a kernel anew, as a new process would, each time it is called."""
     (tmp_path / "library_of_kernels.py").write_text(LIBRARY)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a change within the second would go unnoticed
+    # a change within the second would go unnoticed
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     monkeypatch.setattr("ripple_sim.solver.kernel.kernel_folder", lambda: tmp_path / "kernels")
 
     def imported() -> ModuleType:
@@ -125,14 +132,18 @@ def is_loaded(kernel: Any) -> bool:
     return bool(kernel.stats.cache_hits) and not kernel.stats.cache_misses
 
 
-def test_a_kernel_works_while_a_newer_version_is_installed_under_it(library, tmp_path: Path) -> None:
+def test_a_kernel_works_while_a_newer_version_is_installed_under_it(
+    library, tmp_path: Path
+) -> None:
     kernel = library().sum_of
     (tmp_path / "library_of_kernels.py").write_text("from ripple_sim.later import more\n" + LIBRARY)
     assert not is_loaded(kernel)
     assert not list(tmp_path.glob("kernels/*"))
 
 
-def test_a_kernel_is_compiled_once_and_again_when_its_source_changes(library, tmp_path: Path) -> None:
+def test_a_kernel_is_compiled_once_and_again_when_its_source_changes(
+    library, tmp_path: Path
+) -> None:
     assert not is_loaded(library().sum_of)
     assert is_loaded(library().sum_of)
     source = tmp_path / "library_of_kernels.py"
@@ -141,7 +152,9 @@ def test_a_kernel_is_compiled_once_and_again_when_its_source_changes(library, tm
     assert len(list((tmp_path / "kernels").iterdir())) == 1  # the older one is replaced
 
 
-def test_kernels_with_checks_of_bounds_and_without_never_mix(library, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernels_with_checks_of_bounds_and_without_never_mix(
+    library, monkeypatch: pytest.MonkeyPatch
+) -> None:
     values = np.zeros(4)
     for checks in (None, 1, None, 1):
         monkeypatch.setattr(numba.config, "BOUNDSCHECK", checks)
@@ -155,7 +168,13 @@ def test_kernels_with_checks_of_bounds_and_without_never_mix(library, monkeypatc
 
 @pytest.mark.parametrize(
     ("setting", "value"),
-    [("OPT", 0), ("DEBUGINFO_DEFAULT", 1), ("DEBUG_JIT", 1), ("LOOP_VECTORIZE", 0), ("LLVM_REFPRUNE_FLAGS", "none")],
+    [
+        ("OPT", 0),
+        ("DEBUGINFO_DEFAULT", 1),
+        ("DEBUG_JIT", 1),
+        ("LOOP_VECTORIZE", 0),
+        ("LLVM_REFPRUNE_FLAGS", "none"),
+    ],
 )
 def test_a_kernel_compiled_under_another_setting_is_another_file(
     library, monkeypatch, setting: str, value: Any
@@ -191,11 +210,15 @@ def test_without_compilation_waves_are_the_same() -> None:
     """NUMBA_DISABLE_JIT: impulses find their texels, and loops run over fields and numbers, in plain Python."""
     compiled: dict[str, dict[str, np.ndarray]] = {"results": {}}
     exec(WAVES, compiled)
-    save = "file = io.BytesIO(); np.savez(file, **results); sys.stdout.buffer.write(file.getvalue())"
+    save = (
+        "file = io.BytesIO(); np.savez(file, **results); sys.stdout.buffer.write(file.getvalue())"
+    )
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
     done = ended("-c", WAVES + save, env=environment, text=False, check=True)
     plain = np.load(io.BytesIO(done.stdout))
     assert set(plain) == set(compiled["results"])
     assert plain["square, every, dent"].any()
     for name, expected in compiled["results"].items():
-        np.testing.assert_allclose(plain[name], expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max(), err_msg=name)
+        np.testing.assert_allclose(
+            plain[name], expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max(), err_msg=name
+        )

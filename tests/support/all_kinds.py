@@ -23,14 +23,17 @@ def torus() -> Arrays:
 def thickened_graph(genus: int, seed: int, radius: float = 0.28, spacing: float = 0.13) -> Arrays:
     """Tubes along a random connected graph, which has as many independent cycles as the surface has handles."""
     ends = graph(genus, np.random.default_rng(seed))
-    low, high = ends.min(axis=(0, 1)) - 0.5, ends.max(axis=(0, 1)) + 0.5
+    low = ends.min(axis=(0, 1)) - 0.5
+    high = ends.max(axis=(0, 1)) + 0.5
     axes = [np.arange(a, b, spacing) for a, b in zip(low, high, strict=True)]
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
     P = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
     distance = np.full(len(P), np.inf)
     for a, b in ends:
         share = np.clip((P - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
-        distance = np.minimum(distance, np.linalg.norm(P - a - share[:, None] * (b - a), axis=1) - radius)
+        distance = np.minimum(
+            distance, np.linalg.norm(P - a - share[:, None] * (b - a), axis=1) - radius
+        )
     # not on a node, where triangles would have no area
     distance = np.where(np.abs(distance) < 0.01 * spacing, 0.01 * spacing, distance)
     V, F, _ = igl.marching_cubes(distance, P, *map(len, axes), 0.0)
@@ -40,9 +43,15 @@ def thickened_graph(genus: int, seed: int, radius: float = 0.28, spacing: float 
 def graph(genus: int, rng: np.random.Generator, size: int = 3) -> NDArray[np.float64]:
     """Segments [k, 2, 3] of a tree on a cubic lattice, and one more for each cycle."""
     nodes = [(x, y, z) for x in range(size) for y in range(size) for z in range(size)]
-    links = [(a, b) for a in nodes for b in nodes if a < b and sum(abs(p - q) for p, q in zip(a, b, strict=True)) == 1]
+    links = [
+        (a, b)
+        for a in nodes
+        for b in nodes
+        if a < b and sum(abs(p - q) for p, q in zip(a, b, strict=True)) == 1
+    ]
     links = [links[k] for k in rng.permutation(len(links))]
-    reached, edges = {nodes[0]}, []
+    reached = {nodes[0]}
+    edges = []
     count = min(len(nodes), 15)
     while len(reached) < count:
         edges.append(next(link for link in links if len(reached & set(link)) == 1))
@@ -55,11 +64,14 @@ def graph(genus: int, rng: np.random.Generator, size: int = 3) -> NDArray[np.flo
 def punctured_ball(seed: int, holes: int, subdivisions: int = 3) -> Arrays:
     """A ball without the triangles round some of its vertices, no two of which are near each other."""
     ball = trimesh.creation.icosphere(subdivisions=subdivisions)
-    V, F = np.array(ball.vertices), np.array(ball.faces)
+    V = np.array(ball.vertices)
+    F = np.array(ball.faces)
     rng = np.random.default_rng(seed)
     chosen: list[int] = []
     for vertex in rng.permutation(len(V)):
-        if len(chosen) < holes and all(np.linalg.norm(V[vertex] - V[other]) > 0.6 for other in chosen):
+        if len(chosen) < holes and all(
+            np.linalg.norm(V[vertex] - V[other]) > 0.6 for other in chosen
+        ):
             chosen.append(int(vertex))
     assert len(chosen) == holes
     return V, F[~np.isin(F, chosen).any(axis=1)]
@@ -68,10 +80,13 @@ def punctured_ball(seed: int, holes: int, subdivisions: int = 3) -> Arrays:
 def band(half_twists: int, length: int = 40, width: int = 4) -> Arrays:
     """A closed strip; with an odd number of half twists a Moebius band."""
     u, v = np.meshgrid(np.arange(length), np.arange(width + 1), indexing="ij")
-    angle, across = 2 * np.pi * u / length, v / width - 0.5
+    angle = 2 * np.pi * u / length
+    across = v / width - 0.5
     twist = half_twists * angle / 2
     radius = 2 + across * np.cos(twist)
-    V = np.stack([radius * np.cos(angle), radius * np.sin(angle), across * np.sin(twist)], axis=-1).reshape(-1, 3)
+    V = np.stack(
+        [radius * np.cos(angle), radius * np.sin(angle), across * np.sin(twist)], axis=-1
+    ).reshape(-1, 3)
 
     def number(u: NDArray, v: NDArray) -> NDArray:
         return np.where(u < length, u * (width + 1) + v, width - v if half_twists % 2 else v)
@@ -82,7 +97,8 @@ def band(half_twists: int, length: int = 40, width: int = 4) -> Arrays:
 def klein_bottle(length: int = 24, width: int = 12) -> Arrays:
     """The figure-eight immersion: closed, one-sided, and passing through itself along a circle."""
     u, v = np.meshgrid(np.arange(length), np.arange(width), indexing="ij")
-    a, b = 2 * np.pi * u / length, 2 * np.pi * (v + 0.5) / width
+    a = 2 * np.pi * u / length
+    b = 2 * np.pi * (v + 0.5) / width
     radius = 2 + np.cos(a / 2) * np.sin(b) - np.sin(a / 2) * np.sin(2 * b)
     height = np.sin(a / 2) * np.sin(b) + np.cos(a / 2) * np.sin(2 * b)
     V = np.stack([radius * np.cos(a), radius * np.sin(a), height], axis=-1).reshape(-1, 3)
@@ -96,7 +112,10 @@ def klein_bottle(length: int = 24, width: int = 12) -> Arrays:
 
 def _grid(number, length: int, width: int) -> NDArray[np.int64]:
     u, v = (x.ravel() for x in np.meshgrid(np.arange(length), np.arange(width), indexing="ij"))
-    a, b, c, d = number(u, v), number(u + 1, v), number(u + 1, v + 1), number(u, v + 1)
+    a = number(u, v)
+    b = number(u + 1, v)
+    c = number(u + 1, v + 1)
+    d = number(u, v + 1)
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
@@ -104,7 +123,8 @@ def crumbs(count: int, seed: int = 0) -> Arrays:
     """Tetrahedra and pairs of triangles, scattered."""
     rng = np.random.default_rng(seed)
     V = rng.uniform(size=(count, 4, 3)) + 3 * np.arange(count)[:, None, None] * [1, 0, 0]
-    closed, sheet = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], [[0, 1, 2], [0, 2, 3]]
+    closed = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+    sheet = [[0, 1, 2], [0, 2, 3]]
     F = [np.array(closed if k % 2 else sheet) + 4 * k for k in range(count)]
     return V.reshape(-1, 3), np.concatenate(F)
 
@@ -112,7 +132,9 @@ def crumbs(count: int, seed: int = 0) -> Arrays:
 def needles(count: int, thickness: float = 1e-6) -> Arrays:
     """A fan of triangles that are hardly wider than round-off."""
     angle = np.arange(count + 1) * thickness
-    return np.vstack([[[0, 0, 0]], np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)]), np.stack(
+    return np.vstack(
+        [[[0, 0, 0]], np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)]
+    ), np.stack(
         [np.zeros(count, dtype=int), np.arange(1, count + 1), np.arange(2, count + 2)], axis=1
     )
 
@@ -131,7 +153,9 @@ def voxels(filled: NDArray[np.bool_]) -> Arrays:
             squares.append(cells[:, None] + step)
     V = np.concatenate(squares)
     first = 4 * np.arange(len(V))[:, None]
-    return V.reshape(-1, 3), np.concatenate([first + np.array(corners) for corners in ([0, 1, 2], [0, 2, 3])])
+    return V.reshape(-1, 3), np.concatenate(
+        [first + np.array(corners) for corners in ([0, 1, 2], [0, 2, 3])]
+    )
 
 
 def shuffled(V: NDArray, F: NDArray, seed: int, turned: float = 0.0, loose: bool = False) -> Arrays:

@@ -9,8 +9,11 @@ import pytest
 
 playwright = pytest.importorskip("playwright.sync_api")
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-PATIENCE = 180.0  # [s]; the machine may be busy, and kernels that no test has used yet are compiled meanwhile
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
+# [s]; the machine may be busy, and kernels that no test has used yet are compiled meanwhile
+PATIENCE = 180.0
 
 
 @contextlib.contextmanager
@@ -19,6 +22,9 @@ def launched(*flags: str) -> Iterator[Any]:
         pytest.skip("needs Chromium (on Debian: apt-get install chromium)")
     options = ["--no-sandbox", "--disable-background-networking", *flags]
     with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=options, timeout=1000 * PATIENCE)  # [ms]
+        # [ms]
+        browser = driver.chromium.launch(
+            executable_path=CHROMIUM, args=options, timeout=1000 * PATIENCE
+        )
         yield browser
         browser.close()

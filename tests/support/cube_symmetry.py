@@ -14,7 +14,8 @@ def cube_rotations() -> NDArray[np.float64]:
     rotations = []
     for first in range(6):
         for second in range(6):
-            x, y = CHART_NORMALS[first], CHART_NORMALS[second]
+            x = CHART_NORMALS[first]
+            y = CHART_NORMALS[second]
             if x @ y == 0:
                 rotations.append(np.stack([x, y, np.cross(x, y)], axis=1))
     return np.array(rotations, dtype=np.float64)

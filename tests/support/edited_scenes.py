@@ -1,6 +1,7 @@
 """Edits of a scene between `update_scene` and `render`, which MuJoCo's own renderer and ours both draw.
 
-As a program it draws them with `mujoco.Renderer`, which takes over the process's OpenGL context, to an .npz file.
+As a program it draws them with `mujoco.Renderer`, which takes over the process's OpenGL context, to
+an .npz file.
 """
 
 import sys
@@ -11,7 +12,8 @@ from mujoco_models import posed
 
 SIZE = (96, 128)  # height, width
 FLOOR, TARGET, BOX, LINK = range(4)  # entries of the scene
-GEOM, DYNAMIC = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
+GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
+DYNAMIC = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
 _MODEL = """<mujoco><visual><quality numslices="128" numstacks="64"/></visual>
 <asset><mesh name="tet" vertex="0 0 0 .8 0 0 0 .8 0 0 0 .8"/></asset><worldbody>
 <light pos="0 -1 4" dir="0 .2 -1" diffuse=".6 .6 .6"/><camera name="c" pos="0 -6 3" xyaxes="1 0 0 0 .45 1"/>
@@ -43,7 +45,8 @@ def target_moved(scene: mujoco.MjvScene) -> None:
 
 def other_shapes(scene: mujoco.MjvScene) -> None:
     scene.geoms[BOX].size = [0.6, 0.1, 0.5]
-    scene.geoms[LINK].type, scene.geoms[LINK].size = mujoco.mjtGeom.mjGEOM_ELLIPSOID, [0.2, 0.4, 0.6]
+    scene.geoms[LINK].type = mujoco.mjtGeom.mjGEOM_ELLIPSOID
+    scene.geoms[LINK].size = [0.2, 0.4, 0.6]
 
 
 def taken_away(scene: mujoco.MjvScene) -> None:
@@ -52,14 +55,26 @@ def taken_away(scene: mujoco.MjvScene) -> None:
 
 def added(scene: mujoco.MjvScene) -> None:
     arrow, mesh = scene.geoms[scene.ngeom : scene.ngeom + 2]
-    rgba, zero, turn = np.array([1, 0, 1, 1], np.float32), np.zeros(3), np.eye(3).ravel()
+    rgba = np.array([1, 0, 1, 1], np.float32)
+    zero = np.zeros(3)
+    turn = np.eye(3).ravel()
     mujoco.mjv_initGeom(arrow, mujoco.mjtGeom.mjGEOM_ARROW, zero, zero, turn, rgba)
-    mujoco.mjv_connector(arrow, mujoco.mjtGeom.mjGEOM_ARROW, 0.1, np.array([-2.0, -1, 0.5]), np.array([-1.0, -1, 2.5]))
-    mujoco.mjv_initGeom(mesh, mujoco.mjtGeom.mjGEOM_MESH, zero, np.array([1.5, -1.5, 1]), turn, rgba)
+    mujoco.mjv_connector(
+        arrow,
+        mujoco.mjtGeom.mjGEOM_ARROW,
+        0.1,
+        np.array([-2.0, -1, 0.5]),
+        np.array([-1.0, -1, 2.5]),
+    )
+    mujoco.mjv_initGeom(
+        mesh, mujoco.mjtGeom.mjGEOM_MESH, zero, np.array([1.5, -1.5, 1]), turn, rgba
+    )
     mesh.dataid = 0
     for number, each in enumerate((arrow, mesh)):
-        each.category, each.segid = DYNAMIC, scene.ngeom + number
-        each.objtype, each.objid = mujoco.mjtObj.mjOBJ_UNKNOWN, 70 + number
+        each.category = DYNAMIC
+        each.segid = scene.ngeom + number
+        each.objtype = mujoco.mjtObj.mjOBJ_UNKNOWN
+        each.objid = 70 + number
     scene.ngeom += 2
 
 
@@ -72,13 +87,24 @@ def camera_moved(scene: mujoco.MjvScene) -> None:
 def lamp(scene: mujoco.MjvScene) -> None:
     """A red spot from above the empty middle of the floor."""
     light = scene.lights[scene.nlight]
-    light.type, light.pos, light.dir = mujoco.mjtLightType.mjLIGHT_SPOT, [-1, -1, 4], [0, 0, -1]
-    light.diffuse, light.attenuation, light.cutoff, light.exponent = [1, 0, 0], [1, 0, 0], 30, 1
-    light.ambient, light.specular, light.castshadow, light.headlight = [0, 0, 0], [0.3, 0.3, 0.3], 1, 0
+    light.type = mujoco.mjtLightType.mjLIGHT_SPOT
+    light.pos = [-1, -1, 4]
+    light.dir = [0, 0, -1]
+    light.diffuse = [1, 0, 0]
+    light.attenuation = [1, 0, 0]
+    light.cutoff = 30
+    light.exponent = 1
+    light.ambient = [0, 0, 0]
+    light.specular = [0.3, 0.3, 0.3]
+    light.castshadow = 1
+    light.headlight = 0
     scene.nlight += 1
 
 
-EDITS = {edit.__name__: edit for edit in (ghost, moved, target_moved, other_shapes, taken_away, added, camera_moved)}
+EDITS = {
+    edit.__name__: edit
+    for edit in (ghost, moved, target_moved, other_shapes, taken_away, added, camera_moved)
+}
 
 
 def drawn(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> dict[str, np.ndarray]:
@@ -101,5 +127,7 @@ if __name__ == "__main__":
     model, data = state()
     with mujoco.Renderer(model, *SIZE) as renderer:
         for name in EDITS:
-            found |= {f"{name} {kind}": image for kind, image in drawn(renderer, data, name).items()}
+            found |= {
+                f"{name} {kind}": image for kind, image in drawn(renderer, data, name).items()
+            }
     np.savez(sys.argv[1], **found)

@@ -2,11 +2,19 @@
 
 import numpy as np
 
-FPS, WIDTH, HEIGHT, DISTANCE, FOVY, SPEED = 30, 240, 120, 2.0, 40.0, 18.0
+FPS = 30
+WIDTH = 240
+HEIGHT = 120
+DISTANCE = 2.0
+FOVY = 40.0
+SPEED = 18.0
 MJCF = """<mujoco><option gravity="0 0 0" timestep="0.002"/><worldbody>
 <geom name="egg" type="sphere" size="0.05"/>{bodies}</worldbody></mujoco>"""
 
-SHOT = '<body name="shot" pos="0 0.9 0.3"><freejoint/><geom size="0.05" contype="0" conaffinity="0"/></body>'
+SHOT = (
+    '<body name="shot" pos="0 0.9 0.3"><freejoint/><geom size="0.05" contype="0" '
+    'conaffinity="0"/></body>'
+)
 TOML = f"""model = "scene.xml"
 duration = 0.2
 lighting = "studio"

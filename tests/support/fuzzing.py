@@ -18,8 +18,8 @@ from unfinished_videos import contents
 from ripple_sim.cli import main as cli
 from ripple_sim.solver import RippleError
 
-# `make fuzz` sets it; what it finds is kept in a folder that git ignores, and tried first the next time. The tests take
-# a few examples, always the same.
+# `make fuzz` sets it; what it finds is kept in a folder that git ignores, and tried first the next
+# time. The tests take a few examples, always the same.
 EXAMPLES = int(os.environ.get("RIPPLE_SIM_FUZZ", "0"))
 
 
@@ -37,15 +37,22 @@ def fuzzed_by(usual: int, share: float = 1.0) -> settings:
 fuzzed = fuzzed_by(100)
 
 LIMITS = [0, -1, 10**400, -(10**400), 1e-300, 1e300, float("nan"), float("inf"), True]
-NUMBERS = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.integers(), st.sampled_from(LIMITS))
+NUMBERS = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True), st.integers(), st.sampled_from(LIMITS)
+)
 STRANGE = ["", "\0", "a" * 5000, "../..", "/dev/null", "\ud800", "'\n\""]
 TEXTS = st.one_of(st.text(max_size=20), st.sampled_from(STRANGE))
 SCALARS = st.one_of(NUMBERS, TEXTS, st.none(), st.booleans())
-VALUES = st.recursive(SCALARS, lambda x: st.lists(x, max_size=4) | st.dictionaries(TEXTS, x, max_size=3), max_leaves=6)
+VALUES = st.recursive(
+    SCALARS, lambda x: st.lists(x, max_size=4) | st.dictionaries(TEXTS, x, max_size=3), max_leaves=6
+)
 
 
 def outcome(call: Callable[[], Any]) -> Any:
-    """What a call returns, or its `RippleError`, whose message must be of a readable length. Other errors pass."""
+    """What a call returns, or its `RippleError`, whose message must be of a readable length.
+
+    Other errors pass.
+    """
     try:
         return call()
     except RippleError as error:
@@ -68,7 +75,13 @@ def command(*words: object) -> int:
 
 def places(value: Any, path: tuple = ()) -> list[tuple]:
     """Paths to all values in a table."""
-    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    inner = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     return [path, *(place for key, each in inner for place in places(each, (*path, key)))]
 
 
@@ -108,29 +121,48 @@ def home_of_others() -> Iterator[Path]:
 MARK = '"made by ripple-sim"'
 JSON = ["[]", "{}", "null", "5", MARK, f"[{MARK}]", f"{{{MARK}: 1}}", "[" * 9999]
 SHARES = st.floats(0, 1, exclude_max=True)
-KINDS = st.sampled_from(["empty", "cut", "flip", "missing", "folder", "link", "json", "swap", "digit"])
+KINDS = st.sampled_from(
+    ["empty", "cut", "flip", "missing", "folder", "link", "json", "swap", "digit"]
+)
 DAMAGES = st.lists(st.tuples(SHARES, KINDS, SHARES), min_size=1, max_size=3)
 
 
 def damage(folder: Path, damages: list[tuple[float, str, float]]) -> None:
-    """Spoil what is in a folder: which of all, how, and where in it. Links lead to a folder `thesis` beside."""
+    """Spoil what is in a folder: which of all, how, and where in it.
+
+    Links lead to a folder `thesis` beside.
+    """
     for which, kind, where in damages:
         paths = sorted(path for path in folder.rglob("*") if not path.is_symlink())
         if not paths:
             return
-        path, other = paths[int(which * len(paths))], paths[int(where * len(paths))]
+        path = paths[int(which * len(paths))]
+        other = paths[int(where * len(paths))]
         content = path.read_bytes() if path.is_file() else b"text"
         taken = other.read_bytes() if other.is_file() else b"\xff\0"
         at = int(where * len(content))
         shutil.rmtree(path) if path.is_dir() else path.unlink()
         if kind == "link":
             mine = sorted((folder.parent / "thesis").iterdir())
-            path.symlink_to([folder.parent / "thesis", folder / "nowhere", *mine][int(where * (len(mine) + 2))])
+            path.symlink_to(
+                [folder.parent / "thesis", folder / "nowhere", *mine][int(where * (len(mine) + 2))]
+            )
         elif kind == "folder":
             (path / "inner").mkdir(parents=True)
         elif kind != "missing":
-            flipped = content[:at] + bytes(each ^ 1 << at % 8 for each in content[at : at + 1]) + content[at + 1 :]
+            flipped = (
+                content[:at]
+                + bytes(each ^ 1 << at % 8 for each in content[at : at + 1])
+                + content[at + 1 :]
+            )
             digit = content[:at] + re.sub(rb"\d", b"%d" % (at % 10), content[at:], count=1)
             text = JSON[int(where * len(JSON))].encode()
-            new = {"empty": b"", "cut": content[:at], "flip": flipped, "json": text, "swap": taken, "digit": digit}
+            new = {
+                "empty": b"",
+                "cut": content[:at],
+                "flip": flipped,
+                "json": text,
+                "swap": taken,
+                "digit": digit,
+            }
             path.write_bytes(new[kind])

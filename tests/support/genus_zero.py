@@ -23,9 +23,13 @@ def solid(mesh):
 
 def bipyramid(sides):
     angle = 2 * np.pi / sides * np.arange(sides)
-    V = np.vstack([np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), [[0, 0, 1], [0, 0, -1]]])
-    i, j = np.arange(sides), (np.arange(sides) + 1) % sides
-    top, bottom = np.full(sides, sides), np.full(sides, sides + 1)
+    V = np.vstack(
+        [np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), [[0, 0, 1], [0, 0, -1]]]
+    )
+    i = np.arange(sides)
+    j = (np.arange(sides) + 1) % sides
+    top = np.full(sides, sides)
+    bottom = np.full(sides, sides + 1)
     return V, np.vstack([np.stack([i, j, top], axis=1), np.stack([j, i, bottom], axis=1)])
 
 
@@ -78,7 +82,9 @@ SHAPES = {
     "sphere": lambda: icosphere(3),
     "cigar 100:1": lambda: stretched([1, 1, 100]),
     "pancake 100:1": lambda: stretched([100, 100, 1]),
-    "cylinder of slivers": lambda: solid(trimesh.creation.cylinder(radius=1, height=50, sections=100)),
+    "cylinder of slivers": lambda: solid(
+        trimesh.creation.cylinder(radius=1, height=50, sections=100)
+    ),
     "spikes of 100 radii": lambda: spiky(100),
     "one needle": lambda: (lambda V, F: (np.vstack([V[:1] * 1000, V[1:]]), F))(*icosphere(2)),
     "crumpled, self-intersecting": crumpled,
@@ -88,7 +94,8 @@ SHAPES = {
 
 def stretch_quantiles(V, F, S, quantiles=(0.001, 0.01, 0.5, 0.99, 0.999)):
     """Area-weighted quantiles of the stretch: the value that a given share of the real area stays under."""
-    values, weights = stretch(V, F, S), igl.doublearea(V, F)
+    values = stretch(V, F, S)
+    weights = igl.doublearea(V, F)
     order = np.argsort(values, kind="stable")
     share = np.cumsum(weights[order]) / np.sum(weights)
     return values[order][np.minimum(np.searchsorted(share, quantiles), len(order) - 1)]

@@ -12,11 +12,13 @@ RIM = (-1, -1)
 def _corners_to_places(corners: np.ndarray, topology: TexelTopology) -> np.ndarray:
     """Positions with halo of flat charts with the given corners [C, 4, 3].
 
-    Beyond a rim lies the point of the rim that is nearest to the texel: there the waves' natural boundary is exact.
+    Beyond a rim lies the point of the rim that is nearest to the texel: there the waves' natural
+    boundary is exact.
     """
     n = topology.shape[1]
     u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
-    s, t = u[None, None, :, None], u[None, :, None, None]
+    s = u[None, None, :, None]
+    t = u[None, :, None, None]
     a, b, c, d = (corners[:, k, None, None] for k in range(4))
     places = (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d
     for side, (rim, texel) in enumerate(
@@ -26,7 +28,10 @@ def _corners_to_places(corners: np.ndarray, topology: TexelTopology) -> np.ndarr
         along = corners[:, (side + 1) % 4] - corners[:, side]
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
         offset = places[:, *texel] - corners[:, side, None]
-        places[:, *rim] = corners[:, side, None] + np.einsum("cij,cj->ci", offset, along)[..., None] * along[:, None]
+        places[:, *rim] = (
+            corners[:, side, None]
+            + np.einsum("cij,cj->ci", offset, along)[..., None] * along[:, None]
+        )
     texels = places[:, 1:-1, 1:-1].reshape(-1, 3)
     shown = ~topology.own & ~topology.rim & (topology.halo >= 0)
     places[shown] = texels[topology.halo[shown]]
@@ -37,7 +42,9 @@ def _corners_to_places(corners: np.ndarray, topology: TexelTopology) -> np.ndarr
         if topology.rim[chart, row, column] and other != chart:
             out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
             along_rows = topology.rim[other, out_r, c + 1]
-            places[chart, row, column] = places[other, out_r, c + 1] if along_rows else places[other, r + 1, out_c]
+            places[chart, row, column] = (
+                places[other, out_r, c + 1] if along_rows else places[other, r + 1, out_c]
+            )
     return places
 
 
@@ -57,7 +64,8 @@ def aslant(n: int, slope: float) -> TexelMesh:
     """Unit square with free edges whose grid lines are bent, and end at the edges at an angle."""
     place = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
     u, v = np.meshgrid(place, place)
-    x, y = u + slope * np.sin(np.pi * u) * (v - 0.5), v + 0.7 * slope * np.sin(np.pi * v) * (u - 0.5)
+    x = u + slope * np.sin(np.pi * u) * (v - 0.5)
+    y = v + 0.7 * slope * np.sin(np.pi * v) * (u - 0.5)
     places = np.stack([x, y, 0 * x], axis=-1)[None]
     return TexelMesh.of(glue(np.array([[RIM] * 4]), n), places[:, 1:-1, 1:-1], beyond=places)
 
@@ -68,7 +76,9 @@ def polygon(sides: int, n: int) -> TexelMesh:
     tips = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     middles = (tips + np.roll(tips, -1, axis=0)) / 2
     centre = np.zeros_like(tips)
-    corners = np.stack([centre, middles, np.roll(tips, -1, axis=0), np.roll(middles, -1, axis=0)], axis=1)
+    corners = np.stack(
+        [centre, middles, np.roll(tips, -1, axis=0), np.roll(middles, -1, axis=0)], axis=1
+    )
     glued = [[((i - 1) % sides, 3), RIM, RIM, ((i + 1) % sides, 0)] for i in range(sides)]
     return flat_charts(corners, glued, n)
 
@@ -80,12 +90,17 @@ def disk(n: int) -> TexelMesh:
     u, v = np.meshgrid(t, t)
     charts = [np.stack([0.9 * u - 0.45, 0.9 * v - 0.45], axis=-1)]
     for side in range(4):
-        first, last = inner[(side + 1) % 4], inner[side]
+        first = inner[(side + 1) % 4]
+        last = inner[side]
         angle = (side * 0.5 - 0.25 - 0.5 * u) * np.pi
         rim = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        charts.append((1 - v[..., None]) * (first + u[..., None] * (last - first)) + v[..., None] * rim)
+        charts.append(
+            (1 - v[..., None]) * (first + u[..., None] * (last - first)) + v[..., None] * rim
+        )
     glued = [[(side + 1, 0) for side in range(4)]]
-    glued += [[(0, side), ((side - 1) % 4 + 1, 3), RIM, ((side + 1) % 4 + 1, 1)] for side in range(4)]
+    glued += [
+        [(0, side), ((side - 1) % 4 + 1, 3), RIM, ((side + 1) % 4 + 1, 1)] for side in range(4)
+    ]
     topology = glue(np.array(glued), n)
     flat = np.stack(charts)
     positions = np.concatenate([flat, np.zeros_like(flat[..., :1])], axis=-1)
@@ -114,8 +129,11 @@ def eigenvalues(texels: TexelMesh, count: int) -> np.ndarray:
     """Least squares of the angular frequencies, at wave speed 1."""
     mass = diags_array(texels.areas.ravel())
     start = np.random.default_rng(0).standard_normal(mass.shape[0])
-    # some more than asked for, to full precision: round-off alone shows the second of two equal ones
-    found = eigsh(texels.stiffness(), count + 4, mass.tocsc(), sigma=-0.1, v0=start, return_eigenvectors=False)
+    # some more than asked for, to full precision: round-off alone shows the second of two equal
+    # ones
+    found = eigsh(
+        texels.stiffness(), count + 4, mass.tocsc(), sigma=-0.1, v0=start, return_eigenvectors=False
+    )
     return np.sort(found)[:count]
 
 

@@ -11,12 +11,18 @@ from ripple_sim import Impulse, Material, Ripples, Target
 class Run:
     """A model in motion, the waves of its targets, and the impulses of every step, `hits`.
 
-    The model may be a specification, the material its density [kg/m^2] alone; `contacts` are those of all targets, the
-    options those of `Ripples`.
+    The model may be a specification, the material its density [kg/m^2] alone; `contacts` are those
+    of all targets, the options those of `Ripples`.
     """
 
     def __init__(
-        self, model, *targets: str, density: float = 50.0, material: Material | None = None, contacts=None, **options
+        self,
+        model,
+        *targets: str,
+        density: float = 50.0,
+        material: Material | None = None,
+        contacts=None,
+        **options,
     ):
         self.model = model.compile() if isinstance(model, mujoco.MjSpec) else model
         self.data = mujoco.MjData(self.model)

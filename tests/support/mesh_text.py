@@ -11,33 +11,65 @@ CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
 def obj(vertices, faces, *between: str) -> str:
     """OBJ text of polygons given by indices from 0."""
     lines = [f"v {' '.join(f'{x:g}' for x in v)}" for v in vertices]
-    return "\n".join([*lines, *between, *(f"f {' '.join(str(i + 1) for i in f)}" for f in faces)]) + "\n"
+    return (
+        "\n".join([*lines, *between, *(f"f {' '.join(str(i + 1) for i in f)}" for f in faces)])
+        + "\n"
+    )
 
 
 def off(vertices, faces, header: str = "OFF") -> str:
-    lines = [header, f"{len(vertices)} {len(faces)} 0", *(" ".join(f"{x:g}" for x in v) for v in vertices)]
+    lines = [
+        header,
+        f"{len(vertices)} {len(faces)} 0",
+        *(" ".join(f"{x:g}" for x in v) for v in vertices),
+    ]
     return "\n".join([*lines, *(f"{len(f)} {' '.join(map(str, f))}" for f in faces)]) + "\n"
 
 
-def ply(vertices, faces, layout: str, *, kind: str = "float", length: str = "uchar", texcoord: bool = False) -> bytes:
+def ply(
+    vertices,
+    faces,
+    layout: str,
+    *,
+    kind: str = "float",
+    length: str = "uchar",
+    texcoord: bool = False,
+) -> bytes:
     """PLY file with an element of edges between vertices and faces, and properties that mean nothing here."""
     order = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}[layout]
     codes = {"float": "f", "double": "d", "uchar": "B", "ushort": "H", "int": "i"}
     header = ["ply", f"format {layout} 1.0", "comment made here", f"element vertex {len(vertices)}"]
     header += [f"property {kind} {name}" for name in "xyz"] + ["property uchar red"]
-    header += ["element edge 1", "property int vertex1", "property int vertex2", f"element face {len(faces)}"]
+    header += [
+        "element edge 1",
+        "property int vertex1",
+        "property int vertex2",
+        f"element face {len(faces)}",
+    ]
     header += [f"property list {length} int vertex_indices"]
-    header += ["property list uchar float texcoord"] * texcoord + ["property uchar flags", "end_header"]
+    header += ["property list uchar float texcoord"] * texcoord + [
+        "property uchar flags",
+        "end_header",
+    ]
     rows = [[(codes[kind], [*v]), ("B", [255])] for v in vertices] + [[("i", [0, 1])]]
     for k, face in enumerate(faces):
         rows.append([(codes[length], [len(face)]), ("i", [*face])])
         if texcoord:
-            rows[-1] += [("B", [2 * len(face)]), ("f", [x for j in range(len(face)) for x in (k, j)])]
+            rows[-1] += [
+                ("B", [2 * len(face)]),
+                ("f", [x for j in range(len(face)) for x in (k, j)]),
+            ]
         rows[-1].append(("B", [7]))
     if order is None:
-        body = "".join(" ".join(f"{x:g}" for _, values in row for x in values) + "\n" for row in rows).encode()
+        body = "".join(
+            " ".join(f"{x:g}" for _, values in row for x in values) + "\n" for row in rows
+        ).encode()
     else:
-        body = b"".join(struct.pack(f"{order}{len(values)}{code}", *values) for row in rows for code, values in row)
+        body = b"".join(
+            struct.pack(f"{order}{len(values)}{code}", *values)
+            for row in rows
+            for code, values in row
+        )
     return "\n".join(header).encode() + b"\n" + body
 
 

@@ -22,7 +22,9 @@ def mode_error(n: int, operator: str = "fem") -> float:
     start = zonal_harmonic(atlas.positions[..., 2])
     waves.height = start
     waves.step(2 * np.pi / np.sqrt(20))
-    return np.sqrt((atlas.areas * (waves.height - start) ** 2).sum() / (atlas.areas * start**2).sum())
+    return np.sqrt(
+        (atlas.areas * (waves.height - start) ** 2).sum() / (atlas.areas * start**2).sum()
+    )
 
 
 def swing(waves: WaveSolver, wave: np.ndarray, dt: float, steps: int) -> tuple[float, float]:
@@ -33,6 +35,7 @@ def swing(waves: WaveSolver, wave: np.ndarray, dt: float, steps: int) -> tuple[f
         waves.step(dt)
         found.append(2 * float((waves.height * wave).mean()))
     x = np.array(found)
-    # a damped swing obeys x_{n+1} = a x_n - b x_{n-1}, with a = 2 exp(-r dt) cos(w dt) and b = exp(-2 r dt)
+    # a damped swing obeys x_{n+1} = a x_n - b x_{n-1}, with a = 2 exp(-r dt) cos(w dt) and b =
+    # exp(-2 r dt)
     (a, b), *_ = np.linalg.lstsq(np.stack([x[1:-1], -x[:-2]], axis=1), x[2:])
     return float(np.arccos(a / (2 * np.sqrt(b))) / dt), float(-np.log(b) / (2 * dt))

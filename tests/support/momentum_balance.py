@@ -7,7 +7,8 @@ import mujoco
 import numpy as np
 from hits import contact_forces
 
-# A body that is so many times as heavy as another hardly feels it, and MuJoCo's solvers do not care.
+# A body that is so many times as heavy as another hardly feels it, and MuJoCo's solvers do not
+# care.
 _HEAVY = 1e3
 
 
@@ -16,26 +17,32 @@ class Balance:
     """Impulses of one target and one geom that touches it, summed over steps [N s]."""
 
     given: float = 0.0  # what `Ripples` reports
-    reported: float = 0.0  # normal forces of MuJoCo's contacts, less the pull of suckers, times the time step
-    felt: float = 0.0  # the same, by the change of momentum of the free body that takes part, where one does
+    # normal forces of MuJoCo's contacts, less the pull of suckers, times the time step
+    reported: float = 0.0
+    # the same, by the change of momentum of the free body that takes part, where one does
+    felt: float = 0.0
     exchanged: float = 0.0  # sum of the amounts of what is reported: pushes and pulls do not cancel
 
 
 class MomentumBalance:
     """Keeps account of the exchange between targets and whatever touches them.
 
-    A free body's change of momentum, less gravity and all contact forces but the normal ones, is what its contacts'
-    normal forces gave it. Along their sum it is compared with them.
+    A free body's change of momentum, less gravity and all contact forces but the normal ones, is
+    what its contacts' normal forces gave it. Along their sum it is compared with them.
     """
 
     def __init__(self, model: mujoco.MjModel, targets: list[str]) -> None:
-        self.model, self.names = model, [model.geom(i).name or f"geom {i}" for i in range(model.ngeom)]
+        self.model = model
+        self.names = [model.geom(i).name or f"geom {i}" for i in range(model.ngeom)]
         # by the names of a target and what touches it
         self.pairs: dict[tuple[str, str], Balance] = collections.defaultdict(Balance)
-        # sum of the latest step's normal forces [N, 3] of the first geom on the second, by their names
+        # sum of the latest step's normal forces [N, 3] of the first geom on the second, by their
+        # names
         self.pushes: dict[tuple[str, str], np.ndarray] = {}
         self._targets = targets
-        flexes = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) for flex in range(model.nflex))
+        flexes = (
+            mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) for flex in range(model.nflex)
+        )
         self._flexed = np.array([model.geom(name).id for name in flexes], int)
         free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
         tied = np.isin(free, [model.eq_obj1id, model.eq_obj2id])
@@ -47,13 +54,17 @@ class MomentumBalance:
 
     def after(self, data: mujoco.MjData, impulses: list) -> None:
         """Account for a step."""
-        dt, geoms, forces = self.model.opt.timestep, data.contact.geom.copy(), contact_forces(self.model, data)[:, :3]
+        dt = self.model.opt.timestep
+        geoms = data.contact.geom.copy()
+        forces = contact_forces(self.model, data)[:, :3]
         by_flex = geoms < 0
         geoms[by_flex] = self._flexed[data.contact.flex[by_flex]]
         # which the solver's force contains, unlike the geoms' own
         forces[:, 0] -= self._pulls(data)
         frames = data.contact.frame.reshape(-1, 3, 3)
-        vectors = np.stack([forces[:, :1] * frames[:, 0], np.einsum("ki,kij->kj", forces, frames)], axis=1)
+        vectors = np.stack(
+            [forces[:, :1] * frames[:, 0], np.einsum("ki,kij->kj", forces, frames)], axis=1
+        )
         on_bodies = np.zeros((self.model.nbody, 2, 3))  # normal forces, and whole ones
         np.add.at(on_bodies, self.model.geom_bodyid[geoms[:, 1]], vectors)
         np.subtract.at(on_bodies, self.model.geom_bodyid[geoms[:, 0]], vectors)
@@ -61,10 +72,13 @@ class MomentumBalance:
         shares = {body: self._share(data, body, *on_bodies[body], largest) for body in self._free}
         self.pushes = {}
         for pair in np.unique(geoms, axis=0):
-            mine, (a, b) = (geoms == pair).all(axis=1), (self.names[geom] for geom in pair)
-            push, reported = vectors[mine, 0].sum(axis=0), dt * forces[mine, 0].sum()
+            mine = (geoms == pair).all(axis=1)
+            (a, b) = (self.names[geom] for geom in pair)
+            push = vectors[mine, 0].sum(axis=0)
+            reported = dt * forces[mine, 0].sum()
             if np.isin(pair, self._flexed).any():
-                # contacts with triangles push sideways in pairs: only the sum of their forces is meant
+                # contacts with triangles push sideways in pairs: only the sum of their forces is
+                # meant
                 reported = dt * float(np.linalg.norm(push))
             self.pushes |= {(a, b): push, (b, a): -push}
             for names in ((a, b), (b, a)):
@@ -79,32 +93,48 @@ class MomentumBalance:
     def _share_of_pair(self, pair: np.ndarray, shares: dict[int, float]) -> float:
         """By the lighter body of two geoms, if that is free, or else by the heavier, if that feels it."""
         mass = self.model.body_mass
-        moving = (body for body in self.model.geom_bodyid[pair].tolist() if self.model.body_dofnum[body])
+        moving = (
+            body for body in self.model.geom_bodyid[pair].tolist() if self.model.body_dofnum[body]
+        )
         light, *heavy = sorted(moving, key=lambda body: mass[body])
         known = [light, *(body for body in heavy if mass[body] <= _HEAVY * mass[light])]
         return next((shares[body] for body in known if body in shares), 1.0)
 
     def _pulls(self, data: mujoco.MjData) -> np.ndarray:
         """Share of every contact of the forces of suckers on its bodies [N]."""
-        pulls, contacts = np.zeros(data.ncon), data.contact
-        for sucker in np.flatnonzero(self.model.actuator_trntype == mujoco.mjtTrn.mjTRN_BODY).tolist():
+        pulls = np.zeros(data.ncon)
+        contacts = data.contact
+        for sucker in np.flatnonzero(
+            self.model.actuator_trntype == mujoco.mjtTrn.mjTRN_BODY
+        ).tolist():
             body = self.model.actuator_trnid[sucker, 0]
-            mine = (self.model.geom_bodyid[contacts.geom] == body).any(axis=1) & (contacts.exclude < 2)
+            mine = (self.model.geom_bodyid[contacts.geom] == body).any(axis=1) & (
+                contacts.exclude < 2
+            )
             pulls[mine] += data.actuator_force[sucker] / max(mine.sum(), 1)
         return pulls
 
-    def _share(self, data: mujoco.MjData, body: int, pushed: np.ndarray, whole: np.ndarray, largest: float) -> float:
+    def _share(
+        self, data: mujoco.MjData, body: int, pushed: np.ndarray, whole: np.ndarray, largest: float
+    ) -> float:
         """Change of a free body's momentum over that which its contacts' normal forces account for."""
-        start, mass, gravity = self.model.body_dofadr[body], self.model.body_mass[body], self.model.opt.gravity
-        dof, dt = slice(start, start + 6), self.model.opt.timestep
-        before, change = self._velocity[dof], (data.qvel - self._velocity)[dof] / dt
+        start = self.model.body_dofadr[body]
+        mass = self.model.body_mass[body]
+        gravity = self.model.opt.gravity
+        dof = slice(start, start + 6)
+        dt = self.model.opt.timestep
+        before = self._velocity[dof]
+        change = (data.qvel - self._velocity)[dof] / dt
         usual = max(largest, mass * (np.abs(gravity).max() + np.abs(before).max() / dt))
         if np.linalg.norm(pushed) <= 1e-7 * usual:
             # nothing, or too weak to be felt among roundings
             return 1.0
         # from the frame's origin, whose velocity a free joint has, to the centre of mass
-        rotation, arm = data.xmat[body].reshape(3, 3), data.xipos[body] - data.xpos[body]
+        rotation = data.xmat[body].reshape(3, 3)
+        arm = data.xipos[body] - data.xpos[body]
         spin = rotation @ before[3:]
-        at_centre = change[:3] + np.cross(rotation @ change[3:], arm) + np.cross(spin, np.cross(spin, arm))
+        at_centre = (
+            change[:3] + np.cross(rotation @ change[3:], arm) + np.cross(spin, np.cross(spin, arm))
+        )
         felt = mass * (at_centre - gravity) - (whole - pushed)
         return float(felt @ pushed / (pushed @ pushed))

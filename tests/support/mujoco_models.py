@@ -6,7 +6,10 @@ import numpy as np
 from ripple_sim import make_collidable
 from ripple_sim.scenes.shapes import limbed
 
-BALL = '<body name="ball" pos="{}"><freejoint/><geom name="ball" type="sphere" size="0.05" mass="0.3"/></body>'
+BALL = (
+    '<body name="ball" pos="{}"><freejoint/><geom name="ball" type="sphere" size="0.05" '
+    'mass="0.3"/></body>'
+)
 
 
 def vector(values: np.ndarray) -> str:
@@ -14,7 +17,10 @@ def vector(values: np.ndarray) -> str:
 
 
 def mesh_asset(name: str, V: np.ndarray, F: np.ndarray, attributes: str = "") -> str:
-    return f'<mesh name="{name}" vertex="{vector(V)}" face="{" ".join(map(str, F.ravel()))}" {attributes}/>'
+    return (
+        f'<mesh name="{name}" vertex="{vector(V)}" face="{" ".join(map(str, F.ravel()))}" '
+        f"{attributes}/>"
+    )
 
 
 def limbed_asset(attributes: str = "") -> str:
@@ -44,7 +50,9 @@ def forwarded(model: mujoco.MjModel) -> mujoco.MjData:
     return data
 
 
-def mesh_spec(shape: tuple, joint: str | None = None, route: str | None = "flex", **geom: object) -> mujoco.MjSpec:
+def mesh_spec(
+    shape: tuple, joint: str | None = None, route: str | None = "flex", **geom: object
+) -> mujoco.MjSpec:
     """A mesh geom "target" on a body "base" of its own, which may move."""
     V, F = shape
     spec = mujoco.MjSpec()
@@ -52,7 +60,9 @@ def mesh_spec(shape: tuple, joint: str | None = None, route: str | None = "flex"
     body = spec.worldbody.add_body(name="base", pos=[0.1, -0.2, 0.3], quat=[0.8, 0.0, 0.6, 0.0])
     if joint == "free":
         body.add_freejoint()
-    body.add_geom(name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="shape", mass=3.0, **geom)
+    body.add_geom(
+        name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="shape", mass=3.0, **geom
+    )
     if route is not None:
         make_collidable(spec, "target", route)
     return spec

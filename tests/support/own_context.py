@@ -22,11 +22,18 @@ def own_context() -> Iterator[EGLCurrent]:
     """Make a second context on the first device and leave it current, once, drawing to one surface, reading another."""
     egl = load_egl()
     address = egl.eglGetProcAddress
-    find_devices = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, _pointer, _pointer)(address(b"eglQueryDevicesEXT"))
-    find_display = ctypes.CFUNCTYPE(_pointer, ctypes.c_uint, _pointer, _pointer)(address(b"eglGetPlatformDisplayEXT"))
-    create_surface = ctypes.CFUNCTYPE(_pointer, _pointer, _pointer, _pointer)(address(b"eglCreatePbufferSurface"))
+    find_devices = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_int, _pointer, _pointer)(
+        address(b"eglQueryDevicesEXT")
+    )
+    find_display = ctypes.CFUNCTYPE(_pointer, ctypes.c_uint, _pointer, _pointer)(
+        address(b"eglGetPlatformDisplayEXT")
+    )
+    create_surface = ctypes.CFUNCTYPE(_pointer, _pointer, _pointer, _pointer)(
+        address(b"eglCreatePbufferSurface")
+    )
     create_context = ctypes.CFUNCTYPE(_pointer, *[_pointer] * 4)(address(b"eglCreateContext"))
-    device, count = _pointer(), ctypes.c_int()
+    device = _pointer()
+    count = ctypes.c_int()
     find_devices(1, ctypes.byref(device), ctypes.byref(count))
     display = _pointer(find_display(_PLATFORM_DEVICE, device, None))
     assert egl.eglInitialize(display, None, None)

@@ -11,11 +11,16 @@ from typing import Any
 
 def ended(*words: Any, **options: Any) -> subprocess.CompletedProcess[str]:
     """A Python process with these words that has ended, with what it said; options are those of `subprocess.run`."""
-    return subprocess.run([sys.executable, *words], **{"capture_output": True, "text": True, "check": False, **options})
+    return subprocess.run(
+        [sys.executable, *words],
+        **{"capture_output": True, "text": True, "check": False, **options},
+    )
 
 
 def begin_command(home: Path, words: str, begun: Event) -> None:
-    """Be the program with these words in a folder; workers are this very process. It may be killed once it has `begun`.
+    """Be the program with these words in a folder; workers are this very process.
+
+    It may be killed once it has `begun`.
 
     What it says is in the folder's file `said`; its cache is there too.
     """

@@ -14,7 +14,8 @@ class RandomHit:
     """A random model whose hitters are on their way to the target; the first hit is over after so many `steps`."""
 
     def __init__(self, random: RandomModel) -> None:
-        self._random, self.model = random, random.compile()
+        self._random = random
+        self.model = random.compile()
         self.data = mujoco.MjData(self.model)
         self.steps = int(min(250, 12 + 6 * random.stopping / random.timestep))
         mujoco.mj_fwdPosition(self.model, self.data)
@@ -34,7 +35,10 @@ class RandomHit:
     def filtering(self) -> Iterator[None]:
         """Refuse the contacts of the last hitter with the target, where the model says so."""
         if self._random.refused:
-            pair = {self.model.geom(name).id for name in ("target", f"hitter {len(self._random.hitters) - 1}")}
+            pair = {
+                self.model.geom(name).id
+                for name in ("target", f"hitter {len(self._random.hitters) - 1}")
+            }
             mujoco.set_mjcb_contactfilter(lambda model, data, one, other: int({one, other} == pair))
         try:
             yield
@@ -48,7 +52,8 @@ class RandomHit:
 
     def _drive(self, ways: list[np.ndarray]) -> None:
         """Switch motors and suckers on, towards the target, and choose velocities of mocap bodies [m/s]."""
-        model, self._drift = self.model, np.zeros((self.model.nmocap, 3))
+        model = self.model
+        self._drift = np.zeros((self.model.nmocap, 3))
         driven = {f"hitter {i}": -way for i, way in enumerate(ways)} | {"target": 0.3 * ways[0]}
         for name, way in driven.items():
             if model.body(name).mocapid[0] >= 0:
@@ -62,7 +67,10 @@ class RandomHit:
 
     def _send(self, name: str) -> np.ndarray:
         """Place a body near the target, and give it its speed; the direction that it comes from."""
-        random, rng, model, data = self._random, self._random.rng, self.model, self.data
+        random = self._random
+        rng = self._random.rng
+        model = self.model
+        data = self.data
         way = rng.standard_normal(3)
         if random.ground:
             way[2] = abs(way[2]) + 0.5
@@ -78,12 +86,16 @@ class RandomHit:
         joint = model.body(name).jntadr[0]
         if joint >= 0 and model.jnt_type[joint] == _FREE:
             velocity = data.qvel[model.jnt_dofadr[joint] :][:6]
-            velocity[:] = [*(-random.speed * way), *(rng.uniform(-0.5, 0.5, 3) * random.speed / random.size)]
+            velocity[:] = [
+                *(-random.speed * way),
+                *(rng.uniform(-0.5, 0.5, 3) * random.speed / random.size),
+            ]
         return way
 
     def _lay_ground(self) -> None:
         """Lay the ground below the target, which falls onto it."""
-        random, model = self._random, self.model
+        random = self._random
+        model = self.model
         height = model.geom("ground").pos
 
         def touch(distance: float) -> bool:
@@ -94,7 +106,9 @@ class RandomHit:
         self.data.qvel[model.jnt_dofadr[model.body("target").jntadr[0]] + 2] = -random.speed
 
     def _move(self, name: str, place: np.ndarray) -> None:
-        model, data, body = self.model, self.data, self.model.body(name)
+        model = self.model
+        data = self.data
+        body = self.model.body(name)
         joint = int(body.jntadr[0])
         if body.mocapid[0] >= 0:
             data.mocap_pos[body.mocapid[0]] = place
@@ -110,7 +124,8 @@ class RandomHit:
         """Whether a geom touches the target, or the flex that collides for it."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
-        geom, target = self.model.geom(name).id, self.model.geom("target").id
+        geom = self.model.geom(name).id
+        target = self.model.geom("target").id
         contacts = self.data.contact
         met = (contacts.geom == target).any(axis=1) | (contacts.flex >= 0).any(axis=1)
         return bool((met & (contacts.geom == geom).any(axis=1)).any())

@@ -51,8 +51,9 @@ SCALES = (1e-3, 0.03, 1.0, 30.0, 1e3)
 class RandomModel:
     """A model with a geom "target" and up to three more, "hitter 0" and so on, that are to meet it.
 
-    Lengths are in metres, times in seconds: `size` is half the target's, geoms meet at a `speed`, and their contacts
-    have the time constant `stopping`. What is drawn for the scene beyond the model comes from `rng`.
+    Lengths are in metres, times in seconds: `size` is half the target's, geoms meet at a `speed`,
+    and their contacts have the time constant `stopping`. What is drawn for the scene beyond the
+    model comes from `rng`.
     """
 
     def __init__(self, seed: int) -> None:
@@ -68,7 +69,11 @@ class RandomModel:
         self.speed = float(depth / (self.timestep + self.stopping))
         self.hitters = [str(rng.choice(HITTERS)) for _ in range(rng.integers(1, 4))]
         self.radii = rng.choice([0.15, 0.3, 0.45], 3) * self.size
-        self.ground = str(rng.choice(["plane", "hfield"])) if self.mount == "free" and rng.random() < 0.5 else None
+        self.ground = (
+            str(rng.choice(["plane", "hfield"]))
+            if self.mount == "free" and rng.random() < 0.5
+            else None
+        )
         if self.kind == "sdf" and self.ground == "hfield":
             # which MuJoCo does not collide
             self.ground = "plane"
@@ -85,7 +90,10 @@ class RandomModel:
     @property
     def targets(self) -> list[str]:
         """Geoms that are to ripple."""
-        return ["target", *(f"hitter {i}" for i, hitter in enumerate(self.hitters) if hitter == "second target")]
+        return [
+            "target",
+            *(f"hitter {i}" for i, hitter in enumerate(self.hitters) if hitter == "second target"),
+        ]
 
     def compile(self) -> mujoco.MjModel:
         """The model as MuJoCo compiles it."""
@@ -93,19 +101,26 @@ class RandomModel:
         if self.kind == "flex":
             make_collidable(spec, "target", "flex")
         for mesh in spec.meshes:
-            mesh.octree_maxdepth = 5  # of signed distances, which take a quarter of the default's time
+            # of signed distances, which take a quarter of the default's time
+            mesh.octree_maxdepth = 5
         return spec.compile()
 
     def _xml(self) -> str:
         hitters = [(hitter, self._hitter(i, hitter)) for i, hitter in enumerate(self.hitters)]
         moved = "".join(body for hitter, body in hitters if hitter != "link")
         links = "".join(body for hitter, body in hitters if hitter == "link")
-        bodies, equality = self._target(links) + moved, ""
+        bodies = self._target(links) + moved
+        equality = ""
         if self.mount in ("weld", "connect"):
             partner = self.rng.choice(["partner", "world"])
             anchor = f'anchor="{self._vector(self.size)}"' if self.mount == "connect" else ""
-            equality = f'<equality><{self.mount} body1="target" body2="{partner}" {anchor}/></equality>'
-            bodies += f'<body name="partner" pos="0 0 {6 * self.size}"><freejoint/>{self._inertia()}</body>'
+            equality = (
+                f'<equality><{self.mount} body1="target" body2="{partner}" {anchor}/></equality>'
+            )
+            bodies += (
+                f'<body name="partner" pos="0 0 '
+                f'{6 * self.size}"><freejoint/>{self._inertia()}</body>'
+            )
         if self.ground:
             shape = 'hfield="hills"' if self.ground == "hfield" else 'size="0 0 1"'
             bodies += f'<geom name="ground" type="{self.ground}" {shape} {self._contact()}/>'
@@ -117,26 +132,38 @@ class RandomModel:
     def _target(self, links: str) -> str:
         shape = self._shape(self.kind, self.size, "egg")
         geom = f'<geom name="target" {shape} {self._matter()}/>'
-        joint = MOUNTS[self.mount].format(axis=self._vector(1.0), anchor=self._vector(self.size), mass=self._mass())
+        joint = MOUNTS[self.mount].format(
+            axis=self._vector(1.0), anchor=self._vector(self.size), mass=self._mass()
+        )
         mocap = 'mocap="true"' if self.mount == "mocap" else ""
         if self.sleeps and self.mount == "free" and not self.ground:
             mocap = 'sleep="init"'
-        body = f'<body name="target" quat="{vector(self.rng.standard_normal(4))}" {mocap}>{joint}{geom}{links}</body>'
+        body = (
+            f'<body name="target" quat="{vector(self.rng.standard_normal(4))}" '
+            f"{mocap}>{joint}{geom}{links}</body>"
+        )
         if self.mount != "chain":
             return body
-        return f'<body><joint type="slide" axis="{self._vector(1.0)}"/>{self._inertia()}{body}</body>'
+        return (
+            f'<body><joint type="slide" axis="{self._vector(1.0)}"/>{self._inertia()}{body}</body>'
+        )
 
     def _hitter(self, i: int, hitter: str) -> str:
         """Body of what moves by itself, at a place of its own, with its actuators."""
-        name, place = f"hitter {i}", f'pos="{vector(3 * self.size * np.array([i, 1, 3]))}"'
+        name = f"hitter {i}"
+        place = f'pos="{vector(3 * self.size * np.array([i, 1, 3]))}"'
         shape = self._shape(str(self.rng.choice([*SHAPES, "small sdf"])), self.radii[i], f"egg {i}")
-        geom, turned = f'<geom name="{name}" {shape} {self._matter()}/>', vector(self.rng.standard_normal(4))
+        geom = f'<geom name="{name}" {shape} {self._matter()}/>'
+        turned = vector(self.rng.standard_normal(4))
         force = float(self._mass()) * self.speed / self.stopping
         if hitter == "mocap":
             return f'<body name="{name}" {place} quat="{turned}" mocap="true">{geom}</body>'
         if hitter in ("driven", "link"):
             axes = zip("xyz", np.eye(3), strict=True)
-            x, y, z = (f'<joint name="{axis} {i}" type="slide" axis="{vector(way)}"/>' for axis, way in axes)
+            x, y, z = (
+                f'<joint name="{axis} {i}" type="slide" axis="{vector(way)}"/>'
+                for axis, way in axes
+            )
             inertia = self._inertia() if hitter == "link" else ""
             self._drive(i, force)
             if hitter == "link":
@@ -150,14 +177,17 @@ class RandomModel:
     def _drive(self, i: int, force: float) -> None:
         """Motors of three joints that push with a force [N], or direct current motors that begin with it."""
         constant = 1 / (NO_LOAD * self.speed)
-        motor, matter = "motor", f'gear="{force}"'
+        motor = "motor"
+        matter = f'gear="{force}"'
         if self.rng.random() >= 0.7:
-            motor, matter = "dcmotor", f'motorconst="{constant:.6g}" resistance="{constant / force:.6g}"'
+            motor = "dcmotor"
+            matter = f'motorconst="{constant:.6g}" resistance="{constant / force:.6g}"'
         self._actuators += "".join(f'<{motor} joint="{axis} {i}" {matter}/>' for axis in "xyz")
 
     def _matter(self) -> str:
         """Mass and contact parameters of a geom, which may be sticky."""
-        mass, sticky = self._mass(), ""
+        mass = self._mass()
+        sticky = ""
         if self.stickiness and self.rng.random() < 0.5:
             sticky = f'adhesion="{self.stickiness * float(mass) * self.speed / self.stopping:.4g}"'
         return f'mass="{mass}" {self._contact()} {sticky}'
@@ -168,7 +198,9 @@ class RandomModel:
             return f'type="{kind}" size="{vector(radius * np.array(SHAPES[kind]))}"'
         name, which = ("animal", 1) if kind in ANIMALS else (egg, 0)
         scale = vector(radius * np.ones(3))
-        self._meshes[name] = mesh_asset(name, *_meshes()[which], f'scale="{scale}" inertia="legacy"')
+        self._meshes[name] = mesh_asset(
+            name, *_meshes()[which], f'scale="{scale}" inertia="legacy"'
+        )
         return f'type="{"sdf" if "sdf" in kind else "mesh"}" mesh="{name}"'
 
     def _assets(self) -> str:
@@ -177,7 +209,9 @@ class RandomModel:
             return found
         hills = " ".join(map(str, np.random.default_rng(1).integers(0, 3, 49)))
         sizes = vector(self.size * np.array([9, 9, 1, 1]))
-        return found + f'<hfield name="hills" nrow="7" ncol="7" size="{sizes}" elevation="{hills}"/>'
+        return (
+            found + f'<hfield name="hills" nrow="7" ncol="7" size="{sizes}" elevation="{hills}"/>'
+        )
 
     def _vector(self, size: float) -> str:
         return vector(size * self.rng.uniform(-1, 1, 3))
@@ -193,36 +227,62 @@ class RandomModel:
     def _solref(self) -> str:
         if self.rng.random() < 0.25:
             # stiffness and damping of their own
-            omega, ratio = 1 / self.stopping, self.rng.uniform(0.05, 1.5)
+            omega = 1 / self.stopping
+            ratio = self.rng.uniform(0.05, 1.5)
             return f"{-(omega**2):.5g} {-2 * ratio * omega:.5g}"
         return f"{self.stopping:.5g} {self.rng.uniform(0.1, 1.5):.4g}"
 
     def _contact(self) -> str:
-        rng, small = self.rng, 0.01 * self.size
+        rng = self.rng
+        small = 0.01 * self.size
         margin, gap = (small * rng.random() if rng.random() < 0.3 else 0.0 for _ in range(2))
-        solimp = rng.choice(["0.9 0.95 0.001", f"0.8 0.99 {small:.4g}", "0.95 0.99 0.001 0.3 3", "0.5 0.9 0.01"])
-        friction = f"{rng.uniform(0, 1.5):.3g} {small * rng.uniform(0, 2):.3g} {small * rng.random():.3g}"
+        solimp = rng.choice(
+            ["0.9 0.95 0.001", f"0.8 0.99 {small:.4g}", "0.95 0.99 0.001 0.3 3", "0.5 0.9 0.01"]
+        )
+        friction = (
+            f"{rng.uniform(0, 1.5):.3g} {small * rng.uniform(0, 2):.3g} {small * rng.random():.3g}"
+        )
         return (
-            f'condim="{self.condim}" solref="{self.solref}" solimp="{solimp}" margin="{margin:.4g}" gap="{gap:.4g}" '
-            f'friction="{friction}" priority="{int(rng.random() < 0.15)}" solmix="{rng.uniform(0, 2):.3g}"'
+            f'condim="{self.condim}" solref="{self.solref}" solimp="{solimp}" '
+            f'margin="{margin:.4g}" gap="{gap:.4g}" '
+            f'friction="{friction}" priority="{int(rng.random() < 0.15)}" '
+            f'solmix="{rng.uniform(0, 2):.3g}"'
         )
 
     def _option(self) -> str:
         rng = self.rng
-        solver, cone = rng.choice(["Newton", "CG", "PGS"], p=(0.5, 0.25, 0.25)), rng.choice(["pyramidal", "elliptic"])
+        solver = rng.choice(["Newton", "CG", "PGS"], p=(0.5, 0.25, 0.25))
+        cone = rng.choice(["pyramidal", "elliptic"])
         integrator = rng.choice(list(INTEGRATORS), p=list(INTEGRATORS.values()))
-        if integrator == "discrete" and (solver == "PGS" or not hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")):
+        if integrator == "discrete" and (
+            solver == "PGS" or not hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")
+        ):
             integrator = "implicitfast"
         # share of the models with each of them
-        shares = {"override": 0.1, "multiccd": 0.5, "nativeccd": 0.8, "warmstart": 0.8, "island": 0.8}
-        flags = {flag: rng.random() < share for flag, share in shares.items()} | {"sleep": self.sleeps}
+        shares = {
+            "override": 0.1,
+            "multiccd": 0.5,
+            "nativeccd": 0.8,
+            "warmstart": 0.8,
+            "island": 0.8,
+        }
+        flags = {flag: rng.random() < share for flag, share in shares.items()} | {
+            "sleep": self.sleeps
+        }
         more = rng.spawn(1)[0]
         flags |= {flag: more.random() < 0.5 for flag in FLAGS}
         flags["invdiscrete"] &= integrator != "RK4"
-        jacobian, noslip = more.choice(["dense", "sparse", "auto"]), more.choice([0, 0, 5])
+        jacobian = more.choice(["dense", "sparse", "auto"])
+        noslip = more.choice([0, 0, 5])
         text = " ".join(f'{flag}="{"enable" if on else "disable"}"' for flag, on in flags.items())
-        overrides = f'o_solref="{self._solref()}" o_solimp="0.9 0.95 0.001 0.5 2"' if flags["override"] else ""
-        gravity = vector(0.1 * self.speed / self.stopping * rng.standard_normal(3) * (rng.random() < 0.5))
+        overrides = (
+            f'o_solref="{self._solref()}" o_solimp="0.9 0.95 0.001 0.5 2"'
+            if flags["override"]
+            else ""
+        )
+        gravity = vector(
+            0.1 * self.speed / self.stopping * rng.standard_normal(3) * (rng.random() < 0.5)
+        )
         return f"""<option timestep="{self.timestep:.6g}" integrator="{integrator}" solver="{solver}" cone="{cone}"
             jacobian="{jacobian}" noslip_iterations="{noslip}" gravity="{gravity}"
             sdf_initpoints="50" impratio="{rng.choice([1, 1, 10])}" {overrides}>

@@ -39,7 +39,11 @@ def _source(include: str, expression: str, defines: dict[str, object]) -> str:
     """Source of a fragment shader made here that includes one of the renderer's files, by the loader itself."""
     package = Path(_folder.name, _PACKAGE)
     if not package.exists():
-        shutil.copytree(Path(ripple_sim.render.__file__).parent, package, ignore=shutil.ignore_patterns("*.py", "__*"))
+        shutil.copytree(
+            Path(ripple_sim.render.__file__).parent,
+            package,
+            ignore=shutil.ignore_patterns("*.py", "__*"),
+        )
         (package / "__init__.py").touch()
         sys.path.append(_folder.name)
         importlib.invalidate_caches()
@@ -49,7 +53,9 @@ def _source(include: str, expression: str, defines: dict[str, object]) -> str:
     return load_shader(_PACKAGE, name, "fragment", VARYING="in", **{**DEFINES, **defines})
 
 
-def evaluated(gl: GLContext, include: str, expression: str, inputs: np.ndarray, **defines: object) -> np.ndarray:
+def evaluated(
+    gl: GLContext, include: str, expression: str, inputs: np.ndarray, **defines: object
+) -> np.ndarray:
     """Values [k, 4] of a GLSL expression of `x`, a vec4, at inputs [k, up to 4]; float32."""
     count, columns = inputs.shape
     rows = -(-count // _WIDTH)

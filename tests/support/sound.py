@@ -20,7 +20,11 @@ def assert_sound(mesh: Mesh) -> None:
     assert (area > 0).all()
     assert_single_fans(F)
     rim = [edge for edge in forward if edge[::-1] not in forward]
-    loops = [tuple(edge) for loop in mesh.rims for edge in np.stack([loop, np.roll(loop, -1)], axis=1).tolist()]
+    loops = [
+        tuple(edge)
+        for loop in mesh.rims
+        for edge in np.stack([loop, np.roll(loop, -1)], axis=1).tolist()
+    ]
     assert sorted(rim) == sorted(loops)
     assert mesh.closed == (not rim)
     assert (mesh.genus >= 0).all()
@@ -40,7 +44,8 @@ def assert_single_fans(F: np.ndarray) -> None:
         begins = set(ring) - set(ring.values())
         assert len(begins) <= 1
         start = begins.pop() if begins else next(iter(ring))
-        steps, at = 0, start
+        steps = 0
+        at = start
         while at in ring and steps < len(ring):
             at = ring[at]
             steps += 1

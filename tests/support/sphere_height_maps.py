@@ -22,8 +22,11 @@ def height_map_of(height, gradient) -> np.ndarray:
     with_halo = texels.reshape(-1, 4)[np.maximum(index, 0)]
     for row in (0, -1):
         for column in (0, -1):
-            r, c = (1 if row == 0 else -2), (1 if column == 0 else -2)
-            with_halo[:, row, column] = (with_halo[:, r, c] + with_halo[:, r, column] + with_halo[:, row, c]) / 3
+            r = 1 if row == 0 else -2
+            c = 1 if column == 0 else -2
+            with_halo[:, row, column] = (
+                with_halo[:, r, c] + with_halo[:, r, column] + with_halo[:, row, c]
+            ) / 3
     return with_halo.astype(np.float32)
 
 

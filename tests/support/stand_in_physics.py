@@ -13,7 +13,8 @@ class StandIn:
 
     def __init__(self, xml: str) -> None:
         model = mujoco.MjModel.from_xml_string(xml)
-        self.model, self.data = types.SimpleNamespace(ptr=model), types.SimpleNamespace(ptr=mujoco.MjData(model))
+        self.model = types.SimpleNamespace(ptr=model)
+        self.data = types.SimpleNamespace(ptr=mujoco.MjData(model))
         self.reset()
 
     def reset(self) -> None:
@@ -36,7 +37,11 @@ def stand_in_suite(xml: str) -> types.ModuleType:
     def load(*_: Any, **__: Any) -> types.SimpleNamespace:
         physics = StandIn(xml)
         spec = types.SimpleNamespace(generate_value=lambda: None)
-        calls = {"reset": lambda: physics.reset(), "step": lambda action: physics.step(5), "action_spec": lambda: spec}
+        calls = {
+            "reset": lambda: physics.reset(),
+            "step": lambda action: physics.step(5),
+            "action_spec": lambda: spec,
+        }
         return types.SimpleNamespace(physics=physics, **calls)
 
     suite = types.ModuleType("dm_control.suite")

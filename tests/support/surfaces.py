@@ -8,10 +8,13 @@ import trimesh
 from ripple_sim.solver import Mesh
 
 # radii of a torus and of its tube
-RING, TUBE = 1.0, 0.4
+RING = 1.0
+TUBE = 0.4
 
 
-def grid(n: int, place: Callable, *, closed: tuple[bool, bool] = (False, False)) -> tuple[np.ndarray, np.ndarray]:
+def grid(
+    n: int, place: Callable, *, closed: tuple[bool, bool] = (False, False)
+) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and triangles over n x n squares; place takes two arrays from 0 to 1 to x, y, z."""
     counts = [n if each else n + 1 for each in closed]
     a, b = np.meshgrid(*(np.arange(count) / n for count in counts), indexing="ij")
@@ -19,7 +22,9 @@ def grid(n: int, place: Callable, *, closed: tuple[bool, bool] = (False, False))
     i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
     ring = (0, 0), (1, 0), (1, 1), (0, 1)
     corner = [((i + k) % counts[0] * counts[1] + (j + m) % counts[1]).ravel() for k, m in ring]
-    return V, np.concatenate([np.stack([corner[k] for k in each], axis=1) for each in ((0, 1, 2), (0, 2, 3))])
+    return V, np.concatenate(
+        [np.stack([corner[k] for k in each], axis=1) for each in ((0, 1, 2), (0, 2, 3))]
+    )
 
 
 def square(n: int) -> Mesh:
@@ -31,7 +36,8 @@ def disk(n: int) -> Mesh:
     """Unit disk."""
 
     def place(a: np.ndarray, b: np.ndarray) -> tuple:
-        x, y = 2 * a - 1, 2 * b - 1
+        x = 2 * a - 1
+        y = 2 * b - 1
         return x * np.sqrt(1 - y * y / 2), y * np.sqrt(1 - x * x / 2), 0 * x
 
     return Mesh.from_arrays(*grid(n, place))
@@ -41,7 +47,8 @@ def torus(n: int) -> Mesh:
     """Torus about the z axis."""
 
     def place(a: np.ndarray, b: np.ndarray) -> tuple:
-        u, v = 2 * np.pi * a, 2 * np.pi * b
+        u = 2 * np.pi * a
+        v = 2 * np.pi * b
         rho = RING + TUBE * np.cos(v)
         return rho * np.cos(u), rho * np.sin(u), TUBE * np.sin(v)
 

@@ -9,7 +9,9 @@ TEXTURE = '<texture name="t" type="{kind}" builtin="flat" width="64" height="{he
 MATERIAL = '<material name="m" texture="t" specular="0" {}/>'
 
 
-def textured_model(body: str, attributes: str = "", *, kind: str = "2d", asset: str = "", material: str = MATERIAL):
+def textured_model(
+    body: str, attributes: str = "", *, kind: str = "2d", asset: str = "", material: str = MATERIAL
+):
     """Model of a body with the material "m"; `attributes` are the material's."""
     texture = TEXTURE.format(kind=kind, height=64 if kind == "2d" else 384)
     xml = f"<mujoco><asset>{texture}{material.format(attributes)}{asset}</asset><worldbody>{body}</worldbody></mujoco>"

@@ -24,7 +24,9 @@ class WithAndWithout:
         self._ripples.allow_any_height("target")
         self.filtered = self._ripples["target"]
         self.unfiltered = WaveSolver(self.filtered.atlas, material, **options)
-        self._contacts = ContactLoads(CoupledModel(model), {model.geom("target").id: self.unfiltered})
+        self._contacts = ContactLoads(
+            CoupledModel(model), {model.geom("target").id: self.unfiltered}
+        )
         self.history: list[tuple[float, float]] = []
 
     def step(self, data: mujoco.MjData) -> None:
@@ -34,5 +36,7 @@ class WithAndWithout:
         self._contacts.skip()
         self._contacts.loads(data, dt)
         given = [done.on_texels for done in self._contacts.since_skip]
-        self.unfiltered.step(dt, load=Load.together([Load(each.texels, each.forces) for each in given]))
+        self.unfiltered.step(
+            dt, load=Load.together([Load(each.texels, each.forces) for each in given])
+        )
         self.history.append((rms(self.filtered), rms(self.unfiltered)))

@@ -20,7 +20,9 @@ material = {{speed = 0.3, density = {}}}
 """
 
 
-def egg_scene(folder: Path, floor: str = "", duration: float = 2.0, density: float = 1500.0) -> Scene:
+def egg_scene(
+    folder: Path, floor: str = "", duration: float = 2.0, density: float = 1500.0
+) -> Scene:
     """A scene that is written to a folder and loaded."""
     model = MJCF.replace("</worldbody>", floor + "</worldbody>")
     return load_scene(write_scene(folder, model, TOML.format(duration, density)))
@@ -35,7 +37,11 @@ def interrupting_at(frame: int) -> Callable[[int, int], None]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 FULL = """
@@ -57,11 +63,15 @@ except EncodingError as error:
 """
 
 
-def written_until_full(path: Path, limit: int, width: int, height: int, count: int, **options: object) -> str:
+def written_until_full(
+    path: Path, limit: int, width: int, height: int, count: int, **options: object
+) -> str:
     """What is said where so many frames of noise are written, but no file may grow beyond a limit.
 
     That is what a full disk does, without filling one.
     """
-    result = ended("-c", FULL, path, *map(str, (limit, width, height, count)), json.dumps(options), check=True)
+    result = ended(
+        "-c", FULL, path, *map(str, (limit, width, height, count)), json.dumps(options), check=True
+    )
     assert "Traceback" not in result.stderr
     return result.stdout

@@ -1,6 +1,7 @@
 """Models whose depth and segmentation MuJoCo's own renderer and ours both draw.
 
-As a program it draws them with `mujoco.Renderer`, which takes over the process's OpenGL context, to an .npz file.
+As a program it draws them with `mujoco.Renderer`, which takes over the process's OpenGL context, to
+an .npz file.
 """
 
 import sys
@@ -56,14 +57,18 @@ CAMERAS = {
     "camera with two focal lengths": (f'{_SENSOR} focal="4e-3 7e-3"', ""),
     "camera with near clip planes": ('fovy="50"', _SHALLOW),
     "orthographic camera with near clip planes": ('projection="orthographic" fovy="1.6"', _SHALLOW),
-    "camera with a very near clip plane": ('fovy="50"', '<visual><map znear="2e-4" zfar="3"/></visual>'),
+    "camera with a very near clip plane": (
+        'fovy="50"',
+        '<visual><map znear="2e-4" zfar="3"/></visual>',
+    ),
     "orthographic free camera": ("", '<visual><global orthographic="true" fovy="2.5"/></visual>'),
 }
 WORLDS |= dict.fromkeys(CAMERAS, _SEVERAL)
 _TENDON = '<tendon><spatial width=".02"><site site="a"/><site site="b"/></spatial></tendon>'
 
 
-# What lights a scene and what is around it: an MJCF's `<visual>`, skybox and lamp, and flags of the scene that are set.
+# What lights a scene and what is around it: an MJCF's `<visual>`, skybox and lamp, and flags of the
+# scene that are set.
 _STARS = """<texture type="skybox" builtin="gradient" rgb1=".5 .6 .7" rgb2=".1 .2 .3" width="256" height="256"
     mark="random" markrgb="1 1 1"/>"""
 _LAMP = '<light pos="0 0 6" dir="0 0 -1"/>'
@@ -80,7 +85,10 @@ _PLANES = {
         _FROM_BELOW,
     ),
     "transparent floor": (
-        '<geom type="plane" size="0 0 1" rgba=".4 .6 .4 .4"/><geom size=".5" pos="0 0 -.7" rgba=".9 .8 .1 1"/>',
+        (
+            '<geom type="plane" size="0 0 1" rgba=".4 .6 .4 .4"/><geom size=".5" pos="0 0 -.7" '
+            'rgba=".9 .8 .1 1"/>'
+        ),
         'pos="0 -4 2" xyaxes="1 0 0 0 .6 1"',
     ),
     "transparent ball": (
@@ -94,7 +102,11 @@ _PLANES = {
         'pos="0 -4 2" xyaxes="1 0 0 0 .5 1"',
     ),
     "table": (
-        '<geom type="plane" size=".8 .6 1" pos="0 0 .7" rgba=".9 .1 .1 1"/><geom size=".2" pos="0 0 .9"/>',
+        (
+            '<geom type="plane" size=".8 .6 1" pos="0 0 .7" rgba=".9 .1 .1 1"/><geom size=".2" '
+            'pos="0 '
+            '0 .9"/>'
+        ),
         'pos="0 -4 2" xyaxes="1 0 0 0 .5 1"',
     ),
 }
@@ -121,7 +133,9 @@ def lit_state(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     visual, asset, lamp, _ = LIT[name]
     if name in _PLANES:
         body, camera = _PLANES[name]
-        return posed(f"<mujoco><worldbody>{lamp}{body}<camera name='side' {camera}/></worldbody></mujoco>")
+        return posed(
+            f"<mujoco><worldbody>{lamp}{body}<camera name='side' {camera}/></worldbody></mujoco>"
+        )
     return posed(f"""<mujoco><visual>{visual}</visual><asset>{asset}
         <material name="floor" rgba=".4 .5 .4 1" reflectance=".3"/></asset><worldbody>{lamp}
         <geom type="plane" size="0 0 1" material="floor"/><geom size=".4" pos="-.3 0 .5" rgba=".8 .5 .3 1"/>
@@ -129,7 +143,9 @@ def lit_state(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
         <camera name="side" pos="0 -4 1.2" xyaxes="1 0 0 0 .2 1"/></worldbody></mujoco>""")
 
 
-def lit_frame(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> tuple[np.ndarray, np.ndarray]:
+def lit_frame(
+    renderer: mujoco.Renderer, data: mujoco.MjData, name: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Colours and what each pixel shows."""
     renderer.update_scene(data, camera="side")
     usual = renderer.scene.flags.copy()
@@ -150,11 +166,18 @@ def state_of(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
         </worldbody>{_TENDON if "tendon" in name else ""}</mujoco>""")
 
 
-def drawn(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> tuple[np.ndarray, np.ndarray]:
+def drawn(
+    renderer: mujoco.Renderer, data: mujoco.MjData, name: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Depth and segmentation of a model, by any renderer of that interface."""
     option = mujoco.MjvOption()
     if "contacts" in name:
-        shown = (flag.mjVIS_CONTACTPOINT, flag.mjVIS_CONTACTFORCE, flag.mjVIS_JOINT, flag.mjVIS_TRANSPARENT)
+        shown = (
+            flag.mjVIS_CONTACTPOINT,
+            flag.mjVIS_CONTACTFORCE,
+            flag.mjVIS_JOINT,
+            flag.mjVIS_TRANSPARENT,
+        )
         option.flags[list(map(int, shown))] = 1
     if "edges" in name:
         option.flags[[int(flag.mjVIS_FLEXVERT), int(flag.mjVIS_FLEXFACE)]] = 1

@@ -16,7 +16,8 @@ class WaveHeights:
     """
 
     def __init__(self, atlas: Atlas, steep: float) -> None:
-        self._atlas, self._steep = atlas, steep
+        self._atlas = atlas
+        self._steep = steep
         self._size = float(np.ptp(atlas.mesh.V, axis=0).max())
         self.highest = self.steepest = 0.0
 
@@ -33,14 +34,19 @@ class WaveHeights:
     @functools.cached_property
     def _radius(self) -> np.ndarray:
         """Half the way to the object's other side [m], [C n n]; a half of its size at most, a hundredth at least."""
-        atlas, tree = self._atlas, igl.AABB()
-        V, F = atlas.mesh.V / self._size, atlas.mesh.F
+        atlas = self._atlas
+        tree = igl.AABB()
+        V = atlas.mesh.V / self._size
+        F = atlas.mesh.F
         tree.init(V, F)
         corners = V[F[atlas.triangles.ravel()]]
         across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
         ways = []
         # a needle's own normal may point anywhere, and so may a texel's in a sharp crease
-        for inward in (-atlas.normals.reshape(-1, 3), across / np.linalg.norm(across, axis=1, keepdims=True)):
+        for inward in (
+            -atlas.normals.reshape(-1, 3),
+            across / np.linalg.norm(across, axis=1, keepdims=True),
+        ):
             start = atlas.positions.reshape(-1, 3) / self._size + 1e-3 * inward
             triangles, distance, _ = tree.intersect_ray_first(V, F, start, inward)
             ways.append(np.where(triangles >= 0, np.clip(distance + 1e-3, 0.02, 1.0), 1.0))

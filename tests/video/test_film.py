@@ -1,4 +1,7 @@
-"""Overlays on real frames: colours, contacts, two runs side by side. Needs an OpenGL context; software will do."""
+"""Overlays on real frames: colours, contacts, two runs side by side.
+
+Needs an OpenGL context; software will do.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +25,9 @@ from ripple_sim.solver.layouts.cube import cube_topology, texel_directions
 from ripple_sim.solver.texels import with_filled_halo
 from ripple_sim.video import Film, Progress, VideoOptions
 
-N, RATE, FRAMES = 24, 30, 8
+N = 24
+RATE = 30
+FRAMES = 8
 EVERYTHING = ["height", "contacts", "grid", "time", "energy"]
 
 pytestmark = pytest.mark.usefixtures("opengl")
@@ -33,10 +38,16 @@ def make_scene(tmp_path: Path) -> Callable[..., Scene]:
     return lambda toml=TOML: load_scene(write_scene(tmp_path, MJCF, toml))
 
 
-def film_of(scene: Scene, words: list[str], size: tuple[int, int], baseline: str | None = None) -> Film:
+def film_of(
+    scene: Scene, words: list[str], size: tuple[int, int], baseline: str | None = None
+) -> Film:
     operators = overlay.compared_operators(baseline)
-    simulations = [Simulation(scene, fps=RATE, backend="cpu", operator=operator) for operator in operators]
-    return Film(simulations, VideoOptions(size=size, fps=RATE, overlay=words, compare=baseline), FRAMES)
+    simulations = [
+        Simulation(scene, fps=RATE, backend="cpu", operator=operator) for operator in operators
+    ]
+    return Film(
+        simulations, VideoOptions(size=size, fps=RATE, overlay=words, compare=baseline), FRAMES
+    )
 
 
 def last_frame(film: Film) -> np.ndarray:
@@ -44,9 +55,17 @@ def last_frame(film: Film) -> np.ndarray:
 
 
 def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
-    model, data = posed('<mujoco><worldbody><geom name="target" type="sphere" size="1"/></worldbody></mujoco>')
+    model, data = posed(
+        '<mujoco><worldbody><geom name="target" type="sphere" size="1"/></worldbody></mujoco>'
+    )
     ball = meshes.ball(16)
-    surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell), "metal", heatmap_colors=overlay.color_table())
+    surface = Surface(
+        ball.shell,
+        ball.faces,
+        cube_charts(ball.shell),
+        "metal",
+        heatmap_colors=overlay.color_table(),
+    )
     renderer = Renderer(shared_context(), model, {0: surface}, size=(200, 200))
     renderer.set_heatmap(0, with_filled_halo(cube_topology(field.shape[1]), field), limit)
     return renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 40.0))
@@ -59,8 +78,10 @@ def test_surface_has_the_color_of_its_height(value: float) -> None:
     expected = overlay.colors(value, 0.01).astype(float)
     shade = inside.max(axis=-1) / expected.max()
     assert shade.min() > 0.4
-    assert shade.max() == pytest.approx(1, abs=0.02)  # where the light falls the colour is the bar's own
-    np.testing.assert_allclose(inside, shade[..., None] * expected, atol=2.5)  # and only darker elsewhere
+    # where the light falls the colour is the bar's own
+    assert shade.max() == pytest.approx(1, abs=0.02)
+    # and only darker elsewhere
+    np.testing.assert_allclose(inside, shade[..., None] * expected, atol=2.5)
 
 
 def test_field_is_where_it_belongs_and_seamless() -> None:
@@ -70,7 +91,8 @@ def test_field_is_where_it_belongs_and_seamless() -> None:
     radius = np.tan(np.arcsin(1 / 4.0)) / np.tan(np.radians(20.0))
     column = red[:, 100][np.abs(atlas_z) < 0.9 * radius]
     assert column[0] > 60 > -60 > column[-1]
-    assert (np.diff(column) < 12).all()  # from red at the top to blue at the bottom without a step back
+    # from red at the top to blue at the bottom without a step back
+    assert (np.diff(column) < 12).all()
 
 
 def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) -> None:
@@ -89,7 +111,8 @@ def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) ->
     assert gathered[0].impulse == pytest.approx(sum(each.impulse for each in simulation.impulses))
 
     camera = Camera((0.0, 0.0, 0.0), 1.6, 90.0, -30.0)
-    width, height_px = 320, 180
+    width = 320
+    height_px = 180
     frame = np.full((height_px, width, 3), 255, np.uint8)
     projection = overlay.Projection(camera.pose(), width, height_px)
     layout = overlay.Layout(width, height_px)
@@ -104,7 +127,9 @@ def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) ->
 
 
 @pytest.mark.parametrize("baseline", ["paper", "uncorrected"])
-def test_halves_of_a_comparison_are_the_separate_runs(make_scene: Callable[..., Scene], baseline: str) -> None:
+def test_halves_of_a_comparison_are_the_separate_runs(
+    make_scene: Callable[..., Scene], baseline: str
+) -> None:
     scene = make_scene()
     film = film_of(scene, [], (320, 120), baseline)
     frame = last_frame(film)
@@ -135,7 +160,11 @@ def test_overlays_on_a_transparent_background(make_scene: Callable[..., Scene]) 
     frames = []
     for words in ([], EVERYTHING):
         simulation = Simulation(make_scene(), fps=RATE, backend="cpu")
-        film = Film([simulation], VideoOptions(size=(192, 108), fps=RATE, overlay=words, transparent=True), FRAMES)
+        film = Film(
+            [simulation],
+            VideoOptions(size=(192, 108), fps=RATE, overlay=words, transparent=True),
+            FRAMES,
+        )
         frames.append(last_frame(film))
     plain, drawn = frames
     assert drawn.shape == (108, 192, 4)
@@ -144,9 +173,17 @@ def test_overlays_on_a_transparent_background(make_scene: Callable[..., Scene]) 
     assert (drawn[..., 3] >= plain[..., 3]).all()
 
 
-def test_resumed_video_is_the_unbroken_one(make_scene: Callable[..., Scene], tmp_path: Path) -> None:
+def test_resumed_video_is_the_unbroken_one(
+    make_scene: Callable[..., Scene], tmp_path: Path
+) -> None:
     """Two runs under overlays, each frame a mean over the shutter and the lens."""
-    blur = {"shutter": 180.0, "aperture": 0.05, "focus": "stone", "exposures": 2, "slow_motion": 2.0}
+    blur = {
+        "shutter": 180.0,
+        "aperture": 0.05,
+        "focus": "stone",
+        "exposures": 2,
+        "slow_motion": 2.0,
+    }
     extra = {"compare": "paper", "transparent": True, "supersample": 2, "overlay": EVERYTHING}
 
     def render(name: str, progress: Progress | None = None, **options: Any) -> list[bytes]:
@@ -163,11 +200,15 @@ def test_resumed_video_is_the_unbroken_one(make_scene: Callable[..., Scene], tmp
     assert render("broken", resume=True) == whole
 
 
-def test_scene_file_names_overlays_and_a_video_shows_them(make_scene: Callable[..., Scene], tmp_path: Path) -> None:
+def test_scene_file_names_overlays_and_a_video_shows_them(
+    make_scene: Callable[..., Scene], tmp_path: Path
+) -> None:
     scene = make_scene('overlay = ["height=0.01", "time"]\n' + TOML)
     assert scene.overlay == ("height=0.01", "time")
     pictures = {}
     for name, words in (("own", None), ("same", ["height=0.01", "time"]), ("none", [])):
-        render_video(scene, tmp_path / name, VideoOptions(size=(96, 54), fps=10, duration=0.3, overlay=words))
+        render_video(
+            scene, tmp_path / name, VideoOptions(size=(96, 54), fps=10, duration=0.3, overlay=words)
+        )
         pictures[name] = sorted(path.read_bytes() for path in (tmp_path / name).iterdir())
     assert pictures["own"] == pictures["same"] != pictures["none"]

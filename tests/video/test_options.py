@@ -39,14 +39,24 @@ def test_none_is_left_to_the_scene_and_to_the_output() -> None:
     options = settled(VideoOptions(), scene, Path("clip.gif"))
     assert (options.fps, options.duration, options.overlay) == (25, 2.5, ("time", "contacts"))
     assert options.backend in ("gl", "cpu")
-    assert settled(options, made(duration=9.0), Path("clip.mp4")) == options  # nothing is left to settle
+    # nothing is left to settle
+    assert settled(options, made(duration=9.0), Path("clip.mp4")) == options
 
 
 @pytest.mark.parametrize(
     ("duration", "fps", "slow_motion", "frames"),
-    [(2.0, 60, 1.0, 120), (2.0, 60, 4.0, 480), (2.0, 60, 0.5, 60), (0.1, 24, 1.0, 2), (1e-6, 60, 1.0, 1), (1, 1, 1, 1)],
+    [
+        (2.0, 60, 1.0, 120),
+        (2.0, 60, 4.0, 480),
+        (2.0, 60, 0.5, 60),
+        (0.1, 24, 1.0, 2),
+        (1e-6, 60, 1.0, 1),
+        (1, 1, 1, 1),
+    ],
 )
-def test_frames_fill_the_duration(duration: float, fps: int, slow_motion: float, frames: int) -> None:
+def test_frames_fill_the_duration(
+    duration: float, fps: int, slow_motion: float, frames: int
+) -> None:
     options = VideoOptions(duration=duration, fps=fps, slow_motion=slow_motion)
     assert frame_count(options) == frames
     assert options.rate == fps * slow_motion
@@ -54,9 +64,14 @@ def test_frames_fill_the_duration(duration: float, fps: int, slow_motion: float,
 
 @pytest.mark.parametrize(
     ("name", "valid", "values"),
-    [("duration", "less than 86400", (MAX_DURATION, 1e9)), ("slow_motion", "up to 1000", (MAX_SLOW_MOTION + 1, 1e6))],
+    [
+        ("duration", "less than 86400", (MAX_DURATION, 1e9)),
+        ("slow_motion", "up to 1000", (MAX_SLOW_MOTION + 1, 1e6)),
+    ],
 )
-def test_a_duration_or_slow_motion_out_of_range_is_named(name: str, valid: str, values: tuple[float, float]) -> None:
+def test_a_duration_or_slow_motion_out_of_range_is_named(
+    name: str, valid: str, values: tuple[float, float]
+) -> None:
     for value in values:
         message = f"{name.replace('_', ' ')} is .*{value!r}.*; valid is a positive number,? {valid}"
         with pytest.raises(SceneError, match=message):
@@ -89,8 +104,12 @@ def test_the_same_scene_has_the_same_fingerprint_whatever_its_name_and_length() 
 
 @pytest.mark.parametrize("name", ["face", "skull"])
 def test_a_scene_in_another_folder_has_the_same_fingerprint(tmp_path: Path, name: str) -> None:
-    copy = shutil.copytree(SCENES, tmp_path / "a longer folder", ignore=shutil.ignore_patterns("*.py*"))
-    assert scene_digest(load_scene(copy / f"{name}.toml")) == scene_digest(load_scene(SCENES / f"{name}.toml"))
+    copy = shutil.copytree(
+        SCENES, tmp_path / "a longer folder", ignore=shutil.ignore_patterns("*.py*")
+    )
+    assert scene_digest(load_scene(copy / f"{name}.toml")) == scene_digest(
+        load_scene(SCENES / f"{name}.toml")
+    )
 
 
 def test_everything_that_moves_or_shows_changes_the_fingerprint() -> None:
@@ -102,7 +121,11 @@ def test_everything_that_moves_or_shows_changes_the_fingerprint() -> None:
         dataclasses.replace(base, camera=CameraEntry(shutter=90.0)),
         *(
             dataclasses.replace(base, targets=(msgspec.structs.replace(entry, **change),))
-            for change in ({"resolution": 64}, {"look": "clay"}, {"material": MaterialEntry(speed=0.9)})
+            for change in (
+                {"resolution": 64},
+                {"look": "clay"},
+                {"material": MaterialEntry(speed=0.9)},
+            )
         ),
     ]
     digests = {scene_digest(scene) for scene in (base, *others)}

@@ -17,7 +17,7 @@ from PIL import Image
 from programs import ended
 from unfinished_videos import MJCF, contents, egg_scene, interrupting_at
 
-from ripple_sim import ExportOptions, render_video
+from ripple_sim import ExportOptions, Simulation, render_video
 from ripple_sim.encode import FRAMES_IN_CLIP
 from ripple_sim.errors import ExportError, VideoError
 from ripple_sim.scene import MaterialEntry, Scene, load_scene
@@ -29,26 +29,39 @@ OPTIONS = {"size": (64, 48), "fps": 30}
 
 @pytest.mark.parametrize("name", ["clip.mp4", "frames"])
 def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
-    whole, broken = tmp_path / "whole" / name, tmp_path / "broken" / name
+    whole = tmp_path / "whole" / name
+    broken = tmp_path / "broken" / name
     # with sound, which is heard from where the camera is at each frame
     scene = dataclasses.replace(scene, camera=msgspec.structs.replace(scene.camera, orbit=90.0))
     options = {**OPTIONS, "sound": name == "clip.mp4"}
     assert render_video(scene, whole, VideoOptions(**options)).resumed_at == 0
     for frame in (20, 58):
         with pytest.raises(KeyboardInterrupt):
-            render_video(scene, broken, VideoOptions(resume=True, **options), progress=interrupting_at(frame))
+            render_video(
+                scene, broken, VideoOptions(resume=True, **options), progress=interrupting_at(frame)
+            )
     summary = render_video(scene, broken, VideoOptions(resume=True, **options))
     # frames that wait to be encoded are lost
-    assert summary.resumed_at == FRAMES_IN_CLIP if name == "clip.mp4" else 48 <= summary.resumed_at <= 58
+    assert (
+        summary.resumed_at == FRAMES_IN_CLIP
+        if name == "clip.mp4"
+        else 48 <= summary.resumed_at <= 58
+    )
     assert contents(broken.parent) == contents(whole.parent)
 
 
-def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_shows_them(scene, tmp_path):
+def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_shows_them(
+    scene, tmp_path
+):
     def rendered(density: float, **options: object) -> list[str]:
-        target = msgspec.structs.replace(scene.targets[0], material=MaterialEntry(density=density, stiffness=1e3))
+        target = msgspec.structs.replace(
+            scene.targets[0], material=MaterialEntry(density=density, stiffness=1e3)
+        )
         changed = dataclasses.replace(scene, targets=(target,))
         with warnings.catch_warnings(record=True, action="always") as told:
-            render_video(changed, tmp_path / "frames", VideoOptions(**OPTIONS, overwrite=True, **options))
+            render_video(
+                changed, tmp_path / "frames", VideoOptions(**OPTIONS, overwrite=True, **options)
+            )
         return [str(each.message) for each in told if "higher than a pixel" in str(each.message)]
 
     [message] = rendered(1e6)
@@ -57,15 +70,24 @@ def test_waves_lower_than_a_pixel_are_told_of_and_the_density_that_is_named_show
     assert not rendered(1e6, overlay=["height"]), "colours show them"
 
 
-@pytest.mark.parametrize(("beside", "duration", "lines"), [(0.0, None, 0), (5.0, None, 1), (5.0, 0.3, 0)])
-def test_a_target_that_nothing_touches_in_the_whole_scene_is_told_of(tmp_path, opengl, beside, duration, lines):
+@pytest.mark.parametrize(
+    ("beside", "duration", "lines"), [(0.0, None, 0), (5.0, None, 1), (5.0, 0.3, 0)]
+)
+def test_a_target_that_nothing_touches_in_the_whole_scene_is_told_of(
+    tmp_path, opengl, beside, duration, lines
+):
     egg_scene(tmp_path, duration=0.5)
     text = (tmp_path / "scene.xml").read_text()
-    (tmp_path / "scene.xml").write_text(text.replace('pos="0.05 0 0.3"', f'pos="{0.05 + beside} 0 0.3"'))
-    scene, options = load_scene(tmp_path / "scene.toml"), VideoOptions(**OPTIONS, duration=duration)
+    (tmp_path / "scene.xml").write_text(
+        text.replace('pos="0.05 0 0.3"', f'pos="{0.05 + beside} 0 0.3"')
+    )
+    scene = load_scene(tmp_path / "scene.toml")
+    options = VideoOptions(**OPTIONS, duration=duration)
     with warnings.catch_warnings(record=True, action="always") as told:
         render_video(scene, tmp_path / "frames", options)
-    assert ["no wave on 'egg': nothing touched it" in str(each.message) for each in told] == [True] * lines
+    assert ["no wave on 'egg': nothing touched it" in str(each.message) for each in told] == [
+        True
+    ] * lines
 
 
 def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene, tmp_path):
@@ -83,10 +105,16 @@ def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene,
     with pytest.raises(VideoError, match="the scene's fingerprint was"):
         resume(load_scene(tmp_path / "scene.toml"))
     (tmp_path / "scene.xml").write_text(MJCF)
-    options, push = VideoOptions(resume=True, **OPTIONS), lambda each: np.add.at(each.data.qvel, 0, 1e-9)
+    options = VideoOptions(resume=True, **OPTIONS)
+
+    def push(simulation: Simulation) -> None:
+        simulation.data.qvel[0] += 1e-9
+
     with pytest.raises(VideoError, match="at frame 16 the simulation is not in the state"):
         render_video(scene, tmp_path / "frames", options, on_step=push)
-    assert json.loads((tmp_path / "frames.part" / "settings.json").read_text())["the size"] == "64x48"
+    assert (
+        json.loads((tmp_path / "frames.part" / "settings.json").read_text())["the size"] == "64x48"
+    )
 
 
 @pytest.mark.parametrize("ahead", [False, True])
@@ -105,30 +133,48 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
         "            egl.eglTerminate(ctypes.c_void_p(egl.eglGetCurrentDisplay()))\n"
         "from ripple_sim.video import render_video as module\n"
         "render = module.render_video\n"
-        "module.render_video = lambda *args, **others: render(*args, **{**others, 'progress': lose})\n"
-        "sys.exit(cli.main(['render', *sys.argv[1:], *'--size 64x48 --fps 30 --backend cpu --duration 0.6'.split()]))\n"
+        "module.render_video = lambda *args, **others: render(*args, **{**others, 'progress': "
+        "lose})\n"
+        "sys.exit(cli.main(['render', *sys.argv[1:], *'--size 64x48 --fps 30 --backend cpu "
+        "--duration 0.6'.split()]))\n"
     )
     result = ended("-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames")
     assert result.returncode == 1
-    lines = [line for line in result.stderr.splitlines() if "nanobind" not in line and not line.startswith(" - ")]
-    said = r"ripple-sim: the OpenGL context .* is lost; .* frames are kept in .*; --resume carries on"
+    lines = [
+        line
+        for line in result.stderr.splitlines()
+        if "nanobind" not in line and not line.startswith(" - ")
+    ]
+    said = (
+        r"ripple-sim: the OpenGL context .* is lost; .* frames are kept in .*; --resume carries on"
+    )
     assert len(lines) == 1 and re.match(said, lines[0]), result.stderr
     options = VideoOptions(resume=True, **OPTIONS, backend="cpu", duration=0.6)
     # of those that were given for encoding, what waits is given up
     assert render_video(scene, tmp_path / "frames", options).resumed_at > 8
 
 
-def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(scene, tmp_path, monkeypatch):
+def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(
+    scene, tmp_path, monkeypatch
+):
     """The software driver taken for hardware: two threads share its context, and two frames are on their way."""
     threads: set[str] = set()
     for hardware in (False, True):
         threads.clear()
         monkeypatch.setattr(GLContext, "software", not hardware)
-        options, folder = VideoOptions(**OPTIONS, duration=0.2, backend="gl"), tmp_path / f"frames {hardware}"
-        render_video(scene, folder, options, on_step=lambda _: threads.add(threading.current_thread().name))
+        options = VideoOptions(**OPTIONS, duration=0.2, backend="gl")
+        folder = tmp_path / f"frames {hardware}"
+        render_video(
+            scene, folder, options, on_step=lambda _: threads.add(threading.current_thread().name)
+        )
         assert threads == {"simulation_0" if hardware else "MainThread"}
     host, device = (
-        np.array([np.asarray(Image.open(path), int) for path in sorted((tmp_path / f"frames {hardware}").iterdir())])
+        np.array(
+            [
+                np.asarray(Image.open(path), int)
+                for path in sorted((tmp_path / f"frames {hardware}").iterdir())
+            ]
+        )
         for hardware in (False, True)
     )
     assert len(host) == 6
@@ -137,7 +183,9 @@ def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(scene, 
 
 def test_a_stage_runs_ahead_in_another_thread_as_far_as_it_may_and_no_further():
     begun: list[int] = []
-    threads, taken, before = set(), [], threading.active_count()
+    threads = set()
+    taken = []
+    before = threading.active_count()
 
     def items() -> Iterator[int]:
         for number in range(50):
@@ -175,9 +223,12 @@ def test_an_error_comes_where_the_next_item_would_have_come():
 
 
 def test_every_frame_has_its_passes_whatever_the_exposures(scene: Scene, tmp_path: Path) -> None:
-    options, blur = {"size": (32, 24), "fps": 20, "duration": 0.2}, {"shutter": 180.0, "exposures": 2}
+    options = {"size": (32, 24), "fps": 20, "duration": 0.2}
+    blur = {"shutter": 180.0, "exposures": 2}
     passes = ("depth", "flow")
-    render_video(scene, tmp_path / "clip.mp4", VideoOptions(**options, **blur, supersample=2, passes=passes))
+    render_video(
+        scene, tmp_path / "clip.mp4", VideoOptions(**options, **blur, supersample=2, passes=passes)
+    )
     files = sorted((tmp_path / "clip.passes").glob("*.npz"))
     assert [each.name for each in files] == [f"passes_{frame:05d}.npz" for frame in range(4)]
     _, second, _, last = map(np.load, files)
@@ -186,7 +237,9 @@ def test_every_frame_has_its_passes_whatever_the_exposures(scene: Scene, tmp_pat
     assert not last["flow"].any()
 
 
-def test_a_resumed_render_has_the_passes_of_one_that_was_not_interrupted(scene: Scene, tmp_path: Path) -> None:
+def test_a_resumed_render_has_the_passes_of_one_that_was_not_interrupted(
+    scene: Scene, tmp_path: Path
+) -> None:
     options = VideoOptions(size=(32, 24), fps=20, duration=0.4, passes=("depth", "flow"))
     render_video(scene, tmp_path / "whole", options)
 
@@ -207,7 +260,8 @@ def test_a_resumed_render_has_the_passes_of_one_that_was_not_interrupted(scene: 
     summary = render_video(scene, tmp_path / "clip", dataclasses.replace(options, resume=True))
     assert summary.resumed_at >= 4
     whole, resumed = (contents(tmp_path / f"{name}.passes") for name in ("whole", "clip"))
-    assert whole.pop("segmentation.json") != resumed.pop("segmentation.json")  # which names its video
+    # which names its video
+    assert whole.pop("segmentation.json") != resumed.pop("segmentation.json")
     assert len(whole) == 8 and resumed == whole
 
 
@@ -223,7 +277,8 @@ def test_passes_of_another_video_are_not_replaced(scene: Scene, tmp_path: Path) 
     def fail(simulation: object) -> None:
         raise KeyboardInterrupt
 
-    for name in ("clip.mp4", "other.mp4"):  # a render that fails without a frame leaves all as it was
+    # a render that fails without a frame leaves all as it was
+    for name in ("clip.mp4", "other.mp4"):
         with pytest.raises(KeyboardInterrupt):
             render_video(scene, tmp_path / name, options, on_frame=fail)
     assert contents(tmp_path) == before
@@ -236,7 +291,10 @@ def test_passes_of_another_video_are_not_replaced(scene: Scene, tmp_path: Path) 
         ({"supersample": 0}, "supersample is 0; valid is a whole number, 1 or greater"),
         ({"size": None}, "size is None; valid is (int, int)"),
         ({"size": "64x36"}, "size is '64x36'; valid is (int, int)"),
-        ({"size": (0, 0)}, "size is (0, 0); valid is (width, height) in pixels, two whole numbers greater than 0"),
+        (
+            {"size": (0, 0)},
+            "size is (0, 0); valid is (width, height) in pixels, two whole numbers greater than 0",
+        ),
         ({"fps": 0}, "fps is 0; valid is a whole number, 1 or greater"),
         ({"fps": np.nan}, "fps is nan; valid is int"),
         ({"duration": -1.0}, "duration is -1.0; valid is a finite number greater than 0"),
@@ -260,5 +318,7 @@ def test_options_are_checked_where_they_are_made(given: dict[str, Any], message:
 
 @pytest.mark.parametrize("name", ["progress", "on_step", "on_frame"])
 def test_what_is_called_must_be_a_function(scene: Scene, tmp_path: Path, name: str) -> None:
-    with pytest.raises(VideoError, match=f"^{name.replace('_', ' ')} is 3; valid is a function, or None$"):
+    with pytest.raises(
+        VideoError, match=f"^{name.replace('_', ' ')} is 3; valid is a function, or None$"
+    ):
         render_video(scene, tmp_path / "o.mp4", VideoOptions(), **{name: 3})  # type: ignore[arg-type]

@@ -23,10 +23,17 @@ SIDE = [0.0, -0.3, 0.0]  # towards the camera
 def opened() -> Iterator[tuple[RippleViewer, Ripples, mujoco.MjData]]:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
-    ripples = Ripples(model, {"egg": Material(speed=0.6, damping=2.0, density=300.0)}, resolution=32, backend="cpu")
+    ripples = Ripples(
+        model,
+        {"egg": Material(speed=0.6, damping=2.0, density=300.0)},
+        resolution=32,
+        backend="cpu",
+    )
     with launch_passive(model, data, ripples, show_left_ui=False, show_right_ui=False) as viewer:
         with viewer.lock():
-            viewer.cam.lookat, viewer.cam.distance, viewer.cam.elevation = (0, 0, 0.4), 1.6, -20
+            viewer.cam.lookat = (0, 0, 0.4)
+            viewer.cam.distance = 1.6
+            viewer.cam.elevation = -20
         yield viewer, ripples, data
     assert not viewer.is_running()
 
@@ -54,7 +61,14 @@ def test_ripples_are_seen_and_the_model_stays_as_it_was(opened) -> None:
     color = ripples.model.geom("egg").rgba.copy()
     viewer.user_scn.ngeom = 1
     place = np.array([0.3, -0.6, 0.4])
-    mujoco.mjv_initGeom(viewer.user_scn.geoms[0], 2, np.full(3, 0.03), place, np.eye(3).ravel(), np.ones(4, np.float32))
+    mujoco.mjv_initGeom(
+        viewer.user_scn.geoms[0],
+        2,
+        np.full(3, 0.03),
+        place,
+        np.eye(3).ravel(),
+        np.ones(4, np.float32),
+    )
     still = picture(viewer)
     ripples["egg"].height = 0.04 * np.cos(60 * ripples["egg"].atlas.positions[..., 0])
     waves = picture(viewer, still)
@@ -68,7 +82,8 @@ def test_ripples_are_seen_and_the_model_stays_as_it_was(opened) -> None:
 def test_the_surface_follows_the_mouse(opened, pull: float) -> None:
     viewer, ripples, data = opened
     ripples["egg"].reset()
-    viewer.pert.select, viewer.pert.localpos = 1, SIDE
+    viewer.pert.select = 1
+    viewer.pert.localpos = SIDE
     viewer.pert.refselpos = [0.0, SIDE[1] + pull, 0.4]
     for active in (0, int(mujoco.mjtPertBit.mjPERT_TRANSLATE)):
         assert np.abs(ripples["egg"].height).max() == 0

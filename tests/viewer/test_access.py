@@ -27,11 +27,15 @@ async def served(name: str, host: str = "127.0.0.1") -> AsyncIterator[tuple[int,
 
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        server, port, calls = get_server(name), probe.getsockname()[1], []
+        server = get_server(name)
+        port = probe.getsockname()[1]
+        calls = []
     web.restrict(server, host=host, port=port, secret=SECRET)
     server.controller.trigger_name(lambda: None)
     server.trigger("drive")(lambda: calls.append("drive"))
-    serving = asyncio.ensure_future(server.start(exec_mode="coroutine", open_browser=False, show_connection_info=False))
+    serving = asyncio.ensure_future(
+        server.start(exec_mode="coroutine", open_browser=False, show_connection_info=False)
+    )
     await server.ready
     try:
         async with aiohttp.ClientSession() as client:
@@ -47,7 +51,9 @@ def in_a_loop(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
 
 def packed(method: str, *args: object, number: str = "rpc:c0:0") -> bytes:
     """A call as the page sends it: a header of identity, offset and size, and the message."""
-    message = msgpack.packb({"wslink": "1.0", "id": number, "method": method, "args": list(args), "kwargs": {}})
+    message = msgpack.packb(
+        {"wslink": "1.0", "id": number, "method": method, "args": list(args), "kwargs": {}}
+    )
     return b"\x01\0\0\0\0\0\0\0" + len(message).to_bytes(4, "little") + message
 
 
@@ -69,14 +75,17 @@ async def drive(ws: Any, secret: str) -> list[dict]:
 async def test_the_page_itself_drives_the_viewer_with_the_secret() -> None:
     async with served("own") as (port, client, calls):
         for name in (f"127.0.0.1:{port}", f"localhost:{port}"):
-            url, origin = f"ws://127.0.0.1:{port}/ws", f"http://{name}"
+            url = f"ws://127.0.0.1:{port}/ws"
+            origin = f"http://{name}"
             async with client.ws_connect(url, origin=origin, headers={"Host": name}) as ws:
                 hello, _ = await drive(ws, SECRET)
                 assert "clientID" in hello["result"]
         assert calls == ["drive", "drive"]
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "http://localhost:1", "null", "https://127.0.0.1.evil.com"])
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "http://localhost:1", "null", "https://127.0.0.1.evil.com"]
+)
 @in_a_loop
 async def test_another_site_is_refused_even_with_the_secret(origin: str) -> None:
     async with served(f"origin {origin}") as (port, client, calls):
@@ -94,14 +103,20 @@ async def test_a_name_that_another_site_points_at_this_machine_is_refused() -> N
             async with client.get(f"http://127.0.0.1:{port}{path}", headers=evil) as response:
                 assert response.status == 403
         with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
-            await client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://evil.example:{port}", headers=evil)
+            await client.ws_connect(
+                f"ws://127.0.0.1:{port}/ws", origin=f"http://evil.example:{port}", headers=evil
+            )
 
 
-@pytest.mark.parametrize("secret", ["wslink-secret", "", web.new_secret()], ids=["default", "none", "of another run"])
+@pytest.mark.parametrize(
+    "secret", ["wslink-secret", "", web.new_secret()], ids=["default", "none", "of another run"]
+)
 @in_a_loop
 async def test_without_this_runs_secret_no_call_is_answered(secret: str) -> None:
     async with served(f"secret {secret}") as (port, client, calls):
-        async with client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}") as ws:
+        async with client.ws_connect(
+            f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}"
+        ) as ws:
             answers = await drive(ws, secret)
         assert ["error" in answer for answer in answers] == [True, True]
         assert calls == []
@@ -110,7 +125,9 @@ async def test_without_this_runs_secret_no_call_is_answered(secret: str) -> None
 @in_a_loop
 async def test_a_message_longer_than_the_pages_own_ends_the_connection() -> None:
     async with served("size") as (port, client, _):
-        async with client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}") as ws:
+        async with client.ws_connect(
+            f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}"
+        ) as ws:
             await drive(ws, SECRET)
             await ws.send_bytes(packed("trame.trigger", "x" * 2 * web.LARGEST_MESSAGE))
             closing = await ws.receive(timeout=LIMIT)
@@ -120,7 +137,10 @@ async def test_a_message_longer_than_the_pages_own_ends_the_connection() -> None
 
 @in_a_loop
 async def test_the_page_cannot_be_framed_by_another_and_gives_its_address_to_none() -> None:
-    async with served("framing") as (port, client, _), client.get(f"http://127.0.0.1:{port}/index.html") as response:
+    async with (
+        served("framing") as (port, client, _),
+        client.get(f"http://127.0.0.1:{port}/index.html") as response,
+    ):
         assert response.status == 200
         assert response.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
         assert response.headers["Referrer-Policy"] == "no-referrer"

@@ -27,7 +27,9 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_screenshots_take_the_next_free_number_and_keep_every_pixel(recorder: Recorder, tmp_path: Path) -> None:
+def test_screenshots_take_the_next_free_number_and_keep_every_pixel(
+    recorder: Recorder, tmp_path: Path
+) -> None:
     (tmp_path / "duck-2.png").write_text("mine")
     noise = np.random.default_rng(0).integers(0, 256, (33, 47, 3), np.uint8)
     assert [recorder.save(noise).name for _ in range(2)] == ["duck-1.png", "duck-3.png"]
@@ -35,7 +37,9 @@ def test_screenshots_take_the_next_free_number_and_keep_every_pixel(recorder: Re
     assert (tmp_path / "duck-2.png").read_text() == "mine"
 
 
-def test_a_screenshot_that_cannot_be_written_is_one_line_and_leaves_nothing(tmp_path: Path, monkeypatch) -> None:
+def test_a_screenshot_that_cannot_be_written_is_one_line_and_leaves_nothing(
+    tmp_path: Path, monkeypatch
+) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(VideoError, match=r"cannot write .*duck-1\.png: File exists"):
         Recorder(tmp_path / "file", "duck", 30).save(frame(0))
@@ -65,7 +69,9 @@ def test_a_video_has_the_frames_at_its_rate_without_an_odd_row_or_column(recorde
     np.testing.assert_allclose([image.mean() for image in images], levels, atol=3)
 
 
-def test_a_window_of_another_size_ends_the_video_with_what_it_has(recorder: Recorder, tmp_path: Path) -> None:
+def test_a_window_of_another_size_ends_the_video_with_what_it_has(
+    recorder: Recorder, tmp_path: Path
+) -> None:
     recorder.start(frame(0))
     assert recorder.add(frame(10))
     assert not recorder.add(frame(10, 64, 64))
@@ -83,7 +89,9 @@ def test_a_video_without_frames_leaves_nothing(recorder: Recorder, tmp_path: Pat
     assert names(tmp_path) == []
 
 
-def test_a_window_too_small_for_a_video_is_refused_and_nothing_records(recorder: Recorder, tmp_path: Path) -> None:
+def test_a_window_too_small_for_a_video_is_refused_and_nothing_records(
+    recorder: Recorder, tmp_path: Path
+) -> None:
     with pytest.raises(VideoError, match="14x14; valid is 16"):
         recorder.start(frame(0, 15, 15))
     assert not recorder.recording
@@ -106,7 +114,9 @@ FOCUS = np.array([0.3, -0.1, 0.5])
 
 def camera(offset: list[float], up: tuple[float, float, float] = (0.3, 0.2, 0.9)) -> pv.Camera:
     made = pv.Camera()
-    made.focal_point, made.position, made.up = FOCUS, FOCUS + offset, up
+    made.focal_point = FOCUS
+    made.position = FOCUS + offset
+    made.up = up
     return made
 
 
@@ -116,7 +126,9 @@ def elevation(made: pv.Camera) -> float:
 
 
 @pytest.mark.parametrize("offset", [[1, 2, 0.5], [-3, 0, -4], [0, 1, 20]])
-def test_a_camera_that_is_not_steep_stays_where_it_is_and_is_made_level(offset: list[float]) -> None:
+def test_a_camera_that_is_not_steep_stays_where_it_is_and_is_made_level(
+    offset: list[float],
+) -> None:
     made = camera(offset)
     level(made)
     np.testing.assert_allclose(made.position, FOCUS + offset)
@@ -131,7 +143,9 @@ def test_a_steep_camera_keeps_its_distance_and_direction_at_88_degrees(offset: l
     assert np.sign(elevation(made)) == np.sign(offset[2])
     away = np.array(made.position) - FOCUS
     assert np.linalg.norm(away) == pytest.approx(np.linalg.norm(offset))
-    np.testing.assert_allclose(away[:2] / np.hypot(*away[:2]), np.array(offset[:2]) / np.hypot(*offset[:2]), atol=1e-6)
+    np.testing.assert_allclose(
+        away[:2] / np.hypot(*away[:2]), np.array(offset[:2]) / np.hypot(*offset[:2]), atol=1e-6
+    )
     before = made.position
     level(made)
     np.testing.assert_allclose(made.position, before)  # again: nothing
@@ -144,7 +158,8 @@ def test_a_camera_straight_above_or_below_keeps_what_was_up_in_the_frame(height:
     assert elevation(made) == pytest.approx(np.copysign(88.0, height))
     away = np.array(made.position) - FOCUS
     assert np.linalg.norm(away) == pytest.approx(4.0)
-    right, expected = np.cross(-away, [0, 0, 1]), np.cross([0, 0, -np.sign(height)], [0.6, 0.8, 0])
+    right = np.cross(-away, [0, 0, 1])
+    expected = np.cross([0, 0, -np.sign(height)], [0.6, 0.8, 0])
     np.testing.assert_allclose(right / np.linalg.norm(right), expected, atol=1e-9)
 
 
@@ -156,8 +171,12 @@ def test_a_camera_straight_above_without_any_heading_looks_along_y() -> None:
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_rays_through_a_pixel_start_at_the_eye_or_beside_it_where_they_are_parallel(parallel: bool) -> None:
-    eye, direction, point = np.array([0.0, -3.0, 1.0]), np.array([0.0, 1.0, 0.0]), np.array([0.5, 2.0, 1.5])
+def test_rays_through_a_pixel_start_at_the_eye_or_beside_it_where_they_are_parallel(
+    parallel: bool,
+) -> None:
+    eye = np.array([0.0, -3.0, 1.0])
+    direction = np.array([0.0, 1.0, 0.0])
+    point = np.array([0.5, 2.0, 1.5])
     renderer = SimpleNamespace(
         SetDisplayPoint=lambda *place: None,
         DisplayToWorld=lambda: None,
@@ -166,4 +185,6 @@ def test_rays_through_a_pixel_start_at_the_eye_or_beside_it_where_they_are_paral
     )
     start, along = ray(renderer, 10, 20)
     np.testing.assert_allclose(start, [0.5, -3.0, 1.5] if parallel else eye)
-    np.testing.assert_allclose(along, direction if parallel else (point - eye) / np.linalg.norm(point - eye))
+    np.testing.assert_allclose(
+        along, direction if parallel else (point - eye) / np.linalg.norm(point - eye)
+    )

@@ -20,7 +20,11 @@ def test_on_a_screen(screen: str) -> None:
 
 def test_without_a_display_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom name="ball" size="1"/></worldbody></mujoco>')
-    ripples = Ripples(model, {"ball": Material(speed=1.0, density=10.0)}, resolution=8, backend="cpu")
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom name="ball" size="1"/></worldbody></mujoco>'
+    )
+    ripples = Ripples(
+        model, {"ball": Material(speed=1.0, density=10.0)}, resolution=8, backend="cpu"
+    )
     with pytest.raises(DisplayError, match="RippleRenderer renders frames without"):
         launch_passive(model, mujoco.MjData(model), ripples)

@@ -14,7 +14,9 @@ from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.solver import SolverError
 from ripple_sim.viewer import BALLS, FLIGHT, OPERATORS, Balls, Session, add_balls, open_scene
 
-RADIUS, MIDDLE = 0.5, np.array([0.0, 0.0, 0.5])  # of the scene "sphere" [m]
+# of the scene "sphere" [m]
+RADIUS = 0.5
+MIDDLE = np.array([0.0, 0.0, 0.5])
 MJCF = """<mujoco>{}<worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
 <body pos="0 0 1"><freejoint/><geom size="0.05"/></body></worldbody></mujoco>"""
 TOML = 'model = "scene.xml"\n[[ripple]]\ngeom = "egg"\n'
@@ -26,7 +28,9 @@ def run(session: Session, frames: int) -> None:
 
 
 def state(session: Session) -> bytes:
-    fields = [session.simulation.ripples[name].height.tobytes() for name in session.simulation.ripples]
+    fields = [
+        session.simulation.ripples[name].height.tobytes() for name in session.simulation.ripples
+    ]
     return b"".join([session.simulation.data.qpos.tobytes(), *fields])
 
 
@@ -78,7 +82,11 @@ def test_sliders_change_the_material_and_outlive_a_reset(session: Session) -> No
     np.testing.assert_array_equal(session.simulation.ripples["sphere"].height, before)
     session.reset()
     waves = session.simulation.ripples["sphere"]
-    assert (session.material("speed"), session.material("damping"), session.material("stiffness")) == (0.9, 3.0, 600.0)
+    assert (
+        session.material("speed"),
+        session.material("damping"),
+        session.material("stiffness"),
+    ) == (0.9, 3.0, 600.0)
     assert (waves.material.speed, waves.material.damping) == (0.9, 3.0)
     with pytest.raises(SolverError, match="speed is -1"):
         session.set_material(speed=-1.0)
@@ -116,7 +124,9 @@ def test_colours_follow_the_waves_at_once_and_fade_slowly(session: Session) -> N
     assert 0.9 * high < session.color_range < high
 
 
-def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_becomes_unstable_is_paused_and_can_start_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     path = write_scene(tmp_path, MJCF.format('<option gravity="0 0 -9e9"/>'), TOML)
     session = Session(open_scene(path), resolution=8)
@@ -126,14 +136,17 @@ def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path, mon
     assert not session.advance()
     session.reset()
     assert session.time == 0
-    assert {path.name for path in tmp_path.iterdir()} == {"scene.xml", "scene.toml"}  # no log of MuJoCo's
+    # no log of MuJoCo's
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.xml", "scene.toml"}
 
 
 def test_a_session_needs_no_vtk() -> None:
     code = (
-        "import sys\nfrom ripple_sim.viewer.opening import open_scene\nfrom ripple_sim.viewer.session import Session\n"
+        "import sys\nfrom ripple_sim.viewer.opening import open_scene\nfrom "
+        "ripple_sim.viewer.session import Session\n"
         "session = Session(open_scene('sphere'), resolution=8)\nsession.advance()\n"
-        "print(sorted({name.split('.')[0] for name in sys.modules} & {'vtkmodules', 'pyvista', 'trame'}))"
+        "print(sorted({name.split('.')[0] for name in sys.modules} & {'vtkmodules', 'pyvista', "
+        "'trame'}))"
     )
     result = ended("-c", code, check=True)
     assert result.stdout.splitlines()[-1] == "[]"
@@ -150,7 +163,9 @@ def test_a_ray_finds_the_surface_where_geometry_says(session: Session) -> None:
         assert hit is not None
         # |o + t d| = R
         local = origin - MIDDLE
-        a, b, c = toward @ toward, local @ toward, local @ local - RADIUS**2
+        a = toward @ toward
+        b = local @ toward
+        c = local @ local - RADIUS**2
         assert hit[2] == pytest.approx((-b - np.sqrt(b * b - a * c)) / a, rel=3e-3)
     assert session.pick([3, 0, 0.5], [1, 0, 0]) is None
     assert session.pick([3, 0, 2.5], [-1, 0, 0]) is None
@@ -159,10 +174,14 @@ def test_a_ray_finds_the_surface_where_geometry_says(session: Session) -> None:
 def test_a_ray_finds_the_nearest_of_two_turned_and_moved_surfaces() -> None:
     session = Session(open_scene("pair"), resolution=16)
     run(session, 4)
-    data, ids = session.simulation.data, session.simulation.ripples.geom_ids
+    data = session.simulation.data
+    ids = session.simulation.ripples.geom_ids
     left, right = (data.geom_xpos[ids[name]] for name in ("left", "right"))
     along = (right - left) / np.linalg.norm(right - left)
-    for start, way, name in ((left - 2 * along, along, "left"), (right + 2 * along, -along, "right")):
+    for start, way, name in (
+        (left - 2 * along, along, "left"),
+        (right + 2 * along, -along, "right"),
+    ):
         found, point, distance = session.pick(start, way)
         assert found == name
         closest, _ = session.simulation.ripples[name].atlas.project(point)
@@ -218,7 +237,8 @@ def test_a_ball_flies_a_parabola_through_its_point() -> None:
     add_balls(spec, 2, 0.05, 0.1)
     model = spec.compile()
     model.opt.timestep = 1e-3
-    data, balls = mujoco.MjData(model), Balls(model)
+    data = mujoco.MjData(model)
+    balls = Balls(model)
     assert balls.throw(data, [1.0, 2.0, 3.0], [-1.0, 0.5, 2.0], 0.4)
     for _ in range(400):
         balls.hold(data)
@@ -240,8 +260,11 @@ def test_the_oldest_ball_is_used_again_and_a_reset_calls_all_back(session: Sessi
 
 
 def test_balls_change_neither_the_view_nor_a_keyframe(tmp_path: Path) -> None:
-    path = write_scene(tmp_path, MJCF.format('<keyframe><key qpos="0.1 0.2 0.9 1 0 0 0"/></keyframe>'), TOML)
-    scene, plain = open_scene(path), load_scene(path)
+    path = write_scene(
+        tmp_path, MJCF.format('<keyframe><key qpos="0.1 0.2 0.9 1 0 0 0"/></keyframe>'), TOML
+    )
+    scene = open_scene(path)
+    plain = load_scene(path)
     assert scene.model.stat.extent == plain.model.stat.extent
     np.testing.assert_array_equal(scene.model.stat.center, plain.model.stat.center)
     session = Session(scene, resolution=8)

@@ -30,7 +30,9 @@ def address() -> Iterator[str]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         number = probe.getsockname()[1]
-    words = f"-m ripple_sim view sphere --web --port {number} --size 400x300 --resolution 16".split()
+    words = (
+        f"-m ripple_sim view sphere --web --port {number} --size 400x300 --resolution 16".split()
+    )
     env = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
     server = subprocess.Popen([sys.executable, *words], env=env, **streams)
@@ -104,8 +106,13 @@ def blueness(page: Page) -> int:
     return int(blue - red)
 
 
-def test_the_run_waits_for_the_first_browser_and_the_page_has_the_scenes_name(browser: Any, address: str) -> None:
-    """The first balls had fallen before anybody saw them. This test comes first: later pages join a run."""
+def test_the_run_waits_for_the_first_browser_and_the_page_has_the_scenes_name(
+    browser: Any, address: str
+) -> None:
+    """The first balls had fallen before anybody saw them.
+
+    This test comes first: later pages join a run.
+    """
     time.sleep(1.0)
     begun = time.monotonic()
     page = opened(browser, address)
@@ -172,7 +179,8 @@ def test_a_drag_turns_the_camera(page: Page) -> None:
     page.click("#reset")
     before = picture(page)
     box = page.locator("#picture").bounding_box()
-    x, y = box["x"] + 60, box["y"] + 60
+    x = box["x"] + 60
+    y = box["y"] + 60
     page.mouse.move(x, y)
     page.mouse.down()
     for step in range(8):

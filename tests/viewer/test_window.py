@@ -19,10 +19,14 @@ CHECKS = Path(__file__).with_name("window_checks.py")
 
 def check(display: str | None, *options: str) -> None:
     # off screen some of them are skipped, in CI too
-    environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "CI")}
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("DISPLAY", "CI")
+    }
     if display is not None:
         environment["DISPLAY"] = display
-    result = ended("-m", "pytest", "-q", "-p", "no:cacheprovider", CHECKS, *options, env=environment)
+    result = ended(
+        "-m", "pytest", "-q", "-p", "no:cacheprovider", CHECKS, *options, env=environment
+    )
     assert result.returncode == 0, result.stdout + result.stderr
 
 
@@ -31,7 +35,8 @@ def test_off_screen() -> None:
 
 
 def test_on_a_screen(screen: str) -> None:
-    check(screen, "-k", "click_pokes or drag_turns or one_quits or knob or loop")  # a kind of its events each
+    # a kind of its events each
+    check(screen, "-k", "click_pokes or drag_turns or one_quits or knob or loop")
 
 
 def test_every_control_is_a_method_with_a_key_and_a_line_of_help() -> None:
@@ -66,7 +71,9 @@ def complaint(capsys: pytest.CaptureFixture[str], status: int, *argv: str) -> st
     return err
 
 
-def test_the_help_lists_every_key_and_what_the_mouse_does(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_lists_every_key_and_what_the_mouse_does(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert cli.main(["view", "--help"]) == 0
     text = re.sub(r"[\s│]+", " ", capsys.readouterr().out)
     for key, *_ in CONTROLS:
@@ -100,10 +107,15 @@ def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None
         (["sphere", "--bodies", "-1"], "--bodies"),
         (["sphere", "--port", "http"], "--port.*'http'"),
         (["sphere", "--web", "--size", "0x0"], "0x0; valid is 16 to 8192"),
-        (["sphere", "--benchmark", "--size", "999999x999999"], "999999x999999; valid is 16 to 8192"),
+        (
+            ["sphere", "--benchmark", "--size", "999999x999999"],
+            "999999x999999; valid is 16 to 8192",
+        ),
     ],
 )
-def test_wrong_arguments_are_bad_input(capsys: pytest.CaptureFixture[str], argv: list[str], named: str) -> None:
+def test_wrong_arguments_are_bad_input(
+    capsys: pytest.CaptureFixture[str], argv: list[str], named: str
+) -> None:
     assert re.search(named, complaint(capsys, 2, *argv))
 
 
@@ -112,12 +124,16 @@ def test_an_invalid_mesh_is_bad_input(capsys: pytest.CaptureFixture[str], tmp_pa
     assert "flat.obj" in complaint(capsys, 2, str(tmp_path / "flat.obj"), "--benchmark")
 
 
-def test_without_trame_the_extra_is_named(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_trame_the_extra_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert "pip install 'ripple-sim[web]'" in complaint(capsys, 1, "sphere", "--web")
 
 
-def test_a_port_in_use_and_an_address_of_another_machine_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_port_in_use_and_an_address_of_another_machine_are_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     pytest.importorskip("trame_vtk")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         for option, value in (("--port", str(taken.getsockname()[1])), ("--host", "192.0.2.1")):

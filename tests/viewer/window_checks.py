@@ -1,5 +1,8 @@
-"""Checks of the viewer's window. A plotter makes other OpenGL contexts of its process unusable, so that
-`test_window.py` runs these in processes of their own: off screen, and on a virtual screen where Xvfb is there.
+"""Checks of the viewer's window.
+
+A plotter makes other OpenGL contexts of its process unusable, so that
+`test_window.py` runs these in processes of their own: off screen, and on a virtual screen where
+Xvfb is there.
 """
 
 import functools
@@ -17,7 +20,16 @@ import pyvista
 from PIL import Image
 
 from ripple_sim.cli import main as cli
-from ripple_sim.viewer import BALLS, OPERATORS, SLIDERS, Session, Window, benchmark, run, window as viewing
+from ripple_sim.viewer import (
+    BALLS,
+    OPERATORS,
+    SLIDERS,
+    Session,
+    Window,
+    benchmark,
+    run,
+    window as viewing,
+)
 from ripple_sim.viewer.stage import Stage
 
 OFF_SCREEN = "DISPLAY" not in os.environ
@@ -26,7 +38,9 @@ MIDDLE = (200, 160)  # of the sphere in the window, from the lower left [pixels]
 
 @pytest.fixture
 def closed(scene, tmp_path) -> Iterator[Window]:
-    made = Window(Session(scene, resolution=16), size=(400, 300), off_screen=OFF_SCREEN, folder=tmp_path)
+    made = Window(
+        Session(scene, resolution=16), size=(400, 300), off_screen=OFF_SCREEN, folder=tmp_path
+    )
     yield made
     made.close()
 
@@ -53,7 +67,9 @@ def drag(window: Window, start: tuple[int, int], *places: tuple[int, int]) -> No
     iren._mouse_left_button_release(*(places[-1] if places else start))
 
 
-def difference(one: np.ndarray, other: np.ndarray, region: tuple[slice, slice] = np.s_[:, :]) -> float:
+def difference(
+    one: np.ndarray, other: np.ndarray, region: tuple[slice, slice] = np.s_[:, :]
+) -> float:
     """Share of the pixels that have changed."""
     return float((np.abs(one[region].astype(int) - other[region]).max(axis=-1) > 12).mean())
 
@@ -92,7 +108,8 @@ def test_a_click_beside_the_surface_and_a_drag_poke_nothing(window: Window) -> N
 
 def test_a_drag_turns_the_camera_and_the_horizon_stays_level(window: Window) -> None:
     camera = window.plotter.camera
-    before, distance = np.array(camera.position), camera.distance
+    before = np.array(camera.position)
+    distance = camera.distance
     for height in (170, 299, 5, 299):
         drag(window, MIDDLE, (260, height), (300, height), (340, height))
         window.tick()
@@ -134,7 +151,11 @@ def test_a_ball_is_thrown_at_the_pointer_and_seen(window: Window) -> None:
     hit = []
     for _ in range(12):
         window.tick()
-        hit += [impulse for impulse in window.session.simulation.impulses if impulse.other.startswith("thrown")]
+        hit += [
+            impulse
+            for impulse in window.session.simulation.impulses
+            if impulse.other.startswith("thrown")
+        ]
     assert hit
 
 
@@ -179,10 +200,14 @@ def test_sliders_set_the_poke_and_the_material(window: Window) -> None:
 
 def test_a_knob_can_be_dragged_without_poking_or_turning(window: Window) -> None:
     slider = window._sliders[1]
-    look, camera = slider.GetRepresentation(), tuple(window.plotter.camera.position)
+    look = slider.GetRepresentation()
+    camera = tuple(window.plotter.camera.position)
     share = look.GetValue() / look.GetMaximumValue()
-    left, right = (c.GetValue()[0] for c in (look.GetPoint1Coordinate(), look.GetPoint2Coordinate()))
-    x, y = round(400 * (left + share * (right - left))), round(300 * look.GetPoint1Coordinate().GetValue()[1])
+    left, right = (
+        c.GetValue()[0] for c in (look.GetPoint1Coordinate(), look.GetPoint2Coordinate())
+    )
+    x = round(400 * (left + share * (right - left)))
+    y = round(300 * look.GetPoint1Coordinate().GetValue()[1])
     drag(window, (x, y), (x + 10, y), (x + 25, y))
     window.tick()
     assert window.session.material("speed") > 0.55
@@ -220,10 +245,15 @@ def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> Non
 
 
 def test_a_window_that_is_dropped_is_closed_and_nothing_keeps_it(scene, tmp_path: Path) -> None:
-    window = Window(Session(scene, resolution=8), size=(64, 48), off_screen=OFF_SCREEN, folder=tmp_path)
+    window = Window(
+        Session(scene, resolution=8), size=(64, 48), off_screen=OFF_SCREEN, folder=tmp_path
+    )
     window.open()
     window.tick()
-    kept = {type(each): weakref.ref(each) for each in (window, window.plotter, window.stage, window.session)}
+    kept = {
+        type(each): weakref.ref(each)
+        for each in (window, window.plotter, window.stage, window.session)
+    }
     del window
     gc.collect()
     assert [kind for kind, each in kept.items() if each() is not None] == []
@@ -239,7 +269,9 @@ def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> 
 
 
 @pytest.mark.skipif(OFF_SCREEN, reason="needs a screen")
-def test_the_loop_runs_until_the_user_quits(closed: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_loop_runs_until_the_user_quits(
+    closed: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ticks = []
 
     def tick() -> bool:
@@ -256,7 +288,8 @@ def test_the_loop_runs_until_the_user_quits(closed: Window, monkeypatch: pytest.
 
 def test_shadows_darken_as_bodies_come_down_on_a_level_floor_alone(window: Window) -> None:
     session = window.session
-    model, data = session.simulation.model, session.simulation.data
+    model = session.simulation.model
+    data = session.simulation.data
     ball = model.geom("ball").id
     shadow = window.stage.shadows._actors[ball]
     darkness = []
@@ -273,7 +306,9 @@ def test_shadows_darken_as_bodies_come_down_on_a_level_floor_alone(window: Windo
 @pytest.mark.skipif(not OFF_SCREEN, reason="has a window of its own, without a display")
 def test_the_benchmark_reports_and_closes(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(viewing, "benchmark", functools.partial(benchmark, updates=3, tries=1))
-    assert cli.main(["view", "sphere", "--benchmark", "--resolution", "8", "--size", "160x120"]) == 0
+    assert (
+        cli.main(["view", "sphere", "--benchmark", "--resolution", "8", "--size", "160x120"]) == 0
+    )
     out, err = capsys.readouterr()
     assert err == ""
     times = r"simulation [0-9.]+ ms, drawing [0-9.]+ ms; [0-9.]+ ms of processor time"

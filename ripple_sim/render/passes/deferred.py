@@ -1,8 +1,8 @@
 """Deferred shading: the G-buffer is lit, each visible surface of a pixel once, with the floor and the background.
 
-What is transparent follows layer by layer. The reflection in the floor is shaded likewise, as a camera below sees it.
-The background is floor and sky behind the solids: where it is smooth it is shaded at a fraction of the frame's
-resolution, from which the frame's tiles are filled.
+What is transparent follows layer by layer. The reflection in the floor is shaded likewise, as a
+camera below sees it. The background is floor and sky behind the solids: where it is smooth it is
+shaded at a fraction of the frame's resolution, from which the frame's tiles are filled.
 """
 
 from __future__ import annotations
@@ -25,8 +25,11 @@ from .shadows import Floor
 
 _PIXELS = 4  # along an edge of a block, which a texel of the coarse background stands for
 _BLOCKS = 8  # along an edge of a tile
-# how a tile is filled: from its corners, from the blocks, or likewise but for pixels that are shaded one by one
+# how a tile is filled: from its corners, from the blocks, or likewise but for pixels that are
+# shaded one by one
 _PLAIN, _SMOOTH, _ROUGH = _KINDS = range(3)
+
+TILE = 32  # [pixels]
 
 
 class Background:
@@ -40,7 +43,8 @@ class Background:
         Defines as for the shaders of `DeferredShading`.
     floor : Floor, optional
     block : int
-        Edge of what each pixel of the framebuffer stands for [pixels of the frame]; the last may extend beyond it.
+        Edge of what each pixel of the framebuffer stands for [pixels of the frame]; the last may
+        extend beyond it.
     """
 
     def __init__(
@@ -57,8 +61,11 @@ class Background:
             for shadow in (0, 1)
         ]
         for each in self._passes:
-            each.program["span"] = tuple(block * pixels / of for pixels, of in zip(blocks, size, strict=True))
-        self._floor, self._options = floor, options
+            each.program["span"] = tuple(
+                block * pixels / of for pixels, of in zip(blocks, size, strict=True)
+            )
+        self._floor = floor
+        self._options = options
 
     def prepare(self, ctx: moderngl.Context) -> None:
         """Do what needs no frame."""
@@ -88,27 +95,35 @@ class Background:
 class CoarseBackground:
     """Floor and sky at a fraction of the frame's resolution, from which the frame is filled.
 
-    Square tiles of the frame are filled as fast as each allows, which the GPU finds. Tiles that are plain are
-    interpolated from their corners. In the others, pixels are interpolated from blocks, or shaded one by one near an
-    edge, a narrow penumbra or anything else that is not smooth.
+    Square tiles of the frame are filled as fast as each allows, which the GPU finds. Tiles that are
+    plain are interpolated from their corners. In the others, pixels are interpolated from blocks,
+    or shaded one by one near an edge, a narrow penumbra or anything else that is not smooth.
 
     Parameters as for `Background`.
     """
 
     def __init__(
-        self, resources: Resources, size: tuple[int, int], options: Mapping[str, int], floor: Floor | None
+        self,
+        resources: Resources,
+        size: tuple[int, int],
+        options: Mapping[str, int],
+        floor: Floor | None,
     ) -> None:
         blocks = -(-size[0] // _PIXELS), -(-size[1] // _PIXELS)
         self._gl = resources.gl
         self._texture = resources.clamped_texture(blocks, 4, dtype="f2")
-        self._framebuffer = resources.framebuffer([self._texture], resources.depth_renderbuffer(blocks))
+        self._framebuffer = resources.framebuffer(
+            [self._texture], resources.depth_renderbuffer(blocks)
+        )
         self._blocks = Background(resources, size, options, floor, _PIXELS)
         edge = _PIXELS * _BLOCKS
         tiles = -(-size[0] // edge), -(-size[1] // edge)
         self._kinds = resources.texture(tiles, 1, dtype="u1")
         self._kinds.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._kinds_framebuffer = resources.framebuffer([self._kinds])
-        self._find_kinds = resources.vertex_array(resources.program("passes/background_kinds", TILE=_BLOCKS), [])
+        self._find_kinds = resources.vertex_array(
+            resources.program("passes/background_kinds", TILE=_BLOCKS), []
+        )
         filling = [
             resources.program("passes/background_tiles", **options, PLAIN=plain, ROUGH=rough)
             for plain, rough in ((1, 0), (0, 0), (0, 1))
@@ -121,7 +136,9 @@ class CoarseBackground:
             program["blocks"] = size[0] / _PIXELS, size[1] / _PIXELS
         corners = 4 * np.arange(tiles[0] * tiles[1])[:, None] + [0, 1, 2, 2, 1, 3]
         indices = resources.buffer(corners.astype("i4").tobytes())
-        *self._fill, self._shade = (resources.vertex_array(each, [], indices) for each in (*filling, shading))
+        *self._fill, self._shade = (
+            resources.vertex_array(each, [], indices) for each in (*filling, shading)
+        )
 
     def prepare(self, ctx: moderngl.Context) -> None:
         """Shade the blocks, and find how each tile is to be filled."""
@@ -154,9 +171,6 @@ class CoarseBackground:
         tiles.render()
 
 
-TILE = 32  # [pixels]
-
-
 def touched_tiles(boxes: NDArray[np.int64], size: tuple[int, int]) -> NDArray[np.int64]:
     """Column and row [k, 2] of the tiles of a frame (width, height) that any of some boxes touches; see `boxes_of`."""
     touched = np.zeros((-(-size[1] // TILE), -(-size[0] // TILE)), dtype=bool)
@@ -168,15 +182,16 @@ def touched_tiles(boxes: NDArray[np.int64], size: tuple[int, int]) -> NDArray[np
 class DeferredShading:
     """The G-buffer, and the frame that is shaded from it.
 
-    Triangles of a few pixels would otherwise be lit many times over, since rasterisers work in blocks. The frame's
-    depth buffer holds the level of each pixel (see `contract.LEVELS`), so that a pass runs over its own pixels only.
+    Triangles of a few pixels would otherwise be lit many times over, since rasterisers work in
+    blocks. The frame's depth buffer holds the level of each pixel (see `contract.LEVELS`), so that
+    a pass runs over its own pixels only.
 
     Parameters
     ----------
     floor : Floor, optional
     light_options : mapping
-        SKYBOX, NEAR_LIGHTS and TRANSMISSION (of transparent objects), 0 or 1: whether there are any; LIGHTS: how many
-        there may be; SHADOWS: how many of them may cast shadows.
+        SKYBOX, NEAR_LIGHTS and TRANSMISSION (of transparent objects), 0 or 1: whether there are
+        any; LIGHTS: how many there may be; SHADOWS: how many of them may cast shadows.
 
     Attributes
     ----------
@@ -193,19 +208,25 @@ class DeferredShading:
     """
 
     def __init__(
-        self, resources: Resources, frame_format: FrameFormat, floor: Floor | None, light_options: Mapping[str, int]
+        self,
+        resources: Resources,
+        frame_format: FrameFormat,
+        floor: Floor | None,
+        light_options: Mapping[str, int],
     ) -> None:
         size = width, height = frame_format.size
         with resources.gl as ctx:
             limit = int(ctx.info["GL_MAX_RENDERBUFFER_SIZE"])
         if not (1 <= width <= limit and 1 <= height <= limit):
             raise RippleError(
-                f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} along each side: "
+                f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} "
+                f"along each side: "
                 "choose a size within that"
             )
         self.g_buffer = GBuffer(resources, size, frame_format.samples)
         self.frame: moderngl.Framebuffer = resources.framebuffer(
-            [resources.renderbuffer(size, 4, dtype=frame_format.dtype)], resources.depth_renderbuffer(size)
+            [resources.renderbuffer(size, 4, dtype=frame_format.dtype)],
+            resources.depth_renderbuffer(size),
         )
         self.options = options = {
             **light_options,
@@ -216,11 +237,16 @@ class DeferredShading:
             "MIRROR": int(floor is not None and floor.reflects and not frame_format.alpha),
         }
         smooth = not any(options[name] for name in ("CUT_OUT", "TILED", "MIRROR", "SKYBOX"))
-        self._background = (CoarseBackground if smooth else Background)(resources, size, options, floor)
+        self._background = (CoarseBackground if smooth else Background)(
+            resources, size, options, floor
+        )
         self._solids = FramePass(resources, "passes/deferred", size, **options, LAYER=0)
         # where solids may show, square tiles are classified, as instances
-        self._extent = 2.0 * TILE / np.array(size)  # of a tile, where the frame extends from -1 to 1
-        self._corners = resources.buffer(reserve=8 * -(-size[0] // TILE) * -(-size[1] // TILE), dynamic=True)
+        # of a tile, where the frame extends from -1 to 1
+        self._extent = 2.0 * TILE / np.array(size)
+        self._corners = resources.buffer(
+            reserve=8 * -(-size[0] // TILE) * -(-size[1] // TILE), dynamic=True
+        )
         classify = resources.program("passes/classify", **options, LAYER=0, TILES=1)
         classify["level"] = 0.5  # any will do
         classify["extent"] = tuple(self._extent)
@@ -246,7 +272,8 @@ class DeferredShading:
         """
         self.g_buffer.bind()
         self._background.prepare(ctx)
-        self.frame.use()  # clearing keeps within the scissor in use, which the reflection's frame may have left
+        # clearing keeps within the scissor in use, which the reflection's frame may have left
+        self.frame.use()
         # every pixel gets its colour from the background, or the classification
         self.frame.color_mask = (False,) * 4
         self.frame.clear(depth=LEVELS["OPEN"])
@@ -281,16 +308,22 @@ class TransparentLayers:
         Of the frame.
     """
 
-    def __init__(self, resources: Resources, frame_format: FrameFormat, shading: DeferredShading) -> None:
+    def __init__(
+        self, resources: Resources, frame_format: FrameFormat, shading: DeferredShading
+    ) -> None:
         size = frame_format.size
-        self._g_buffer, self._frame = shading.g_buffer, cast(Any, shading.frame)  # its scissor may be None
+        # its scissor may be None
+        self._g_buffer = shading.g_buffer
+        self._frame = cast(Any, shading.frame)
         kind = {"dtype": "f2"} if frame_format.linear else {"internal_format": SRGB8_ALPHA8}
         self._behind = resources.clamped_texture(size, 4, mipmaps=True, **kind)
         self._behind_framebuffer = resources.framebuffer([self._behind])
         self._classify = FramePass(resources, "passes/classify", size, **shading.options, LAYER=1)
         self._shade = FramePass(resources, "passes/deferred", size, **shading.options, LAYER=1)
 
-    def add(self, ctx: moderngl.Context, number: int, draw: Callable[[], None], boxes: NDArray[np.int64]) -> None:
+    def add(
+        self, ctx: moderngl.Context, number: int, draw: Callable[[], None], boxes: NDArray[np.int64]
+    ) -> None:
         """Draw and shade a single transparent object over the frame.
 
         Parameters
@@ -340,9 +373,14 @@ class Mirror:
     """
 
     def __init__(
-        self, resources: Resources, frame_format: FrameFormat, floor: Floor, light_options: Mapping[str, int]
+        self,
+        resources: Resources,
+        frame_format: FrameFormat,
+        floor: Floor,
+        light_options: Mapping[str, int],
     ) -> None:
-        self._floor, self._aspect = floor, frame_format.aspect
+        self._floor = floor
+        self._aspect = frame_format.aspect
         self._backdrop = bool(light_options["BACKDROP"])
         width, height = frame_format.size
         half = dataclasses.replace(frame_format, size=(max(width // 2, 1), max(height // 2, 1)))

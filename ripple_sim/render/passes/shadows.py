@@ -21,13 +21,31 @@ from ripple_sim.render.visuals.objects import Assets
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import Visual, finish_of, geom_visual, visible_geoms
 
-# Texels along a side: as many as make one about as wide as a pixel, where the casters fill the frame.
-_LEAST, _MOST, _PER_PIXEL, _STEP = 512, 1536, 1.4, 256
+# Texels along a side: as many as make one about as wide as a pixel, where the casters fill the
+# frame.
+_LEAST = 512
+_MOST = 1536
+_PER_PIXEL = 1.4
+_STEP = 256
 _WIDEST = 0.15  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
 _REACH = 30.0  # how far behind the casters shadows fall, in radii of the casters' ball
 _TEXELS_PER_BLOCKER = 4
 _LEVELS = 7  # of mipmaps of the blockers: as wide as twice the widest penumbra
+
+_GROUND = 4.0  # least half size of the floor, in radii of all else
+_LEAST_UP = 0.1  # of the floor's normal: walls are none
+_ENDLESS = 1e9  # half size of an infinite plane [m]
+_SOFT = 0.1  # margin about shadows for their penumbras, in half widths of the map
+_LOWEST_SINE = 0.02  # elevation of a light at which shadows have no end
+_CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # of a box about a ball
+_CEILING_SIZE = 224
+_MAP_SIZE = 112
+
+# of mipmaps that are looked up
+_MAP_LEVELS = 5
+_BOUNCE_LEVELS = 3
+_INFLUENCE = 0.8  # radius, in half widths of the map
 
 
 class ShadowMaps:
@@ -63,17 +81,25 @@ class ShadowMaps:
         blockers = count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER
         self._blockers = resources.clamped_texture(blockers, 4, mipmaps=True, dtype="f4")
         self._blockers_target = resources.framebuffer([self._blockers])
-        self._find_blockers = resources.vertex_array(resources.program("passes/blockers", SHADOWS=count), [])
+        self._find_blockers = resources.vertex_array(
+            resources.program("passes/blockers", SHADOWS=count), []
+        )
 
-    def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
+    def fit(
+        self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float
+    ) -> list[Light]:
         """Aim the maps at a ball [m] that contains all casters, set the frame's shadows, and return their lights."""
         casting = [light for light in lights if light.shadow][: self._count]
         self.views = []
         for shadow, light in zip(frame.values["shadows"], casting, strict=False):
             aim = _fit_far if light.position is None else _fit_near
             matrix = aim(shadow, light, self.size, centre, radius)
-            to_map = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]]) @ matrix
-            shadow["matrix"], shadow["planes"] = to_map.T, np.linalg.inv(to_map)
+            to_map = (
+                np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]])
+                @ matrix
+            )
+            shadow["matrix"] = to_map.T
+            shadow["planes"] = np.linalg.inv(to_map)
             self.views.append(tuple(matrix.T.ravel()))
         return casting
 
@@ -103,7 +129,9 @@ class ShadowMaps:
         self._blockers.use(Unit.BLOCKERS)
 
 
-def _fit_far(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float) -> NDArray[np.float64]:
+def _fit_far(
+    shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float
+) -> NDArray[np.float64]:
     """Fit a box to the ball; it grows in coarse steps and moves by whole texels, so that shadow edges do not crawl.
 
     It extends behind the ball, where the shadows fall.
@@ -121,7 +149,9 @@ def _fit_far(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: 
     return orthographic(half_width, depth) @ view_along(rotation, eye)
 
 
-def _fit_near(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float) -> NDArray[np.float64]:
+def _fit_near(
+    shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float
+) -> NDArray[np.float64]:
     """Fit the light's view to the ball, no wider than its beam."""
     position: Any = light.position
     away = float(np.linalg.norm(centre - position))
@@ -129,7 +159,8 @@ def _fit_near(shadow: NDArray, light: Light, size: int, centre: NDArray, radius:
     widest = np.radians(_STEEPEST_FOV / 2)
     half = widest if away < 1.1 * radius else min(float(np.arcsin(radius / away)), widest)
     if light.cutoff < half:
-        towards, half = light.direction, light.cutoff
+        towards = light.direction
+        half = light.cutoff
     half = np.ceil(half * 64) / 64
     far = away + _REACH * radius
     near = max(0.5 * (away - radius), 0.004 * far)
@@ -137,7 +168,9 @@ def _fit_near(shadow: NDArray, light: Light, size: int, centre: NDArray, radius:
     shadow["width"] = 0, 2 * np.tan(half), size, 0
     shadow["penumbra"] = 0, light.size, _WIDEST, 0
     rotation = _axes(towards)
-    return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ view_along(rotation, rotation @ position)
+    return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ view_along(
+        rotation, rotation @ position
+    )
 
 
 def _axes(back: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -162,7 +195,9 @@ class TransmissionMaps:
     def __init__(self, resources: Resources, count: int, size: int) -> None:
         self._size = size
         self._maps = resources.clamped_texture((count * size, size), 4, mipmaps=True, dtype="f2")
-        self._target = resources.framebuffer([self._maps], resources.depth_renderbuffer((count * size, size)))
+        self._target = resources.framebuffer(
+            [self._maps], resources.depth_renderbuffer((count * size, size))
+        )
 
     def draw(self, views: Sequence[tuple[float, ...]], cast: Callable[..., None]) -> None:
         """Draw all maps, of the lights' `ShadowMaps.views`, with the scene's `cast`."""
@@ -179,20 +214,13 @@ class TransmissionMaps:
         self._maps.use(Unit.TRANSMISSION)
 
 
-_GROUND = 4.0  # least half size of the floor, in radii of all else
-_LEAST_UP = 0.1  # of the floor's normal: walls are none
-_ENDLESS = 1e9  # half size of an infinite plane [m]
-_SOFT = 0.1  # margin about shadows for their penumbras, in half widths of the map
-_LOWEST_SINE = 0.02  # elevation of a light at which shadows have no end
-
-_CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # of a box about a ball
-
-
 def find_floor(model: Any, targets: Collection[int]) -> int | None:
-    """The visible plane under all, or None: infinite or large, and no target. A table's top is none.
+    """The visible plane under all, or None: infinite or large, and no target.
 
-    Opaque ones come before others, infinite ones before large ones, then those that face up most, of several the
-    highest.
+    A table's top is none.
+
+    Opaque ones come before others, infinite ones before large ones, then those that face up most,
+    of several the highest.
     """
     rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
@@ -212,7 +240,8 @@ def find_floor(model: Any, targets: Collection[int]) -> int | None:
     ]
 
     def order(geom: int) -> tuple[bool, bool, float, float]:
-        opaque, endless = geom_visual(model, geom).opacity == 1.0, not half[geom].any()
+        opaque = geom_visual(model, geom).opacity == 1.0
+        endless = not half[geom].any()
         return opaque, endless, round(rest.geom_xmat[geom, 8], 3), rest.geom_xpos[geom, 2]
 
     return max(ground, key=order, default=None)
@@ -243,16 +272,20 @@ class Floor:
     """
 
     def __init__(self, assets: Assets, geom: int) -> None:
-        self.geom, self._assets = geom, assets
+        self.geom = geom
+        self._assets = assets
         self.shown = True
         self.paint(geom_visual(assets.model, geom))
 
     def paint(self, visual: Visual) -> None:
         """Be painted as this visual of the plane."""
-        assets, model = self._assets, self._assets.model
+        assets = self._assets
+        model = self._assets.model
         mapping = mapping_of(model, visual)
         self.tiled = mapping.kind == MappingKind.FLAT_IMAGE
-        self.tiling, self.albedo, self.tint = mapping.tiling, visual.color, visual.color
+        self.tiling = mapping.tiling
+        self.albedo = visual.color
+        self.tint = visual.color
         self._image = assets.texture(mapping.texture) if self.tiled else None
         if self.tiled:
             self.albedo = self.tint * assets.mean_color(mapping.texture)
@@ -279,7 +312,10 @@ class Floor:
         """Set where the floor is, and let the floor map cover what is under a ball [m]."""
         self.rotation = rotation = data.geom_xmat[self.geom].reshape(3, 3)
         self.origin = np.array(data.geom_xpos[self.geom])
-        self.centre, self.half_width = local, half_width = rotation.T @ (centre - self.origin), 1.8 * radius
+        self.centre, self.half_width = local, half_width = (
+            rotation.T @ (centre - self.origin),
+            1.8 * radius,
+        )
         frame.set_vector("floor_origin", self.origin, float(self.shown))
         frame.set_vector("floor_u", rotation[:, 0], self._half[0])
         frame.set_vector("floor_v", rotation[:, 1], self._half[1])
@@ -287,7 +323,9 @@ class Floor:
         frame.set_vector("floor_albedo", self.albedo)
         frame.set_vector("floor_map", [local[0], local[1], half_width])
 
-    def shade(self, frame: FrameUniforms, lights: list[Light], casters: NDArray[np.float64]) -> None:
+    def shade(
+        self, frame: FrameUniforms, lights: list[Light], casters: NDArray[np.float64]
+    ) -> None:
         """Set the parts of the floor on which the shadows of some balls may fall, for each light."""
         points = casters[:, None, :3] + casters[:, 3:, None] * _CORNERS
         height = np.maximum((points - self.origin) @ self.normal, 0.0)
@@ -297,9 +335,11 @@ class Floor:
             low = rise < _LOWEST_SINE * np.linalg.norm(towards, axis=-1)
             shadows = points - towards * (height / np.where(low, 1.0, rise))[..., None]
             local = ((shadows - self.origin) @ self.rotation)[..., :2] - self.centre[:2]
-            least, most = local.min(axis=(0, 1)), local.max(axis=(0, 1))
+            least = local.min(axis=(0, 1))
+            most = local.max(axis=(0, 1))
             if low.any():
-                least, most = np.full(2, -_ENDLESS), np.full(2, _ENDLESS)
+                least = np.full(2, -_ENDLESS)
+                most = np.full(2, _ENDLESS)
             # lower and upper corner, in the floor map, of a box about the shadows
             box = np.concatenate([least / self.half_width - _SOFT, most / self.half_width + _SOFT])
             shadow["floor"] = 0.5 + 0.5 * box
@@ -308,11 +348,6 @@ class Floor:
         """Bind the floor's texture."""
         if self._image is not None:
             self._image.use(Unit.FLAT_IMAGE)
-
-
-_CEILING_SIZE, _MAP_SIZE = 224, 112
-_MAP_LEVELS, _BOUNCE_LEVELS = 5, 3  # of mipmaps that are looked up
-_INFLUENCE = 0.8  # radius, in half widths of the map
 
 
 class FloorOcclusion:
@@ -327,16 +362,22 @@ class FloorOcclusion:
     floor : Floor, optional
     """
 
-    def __init__(self, resources: Resources, options: Mapping[str, int], floor: Floor | None) -> None:
+    def __init__(
+        self, resources: Resources, options: Mapping[str, int], floor: Floor | None
+    ) -> None:
         self._floor = floor
         if floor is None:
             self._map = self._seen = self._bounce = resources.texture((1, 1), 4, bytes(4))
             return
-        self._pass = resources.vertex_array(resources.program("passes/floor_occlusion", **options, TILES=0), [])
+        self._pass = resources.vertex_array(
+            resources.program("passes/floor_occlusion", **options, TILES=0), []
+        )
         ceiling = _CEILING_SIZE, _CEILING_SIZE
         self._ceiling = resources.clamped_texture(ceiling, 4, dtype="nu2")
         self._ceiling.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._ceiling_framebuffer = resources.framebuffer([self._ceiling], resources.depth_renderbuffer(ceiling))
+        self._ceiling_framebuffer = resources.framebuffer(
+            [self._ceiling], resources.depth_renderbuffer(ceiling)
+        )
         self._map, self._bounce, self._seen = maps = [
             resources.clamped_texture((_MAP_SIZE, _MAP_SIZE), components, mipmaps=True, dtype=dtype)
             for components, dtype in ((2, "f2"), (4, "f2"), (4, "f1"))
@@ -348,9 +389,12 @@ class FloorOcclusion:
         floor = self._floor
         if floor is None:
             return
-        # height above the floor becomes depth; this mirrors the scene: what faces the floor goes clockwise
+        # height above the floor becomes depth; this mirrors the scene: what faces the floor goes
+        # clockwise
         turned = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
-        view = view_along(turned, turned @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2]))
+        view = view_along(
+            turned, turned @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2])
+        )
         matrix = orthographic(floor.half_width, floor.half_width) @ view
         self._ceiling_framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
@@ -368,7 +412,11 @@ class FloorOcclusion:
         ctx.disable(moderngl.DEPTH_TEST)
         shadows.bind()
         self._ceiling.use(Unit.CEILING)
-        self._pass.program["extent"] = (2 * floor.half_width, floor.half_width, _INFLUENCE * floor.half_width)
+        self._pass.program["extent"] = (
+            2 * floor.half_width,
+            floor.half_width,
+            _INFLUENCE * floor.half_width,
+        )
         self._pass.render(moderngl.TRIANGLES, vertices=3)
 
     def average(self) -> None:

@@ -1,8 +1,8 @@
 """What a frame does to a target's mesh: edges from which the waves depart are split, and vertices are displaced.
 
-Edges are split either on the processor, from heights in its memory, or on the GPU, from a texture's heights, by compute
-shaders, as the waves are: the same triangles in the same order. Heights between the texels are those of a quadratic
-B-spline (glsl/height_maps.glsl).
+Edges are split either on the processor, from heights in its memory, or on the GPU, from a texture's
+heights, by compute shaders, as the waves are: the same triangles in the same order. Heights between
+the texels are those of a quadratic B-spline (glsl/height_maps.glsl).
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from ripple_sim.solver.texels.chart_page import ChartPage
 from .tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from .vertices import SurfaceVertices
 
+_GROUP = 256
+
 
 def spline_samples(
     chart: NDArray, row: NDArray, column: NDArray, resolution: int
@@ -28,7 +30,8 @@ def spline_samples(
     Returns
     -------
     texel : int32 [k, 3]
-        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels about each place.
+        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels about each
+        place.
     offset : float32 [k, 2]
         How far off the middle one's centre it is [texels].
     """
@@ -53,13 +56,18 @@ def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Flo
     height = np.empty(len(texel), np.float32)
     for i in range(len(texel)):
         # number by number: unpacking rows takes longer than all the rest
-        chart, row, column = texel[i, 0], texel[i, 1], texel[i, 2]
-        down, across = spline_weights(offset[i, 0]), spline_weights(offset[i, 1])
+        chart = texel[i, 0]
+        row = texel[i, 1]
+        column = texel[i, 2]
+        down = spline_weights(offset[i, 0])
+        across = spline_weights(offset[i, 1])
         total = np.float32(0)
         for j in range(3):
             line = height_map[chart, row + j]
             total += down[j] * (
-                across[0] * line[column, 3] + across[1] * line[column + 1, 3] + across[2] * line[column + 2, 3]
+                across[0] * line[column, 3]
+                + across[1] * line[column + 1, 3]
+                + across[2] * line[column + 2, 3]
             )
         height[i] = total
     return height
@@ -68,8 +76,8 @@ def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Flo
 class AdaptiveTessellation:
     """Splits the edges of a mesh at their midpoints where a height map bends too much between their ends.
 
-    Whether an edge is split depends only on its length and the heights at its ends and midpoint, so that the triangles
-    on both sides of it agree, across seams and creases, too: no gap opens.
+    Whether an edge is split depends only on its length and the heights at its ends and midpoint, so
+    that the triangles on both sides of it agree, across seams and creases, too: no gap opens.
 
     Parameters
     ----------
@@ -91,40 +99,54 @@ class AdaptiveTessellation:
     ends : int32 [l, 2]
         Lookups of their ends; those of their midpoints are the last l.
     texel, offset : int32 and float32, [..., 3] and [..., 2]
-        Of each lookup: chart, row and column of the first of the 3 x 3 texels about it, in a chart with its halo, and
-        how far it is off their centre, in rows and columns.
+        Of each lookup: chart, row and column of the first of the 3 x 3 texels about it, in a chart
+        with its halo, and how far it is off their centre, in rows and columns.
     """
 
-    def __init__(self, vertices: SurfaceVertices, page: ChartPage, tolerance: float, min_length: float) -> None:
-        edges, positions = vertices.edges, vertices.attributes[:, POSITION]
+    def __init__(
+        self, vertices: SurfaceVertices, page: ChartPage, tolerance: float, min_length: float
+    ) -> None:
+        edges = vertices.edges
+        positions = vertices.attributes[:, POSITION]
         self.base_count = len(positions) - len(edges.ends)
-        self.faces, self.sides = np.asarray(vertices.F, np.int32), np.asarray(edges.of, np.int32)
-        self.length = np.linalg.norm(positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1)
+        self.faces = np.asarray(vertices.F, np.int32)
+        self.sides = np.asarray(edges.of, np.int32)
+        self.length = np.linalg.norm(
+            positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1
+        )
         self.tolerance = np.float32(tolerance)
-        # heights are looked up at the ends of the edges that may be split, and then at these edges' midpoints
+        # heights are looked up at the ends of the edges that may be split, and then at these edges'
+        # midpoints
         self.long = np.flatnonzero(self.length >= min_length).astype(np.int32)
         ends, index = np.unique(edges.ends[self.long], return_inverse=True)
         self.ends = index.reshape(-1, 2).astype(np.int32)
         places = vertices.lookups[np.concatenate([ends, self.base_count + self.long])]
         self.texel, self.offset = spline_samples(*page.locate(places), page.resolution)
 
-    def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def __call__(
+        self, height_map: NDArray[np.float32]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.
 
-        In the triangles these midpoints follow the mesh's own vertices, as `Displacement.use` arranges them. Where no
-        edge is split, the triangles are the same array each time.
+        In the triangles these midpoints follow the mesh's own vertices, as `Displacement.use`
+        arranges them. Where no edge is split, the triangles are the same array each time.
         """
         whole = self.faces, np.empty(0, np.int32)
         if not len(self.long) or not height_map[..., 3].any():
             return whole
         height = spline_heights(height_map, self.texel, self.offset)
-        middle, ends = height[-len(self.long) :], height[self.ends]
-        split = self.long[np.abs(middle - np.float32(0.5) * (ends[:, 0] + ends[:, 1])) > self.tolerance]
+        middle = height[-len(self.long) :]
+        ends = height[self.ends]
+        split = self.long[
+            np.abs(middle - np.float32(0.5) * (ends[:, 0] + ends[:, 1])) > self.tolerance
+        ]
         if not len(split):
             return whole
         midpoint = np.full(len(self.length), -1, np.int32)
         midpoint[split] = np.arange(self.base_count, self.base_count + len(split))
-        return _triangles(self.faces, self.sides, midpoint, self.length), np.int32(self.base_count) + split
+        return _triangles(self.faces, self.sides, midpoint, self.length), np.int32(
+            self.base_count
+        ) + split
 
 
 @kernel
@@ -141,10 +163,17 @@ def _triangles(faces: Ints32, sides: Ints32, midpoint: Ints32, length: Floats) -
         if splits == 1 or splits == 2:
             while (midpoint[sides[face, first]] >= 0) != (splits == 1):
                 first += 1
-        second, third = (first + 1) % 3, (first + 2) % 3
-        a, b, c = faces[face, first], faces[face, second], faces[face, third]
-        ab, bc, ca = sides[face, first], sides[face, second], sides[face, third]
-        m, n, o = midpoint[ab], midpoint[bc], midpoint[ca]
+        second = (first + 1) % 3
+        third = (first + 2) % 3
+        a = faces[face, first]
+        b = faces[face, second]
+        c = faces[face, third]
+        ab = sides[face, first]
+        bc = sides[face, second]
+        ca = sides[face, third]
+        m = midpoint[ab]
+        n = midpoint[bc]
+        o = midpoint[ca]
         if splits == 0:
             triangles[count] = a, b, c
         elif splits == 1:
@@ -168,14 +197,11 @@ def _triangles(faces: Ints32, sides: Ints32, midpoint: Ints32, length: Floats) -
     return triangles[:count]
 
 
-_GROUP = 256
-
-
 class DeviceTessellation:
     """Decides which edges are split, and writes triangles and the draw call's size, without asking the host.
 
-    How many triangles come before each face's is a sum over all faces before it: within groups of faces first, and then
-    over the groups. So their order is always the same.
+    How many triangles come before each face's is a sum over all faces before it: within groups of
+    faces first, and then over the groups. So their order is always the same.
 
     Parameters
     ----------
@@ -202,21 +228,27 @@ class DeviceTessellation:
         layer: int,
         indices: moderngl.Buffer,
     ) -> None:
-        self._layer, self._tolerance = layer, float(adaptive.tolerance)
+        self._layer = layer
+        self._tolerance = float(adaptive.tolerance)
         self._counts = len(adaptive.long), len(adaptive.faces)
         _, rank = np.unique(adaptive.length, return_inverse=True)
         first = np.array([page.corner(chart) for chart in range(page.charts)])[adaptive.texel[:, 0]]
         places = np.concatenate([first + adaptive.texel[:, :0:-1], adaptive.offset], axis=1)
         middles = len(adaptive.texel) - len(adaptive.long) + np.arange(len(adaptive.long))
         groups = -(-len(adaptive.faces) // _GROUP)
-        self.midpoints = np.arange(adaptive.base_count, adaptive.base_count + len(adaptive.length), dtype=np.int32)
+        self.midpoints = np.arange(
+            adaptive.base_count, adaptive.base_count + len(adaptive.length), dtype=np.int32
+        )
 
         def buffer(content: NDArray, dtype: str = "i4") -> moderngl.Buffer:
             return resources.buffer(content.astype(dtype).tobytes() or bytes(16))
 
-        self.split, self.command = buffer(np.zeros(len(rank))), buffer(np.array([0, 1, 0, 0, 0]))
+        self.split = buffer(np.zeros(len(rank)))
+        self.command = buffer(np.array([0, 1, 0, 0, 0]))
         sides = adaptive.sides
-        faces = np.concatenate([adaptive.faces, adaptive.base_count + sides, rank.ravel()[sides]], axis=1)
+        faces = np.concatenate(
+            [adaptive.faces, adaptive.base_count + sides, rank.ravel()[sides]], axis=1
+        )
         self._buffers = {
             Binding.SPLIT: self.split,
             Binding.LONG_EDGES: buffer(np.column_stack([adaptive.long, adaptive.ends, middles])),
@@ -240,7 +272,12 @@ class DeviceTessellation:
         self._split_edges["layer"], self._split_edges["tolerance"] = self._layer, self._tolerance
         for shader in (self._count, self._write):
             shader["first_midpoint"] = self.midpoints[0]
-        for shader, count in ((self._split_edges, edges), (self._count, faces), (self._add, 1), (self._write, faces)):
+        for shader, count in (
+            (self._split_edges, edges),
+            (self._count, faces),
+            (self._add, 1),
+            (self._write, faces),
+        ):
             if count:
                 if shader is not self._add:
                     shader["count"] = count
@@ -251,7 +288,8 @@ class DeviceTessellation:
 class Displacement:
     """The vertices of a target on the GPU, and the pass that displaces them and puts them into the world, once a frame.
 
-    First come the mesh's own, then the midpoints in use. What the pass finds is captured by transform feedback.
+    First come the mesh's own, then the midpoints in use. What the pass finds is captured by
+    transform feedback.
 
     Parameters
     ----------
@@ -263,7 +301,8 @@ class Displacement:
     Attributes
     ----------
     moved : moderngl.Buffer
-        vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms leave.
+        vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms
+        leave.
     vertices : moderngl.Buffer
         What `KEPT` says of each vertex.
     """
@@ -272,18 +311,32 @@ class Displacement:
     KEPT = "8x4 3f 3f 2f 3f", "in_normal", "in_baked", "in_place", "in_mapped"
 
     def __init__(
-        self, resources: Resources, vertices: SurfaceVertices, mapped: NDArray[np.float64], layer: int
+        self,
+        resources: Resources,
+        vertices: SurfaceVertices,
+        mapped: NDArray[np.float64],
+        layer: int,
     ) -> None:
         own = vertices.attributes
         self._base_count = len(own) - len(vertices.edges.ends)
-        columns = own[:, POSITION], own[:, DIRECTION], vertices.lookups, own[:, NORMAL], own[:, BAKED]
-        self._content = np.concatenate([*columns, vertices.places, mapped], axis=1).astype(np.float32)
+        columns = (
+            own[:, POSITION],
+            own[:, DIRECTION],
+            vertices.lookups,
+            own[:, NORMAL],
+            own[:, BAKED],
+        )
+        self._content = np.concatenate([*columns, vertices.places, mapped], axis=1).astype(
+            np.float32
+        )
         self.vertices: moderngl.Buffer = resources.buffer(self._content.tobytes(), dynamic=True)
         self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(own))
         self._program = resources.program("surfaces/displacement", "moved")
         self._program["layer"] = float(layer)
         names = "in_position", "in_direction", "in_lookup"
-        self._pass = resources.vertex_array(self._program, [(self.vertices, "3f 3f 2f 11x4", *names)])
+        self._pass = resources.vertex_array(
+            self._program, [(self.vertices, "3f 3f 2f 11x4", *names)]
+        )
         # nothing is drawn, but OpenGL asks for a framebuffer
         self._framebuffer = resources.framebuffer([resources.renderbuffer((1, 1))])
         self._used: NDArray[np.int32] | None = None
@@ -294,7 +347,9 @@ class Displacement:
         self.vertices.write(self._content[: self._base_count])
         self._used = None
 
-    def move(self, points: Floats32, directions: Floats32, normals: Floats32, baked: Floats32) -> None:
+    def move(
+        self, points: Floats32, directions: Floats32, normals: Floats32, baked: Floats32
+    ) -> None:
         """Replace where all vertices are at rest [m], the directions that they are displaced in, and more, [n, 3]."""
         self._content[:, :6] = np.hstack([points, directions])
         self._content[:, 8:14] = np.hstack([normals, baked])
@@ -309,7 +364,9 @@ class Displacement:
         self._used = midpoints
         self._count = self._base_count + len(midpoints)
 
-    def run(self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: int) -> None:
+    def run(
+        self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: int
+    ) -> None:
         """Displace all that are in use; height maps and occluders are bound already.
 
         Parameters

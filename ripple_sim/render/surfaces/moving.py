@@ -15,12 +15,17 @@ from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 from .tessellation import coarse_mesh
 
+_SAMPLES = 1_000  # vertices that cast rays, at most
+_RAYS = 32_000  # a frame, about
+_NEAR = 6  # samples about a point
+
 
 class MovingVertices:
     """Takes the points of a finer surface along with the mesh on which it was made.
 
-    A triangle's motion is a linear map, which leaves unit normals of unit length; a vertex takes the mean of those
-    about it, and a point the mean of its triangle's corners: what bulges out bulges on, and normals turn smoothly.
+    A triangle's motion is a linear map, which leaves unit normals of unit length; a vertex takes
+    the mean of those about it, and a point the mean of its triangle's corners: what bulges out
+    bulges on, and normals turn smoothly.
 
     Parameters
     ----------
@@ -33,12 +38,15 @@ class MovingVertices:
     Attributes
     ----------
     rest : (int64 [n, 3], float64 [n, 3], float64 [n, 3], float64 [n, 3], float64 [n, 3])
-        How the points hang on the mesh: vertices of the nearest triangle, weights of these at the nearest place, the
-        way from there to the point [m], and the directions and normals.
+        How the points hang on the mesh: vertices of the nearest triangle, weights of these at the
+        nearest place, the way from there to the point [m], and the directions and normals.
     """
 
-    def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, normals: NDArray) -> None:
-        self._V, self._F = np.ascontiguousarray(V, np.float64), np.ascontiguousarray(F, np.int64)
+    def __init__(
+        self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, normals: NDArray
+    ) -> None:
+        self._V = np.ascontiguousarray(V, np.float64)
+        self._F = np.ascontiguousarray(F, np.int64)
         rest = [np.ascontiguousarray(each, np.float64) for each in (points, directions, normals)]
         triangle, closest = ClosestPoints(self._V, self._F)(rest[0])
         corners = self._F[triangle]
@@ -50,7 +58,9 @@ class MovingVertices:
         """Points [m], directions of displacement and normals, float32 [n, 3] each, for vertices [k, 3] [m]."""
         V = np.ascontiguousarray(V, np.float64)
         maps = _vertex_maps(self._V, V, self._F)
-        points, directions, normals = (np.empty((len(self.rest[0]), 3), np.float32) for _ in range(3))
+        points, directions, normals = (
+            np.empty((len(self.rest[0]), 3), np.float32) for _ in range(3)
+        )
         _move(V, maps, *self.rest, points, directions, normals)
         return points, directions, normals
 
@@ -59,28 +69,37 @@ class MovingVertices:
 def _frame(V: Floats, F: Ints, i: int, frame: Floats) -> float:
     """Two sides and the unit normal of a triangle, as rows; return twice its area."""
     first = row(V, F[i, 0])
-    u, v = subtract(row(V, F[i, 1]), first), subtract(row(V, F[i, 2]), first)
+    u = subtract(row(V, F[i, 1]), first)
+    v = subtract(row(V, F[i, 2]), first)
     normal = cross(u, v)
     length = np.sqrt(dot(normal, normal))
     for k in range(3):
-        frame[0, k], frame[1, k], frame[2, k] = u[k], v[k], normal[k] / max(length, 1e-300)
+        frame[0, k] = u[k]
+        frame[1, k] = v[k]
+        frame[2, k] = normal[k] / max(length, 1e-300)
     return length
 
 
 @kernel
 def _vertex_maps(rest: Floats, moved: Floats, F: Ints) -> Floats:
     """Mean linear map about each vertex, [k, 3, 3], of its triangles' maps by their areas."""
-    maps, areas = np.zeros((len(rest), 3, 3)), np.zeros(len(rest))
-    old, new, back = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    maps = np.zeros((len(rest), 3, 3))
+    areas = np.zeros(len(rest))
+    old = np.empty((3, 3))
+    new = np.empty((3, 3))
+    back = np.empty((3, 3))
     for i in range(len(F)):
         area = _frame(rest, F, i, old)
         _frame(moved, F, i, new)
         if not area > 0:
             continue
         # rows dual to the two sides and the normal
-        first, second = cross(row(old, 1), row(old, 2)), cross(row(old, 2), row(old, 0))
+        first = cross(row(old, 1), row(old, 2))
+        second = cross(row(old, 2), row(old, 0))
         for k in range(3):
-            back[0, k], back[1, k], back[2, k] = first[k] / area, second[k] / area, old[2, k]
+            back[0, k] = first[k] / area
+            back[1, k] = second[k] / area
+            back[2, k] = old[2, k]
         for corner in range(3):
             v = F[i, corner]
             areas[v] += area
@@ -91,7 +110,9 @@ def _vertex_maps(rest: Floats, moved: Floats, F: Ints) -> Floats:
     for v in range(len(rest)):
         for a in range(3):
             for b in range(3):
-                maps[v, a, b] = maps[v, a, b] / areas[v] if areas[v] > 0 else (1.0 if a == b else 0.0)
+                maps[v, a, b] = (
+                    maps[v, a, b] / areas[v] if areas[v] > 0 else (1.0 if a == b else 0.0)
+                )
     return maps
 
 
@@ -132,17 +153,12 @@ def _move(
         _turn(mean, rest_normals, i, normals)
 
 
-_SAMPLES = 1_000  # vertices that cast rays, at most
-_RAYS = 32_000  # a frame, about
-_NEAR = 6  # samples about a point
-
-
 class MovingOcclusion:
     """Adds to what is baked at rest how it changes.
 
-    Rays find the change, from the vertices of a coarse mesh that moves along, against that mesh, at rest and in each
-    frame: what is coarse about it is then in both. The rays turn with the surface, so that a rigid motion changes
-    nothing and noise does not crawl.
+    Rays find the change, from the vertices of a coarse mesh that moves along, against that mesh, at
+    rest and in each frame: what is coarse about it is then in both. The rays turn with the surface,
+    so that a rigid motion changes nothing and noise does not crawl.
 
     Parameters
     ----------
@@ -155,22 +171,35 @@ class MovingOcclusion:
         Ambient visibility, thickness and inner ambient visibility of the points, see `bake`.
     """
 
-    def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, baked: NDArray) -> None:
-        count, normals = min(_SAMPLES, len(V)), smooth_normals(V, F)
+    def __init__(
+        self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, baked: NDArray
+    ) -> None:
+        count = min(_SAMPLES, len(V))
+        normals = smooth_normals(V, F)
         spacing = float(np.sqrt(Mesh(V, F).area / count))
-        apart = 2 * spacing * normals  # so that the two sides of a thin body are far from each other
+        # so that the two sides of a thin body are far from each other
+        apart = 2 * spacing * normals
         vertices, coarse = coarse_mesh(F, np.hstack([V, apart]), count)
         samples = cKDTree(np.hstack([V, apart])[vertices])
-        distance, near = samples.query(np.hstack([points, 2 * spacing * directions]), min(_NEAR + 1, samples.n))
+        distance, near = samples.query(
+            np.hstack([points, 2 * spacing * directions]), min(_NEAR + 1, samples.n)
+        )
         # the farthest one's weight is 0: no point jumps
         weights = (1 - distance / np.maximum(distance[:, -1:], 1e-300)) ** 2 + 1e-12
-        self._baked, self._near, self._weights = baked, near, weights / weights.sum(axis=1, keepdims=True)
-        self._vertices, self._F, self._radius = vertices, coarse, bounding_radius(V)
+        self._baked = baked
+        self._near = near
+        self._weights = weights / weights.sum(axis=1, keepdims=True)
+        self._vertices = vertices
+        self._F = coarse
+        self._radius = bounding_radius(V)
         # triangles of a coarse mesh may lie slightly over its vertices
         self._start = 0.3 * spacing if count < len(V) else 0.0
         self._count = int(np.clip(_RAYS // (2 * count), 16, 64))
-        at_rest, normals = self._of(V), normals[vertices]
-        self._frames = MovingVertices(at_rest, coarse, at_rest, frames_about(normals)[:, 1], normals)
+        at_rest = self._of(V)
+        normals = normals[vertices]
+        self._frames = MovingVertices(
+            at_rest, coarse, at_rest, frames_about(normals)[:, 1], normals
+        )
         self._rest = self._measured(V)
 
     def __call__(self, V: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -187,4 +216,6 @@ class MovingOcclusion:
     def _measured(self, V: NDArray[np.float64]) -> NDArray[np.float64]:
         V = self._of(V)
         _, directions, normals = self._frames(V)
-        return cast(V, self._F, frames_about(normals, directions), self._count, self._radius, self._start)
+        return cast(
+            V, self._F, frames_about(normals, directions), self._count, self._radius, self._start
+        )

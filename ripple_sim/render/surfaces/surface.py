@@ -16,7 +16,14 @@ from ripple_sim.render.contract import MappingKind, Unit
 from ripple_sim.render.resources import Resources, write_page
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
-from ripple_sim.render.visuals.visual import MODEL_LOOK, Look, Visual, find_look, geom_visual, look_of
+from ripple_sim.render.visuals.visual import (
+    MODEL_LOOK,
+    Look,
+    Visual,
+    find_look,
+    geom_visual,
+    look_of,
+)
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.mesh.topology import undirected
@@ -27,6 +34,9 @@ from .tessellation import COORDINATES, NORMAL, POSITION
 
 _ON_BORDER = 1e-9  # of a chart
 _BITS = 36  # of the attributes of cut points: round-off is within their last one
+
+# What is lit under the colours: only its shadows are kept.
+UNDER_HEATMAP = Look(color=(0.81, 0.81, 0.81), roughness=0.8)
 
 
 class Charts(NamedTuple):
@@ -64,14 +74,16 @@ def split_at_charts(
     Returns
     -------
     F, attributes, same
-        The mesh, of which every triangle lies in one chart; vertices on the borders stand once for each chart, and
-        `same` is equal for those that differ in their texture coordinates and charts at most.
+        The mesh, of which every triangle lies in one chart; vertices on the borders stand once for
+        each chart, and `same` is equal for those that differ in their texture coordinates and
+        charts at most.
     chart : int64 [n]
         Of each vertex.
     """
     F, attributes, same = mesh
     triangle, barycentrics, chart = charts.map.split(attributes[F][:, :, COORDINATES])
-    whole, corner = barycentrics.max(axis=2) == 1, barycentrics.argmax(axis=2)
+    whole = barycentrics.max(axis=2) == 1
+    corner = barycentrics.argmax(axis=2)
     vertex = np.take_along_axis(F[triangle], corner, axis=1)
     part, place = np.nonzero(~whole)
     cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
@@ -81,7 +93,8 @@ def split_at_charts(
     cut = np.round(cut / step) * step
     _, point = np.unique(np.hstack([cut[:, POSITION], cut[:, NORMAL]]), axis=0, return_inverse=True)
     _, distinct = np.unique(cut, axis=0, return_inverse=True)
-    source, alike = np.where(whole, vertex, 0), np.where(whole, vertex, 0)
+    source = np.where(whole, vertex, 0)
+    alike = np.where(whole, vertex, 0)
     source[part, place] = len(attributes) + np.arange(len(cut))
     alike[part, place] = len(attributes) + distinct.ravel()
     key = alike * charts.page.charts + chart[:, None]
@@ -92,21 +105,19 @@ def split_at_charts(
     return index.reshape(-1, 3), attributes, same, key.ravel()[where] % charts.page.charts
 
 
-def shared_places(uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray) -> NDArray[np.float64]:
+def shared_places(
+    uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray
+) -> NDArray[np.float64]:
     """Places [n, 2] on the page that are the same for vertices at the same point, whatever their charts.
 
-    Heights on both sides of a border are equal but for round-off; looked up in one place they are the same, so that no
-    gap opens. `points` [n, k] are equal where the vertices are at one point.
+    Heights on both sides of a border are equal but for round-off; looked up in one place they are
+    the same, so that no gap opens. `points` [n, k] are equal where the vertices are at one point.
     """
     border = np.flatnonzero(((uv < _ON_BORDER) | (uv > 1 - _ON_BORDER)).any(axis=1))
     _, first, index = np.unique(points[border], axis=0, return_index=True, return_inverse=True)
     shared = places.copy()
     shared[border] = places[border[first[index.ravel()]]]
     return shared
-
-
-# What is lit under the colours: only its shadows are kept.
-UNDER_HEATMAP = Look(color=(0.81, 0.81, 0.81), roughness=0.8)
 
 
 class HeatmapTexture:
@@ -121,9 +132,12 @@ class HeatmapTexture:
     """
 
     def __init__(self, resources: Resources, page: ChartPage, colors: NDArray[np.uint8]) -> None:
-        self._page, self._shape = page, (page.charts, page.block, page.block)
+        self._page = page
+        self._shape = (page.charts, page.block, page.block)
         self._values = resources.clamped_texture((*page.size, 1), 1, dtype="f4")
-        self._colors = resources.clamped_texture((len(colors), 1), 3, data=colors.tobytes(), alignment=1)
+        self._colors = resources.clamped_texture(
+            (len(colors), 1), 3, data=colors.tobytes(), alignment=1
+        )
         self.set(np.zeros(self._shape, np.float32), 1.0)
 
     def set(self, values: NDArray[np.float32], limit: float) -> None:
@@ -133,11 +147,14 @@ class HeatmapTexture:
         """
         if values.shape != self._shape:
             raise RippleError(
-                f"the heatmap's values have shape {list(values.shape)}; valid is {list(self._shape)}: charts with a "
+                f"the heatmap's values have shape {list(values.shape)}; valid is "
+                f"{list(self._shape)}: charts with a "
                 "halo of one texel"
             )
         if not (np.isfinite(limit) and limit > 0):
-            raise RippleError(f"the heatmap's limit is {limit!r}; valid is a positive, finite number")
+            raise RippleError(
+                f"the heatmap's limit is {limit!r}; valid is a positive, finite number"
+            )
         write_page(self._values, self._page, 0, values)
         self._limit = float(limit)
 
@@ -161,15 +178,18 @@ class Surface:
     charts : Charts
         Of the target's atlas: where height map and heatmap are looked up.
     look : str
-        Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
+        Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo
+        material.
     color : tuple, optional
-        sRGB, 0 to 1. By default the texture or colour that the model gives the geom, or else the look's own.
+        sRGB, 0 to 1. By default the texture or colour that the model gives the geom, or else the
+        look's own.
     grey : bool
         Whether MuJoCo's grey takes the place of the look's own colour.
     uv : array, optional
         Texture coordinates, shape [n, 2] or per corner [m, 3, 2].
     heatmap_colors : array of uint8, shape [k, 3], optional
-        sRGB, from the least to the greatest value of a heatmap that replaces the look; see `Renderer.set_heatmap`.
+        sRGB, from the least to the greatest value of a heatmap that replaces the look; see
+        `Renderer.set_heatmap`.
     grid : int
         Texels between the lines of a grid on the surface; 0: no grid.
     moving : (V, F), optional
@@ -194,7 +214,9 @@ class Surface:
         return bool((np.unique(edges, return_counts=True)[1] == 1).any())
 
 
-def appearance(model: Any, visual: Visual, surface: Surface) -> tuple[Look, NDArray[np.float64], TextureMapping]:
+def appearance(
+    model: Any, visual: Visual, surface: Surface
+) -> tuple[Look, NDArray[np.float64], TextureMapping]:
     """Look, linear colour under the texture, and how the texture lies on a surface that stands for a visual."""
     if surface.heatmap_colors is not None:
         return UNDER_HEATMAP, np.ones(3), TextureMapping()
@@ -215,22 +237,31 @@ def painted(
 def _painted(
     model: Any, visual: Visual, look: str, color: tuple[float, float, float] | None, has_uv: bool
 ) -> tuple[Look, NDArray[np.float64], TextureMapping]:
-    found, mapping = find_look(look), mapping_of(model, visual)
+    found = find_look(look)
+    mapping = mapping_of(model, visual)
     if mapping.own and not has_uv:
         mapping = TextureMapping()
     if look == MODEL_LOOK:
-        return look_of(model, visual), visual.color if color is None else srgb_to_linear(color), mapping
+        return (
+            look_of(model, visual),
+            visual.color if color is None else srgb_to_linear(color),
+            mapping,
+        )
     if color is None and mapping.kind != MappingKind.NO_IMAGE:
         return found, visual.color, mapping
     return found, srgb_to_linear(_own_color(model, visual, look, color)), TextureMapping()
 
 
-def target_color(model: Any, geom: int, look: str, given: tuple[float, float, float] | None) -> NDArray[np.float64]:
+def target_color(
+    model: Any, geom: int, look: str, given: tuple[float, float, float] | None
+) -> NDArray[np.float64]:
     """Colour of a target without its texture, sRGB [3]: the given one, or else the model's own, or else the look's."""
     return _own_color(model, geom_visual(model, geom), look, given)
 
 
-def _own_color(model: Any, visual: Visual, look: str, given: tuple[float, float, float] | None) -> NDArray[np.float64]:
+def _own_color(
+    model: Any, visual: Visual, look: str, given: tuple[float, float, float] | None
+) -> NDArray[np.float64]:
     if given is not None:
         return np.array(given)
     plain = mapping_of(model, visual).kind == MappingKind.NO_IMAGE

@@ -1,7 +1,7 @@
 """Finer and coarser meshes of the same shape.
 
-Static tessellation splits long edges at their midpoints; smooth surfaces get rounder. A coarse mesh has few of the
-vertices, spread evenly.
+Static tessellation splits long edges at their midpoints; smooth surfaces get rounder. A coarse mesh
+has few of the vertices, spread evenly.
 """
 
 from __future__ import annotations
@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.topology import Edges, edges_of, undirected
 
-# columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
-# chart map
-POSITION, NORMAL, COORDINATES = slice(0, 3), slice(3, 6), slice(6, 9)
-DIRECTION, BAKED, UV = slice(9, 12), slice(12, 15), slice(15, 17)
+# columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced;
+# COORDINATES are for the chart map
+POSITION = slice(0, 3)
+NORMAL = slice(3, 6)
+COORDINATES = slice(6, 9)
+DIRECTION = slice(9, 12)
+BAKED = slice(12, 15)
+UV = slice(15, 17)
 
 
 def tessellate(
@@ -28,10 +32,11 @@ def tessellate(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Split edges until none is longer than `max_length` or the mesh has about `max_faces` triangles.
 
-    A midpoint has the mean of its ends' attributes. Between two triangles that share the normals at both ends of their
-    edge it also bulges out to where a surface with these normals would be: half the way to the mean of its projections
-    onto the ends' tangent planes (Boubekeur and Alexa, Phong Tessellation, 2008); half is exact on a sphere to second
-    order. Creases and open edges stay straight. No gaps open.
+    A midpoint has the mean of its ends' attributes. Between two triangles that share the normals at
+    both ends of their edge it also bulges out to where a surface with these normals would be: half
+    the way to the mean of its projections onto the ends' tangent planes (Boubekeur and Alexa, Phong
+    Tessellation, 2008); half is exact on a sphere to second order. Creases and open edges stay
+    straight. No gaps open.
 
     Parameters
     ----------
@@ -40,27 +45,32 @@ def tessellate(
     attributes : array, shape [n, k]
         Of the vertices, in the columns above, of which those from COORDINATES on may be missing.
     same : array, shape [n]
-        Whole numbers, equal for vertices that differ in their texture coordinates at most: a seam is no crease.
+        Whole numbers, equal for vertices that differ in their texture coordinates at most: a seam
+        is no crease.
     max_length : float
         [m]
     max_faces : int
         The longest edges are split first; a mesh that is finer from the start stays as it is.
     crease_length : float, optional
-        Creases and open edges are split further, to this length [m], for a quarter more triangles at most: both sides
-        of them contrast, so that corners of the displaced edge would show where those of other edges do not.
+        Creases and open edges are split further, to this length [m], for a quarter more triangles
+        at most: both sides of them contrast, so that corners of the displaced edge would show where
+        those of other edges do not.
 
     Returns
     -------
     F, attributes, same
         The finer mesh, as above. The original vertices come first.
     """
-    F, attributes = np.asarray(F, dtype=np.int64), np.asarray(attributes, dtype=np.float64)
+    F = np.asarray(F, dtype=np.int64)
+    attributes = np.asarray(attributes, dtype=np.float64)
     same = np.asarray(same, dtype=np.int64)
     most = max_faces if crease_length is None else max(max_faces, len(F)) * 5 // 4
     while len(F) < most:
         edges = edges_of(F)
         weld, inner = welded(edges, F, same)
-        length = np.linalg.norm(attributes[edges.ends[:, 0], POSITION] - attributes[edges.ends[:, 1], POSITION], axis=1)
+        length = np.linalg.norm(
+            attributes[edges.ends[:, 0], POSITION] - attributes[edges.ends[:, 1], POSITION], axis=1
+        )
         marked = _longest(length, max_length, max_faces - len(F))
         if crease_length is not None and not marked.any():
             marked = _longest(np.where(inner, 0.0, length), crease_length, most - len(F))
@@ -74,11 +84,13 @@ def tessellate(
     return F, attributes, same
 
 
-def welded(edges: Edges, F: NDArray[np.int64], same: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def welded(
+    edges: Edges, F: NDArray[np.int64], same: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Two things of each edge [k] of triangles [m, 3]; `same` as for `tessellate`.
 
-    A number that is equal for edges whose ends differ in their texture coordinates at most, and whether two triangles
-    share the edge, and the normals at its ends: whether it is an inner one.
+    A number that is equal for edges whose ends differ in their texture coordinates at most, and
+    whether two triangles share the edge, and the normals at its ends: whether it is an inner one.
     """
     _, weld_of_side = np.unique(undirected(same[F])[0], return_inverse=True)
     weld = np.empty(len(edges.ends), dtype=np.int64)
@@ -86,20 +98,28 @@ def welded(edges: Edges, F: NDArray[np.int64], same: NDArray[np.int64]) -> tuple
     return weld, np.bincount(weld_of_side)[weld] == 2
 
 
-def midpoints(ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray) -> NDArray[np.float64]:
+def midpoints(
+    ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray
+) -> NDArray[np.float64]:
     """Attributes of the midpoints of all edges, [k, ...]; see `tessellate`."""
-    a, b = attributes[ends[:, 0]], attributes[ends[:, 1]]
+    a = attributes[ends[:, 0]]
+    b = attributes[ends[:, 1]]
     middle = (a + b) / 2
     middle[:, POSITION] += bulges(ends, inner, attributes)
     middle[:, NORMAL] /= np.maximum(np.linalg.norm(middle[:, NORMAL], axis=1, keepdims=True), 1e-12)
     return middle
 
 
-def bulges(ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray) -> NDArray[np.float64]:
+def bulges(
+    ends: NDArray[np.int64], inner: NDArray[np.bool_], attributes: NDArray
+) -> NDArray[np.float64]:
     """How far the midpoints of all edges move out [m], [k, 3]; see `tessellate`."""
-    a, b = attributes[ends[:, 0]], attributes[ends[:, 1]]
+    a = attributes[ends[:, 0]]
+    b = attributes[ends[:, 1]]
     half = (b[:, POSITION] - a[:, POSITION]) / 2
-    above_a, above_b = (np.einsum("ij,ij->i", half, end[:, NORMAL])[:, None] * end[:, NORMAL] for end in (a, b))
+    above_a, above_b = (
+        np.einsum("ij,ij->i", half, end[:, NORMAL])[:, None] * end[:, NORMAL] for end in (a, b)
+    )
     return inner[:, None] * ((above_b - above_a) / 4)
 
 
@@ -109,19 +129,24 @@ def _longest(length: NDArray, max_length: float, new_faces: int) -> NDArray[np.b
         return np.zeros(len(length), np.bool_)
     budget = max(new_faces // 2, 1)
     if budget < len(length):
-        max_length = max(max_length, np.partition(length, len(length) - budget)[len(length) - budget])
+        max_length = max(
+            max_length, np.partition(length, len(length) - budget)[len(length) - budget]
+        )
     # half of the longest edge as a floor keeps the triangles in shape: long edges are split first
     return length > max(max_length, length.max() / 2)
 
 
 def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]:
     """Cut every triangle into 1 to 4 by the midpoints of its sides (side k runs from corner k to k + 1), -1 = none."""
-    split, count = middle >= 0, (middle >= 0).sum(axis=1)
+    split = middle >= 0
+    count = (middle >= 0).sum(axis=1)
     # turn the triangles so that their only split side, or their only whole one, is side 0
     first = np.where(count == 1, split.argmax(axis=1), split.argmin(axis=1))
     index = (first[:, None] + np.arange(3)) % 3
     # columns 0 to 2 are a triangle's corners, 3 to 5 the midpoints of its sides
-    points = np.hstack([np.take_along_axis(F, index, axis=1), np.take_along_axis(middle, index, axis=1)])
+    points = np.hstack(
+        [np.take_along_axis(F, index, axis=1), np.take_along_axis(middle, index, axis=1)]
+    )
     one, two, three = (points[count == number] for number in (1, 2, 3))
     # the quadrilateral 0 1 4 5 that is left of those with two is cut along its shorter diagonal
     diagonals = np.linalg.norm(positions[two[:, :2]] - positions[two[:, 4:]], axis=2)
@@ -133,7 +158,9 @@ def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]
         (two[shorter], [[0, 1, 4], [0, 4, 5]]),
         (two[~shorter], [[0, 1, 5], [1, 4, 5]]),
     ]
-    return np.concatenate([F[count == 0], *(each[:, corners] for each, some in patterns for corners in some)])
+    return np.concatenate(
+        [F[count == 0], *(each[:, corners] for each, some in patterns for corners in some)]
+    )
 
 
 def coarse_mesh(
@@ -156,11 +183,14 @@ def coarse_mesh(
     """
     if len(features) <= count:
         return np.arange(len(features)), np.asarray(F)
-    # each of those left is the farthest from those before, and `owner` the number of the nearest to every vertex; plain
-    # numpy, column by column, takes twice the time of a compiled loop, and less than to compile that
+    # each of those left is the farthest from those before, and `owner` the number of the nearest to
+    # every vertex; plain numpy, column by column, takes twice the time of a compiled loop, and less
+    # than to compile that
     columns = np.ascontiguousarray(features.T)
-    chosen, owner = np.zeros(count, np.int64), np.zeros(len(features), np.int64)
-    square, latest = np.full(len(features), np.inf), 0
+    chosen = np.zeros(count, np.int64)
+    owner = np.zeros(len(features), np.int64)
+    square = np.full(len(features), np.inf)
+    latest = 0
     for k in range(count):
         chosen[k] = latest
         distance = np.zeros(len(features))

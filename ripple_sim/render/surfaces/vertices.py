@@ -1,7 +1,7 @@
 """The triangles and vertices that a target is drawn with: small, round in outline, split at creases and seams.
 
-`surface_vertices` makes them of a `Surface`: its mesh is cut into the parts of its chart map, tessellated, cut where
-its triangles leave a chart, and ordered for vertex caches.
+`surface_vertices` makes them of a `Surface`: its mesh is cut into the parts of its chart map,
+tessellated, cut where its triangles leave a chart, and ordered for vertex caches.
 """
 
 from __future__ import annotations
@@ -12,7 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.camera import balls_about
-from ripple_sim.render.visuals.corners import bake, corner_normals, normalized, smooth_normals, split_corners
+from ripple_sim.render.visuals.corners import (
+    bake,
+    corner_normals,
+    normalized,
+    smooth_normals,
+    split_corners,
+)
 from ripple_sim.render.visuals.texture_mapping import TextureMapping
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.cache import ResultCache, content_key
@@ -20,37 +26,63 @@ from ripple_sim.solver.mesh.topology import Edges, edges_of
 from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
 
 from .surface import Charts, Surface, shared_places, split_at_charts
-from .tessellation import COORDINATES, DIRECTION, POSITION, UV, bulges, coarse_mesh, midpoints, tessellate, welded
+from .tessellation import (
+    COORDINATES,
+    DIRECTION,
+    POSITION,
+    UV,
+    bulges,
+    coarse_mesh,
+    midpoints,
+    tessellate,
+    welded,
+)
 
 _ALIKE = 1e-4  # normals at a vertex that differ by less are one
 
+_BITS = 10  # of a coordinate
+_LEAST_FACES = 8_000
+_MOST_FACES = 400_000
 
-def rounded_parts(mesh: Mesh, chart_map: ChartMap) -> tuple[PartsMesh, NDArray[np.float64], NDArray[np.float64]]:
+# Creases are split down to half a texel, as heights have no finer detail, but to no less than a
+# quarter of other edges.
+_CREASE = 0.5
+_CREASE_PARTS = 4
+_BALLS = 16  # that bound the mesh
+_COARSE = 600  # vertices of what the floor sees: texels of its map are about as far apart
+_APART = 0.1  # of the bounding radius: how far from each other the two sides of a thin body are
+_MOST_KEPT_FACES = 100_000  # of a surface that is kept: 30 MB
+
+
+def rounded_parts(
+    mesh: Mesh, chart_map: ChartMap
+) -> tuple[PartsMesh, NDArray[np.float64], NDArray[np.float64]]:
     """Cut a mesh into the parts of its chart map, as round as before; return also their vertices and corner normals.
 
-    Vertices are [n, 3] [m], normals [m, 3, 3]. These go over from the mesh's triangles, whose parts bulge out as the
-    triangles themselves would.
+    Vertices are [n, 3] [m], normals [m, 3, 3]. These go over from the mesh's triangles, whose parts
+    bulge out as the triangles themselves would.
 
-    A triangle is the quadratic patch whose edges have the midpoints of `tessellate`: flat where its normals say so.
+    A triangle is the quadratic patch whose edges have the midpoints of `tessellate`: flat where its
+    normals say so.
     """
-    parts, normals = parts_mesh(chart_map, mesh), corner_normals(mesh.V, mesh.F)
+    parts = parts_mesh(chart_map, mesh)
+    normals = corner_normals(mesh.V, mesh.F)
     if parts.V is mesh.V:
         return parts, mesh.V, normals
     # how far the midpoint of each triangle's side from corner k to k + 1 bulges out [m], [m, 3, 3]
     vertices, F, split_normals, _, _ = split_corners(mesh.V, mesh.F)
-    attributes, edges = np.concatenate([mesh.V[vertices], split_normals], axis=1), edges_of(F)
+    attributes = np.concatenate([mesh.V[vertices], split_normals], axis=1)
+    edges = edges_of(F)
     _, inner = welded(edges, F, np.arange(len(attributes)))
     out = bulges(edges.ends, inner, attributes)[edges.of]
-    V, w = parts.V.copy(), parts.barycentrics
+    V = parts.V.copy()
+    w = parts.barycentrics
     V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out[parts.triangle])
     # corner normals are the same to the last bit where they differ by round-off at a vertex
     normals = normalized(parts.carry(normals)).reshape(-1, 3)
     key = np.column_stack([parts.F.ravel(), np.rint(normals / _ALIKE).astype(np.int64)])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return parts, V, normals[first[group.ravel()]].reshape(-1, 3, 3)
-
-
-_BITS = 10  # of a coordinate
 
 
 def memory_order(
@@ -82,18 +114,14 @@ def memory_order(
 
 def morton_order(points: NDArray) -> NDArray[np.int64]:
     """Order of points [k, 3] along a Morton curve: by the bits of their coordinates, interleaved."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     cell = ((points - low) / max((high - low).max(), 1e-300) * (2**_BITS - 1)).astype(np.int64)
     code = np.zeros(len(points), dtype=np.int64)
     for bit in range(_BITS):
         for axis in range(3):
             code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
     return np.argsort(code, kind="stable")
-
-
-_LEAST_FACES, _MOST_FACES = 8_000, 400_000
-# Creases are split down to half a texel, as heights have no finer detail, but to no less than a quarter of other edges.
-_CREASE, _CREASE_PARTS = 0.5, 4
 
 
 def tessellated(
@@ -128,16 +156,26 @@ def tessellated(
     parts, V, normals = rounded_parts(mesh, charts.map)
     F = parts.F
     corner_uv = None if corner_uv is None else parts.carry(corner_uv)
-    each, split_F, normals, uv, coordinates = split_corners(V, F, corner_uv, parts.coordinates, normals)
+    each, split_F, normals, uv, coordinates = split_corners(
+        V, F, corner_uv, parts.coordinates, normals
+    )
     baked = np.zeros((len(mesh.V), 3)) if baked is None else baked
     if parts.V is not mesh.V:
         at_parts = np.zeros((len(V), 6))
         at_parts[F] = parts.carry(np.concatenate([smooth, baked], axis=1)[mesh.F])
-        smooth, baked = normalized(at_parts[:, :3]), at_parts[:, 3:]
+        smooth = normalized(at_parts[:, :3])
+        baked = at_parts[:, 3:]
     _, same = np.unique(np.column_stack([each, normals]), axis=0, return_inverse=True)
-    attributes = np.concatenate([V[each], normals, coordinates, smooth[each], baked[each], uv], axis=1)
+    attributes = np.concatenate(
+        [V[each], normals, coordinates, smooth[each], baked[each], uv], axis=1
+    )
     return tessellate(
-        split_F, attributes, same.ravel(), max_length=max_length, max_faces=max_faces, crease_length=crease_length
+        split_F,
+        attributes,
+        same.ravel(),
+        max_length=max_length,
+        max_faces=max_faces,
+        crease_length=crease_length,
     )
 
 
@@ -172,8 +210,10 @@ class SurfaceVertices(NamedTuple):
 
 
 def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:
-    V, F = np.asarray(surface.V, dtype=np.float64), np.asarray(surface.F, dtype=np.int64)
-    smooth, charts = smooth_normals(V, F), surface.charts
+    V = np.asarray(surface.V, dtype=np.float64)
+    F = np.asarray(surface.F, dtype=np.int64)
+    smooth = smooth_normals(V, F)
+    charts = surface.charts
     uv = np.zeros((len(V), 2)) if surface.uv is None else np.asarray(surface.uv, dtype=np.float64)
     mesh = Mesh(V, F)
     texel_size = float(np.sqrt(mesh.area / (charts.page.charts * charts.page.resolution**2)))
@@ -189,11 +229,15 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     )
     faces, attributes, same, chart = split_at_charts(finer, charts)
     faces, order, _ = memory_order(faces, attributes[:, POSITION])
-    attributes, same, chart = attributes[order], same[order], chart[order]
+    attributes = attributes[order]
+    same = same[order]
+    chart = chart[order]
     edges = edges_of(faces)
     _, inner = welded(edges, faces, same)
     attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes)])
-    attributes[:, DIRECTION] /= np.maximum(np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True), 1e-12)
+    attributes[:, DIRECTION] /= np.maximum(
+        np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True), 1e-12
+    )
     chart = np.concatenate([chart, chart[edges.ends[:, 0]]])
     chart_uv = charts.map.uv(attributes[:, COORDINATES], chart)
     places = charts.page.places(chart, chart_uv)
@@ -202,7 +246,9 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of])
     balls = balls_about(attributes[:, POSITION][corners], _BALLS)
     apart = _APART * np.ptp(points, axis=0)[:3].max() / 2 * attributes[: len(same), DIRECTION]
-    some, coarse = coarse_mesh(faces, np.hstack([attributes[: len(same), POSITION], apart]), _COARSE)
+    some, coarse = coarse_mesh(
+        faces, np.hstack([attributes[: len(same), POSITION], apart]), _COARSE
+    )
     made = SurfaceVertices(faces, attributes, edges, places, lookups, balls, some[coarse])
     for array in (*edges, *made):
         if isinstance(array, np.ndarray):
@@ -210,7 +256,9 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     return made
 
 
-def mapped_coordinates(vertices: NDArray[np.float64], mapping: TextureMapping) -> NDArray[np.float64]:
+def mapped_coordinates(
+    vertices: NDArray[np.float64], mapping: TextureMapping
+) -> NDArray[np.float64]:
     """Texture coordinates of the vertices, [n, 3]; see `TextureMapping`."""
     if not mapping.own:
         return mapping.at(vertices[:, POSITION])
@@ -218,11 +266,6 @@ def mapped_coordinates(vertices: NDArray[np.float64], mapping: TextureMapping) -
     # a surface counts v from the image's lower edge, MuJoCo from the upper edge
     return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1)
 
-
-_BALLS = 16  # that bound the mesh
-_COARSE = 600  # vertices of what the floor sees: texels of its map are about as far apart
-_APART = 0.1  # of the bounding radius: how far from each other the two sides of a thin body are
-_MOST_KEPT_FACES = 100_000  # of a surface that is kept: 30 MB
 
 _kept: ResultCache[SurfaceVertices] = ResultCache(4, lambda each: len(each.F) <= _MOST_KEPT_FACES)
 
@@ -232,7 +275,8 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
 
     In a batch the next scene mostly has the same surfaces.
     """
-    charts, uv = surface.charts, np.zeros(0) if surface.uv is None else np.asarray(surface.uv)
+    charts = surface.charts
+    uv = np.zeros(0) if surface.uv is None else np.asarray(surface.uv)
     arrays = charts.map.arrays()
     name = f"{charts.map.layout} {charts.page} {list(arrays)} {max_length!r} {max_faces}"
     key = content_key(name, [surface.V, surface.F, uv, *arrays.values()])

@@ -9,7 +9,12 @@ from .corners import (
     split_corners as split_corners,
     triangle_normals as triangle_normals,
 )
-from .geoms import Instances as Instances, instances_of as instances_of, shaped as shaped, visuals_of as visuals_of
+from .geoms import (
+    Instances as Instances,
+    instances_of as instances_of,
+    shaped as shaped,
+    visuals_of as visuals_of,
+)
 from .lights import (
     BESIDE_LIGHTS as BESIDE_LIGHTS,
     FADE as FADE,

@@ -6,9 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.queries import RayScene
-from ripple_sim.solver.mesh.topology import edges_of, labels, normalized, triangle_normals, undirected
+from ripple_sim.solver.mesh.topology import (
+    edges_of,
+    labels,
+    normalized,
+    triangle_normals,
+    undirected,
+)
 
 _ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex
+
+_RAYS = 1_000_000
 
 
 def split_corners(
@@ -17,18 +25,31 @@ def split_corners(
     corner_uv: NDArray | None = None,
     coordinates: NDArray | None = None,
     normals: NDArray | None = None,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+]:
     """Split vertices where normals, texture coordinates [m, 3, 2] or other coordinates [m, 3, d] jump.
 
-    The normals, [m, 3, 3], are those of `corner_normals` unless given. Return the vertex of the original mesh that each
-    was [n], triangles [m, 3], and normals [n, 3], texture coordinates [n, 2] and other coordinates [n, d].
+    The normals, [m, 3, 3], are those of `corner_normals` unless given. Return the vertex of the
+    original mesh that each was [n], triangles [m, 3], and normals [n, 3], texture coordinates [n,
+    2] and other coordinates [n, d].
     """
     normals = corner_normals(V, F) if normals is None else normals
     uv = np.zeros((*F.shape, 2)) if corner_uv is None else corner_uv
     others = np.zeros((*F.shape, 0)) if coordinates is None else coordinates
     corners = np.concatenate([F[:, :, None], normals, uv, others], axis=2)
     unique, index = np.unique(corners.reshape(F.size, -1), axis=0, return_inverse=True)
-    return unique[:, 0].astype(np.int64), index.reshape(F.shape), unique[:, 1:4], unique[:, 4:6], unique[:, 6:]
+    return (
+        unique[:, 0].astype(np.int64),
+        index.reshape(F.shape),
+        unique[:, 1:4],
+        unique[:, 4:6],
+        unique[:, 6:],
+    )
 
 
 def smooth_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:
@@ -39,9 +60,9 @@ def smooth_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:
 def corner_normals(V: NDArray, F: NDArray, crease: float = 45.0) -> NDArray[np.float64]:
     """Angle-weighted unit normals of every triangle's corners, shape [m, 3, 3].
 
-    The triangles round a vertex share one normal from crease to crease, edges that bend by more than `crease` degrees:
-    sharp edges stay sharp and run out smoothly where they end. A triangle that is turned far away from that normal, as
-    at the tip of a cone, keeps its own.
+    The triangles round a vertex share one normal from crease to crease, edges that bend by more
+    than `crease` degrees: sharp edges stay sharp and run out smoothly where they end. A triangle
+    that is turned far away from that normal, as at the tip of a cone, keeps its own.
     """
     own = np.repeat(triangle_normals(V, F), 3, axis=0)
     fan = _fans(F, own[::3], crease)
@@ -59,9 +80,14 @@ def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[n
     _, edge, count = np.unique(undirected(F)[0], return_inverse=True, return_counts=True)
     order = np.argsort(edge, kind="stable")
     one, other = order[count[edge[order]] == 2].reshape(-1, 2).T
-    a, b = triangle[one // 3], triangle[other // 3]
+    a = triangle[one // 3]
+    b = triangle[other // 3]
     # a triangle without area bends nowhere
-    even = (np.einsum("ij,ij->i", a, b) >= np.cos(np.radians(crease)) - 1e-9) | ~a.any(axis=1) | ~b.any(axis=1)
+    even = (
+        (np.einsum("ij,ij->i", a, b) >= np.cos(np.radians(crease)) - 1e-9)
+        | ~a.any(axis=1)
+        | ~b.any(axis=1)
+    )
     pairs = np.stack([corners[one[even]], corners[other[even]]], axis=1).reshape(-1, 2, 2)
     return labels(pairs.swapaxes(1, 2).reshape(-1, 2), F.size)
 
@@ -69,16 +95,17 @@ def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[n
 def _weighted(V: NDArray, F: NDArray) -> NDArray[np.float64]:
     """Normals of the triangles, weighted with their angles at the corners [3 m, 3]."""
     sides = normalized(V[np.roll(F, -1, axis=1)] - V[F])
-    angles = np.arccos(np.clip(np.einsum("fkj,fkj->fk", sides, -np.roll(sides, 1, axis=1)), -1.0, 1.0))
+    angles = np.arccos(
+        np.clip(np.einsum("fkj,fkj->fk", sides, -np.roll(sides, 1, axis=1)), -1.0, 1.0)
+    )
     return (angles[:, :, None] * triangle_normals(V, F)[:, None, :]).reshape(-1, 3)
 
 
 def _sums(weighted: NDArray[np.float64], group: NDArray, count: int) -> NDArray[np.float64]:
     """Unit sums of vectors [k, 3] that belong to the same of `count` groups [k]."""
-    return normalized(np.stack([np.bincount(group, column, count) for column in weighted.T], axis=1))
-
-
-_RAYS = 1_000_000
+    return normalized(
+        np.stack([np.bincount(group, column, count) for column in weighted.T], axis=1)
+    )
 
 
 def bake(V: NDArray, F: NDArray, normals: NDArray) -> NDArray[np.float64]:
@@ -87,9 +114,9 @@ def bake(V: NDArray, F: NDArray, normals: NDArray) -> NDArray[np.float64]:
     Returns
     -------
     float64 [n, 3]
-        Ambient visibility, 1 - occlusion: share of the outer hemisphere from which light arrives. Thickness: mean
-        length of the inner rays over the mesh's bounding radius. Ambient visibility of the inner side, which an open
-        surface shows.
+        Ambient visibility, 1 - occlusion: share of the outer hemisphere from which light arrives.
+        Thickness: mean length of the inner rays over the mesh's bounding radius. Ambient visibility
+        of the inner side, which an open surface shows.
     """
     count = int(np.clip(_RAYS // (2 * len(V)), 16, 64))
     return cast(V, F, frames_about(normals), count, bounding_radius(V))
@@ -100,7 +127,9 @@ def bounding_radius(V: NDArray) -> float:
     return float(np.linalg.norm(V - V.mean(axis=0), axis=1).max())
 
 
-def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, start: float = 0.0) -> NDArray[np.float64]:
+def cast(
+    V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, start: float = 0.0
+) -> NDArray[np.float64]:
     """Cast rays from every vertex to either side, as `bake` does.
 
     Parameters
@@ -116,11 +145,17 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
         Walls nearer than that are not seen [m].
     """
     scene = RayScene(V, F)
-    # cosine-distributed directions on a spiral about every normal, turned differently at every vertex
-    index, golden = np.arange(count) + 0.5, np.pi * (3 - np.sqrt(5))
+    # cosine-distributed directions on a spiral about every normal, turned differently at every
+    # vertex
+    index = np.arange(count) + 0.5
+    golden = np.pi * (3 - np.sqrt(5))
     turn = index * golden + (np.arange(len(frames)) * golden)[:, None]
-    r, z = np.sqrt(index / count), np.sqrt(1 - index / count)
-    hemisphere = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z, turn.shape)], axis=2) @ frames
+    r = np.sqrt(index / count)
+    z = np.sqrt(1 - index / count)
+    hemisphere = (
+        np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z, turn.shape)], axis=2)
+        @ frames
+    )
 
     def distances(side: float) -> NDArray[np.float64]:
         directions = side * hemisphere
@@ -129,8 +164,12 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
         return (np.minimum(hits, 4.0 * radius) / radius).reshape(len(V), count)
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
-    outer, inner = distances(1.0), distances(-1.0)
-    means = np.stack([each.mean(axis=1) for each in (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0))], axis=1)
+    outer = distances(1.0)
+    inner = distances(-1.0)
+    means = np.stack(
+        [each.mean(axis=1) for each in (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0))],
+        axis=1,
+    )
     ends = edges_of(F).ends
     here, there = np.concatenate([ends, ends[:, ::-1]]).T
     degree = np.maximum(np.bincount(here, minlength=len(V)), 1)[:, None]

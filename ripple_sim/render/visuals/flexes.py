@@ -1,7 +1,7 @@
 """Flexes as a scene of MuJoCo's shows them: the corners of the triangles of their faces, edges and vertices.
 
-Corners are float32 [3 m, 8], three for each triangle: point, normal and texture coordinates. Edges are cylinders
-without caps, vertices balls, both as thick as the flex's radius.
+Corners are float32 [3 m, 8], three for each triangle: point, normal and texture coordinates. Edges
+are cylinders without caps, vertices balls, both as thick as the flex's radius.
 """
 
 from __future__ import annotations
@@ -18,12 +18,15 @@ _SIDES = 20  # of the cylinder of an edge, and round the ball of a vertex
 _STACKS = 10  # of that ball, from pole to pole
 
 
-def flex_parts(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> dict[str, NDArray[np.float32]]:
+def flex_parts(
+    model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom
+) -> dict[str, NDArray[np.float32]]:
     """Corners of what MuJoCo draws of a flex, as far as there is any: of its "faces", "edges" and "vertices".
 
     The smooth skin of a flex replaces edges and vertices.
     """
-    flex, radius = int(drawn.objid), float(drawn.size[0])
+    flex = int(drawn.objid)
+    radius = float(drawn.size[0])
     smooth = bool(scene.flexskinopt and scene.flexfaceused[flex])
     parts = {}
     if scene.flexfaceused[flex]:
@@ -36,12 +39,14 @@ def flex_parts(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> dic
 
 
 def _vertices(scene: mujoco.MjvScene, flex: int) -> NDArray[np.float64]:
-    first, count = int(scene.flexvertadr[flex]), int(scene.flexvertnum[flex])
+    first = int(scene.flexvertadr[flex])
+    count = int(scene.flexvertnum[flex])
     return scene.flexvert.reshape(-1, 3)[first : first + count].astype(np.float64)
 
 
 def _faces(model: Any, scene: mujoco.MjvScene, flex: int) -> NDArray[np.float32]:
-    first, count = int(scene.flexfaceadr[flex]), int(scene.flexfaceused[flex])
+    first = int(scene.flexfaceadr[flex])
+    count = int(scene.flexfaceused[flex])
     corners = slice(3 * first, 3 * (first + count))
     points = scene.flexface.reshape(-1, 3)[corners]
     normals = scene.flexnormal.reshape(-1, 3)[corners]
@@ -52,14 +57,16 @@ def _faces(model: Any, scene: mujoco.MjvScene, flex: int) -> NDArray[np.float32]
 
 
 def _edges(scene: mujoco.MjvScene, flex: int, radius: float) -> NDArray[np.float32]:
-    first, count = int(scene.flexedgeadr[flex]), int(scene.flexedgenum[flex])
+    first = int(scene.flexedgeadr[flex])
+    count = int(scene.flexedgenum[flex])
     ends = _vertices(scene, flex)[scene.flexedge.reshape(-1, 2)[first : first + count]]
     along = normalized(ends[:, 1] - ends[:, 0])
     helper = np.where(np.abs(along[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     across = normalized(np.cross(helper, along))
     turn = 2 * np.pi * np.arange(_SIDES + 1) / _SIDES
     outwards = (
-        np.cos(turn)[:, None] * across[:, None] + np.sin(turn)[:, None] * np.cross(along, across)[:, None]
+        np.cos(turn)[:, None] * across[:, None]
+        + np.sin(turn)[:, None] * np.cross(along, across)[:, None]
     )  # [edge, side, 3]
     lower = ends[:, :1] + radius * outwards
     upper = ends[:, 1:] + radius * outwards
@@ -69,7 +76,9 @@ def _edges(scene: mujoco.MjvScene, flex: int, radius: float) -> NDArray[np.float
 def _balls(centres: NDArray[np.float64], radius: float) -> NDArray[np.float32]:
     turn = 2 * np.pi * np.arange(_SIDES + 1) / _SIDES
     rise = np.pi * (np.arange(_STACKS + 1) / _STACKS - 0.5)
-    flat = np.cos(rise)[:, None, None] * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    flat = np.cos(rise)[:, None, None] * np.stack(
+        [np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1
+    )
     directions = flat + np.sin(rise)[:, None, None] * [0.0, 0.0, 1.0]  # [level, side, 3]
     rings = centres[:, None, None] + radius * directions
     normals = np.broadcast_to(directions, rings.shape)
@@ -90,8 +99,10 @@ def _strips(
     """Corners of the bands between pairs of rings [k, sides + 1, 3], counter-clockwise as seen from outside."""
 
     def corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
-        a, b = low[:, :-1], low[:, 1:]
-        c, d = high[:, 1:], high[:, :-1]
+        a = low[:, :-1]
+        b = low[:, 1:]
+        c = high[:, 1:]
+        d = high[:, :-1]
         return np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3)
 
     points = corners(lower, upper)

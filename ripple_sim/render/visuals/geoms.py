@@ -37,14 +37,23 @@ INSTANCE = np.dtype(
 _GEOM = mujoco.mjtGeom
 _ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
 # Kinds that are made of as many segments as they need; others are always the same.
-_WITH_LEVELS = (*_ROUND, _GEOM.mjGEOM_BOX, _GEOM.mjGEOM_ARROW, _GEOM.mjGEOM_ARROW1, _GEOM.mjGEOM_ARROW2)
+_WITH_LEVELS = (
+    *_ROUND,
+    _GEOM.mjGEOM_BOX,
+    _GEOM.mjGEOM_ARROW,
+    _GEOM.mjGEOM_ARROW1,
+    _GEOM.mjGEOM_ARROW2,
+)
 _LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
-_MEASURED_LEVELS = (*_LEVELS, 2 * _LEVELS[-1])  # where shapes are measured, in depth and segmentation
+# where shapes are measured, in depth and segmentation
+_MEASURED_LEVELS = (*_LEVELS, 2 * _LEVELS[-1])
 _BIAS = 3.0  # of shadows, in sagittas of the edges: where light grazes, one is not enough
 _SHARPEST = 1e-6  # bevel of sharp edges, in half sizes: normals need some
-# How far the edges of a round shape may be off its surface [pixels]: in colours; and where shapes are measured. There
-# depths are off by as much of a pixel's width, and more only where a surface is seen at a slant.
-_FLATNESS, _MEASURED_FLATNESS = 0.25, 1 / 64
+# How far the edges of a round shape may be off its surface [pixels]: in colours; and where shapes
+# are measured. There depths are off by as much of a pixel's width, and more only where a surface is
+# seen at a slant.
+_FLATNESS = 0.25
+_MEASURED_FLATNESS = 1 / 64
 
 
 class Levels:
@@ -57,7 +66,8 @@ class Levels:
     """
 
     def __init__(self, resources: Resources, make: Callable[[int], Shape]) -> None:
-        self._resources, self._make = resources, make
+        self._resources = resources
+        self._make = make
         self._levels: dict[int, tuple[moderngl.Buffer, moderngl.Buffer, int]] = {}
 
     def __call__(self, segments: int) -> tuple[moderngl.Buffer, moderngl.Buffer]:
@@ -125,8 +135,12 @@ class Instances:
         programs: Mapping[CasterMap | None, moderngl.Program],
         members: list[tuple[Visual, int]],
     ) -> None:
-        self._assets, self._level, self._programs = assets, level, programs
-        self._buffer = assets.resources.buffer(reserve=INSTANCE.itemsize * len(members), dynamic=True)
+        self._assets = assets
+        self._level = level
+        self._programs = programs
+        self._buffer = assets.resources.buffer(
+            reserve=INSTANCE.itemsize * len(members), dynamic=True
+        )
         self._level_buffers: dict[int, moderngl.Buffer] = {}
         self._arrays: dict[tuple[CasterMap | None, int, moderngl.Buffer], moderngl.VertexArray] = {}
         self._segments = _LEVELS[-1]
@@ -134,7 +148,8 @@ class Instances:
 
     def hold(self, members: list[tuple[Visual, int]]) -> None:
         """Have these members from now on, of the same shape and texture as before."""
-        model, self._visual = self._assets.model, members[0][0]
+        model = self._assets.model
+        self._visual = members[0][0]
         self.numbers = [number for _, number in members]
         self.transparent = self._visual.opacity < 1.0
         self.blocks = self._visual.passes == 0.0
@@ -151,30 +166,47 @@ class Instances:
             record["mapping"] = [*mapping.scale, mapping.stretch * mapping.scale[2]]
             record["tiling"] = mapping.tiling
         # with round edges, and with sharp ones
-        self._sizes = [np.array([sizes(model, each, *bevel) for each, _ in members]) for bevel in ((), (_SHARPEST,))]
-        self._unit, self._image = mapping.unit, None if mapping.texture < 0 else self._assets.texture(mapping.texture)
+        self._sizes = [
+            np.array([sizes(model, each, *bevel) for each, _ in members])
+            for bevel in ((), (_SHARPEST,))
+        ]
+        self._unit = mapping.unit
+        self._image = None if mapping.texture < 0 else self._assets.texture(mapping.texture)
         if self._buffer.size < self._records.nbytes:
             self._buffer.orphan(2 * self._records.nbytes)
-        if self._visual.corners is not None and (found := shape_of(model, self._visual)) is not None:
+        if (
+            self._visual.corners is not None
+            and (found := shape_of(model, self._visual)) is not None
+        ):
             self._level.renew(found[1])
         self.shadow_biases = np.zeros(len(members))
 
-    def update(self, data: Any, pose: Pose, height: int, occluders: Occluders, sharp: bool = False) -> None:
+    def update(
+        self, data: Any, pose: Pose, height: int, occluders: Occluders, sharp: bool = False
+    ) -> None:
         """Take the poses from MuJoCo's data; they are seen from a pose in frames of a height [pixels].
 
-        With `sharp` edges are as MuJoCo has them, and each one that is round has as many segments as it needs itself.
+        With `sharp` edges are as MuJoCo has them, and each one that is round has as many segments
+        as it needs itself.
         """
         if self._poses:
             position, rotation = (np.array(each) for each in zip(*self._poses, strict=True))
         else:
-            poses = (data.site_xpos, data.site_xmat) if self._visual.site else (data.geom_xpos, data.geom_xmat)
+            poses = (
+                (data.site_xpos, data.site_xmat)
+                if self._visual.site
+                else (data.geom_xpos, data.geom_xmat)
+            )
             position, rotation = (each[self._indices] for each in poses)
         self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
         self._records["origin"] = position
-        self._records["core_size"], self._records["shell_size"] = self._sizes[sharp].transpose(1, 0, 2)
+        self._records["core_size"], self._records["shell_size"] = self._sizes[sharp].transpose(
+            1, 0, 2
+        )
         self._buffer.write(self._records.tobytes())
         half = self._records["core_size"] + self._records["shell_size"]
-        balls, radius = np.column_stack([position, np.linalg.norm(half, axis=1)]), half.max(axis=1)
+        balls = np.column_stack([position, np.linalg.norm(half, axis=1)])
+        radius = half.max(axis=1)
         away = np.maximum(np.linalg.norm(position - pose.position, axis=1) - radius, 0.1 * radius)
         nearest = np.ones_like(radius) if pose.orthographic else away
         pixels = radius / nearest / pose.pixel_height(1.0, height)
@@ -197,7 +229,9 @@ class Instances:
         for level in levels:
             records = self._records[segments == level]
             if level not in self._level_buffers:
-                self._level_buffers[level] = self._assets.resources.buffer(reserve=records.nbytes, dynamic=True)
+                self._level_buffers[level] = self._assets.resources.buffer(
+                    reserve=records.nbytes, dynamic=True
+                )
             buffer = self._level_buffers[level]
             if buffer.size < records.nbytes:
                 buffer.orphan(2 * records.nbytes)
@@ -225,14 +259,20 @@ class Instances:
         segments = _LEVELS[0] if seen == CasterMap.ALBEDO else self._segments
         self._render(seen, segments, self._buffer, len(self._records))
 
-    def _render(self, seen: CasterMap | None, segments: int, members: moderngl.Buffer, count: int) -> None:
+    def _render(
+        self, seen: CasterMap | None, segments: int, members: moderngl.Buffer, count: int
+    ) -> None:
         """Render so many members, whose records are in a buffer."""
         segments = segments if self._visual.kind in _WITH_LEVELS else 0
         if (seen, segments, members) not in self._arrays:
             vertices, indices = self._level(segments)
             content = [
                 (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
-                (members, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
+                (
+                    members,
+                    "9f 3f 3f 3f 4f 4f 4f/i",
+                    *(f"in_{name}" for name in INSTANCE.names or ()),
+                ),
             ]
             # what a program does not use is optimised away
             self._arrays[seen, segments, members] = self._assets.resources.vertex_array(
@@ -241,12 +281,16 @@ class Instances:
         with self._assets.resources.gl as ctx:
             if self.is_plane:
                 ctx.disable(moderngl.CULL_FACE)
-            self._arrays[seen, segments, members].render(vertices=self._level.count(segments), instances=count)
+            self._arrays[seen, segments, members].render(
+                vertices=self._level.count(segments), instances=count
+            )
             if self.is_plane:
                 ctx.enable(moderngl.CULL_FACE)
 
 
-def _segments(radius: NDArray[np.float64], flatness: float, levels: tuple[int, ...]) -> NDArray[np.int64]:
+def _segments(
+    radius: NDArray[np.float64], flatness: float, levels: tuple[int, ...]
+) -> NDArray[np.int64]:
     """The level, segments to a right angle, at which circles of a radius [pixels] are so flat [pixels]; or the finest.
 
     The sagitta of a chord over a right angle's nth part is r (1 - cos(pi / 4n)).
@@ -257,7 +301,9 @@ def _segments(radius: NDArray[np.float64], flatness: float, levels: tuple[int, .
 
 def visuals_of(model: Any, geoms: Iterable[int]) -> list[tuple[Visual, NamedShape]]:
     """Given geoms of a model and its visible sites, as far as they have a shape, with that."""
-    visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
+    visuals = [geom_visual(model, geom) for geom in geoms] + [
+        site_visual(model, i) for i in visible_sites(model)
+    ]
     return shaped(model, visuals)
 
 
@@ -267,23 +313,33 @@ def shaped(model: Any, visuals: Iterable[Visual]) -> list[tuple[Visual, NamedSha
 
 
 def instances_of(
-    assets: Assets, visuals: list[tuple[Visual, NamedShape]], made: dict[tuple[Any, ...], Instances] | None = None
+    assets: Assets,
+    visuals: list[tuple[Visual, NamedShape]],
+    made: dict[tuple[Any, ...], Instances] | None = None,
 ) -> list[Instances]:
     """Draw calls of visuals: those alike in shape and texture in one, transparent ones each in its own.
 
     Those `made` for other visuals are taken again, and new ones added.
     """
-    model, resources = assets.model, assets.resources
+    model = assets.model
+    resources = assets.resources
     made = {} if made is None else made
     groups: dict[tuple[Any, ...], tuple[NamedShape, TextureMapping, list[tuple[Visual, int]]]] = {}
     for index, (visual, shape) in enumerate(visuals):
         mapping = mapping_of(model, visual)
-        look, host = look_of(model, visual), host_of(model, visual)
+        look = look_of(model, visual)
+        host = host_of(model, visual)
         number = assets.objects.add(
             look, host, opacity=visual.opacity, identity=visual.identity, lit_in_front=visual.behind
         )
         kind = visual.site, visual.pose is not None, visual.casts
-        key = *kind, shape[0], mapping.kind, mapping.texture, index if visual.opacity < 1.0 else None
+        key = (
+            *kind,
+            shape[0],
+            mapping.kind,
+            mapping.texture,
+            index if visual.opacity < 1.0 else None,
+        )
         groups.setdefault(key, (shape, mapping, []))[2].append((visual, number))
 
     @functools.cache
@@ -298,5 +354,7 @@ def instances_of(
             made[key].hold(members)
         else:
             level = assets.levels.setdefault(name, Levels(resources, make))
-            made[key] = Instances(assets, level, casters | {None: program(mapping.kind, mapping.own)}, members)
+            made[key] = Instances(
+                assets, level, casters | {None: program(mapping.kind, mapping.own)}, members
+            )
     return [made[key] for key in groups]

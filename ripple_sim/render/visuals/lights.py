@@ -1,7 +1,7 @@
 """The light of a scene: the lights and the skybox of the MJCF, or a photo studio in their place.
 
-Lights of the MJCF are converted from MuJoCo's light in sRGB to linear light. The studio has a key light, soft boxes
-and a backdrop; it stands in where the MJCF has no lights.
+Lights of the MJCF are converted from MuJoCo's light in sRGB to linear light. The studio has a key
+light, soft boxes and a backdrop; it stands in where the MJCF has no lights.
 """
 
 from __future__ import annotations
@@ -29,6 +29,27 @@ _SUN_TANGENT = 0.05  # of the angular radius of a directional light, which MJCF 
 _UNLIT = 0.3  # ambient light in sRGB where there is no light at all, as in MuJoCo
 _GAMMA = 2.2  # of sRGB, about: factor of a beam's exponent from sRGB to linear light
 _BRIGHTEST = 1.3  # sum of all lights above which exposure is reduced, as MuJoCo's frames saturate
+
+_KEY_RADIANCE = np.array([1.34, 1.28, 1.19])
+_KEY_TANGENT = 0.10
+_KEY_AZIMUTH = 92.0
+_KEY_ELEVATION = 44.0
+
+# soft boxes: azimuth from the camera's forward axis (left is positive) and elevation [degrees],
+# half width and half height over distance, radiance
+SOFT_BOX_LIGHTS = (
+    (100.0, 46.0, 0.26, 0.34, (7.5, 7.2, 6.8)),
+    (-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
+    (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
+)
+BESIDE_LIGHTS = 0.5  # brightness of the soft boxes' reflections beside lights of the MJCF
+_FLOOR_IN_BACKGROUND = 0.6  # most of the floor's colour that the background takes on
+
+# of the floor into the background, in distances of the focus
+STUDIO_FADE = (0.4, 3.4)
+FADE = (1.5, 10.0)
+LIGHTING = ("auto", "model", "studio")
+_AS_USUAL = RenderFlags()
 
 
 @dataclass(frozen=True)
@@ -73,7 +94,8 @@ class Light:
 
     def at(self, point: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
         """Irradiance over pi of a small patch, shape [3]."""
-        towards, strength = self.direction, 1.0
+        towards = self.direction
+        strength = 1.0
         if self.position is not None:
             offset = self.position - point
             distance = max(float(np.linalg.norm(offset)), 1e-9)
@@ -88,8 +110,8 @@ class Light:
 class Lighting:
     """All light of a frame: the lights, of which the first may cast shadows, and the ambient light.
 
-    `ambient` is the radiance from all around, shape [3]; with `studio` the studio replaces the MJCF's lights. Without a
-    `backdrop` nothing is around the scene but a skybox, as in MuJoCo.
+    `ambient` is the radiance from all around, shape [3]; with `studio` the studio replaces the
+    MJCF's lights. Without a `backdrop` nothing is around the scene but a skybox, as in MuJoCo.
     """
 
     lights: list[Light]
@@ -108,9 +130,16 @@ def in_studio(model: Any, lighting: str) -> bool:
 
 
 def lighting_of(
-    model: Any, data: Any, pose: Pose, lighting: str, lights: Sequence[mujoco.MjvLight] | None = None
+    model: Any,
+    data: Any,
+    pose: Pose,
+    lighting: str,
+    lights: Sequence[mujoco.MjvLight] | None = None,
 ) -> Lighting:
-    """All light of a frame, as the renderer has it; see `SceneLight`. A scene's `lights` replace those of the model."""
+    """All light of a frame, as the renderer has it; see `SceneLight`.
+
+    A scene's `lights` replace those of the model.
+    """
     if in_studio(model, lighting):
         return studio_lighting(pose)
     return model_lighting(model, data, pose) if lights is None else scene_lighting(lights)
@@ -119,15 +148,18 @@ def lighting_of(
 def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     """Lights of the MJCF as posed in `data`, and the headlight.
 
-    MuJoCo adds light up in sRGB and cuts off at 1. Here it adds up in linear light, scaled such that a surface comes
-    out as in MuJoCo both where it faces all lights and where it faces none.
+    MuJoCo adds light up in sRGB and cuts off at 1. Here it adds up in linear light, scaled such
+    that a surface comes out as in MuJoCo both where it faces all lights and where it faces none.
     """
     head = model.vis.headlight
-    ambient, lights = np.zeros(3), []
+    ambient = np.zeros(3)
+    lights = []
     if head.active:
         ambient += head.ambient
         radiance = np.array(head.diffuse, dtype=np.float64)
-        lights.append(Light(direction=pose.rotation[:, 2], radiance=radiance, gloss=_gloss(head.specular)))
+        lights.append(
+            Light(direction=pose.rotation[:, 2], radiance=radiance, gloss=_gloss(head.specular))
+        )
     for index in range(model.nlight):
         if model.light_active[index] and model.light_type[index] != _KIND.mjLIGHT_IMAGE:
             ambient += model.light_ambient[index]
@@ -137,7 +169,8 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
 
 def scene_lighting(lights: Sequence[mujoco.MjvLight]) -> Lighting:
     """Lights as a scene of MuJoCo's has them, the headlight too; see `model_lighting`."""
-    ambient, lamps = np.zeros(3), []
+    ambient = np.zeros(3)
+    lamps = []
     for light in lights:
         if light.type != _KIND.mjLIGHT_IMAGE:
             ambient += light.ambient
@@ -153,8 +186,14 @@ def _in_linear_light(lights: list[Light], ambient: NDArray[np.float64]) -> Light
     lights = lights[:MAX_LIGHTS]
     total = sum((light.radiance for light in lights), np.zeros(3)).max()
     base = srgb_to_linear(ambient.max())
-    scale = (srgb_to_linear(min(ambient.max() + total, _BRIGHTEST)) - base) / total if total > 0 else 0.0
-    lights = [dataclasses.replace(light, radiance=max(scale, 0.0) * light.radiance) for light in lights]
+    scale = (
+        (srgb_to_linear(min(ambient.max() + total, _BRIGHTEST)) - base) / total
+        if total > 0
+        else 0.0
+    )
+    lights = [
+        dataclasses.replace(light, radiance=max(scale, 0.0) * light.radiance) for light in lights
+    ]
     return Lighting(lights, srgb_to_linear(ambient), studio=False)
 
 
@@ -182,7 +221,8 @@ def _light(model: Any, data: Any, index: int) -> Light:
 
 def _scene_light(light: mujoco.MjvLight) -> Light:
     """A light of a scene, with its radiance in sRGB."""
-    directional, spot = light.type == _KIND.mjLIGHT_DIRECTIONAL, light.type == _KIND.mjLIGHT_SPOT
+    directional = light.type == _KIND.mjLIGHT_DIRECTIONAL
+    spot = light.type == _KIND.mjLIGHT_SPOT
     direction = np.array(light.dir, dtype=np.float64)
     return Light(
         direction=-direction / max(float(np.linalg.norm(direction)), 1e-9),
@@ -197,24 +237,14 @@ def _scene_light(light: mujoco.MjvLight) -> Light:
     )
 
 
-_KEY_RADIANCE = np.array([1.34, 1.28, 1.19])
-_KEY_TANGENT = 0.10
-_KEY_AZIMUTH, _KEY_ELEVATION = 92.0, 44.0
-# soft boxes: azimuth from the camera's forward axis (left is positive) and elevation [degrees], half width and half
-# height over distance, radiance
-SOFT_BOX_LIGHTS = (
-    (100.0, 46.0, 0.26, 0.34, (7.5, 7.2, 6.8)),
-    (-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
-    (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
-)
-BESIDE_LIGHTS = 0.5  # brightness of the soft boxes' reflections beside lights of the MJCF
-_FLOOR_IN_BACKGROUND = 0.6  # most of the floor's colour that the background takes on
-STUDIO_FADE, FADE = (0.4, 3.4), (1.5, 10.0)  # of the floor into the background, in distances of the focus
-
-
 def studio_lighting(pose: Pose) -> Lighting:
     """One key light that turns with the camera, as with a turntable: ripples look alike from all sides."""
-    key = Light(_direction(pose, _KEY_AZIMUTH, _KEY_ELEVATION), _KEY_RADIANCE, size=_KEY_TANGENT, shadow=True)
+    key = Light(
+        _direction(pose, _KEY_AZIMUTH, _KEY_ELEVATION),
+        _KEY_RADIANCE,
+        size=_KEY_TANGENT,
+        shadow=True,
+    )
     return Lighting([key], np.zeros(3), studio=True)
 
 
@@ -230,7 +260,11 @@ def sky_colors(
     tint = np.array([0.40, 0.42, 0.46])
     if floor_albedo is not None:
         # irradiance over pi of the floor far away, as far as it tints the background
-        away = [light.at(pose.focus, np.array([0.0, 0.0, 1.0])) for light in lighting.lights if light.position is None]
+        away = [
+            light.at(pose.focus, np.array([0.0, 0.0, 1.0]))
+            for light in lighting.lights
+            if light.position is None
+        ]
         far = np.minimum(sum(away, lighting.ambient), _FLOOR_IN_BACKGROUND)
         tint = (_FLOOR_IN_BACKGROUND if lighting.studio else far) * floor_albedo
     zenith = tint * np.array([0.36, 0.40, 0.48])
@@ -241,7 +275,11 @@ def sky_colors(
 
 
 def set_lighting(
-    frame: FrameUniforms, lighting: Lighting, pose: Pose, floor_albedo: NDArray | None, sky: NDArray | None
+    frame: FrameUniforms,
+    lighting: Lighting,
+    pose: Pose,
+    floor_albedo: NDArray | None,
+    sky: NDArray | None,
 ) -> None:
     """Set the frame's lights and soft boxes, and colour its background.
 
@@ -253,7 +291,8 @@ def set_lighting(
         Mean linear colour of a skybox.
     """
     boxes = np.full(3, 1.0 if lighting.studio else BESIDE_LIGHTS)
-    if not lighting.backdrop:  # what a surface reflects besides the lamps is as dark and of the colour as these
+    # what a surface reflects besides the lamps is as dark and of the colour as these
+    if not lighting.backdrop:
         total = sum((light.radiance for light in lighting.lights), lighting.ambient)
         boxes = boxes * np.minimum(total, 1.0)
     frame.values["lights"] = 0  # where there are fewer, the others are dark
@@ -263,7 +302,9 @@ def set_lighting(
         record["radiance"] = [*light.radiance, light.exponent]
         record["falloff"] = [*light.falloff, light.gloss]
     # the soft boxes turn with the camera
-    for index, (azimuth, elevation, half_width, half_height, brightness) in enumerate(SOFT_BOX_LIGHTS):
+    for index, (azimuth, elevation, half_width, half_height, brightness) in enumerate(
+        SOFT_BOX_LIGHTS
+    ):
         normal = _direction(pose, azimuth, elevation)
         tangent = np.cross([0.0, 0.0, 1.0], normal)
         frame.values["soft_box_normal"][index] = [*normal, half_width]
@@ -286,10 +327,6 @@ def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float
     return np.cos(rise) * flat + np.sin(rise) * np.array([0.0, 0.0, 1.0])
 
 
-LIGHTING = ("auto", "model", "studio")
-_AS_USUAL = RenderFlags()
-
-
 class SceneLight:
     """What lights a model.
 
@@ -298,15 +335,17 @@ class SceneLight:
     lighting : str
         One of `LIGHTING`; "auto": the studio where the MJCF has no light.
     backdrop : bool
-        Whether the floor fades into a backdrop, or into the horizon of the skybox. Otherwise what is around the scene
-        is as in MuJoCo: black, or the skybox, with fog and haze. The studio always has its backdrop.
+        Whether the floor fades into a backdrop, or into the horizon of the skybox. Otherwise what
+        is around the scene is as in MuJoCo: black, or the skybox, with fog and haze. The studio
+        always has its backdrop.
 
     Attributes
     ----------
     studio : bool
         Whether the studio replaces all lights.
     options : dict
-        Defines for the shaders, see `DeferredShading`: BACKDROP, SKYBOX, HORIZON, NEAR_LIGHTS, LIGHTS and SHADOWS.
+        Defines for the shaders, see `DeferredShading`: BACKDROP, SKYBOX, HORIZON, NEAR_LIGHTS,
+        LIGHTS and SHADOWS.
 
     Raises
     ------
@@ -316,9 +355,12 @@ class SceneLight:
 
     def __init__(self, assets: Assets, lighting: str, backdrop: bool = True) -> None:
         if lighting not in LIGHTING:
-            raise RippleError(f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
+            raise RippleError(
+                f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}"
+            )
         self._model = model = assets.model
-        self._lighting, studio = lighting, in_studio(model, lighting)
+        self._lighting = lighting
+        studio = in_studio(model, lighting)
         self._sky = None if studio else assets.skybox()
         self._backdrop = backdrop or studio
         self.studio = studio
@@ -337,9 +379,12 @@ class SceneLight:
         if self.studio:
             return
         if lights is None:
-            kinds, casting = self._model.light_type, self._model.light_castshadow
+            kinds = self._model.light_type
+            casting = self._model.light_castshadow
         else:
-            kinds, casting = np.array([(each.type, each.castshadow) for each in lights]).reshape(-1, 2).T
+            kinds, casting = (
+                np.array([(each.type, each.castshadow) for each in lights]).reshape(-1, 2).T
+            )
         cast = np.count_nonzero(casting.astype(bool) & (kinds != _KIND.mjLIGHT_IMAGE))
         needed = {
             "NEAR_LIGHTS": int((kinds != _KIND.mjLIGHT_DIRECTIONAL).any()),
@@ -363,8 +408,9 @@ class SceneLight:
     ) -> list[Light]:
         """Set the frame's light and background; return the lights.
 
-        The floor's colour and normal are [3] each, likewise a point of it, the `ground`, where it is an infinite plane
-        that is seen from above: nothing that is seen has the light of lamps below it, unless they cast no shadows.
+        The floor's colour and normal are [3] each, likewise a point of it, the `ground`, where it
+        is an infinite plane that is seen from above: nothing that is seen has the light of lamps
+        below it, unless they cast no shadows.
 
         `lights` are those of a scene that replace the model's.
         """
@@ -375,13 +421,23 @@ class SceneLight:
         lighting = dataclasses.replace(lighting, lights=shining, backdrop=self._backdrop)
         if not self._backdrop:
             if ground is not None and floor_normal is not None:
-                above = [light for light in shining if not (light.shadow and light.is_below(ground, floor_normal))]
+                above = [
+                    light
+                    for light in shining
+                    if not (light.shadow and light.is_below(ground, floor_normal))
+                ]
                 lighting = dataclasses.replace(lighting, lights=above)
-            if lights is None and not (self._model.vis.headlight.active or self._model.light_active.any()):
+            if lights is None and not (
+                self._model.vis.headlight.active or self._model.light_active.any()
+            ):
                 lighting = dataclasses.replace(lighting, ambient=np.full(3, srgb_to_linear(_UNLIT)))
             sky = self._sky is not None
-            set_surroundings(frame, self._model, pose, flags, skybox=sky, endless=ground is not None)
-        set_lighting(frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky.mean)
+            set_surroundings(
+                frame, self._model, pose, flags, skybox=sky, endless=ground is not None
+            )
+        set_lighting(
+            frame, lighting, pose, floor_albedo, None if self._sky is None else self._sky.mean
+        )
         if floor_normal is not None:
             frame.set_vector("floor_light", lighting.on(pose.focus, floor_normal))
         return lighting.lights

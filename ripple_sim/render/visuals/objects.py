@@ -21,6 +21,8 @@ from .visual import Look, texture_pixels
 _ROW = OBJECT.dtype
 _MOST_TEXELS = 2048  # of a texture, along a side, that its mean colour is taken from
 
+_REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky
+
 
 class ObjectTable:
     """Rows of the shaders' `Object`; draw calls write the number of their row.
@@ -52,10 +54,11 @@ class ObjectTable:
     ) -> int:
         """Append a row and return its number.
 
-        `identity` is the id and the type, of `mujoco.mjtObj`, of what is drawn; `size` [m] is how thick a transparent
-        object is where its relative thickness is 1; `heatmap` says that colours are shown as they are, but for shadows;
-        `lit_in_front` that a sheet's back is as bright as its front; `height_map` is the layer of the object's height
-        map, and `chart` the side of a chart with its halo in it [texels].
+        `identity` is the id and the type, of `mujoco.mjtObj`, of what is drawn; `size` [m] is how
+        thick a transparent object is where its relative thickness is 1; `heatmap` says that colours
+        are shown as they are, but for shadows; `lit_in_front` that a sheet's back is as bright as
+        its front; `height_map` is the layer of the object's height map, and `chart` the side of a
+        chart with its halo in it [texels].
         """
         row = np.zeros((), dtype=_ROW)
         row["volume"][3] = opacity
@@ -76,7 +79,12 @@ class ObjectTable:
         row["volume"][:3] = look.translucency, look.transparency, look.emission
 
     def place(
-        self, number: int, bias: float, *, occluders: int = 0, rotation: NDArray[np.float64] | None = None
+        self,
+        number: int,
+        bias: float,
+        *,
+        occluders: int = 0,
+        rotation: NDArray[np.float64] | None = None,
     ) -> None:
         """Set what changes from frame to frame.
 
@@ -85,14 +93,16 @@ class ObjectTable:
         number : int
             Of the row.
         bias : float
-            How far above its surface an object's shadows are looked up [m]: its bumps shall not shade each other.
+            How far above its surface an object's shadows are looked up [m]: its bumps shall not
+            shade each other.
         occluders : int
             Which occluders darken it, as bits; see `Occluders.near`.
         rotation : float64 [3, 3], optional
             Of its height map into the world.
         """
         row = self._rows[number]
-        row["place"][2], row["height_map"][2] = bias, occluders
+        row["place"][2] = bias
+        row["height_map"][2] = occluders
         if rotation is not None:
             row["rotation"][:, :3] = rotation.T  # column by column
 
@@ -150,7 +160,8 @@ class Assets:
     """
 
     def __init__(self, model: Any, resources: Resources) -> None:
-        self.model, self.resources = model, resources
+        self.model = model
+        self.resources = resources
         self.objects = ObjectTable(resources)
         self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
         self._mean_colors: dict[int, NDArray[np.float64]] = {}
@@ -195,8 +206,11 @@ class Assets:
         """Mean linear colour [3] of the texture of an id."""
         if texture not in self._mean_colors:
             pixels = texture_pixels(self.model, texture)
-            apart = -(-max(pixels.shape) // _MOST_TEXELS)  # all of a large one would be gigabytes of numbers
-            self._mean_colors[texture] = srgb_to_linear(pixels[::apart, ::apart] / 255.0).mean(axis=(0, 1))
+            # all of a large one would be gigabytes of numbers
+            apart = -(-max(pixels.shape) // _MOST_TEXELS)
+            self._mean_colors[texture] = srgb_to_linear(pixels[::apart, ::apart] / 255.0).mean(
+                axis=(0, 1)
+            )
         return self._mean_colors[texture]
 
     def skybox(self) -> Skybox | None:
@@ -219,9 +233,6 @@ class Assets:
         return texture
 
 
-_REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky
-
-
 class Occluders:
     """Capsules of about each geom's size.
 
@@ -234,7 +245,8 @@ class Occluders:
     def __init__(self, resources: Resources, model: Any, geoms: NDArray[np.int64]) -> None:
         self._model = model
         self._buffer = resources.buffer(reserve=32 * MAX_OCCLUDERS, dynamic=True)
-        self._bound, self._bound_geoms = np.zeros((0, 2, 4)), np.zeros(0, np.int64)
+        self._bound = np.zeros((0, 2, 4))
+        self._bound_geoms = np.zeros(0, np.int64)
         self.hold(geoms)
 
     def hold(self, geoms: NDArray[np.int64], boxes: NDArray[np.float64] | None = None) -> None:
@@ -243,9 +255,12 @@ class Occluders:
         `boxes`, centres and half sizes [k, 6] [m], hold them; by default they are the model's.
         """
         boxes = self._model.geom_aabb[geoms] if boxes is None else boxes
-        self._geoms, half = geoms, boxes[:, 3:]
-        across = np.arange(3) != half.argmax(axis=1)[:, None]  # a capsule lies along its geom's longest axis
-        self._centre, self._bounds = boxes[:, :3], np.linalg.norm(half, axis=1)
+        self._geoms = geoms
+        half = boxes[:, 3:]
+        # a capsule lies along its geom's longest axis
+        across = np.arange(3) != half.argmax(axis=1)[:, None]
+        self._centre = boxes[:, :3]
+        self._bounds = np.linalg.norm(half, axis=1)
         self._radius = np.sqrt(np.prod(half, axis=1, where=across))
         self._half_axis = np.where(across, 0.0, np.maximum(half - self._radius[:, None], 0.0))
 
@@ -269,7 +284,8 @@ class Occluders:
         packed[:, 0, 3] = self._radius[nearest] * fade
         self._buffer.write(packed.tobytes())
         self._buffer.bind_to_uniform_block(Binding.OCCLUDERS)
-        self._bound, self._bound_geoms = packed.astype(np.float64), self._geoms[nearest]
+        self._bound = packed.astype(np.float64)
+        self._bound_geoms = self._geoms[nearest]
 
     def near(self, balls: NDArray[np.float64], geoms: NDArray[np.int64]) -> NDArray[np.int64]:
         """Bits of the bound capsules that darken objects by a hundredth or more; never an object's own.
@@ -281,13 +297,20 @@ class Occluders:
         geoms : int64 [k]
             The objects' own.
         """
-        first, last, radius = self._bound[:, 0, :3], self._bound[:, 1, :3], self._bound[:, 0, 3]
-        axis, to = last - first, balls[:, None, :3] - first
-        along = np.einsum("ej,kej->ke", axis, to) / np.maximum(np.einsum("ej,ej->e", axis, axis), 1e-12)
+        first = self._bound[:, 0, :3]
+        last = self._bound[:, 1, :3]
+        radius = self._bound[:, 0, 3]
+        axis = last - first
+        to = balls[:, None, :3] - first
+        along = np.einsum("ej,kej->ke", axis, to) / np.maximum(
+            np.einsum("ej,ej->e", axis, axis), 1e-12
+        )
         away = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * axis, axis=2) - balls[:, 3:]
         counts = (away < _REACH * radius) & (geoms[:, None] != self._bound_geoms)
         return (counts << np.arange(len(radius))).sum(axis=1)
 
     def _middles(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rotation = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
-        return rotation, data.geom_xpos[self._geoms] + np.einsum("gij,gj->gi", rotation, self._centre)
+        return rotation, data.geom_xpos[self._geoms] + np.einsum(
+            "gij,gj->gi", rotation, self._centre
+        )

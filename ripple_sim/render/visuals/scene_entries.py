@@ -1,7 +1,8 @@
 """What the entries of a scene of MuJoCo's show: geoms and sites of the model, and all that is added to these.
 
-An entry says everything of what it shows: type, size, pose, colour and finish, whoever wrote it. The first entry of a
-geom or a site is that geom or site; others of the same id are shown beside it, as ghosts.
+An entry says everything of what it shows: type, size, pose, colour and finish, whoever wrote it.
+The first entry of a geom or a site is that geom or site; others of the same id are shown beside it,
+as ghosts.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ _GEOM = mujoco.mjtGeom
 _MESHES = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF)
 _SOFT = (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN)
 _DECOR = int(mujoco.mjtCatBit.mjCAT_DECOR)
-# How far a scene's rounded pose of an infinite plane may be off the plane, over the distance from the origin.
+# How far a scene's rounded pose of an infinite plane may be off the plane, over the distance from
+# the origin.
 _IN_PLANE = 1e-5
 # How far apart two boxes may be that are one, over their size.
 _SAME_BOX = 1e-3
@@ -76,11 +78,13 @@ def visuals_in(
 ) -> list[Visual]:
     """What an entry of a scene shows: one visual, but of a flex its faces, edges and vertices.
 
-    A `ghost` of a geom or a site is none of the model's, but something beside them. For `reshaped` see `own_visual`.
+    A `ghost` of a geom or a site is none of the model's, but something beside them. For `reshaped`
+    see `own_visual`.
     """
     if not ghost and is_of_model(model, entry):
         return [own_visual(model, entry, reshaped)]
-    size, asset = np.array(entry.size, dtype=np.float64), _asset_of(model, entry)
+    size = np.array(entry.size, dtype=np.float64)
+    asset = _asset_of(model, entry)
     visual = Visual(
         False,
         -1,
@@ -101,19 +105,31 @@ def visuals_in(
     if entry.type == _GEOM.mjGEOM_SKIN:
         return [replace(in_world, corners=_skin_corners(model, scene, int(entry.objid)))]
     return [
-        replace(in_world, corners=corners, part=part, material=in_world.material if part == "faces" else -1)
+        replace(
+            in_world,
+            corners=corners,
+            part=part,
+            material=in_world.material if part == "faces" else -1,
+        )
         for part, corners in flex_parts(model, scene, entry).items()
     ]
 
 
-def own_visual(model: Any, entry: mujoco.MjvGeom, reshaped: Collection[tuple[str, int]] = ()) -> Visual:
+def own_visual(
+    model: Any, entry: mujoco.MjvGeom, reshaped: Collection[tuple[str, int]] = ()
+) -> Visual:
     """The geom or site of the model that an entry shows; its pose is that of the model's data, see `ScenePoses`.
 
-    What is `reshaped`, by "mesh" or "hfield" and its id, has outgrown the box that the model was compiled with.
+    What is `reshaped`, by "mesh" or "hfield" and its id, has outgrown the box that the model was
+    compiled with.
     """
     site = entry.objtype == SITE_OBJECT
     visual = (site_visual if site else geom_visual)(model, int(entry.objid))
-    kind, size, asset, half_size, box = int(entry.type), np.array(entry.size), _asset_of(model, entry), None, None
+    kind = int(entry.type)
+    size = np.array(entry.size)
+    asset = _asset_of(model, entry)
+    half_size = None
+    box = None
     # the scene's sizes are those of the model, rounded
     if kind != visual.kind or not np.array_equal(visual.half_sizes.astype(np.float32), size):
         half_size = size.astype(np.float64)
@@ -121,11 +137,19 @@ def own_visual(model: Any, entry: mujoco.MjvGeom, reshaped: Collection[tuple[str
     if not site and ((kind, asset) != (visual.kind, visual.asset) or has_outgrown):
         box = asset_box(model, kind, asset)
     return replace(
-        visual, kind=kind, asset=asset, hull=_is_hull(entry), half_size=half_size, box=box, **_paint_of(entry)
+        visual,
+        kind=kind,
+        asset=asset,
+        hull=_is_hull(entry),
+        half_size=half_size,
+        box=box,
+        **_paint_of(entry),
     )
 
 
-def asset_box(model: Any, kind: int, asset: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def asset_box(
+    model: Any, kind: int, asset: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Centre and half sizes [m] of the box about a mesh or a height field, in the frame of its geom; else None."""
     if asset < 0:
         return None
@@ -133,8 +157,11 @@ def asset_box(model: Any, kind: int, asset: int) -> tuple[NDArray[np.float64], N
         points = mesh_arrays(model, asset)[0]
     else:
         points = height_field_triangles(model, asset)[0]
-        points = np.concatenate([points, points[:1] * [1, 1, 0] - [0, 0, model.hfield_size[asset, 3]]])
-    least, most = points.min(axis=0), points.max(axis=0)
+        points = np.concatenate(
+            [points, points[:1] * [1, 1, 0] - [0, 0, model.hfield_size[asset, 3]]]
+        )
+    least = points.min(axis=0)
+    most = points.max(axis=0)
     return (least + most) / 2, (most - least) / 2
 
 
@@ -143,9 +170,13 @@ def outgrown_assets(model: Any) -> set[tuple[str, int]]:
     found = set()
     kinds = (*_MESHES, _GEOM.mjGEOM_HFIELD)
     for geom in np.flatnonzero(np.isin(model.geom_type, [int(kind) for kind in kinds])).tolist():
-        kind, asset = int(model.geom_type[geom]), int(model.geom_dataid[geom])
+        kind = int(model.geom_type[geom])
+        asset = int(model.geom_dataid[geom])
         box = asset_box(model, kind, asset)
-        if box is not None and np.abs(np.concatenate(box) - model.geom_aabb[geom]).max() > _SAME_BOX * box[1].max():
+        if (
+            box is not None
+            and np.abs(np.concatenate(box) - model.geom_aabb[geom]).max() > _SAME_BOX * box[1].max()
+        ):
             found.add(("mesh" if kind in _MESHES else "hfield", asset))
     return found
 
@@ -181,9 +212,12 @@ def _paint_of(entry: mujoco.MjvGeom) -> dict[str, Any]:
 
 def _skin_corners(model: Any, scene: mujoco.MjvScene, index: int) -> NDArray[np.float32]:
     """Corners of the triangles of a scene's skin, see `Visual`."""
-    face, vertex = model.skin_faceadr[index], scene.skinvertadr[index]
+    face = model.skin_faceadr[index]
+    vertex = scene.skinvertadr[index]
     F = model.skin_face[face : face + model.skin_facenum[index]].ravel()
-    points, normals = (array.reshape(-1, 3)[vertex + F] for array in (scene.skinvert, scene.skinnormal))
+    points, normals = (
+        array.reshape(-1, 3)[vertex + F] for array in (scene.skinvert, scene.skinnormal)
+    )
     start = model.skin_texcoordadr[index]
     uv = model.skin_texcoord[start + F] if start >= 0 else np.zeros((len(F), 2))
     return np.concatenate([points, normals, uv], axis=1, dtype=np.float32)
@@ -218,11 +252,14 @@ class EntryPoses:
 
     def of(self, data: Any) -> Any:
         """Where everything is: the data itself where the scene agrees with it, but for rounding, else `ScenePoses`."""
-        geom = self._differing(self._geoms, self._geom_ids, data.geom_xpos, data.geom_xmat, planes=True)
+        geom = self._differing(
+            self._geoms, self._geom_ids, data.geom_xpos, data.geom_xmat, planes=True
+        )
         site = self._differing(self._sites, self._site_ids, data.site_xpos, data.site_xmat)
         if geom is site is None:
             return data
-        geom_poses, site_poses = geom or (data.geom_xpos, data.geom_xmat), site or (data.site_xpos, data.site_xmat)
+        geom_poses = geom or (data.geom_xpos, data.geom_xmat)
+        site_poses = site or (data.site_xpos, data.site_xmat)
         return ScenePoses(self._model, *geom_poses, *site_poses)
 
     def _differing(
@@ -245,12 +282,18 @@ class EntryPoses:
         differs = moved | turned
         if not differs.any():
             return None
-        positions, rotations = positions.copy(), rotations.copy()
-        positions[ids[differs]], rotations[ids[differs]] = position[differs], rotation[differs]
+        positions = positions.copy()
+        rotations = rotations.copy()
+        positions[ids[differs]] = position[differs]
+        rotations[ids[differs]] = rotation[differs]
         return positions, rotations
 
     def _recentred(
-        self, ids: NDArray[np.int64], position: NDArray, own: NDArray[np.float64], rotation: NDArray[np.float64]
+        self,
+        ids: NDArray[np.int64],
+        position: NDArray,
+        own: NDArray[np.float64],
+        rotation: NDArray[np.float64],
     ) -> NDArray[np.bool_]:
         """Which of the geoms are infinite planes that MuJoCo has moved along themselves, to be below the camera."""
         endless = (self._model.geom_size[ids, :2] <= 0).any(axis=1)

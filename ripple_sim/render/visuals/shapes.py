@@ -1,8 +1,9 @@
 """Shapes of visuals: which mesh each kind of geom is drawn as, with vertex normals, and its sizes.
 
-Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it is `core * core_size
-+ shell * shell_size`, component by component. A sphere has no core, a capsule's is a segment, a box's a box; boxes and
-cylinders get a small round shell: edges that catch the light.
+Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it
+is `core * core_size
++ shell * shell_size`, component by component. A sphere has no core, a capsule's is a segment, a
+  box's a box; boxes and cylinders get a small round shell: edges that catch the light.
 """
 
 from __future__ import annotations
@@ -21,13 +22,17 @@ from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CH
 from .corners import normalized, split_corners
 from .visual import WALLS, Visual
 
+_BEVEL = 0.06
+_ENDLESS = 100.0  # half size of infinite planes, in extents of the model
+_GEOM = mujoco.mjtGeom
+
 
 @dataclass(frozen=True)
 class Shape:
     """A triangle mesh whose vertices scale with two sizes.
 
-    `core`, `shell` and `normals` have shape [n, 3], `faces` shape [m, 3]; `uv`, shape [n, 2], are texture coordinates
-    where the mesh has any.
+    `core`, `shell` and `normals` have shape [n, 3], `faces` shape [m, 3]; `uv`, shape [n, 2], are
+    texture coordinates where the mesh has any.
     """
 
     core: NDArray[np.float64]
@@ -36,13 +41,18 @@ class Shape:
     faces: NDArray[np.int64]
     uv: NDArray[np.float64] | None = None
 
-    def positions(self, core_size: NDArray[np.float64], shell_size: NDArray[np.float64]) -> NDArray[np.float64]:
+    def positions(
+        self, core_size: NDArray[np.float64], shell_size: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         """Vertices [n, 3] for the two sizes [m], shape [3] each."""
         return self.core * core_size + self.shell * shell_size
 
 
 def ball(divisions: int) -> Shape:
-    """Unit sphere: a cube of `divisions` squares an edge, projected at equal angles. Also for ellipsoids."""
+    """Unit sphere: a cube of `divisions` squares an edge, projected at equal angles.
+
+    Also for ellipsoids.
+    """
     points, faces = _cube_grid(np.linspace(-1.0, 1.0, divisions + 1))
     directions = normalized(np.tan(np.pi / 4 * points))
     return Shape(np.zeros_like(directions), directions, directions, faces)
@@ -50,7 +60,8 @@ def ball(divisions: int) -> Shape:
 
 def box(divisions: int) -> Shape:
     """Box with half sizes core + shell and round edges of `divisions` segments."""
-    # a face's grid line is straight between -1 and 1 and bends round the edges beyond; an edge's middle is at 1.5
+    # a face's grid line is straight between -1 and 1 and bends round the edges beyond; an edge's
+    # middle is at 1.5
     bend = np.linspace(0.0, 0.5, divisions + 1)[1:]
     points, faces = _cube_grid(np.concatenate([-1 - bend[::-1], [-1.0, 1.0], 1 + bend]))
     core = np.clip(points, -1.0, 1.0)
@@ -60,14 +71,17 @@ def box(divisions: int) -> Shape:
 
 def capsule(sides: int, rings: int) -> Shape:
     """Capsule along z: the core is a segment of half length core_size[2], the shell a ball."""
-    angle = np.concatenate([np.linspace(-np.pi / 2, 0, rings + 1), np.linspace(0, np.pi / 2, rings + 1)])
+    angle = np.concatenate(
+        [np.linspace(-np.pi / 2, 0, rings + 1), np.linspace(0, np.pi / 2, rings + 1)]
+    )
     core_z = np.repeat([-1.0, 1.0], rings + 1)
     return _revolved(np.zeros_like(angle), core_z, np.cos(angle), np.sin(angle), sides)
 
 
 def cylinder(sides: int, rings: int) -> Shape:
     """Cylinder along z with round rims: radius and half height are core + shell."""
-    lower, upper = np.linspace(-np.pi / 2, 0, rings + 1), np.linspace(0, np.pi / 2, rings + 1)
+    lower = np.linspace(-np.pi / 2, 0, rings + 1)
+    upper = np.linspace(0, np.pi / 2, rings + 1)
     angle = np.concatenate([[-np.pi / 2], lower, upper, [np.pi / 2]])
     core_r = np.concatenate([[0.0], np.ones(2 * rings + 2), [0.0]])
     core_z = np.repeat([-1.0, 1.0], rings + 2)
@@ -84,20 +98,30 @@ def sheet() -> Shape:
 def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices and outward triangles of a cube with the grid line x line on each face; edges are welded.
 
-    Vertices are welded by whole numbers: a coordinate is the entry of `line` at (lattice + last) / 2.
+    Vertices are welded by whole numbers: a coordinate is the entry of `line` at (lattice + last) /
+    2.
     """
     last = len(line) - 1
     row, column = np.divmod(np.arange(len(line) ** 2), len(line))
-    a, b = 2 * column - last, 2 * row - last
-    lattice = last * CHART_NORMALS[:, None] + a[:, None] * CHART_U[:, None] + b[:, None] * CHART_V[:, None]
+    a = 2 * column - last
+    b = 2 * row - last
+    lattice = (
+        last * CHART_NORMALS[:, None]
+        + a[:, None] * CHART_U[:, None]
+        + b[:, None] * CHART_V[:, None]
+    )
     corner = (np.arange(last)[:, None] * len(line) + np.arange(last)).ravel()
     quad = np.stack([corner, corner + 1, corner + len(line) + 1, corner + len(line)], axis=1)
     quads = np.concatenate([quad + face * len(line) ** 2 for face in range(6)])
     welded, index = np.unique(lattice.reshape(-1, 3), axis=0, return_inverse=True)
-    return line[(welded + last) // 2], index.ravel()[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
+    return line[(welded + last) // 2], index.ravel()[
+        np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    ]
 
 
-def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArray, sides: int) -> Shape:
+def _revolved(
+    core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArray, sides: int
+) -> Shape:
     """Revolve a profile, from the lower pole to the upper one, about z; the poles are single vertices."""
     turn = 2 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=1)
@@ -111,11 +135,16 @@ def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArr
     index = 1 + np.arange(count * sides).reshape(count, sides)
     after = np.roll(index, -1, axis=1)
     bottom = np.stack([np.zeros(sides, dtype=np.int64), after[0], index[0]], axis=1)
-    a, b, c, d = index[:-1], after[:-1], after[1:], index[1:]
+    a = index[:-1]
+    b = after[:-1]
+    c = after[1:]
+    d = index[1:]
     between = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=1)
     top = np.stack([index[-1], after[-1], np.full(sides, 1 + count * sides)], axis=1)
     shell = normalized(rings(shell_r, shell_z))
-    return Shape(rings(core_r, core_z), shell, shell, np.concatenate([bottom, between.reshape(-1, 3), top]))
+    return Shape(
+        rings(core_r, core_z), shell, shell, np.concatenate([bottom, between.reshape(-1, 3), top])
+    )
 
 
 def _arrow(*profile: tuple[float, float]) -> Callable[[int], Shape]:
@@ -134,7 +163,8 @@ def mesh_asset(model: Any, mesh: int, hull: bool = False) -> Shape:
     V, F, uv = mesh_arrays(model, mesh)
     if hull and model.mesh_graphadr[mesh] >= 0:
         graph = model.mesh_graph[model.mesh_graphadr[mesh] :]
-        vertices, triangles = int(graph[0]), int(graph[1])
+        vertices = int(graph[0])
+        triangles = int(graph[1])
         end = 2 + 3 * vertices + 6 * triangles
         return creased(V, graph[end - 3 * triangles : end].reshape(-1, 3).astype(np.int64))
     return creased(V, F, uv)
@@ -147,10 +177,12 @@ def height_field(model: Any, hfield: int, walls_only: bool = False) -> Shape:
     # round the rim, counter-clockwise from above
     rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
     foot = len(ground) + np.arange(len(rim))
-    after, foot_after = np.roll(rim, -1), np.roll(foot, -1)
+    after = np.roll(rim, -1)
+    foot_after = np.roll(foot, -1)
     walls = np.stack([rim, foot, foot_after], axis=1), np.stack([rim, foot_after, after], axis=1)
     feet = ground[rim] * [1, 1, 0] - [0, 0, model.hfield_size[hfield, 3]]
-    V, F = np.concatenate([ground, feet]), np.concatenate(walls if walls_only else [F, *walls])
+    V = np.concatenate([ground, feet])
+    F = np.concatenate(walls if walls_only else [F, *walls])
     return creased(V, F)
 
 
@@ -158,13 +190,11 @@ def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
     """Mesh of a fixed size, its vertices split where normals or texture coordinates [m, 3, 2] jump."""
     vertices, faces, normals, uv, _ = split_corners(V, F, corner_uv)
     positions = V[vertices]
-    return Shape(np.zeros_like(positions), positions, normals, faces, None if corner_uv is None else uv)
+    return Shape(
+        np.zeros_like(positions), positions, normals, faces, None if corner_uv is None else uv
+    )
 
 
-_BEVEL = 0.06
-_ENDLESS = 100.0  # half size of infinite planes, in extents of the model
-
-_GEOM = mujoco.mjtGeom
 # name, and a function that makes the shape with a number of segments to a right angle
 NamedShape: TypeAlias = tuple[str, Callable[[int], Shape]]
 _SHAPES: dict[int, NamedShape] = {
@@ -177,7 +207,10 @@ _SHAPES: dict[int, NamedShape] = {
     # MuJoCo's arrows: a shaft of radius 1 and length 2, and a head of length 1
     _GEOM.mjGEOM_ARROW: ("arrow", _arrow((0, 0), (1, 0), (1, 2), (1.75, 2), (0, 3))),
     _GEOM.mjGEOM_ARROW1: ("arrow1", _arrow((0, 0), (1, 0), (1, 2), (0, 3))),
-    _GEOM.mjGEOM_ARROW2: ("arrow2", _arrow((0, -3), (1.75, -2), (1, -2), (1, 2), (1.75, 2), (0, 3))),
+    _GEOM.mjGEOM_ARROW2: (
+        "arrow2",
+        _arrow((0, -3), (1.75, -2), (1, -2), (1, 2), (1.75, 2), (0, 3)),
+    ),
 }
 
 
@@ -186,12 +219,17 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
 
     None for other types.
     """
-    kind, asset = visual.kind, visual.asset
+    kind = visual.kind
+    asset = visual.asset
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and asset >= 0:
-        return f"{'hull' if visual.hull else 'mesh'} {asset}", lambda _: mesh_asset(model, asset, visual.hull)
+        return f"{'hull' if visual.hull else 'mesh'} {asset}", lambda _: mesh_asset(
+            model, asset, visual.hull
+        )
     if visual.corners is not None:
         own = visual.corners.astype(np.float64)
-        points, normals, uv = own[:, :3], own[:, 3:6], own[:, 6:]
+        points = own[:, :3]
+        normals = own[:, 3:6]
+        uv = own[:, 6:]
         faces = np.arange(len(own)).reshape(-1, 3)
         name = f"{kind} {visual.part} {visual.identity[0]}"
         return name, lambda _: Shape(np.zeros_like(points), points, normals, faces, uv)
@@ -202,7 +240,9 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
     return _SHAPES.get(kind)
 
 
-def sizes(model: Any, visual: Visual, bevel: float = _BEVEL) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def sizes(
+    model: Any, visual: Visual, bevel: float = _BEVEL
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Core and shell size of a visual [m], shape [3] each, see above; `bevel` is in its smallest half sizes."""
     half = visual.half_sizes
     match visual.kind:

@@ -19,7 +19,9 @@ _SKYBOX = 0.7  # distance of MuJoCo's skybox, likewise
 
 
 _AZIMUTHS = 64  # of the horizon
-_BESIDE, _ABOVE = 16, 8  # directions whose median is the horizon's colour there
+# directions whose median is the horizon's colour there
+_BESIDE = 16
+_ABOVE = 8
 _HIGHEST = 0.06  # of them, as a slope
 _SMOOTH = 0.03  # difference in linear colour from the median up to which a horizon is smooth
 
@@ -35,10 +37,16 @@ def horizon_of(pixels: NDArray[np.uint8]) -> NDArray[np.float64] | None:
         Its faces below one another, as `srgb_cube` takes them, or one image for all of them.
     """
     size = pixels.shape[1]
-    faces = np.stack([pixels[:size]] * 6) if len(pixels) != 6 * size else pixels.reshape(6, size, size, -1)
+    faces = (
+        np.stack([pixels[:size]] * 6)
+        if len(pixels) != 6 * size
+        else pixels.reshape(6, size, size, -1)
+    )
     azimuth = 2 * np.pi * (np.arange(_AZIMUTHS * _BESIDE) + 0.5) / (_AZIMUTHS * _BESIDE)
     slope = _HIGHEST * np.arange(_ABOVE) / (_ABOVE - 1)
-    directions = np.stack(np.broadcast_arrays(np.cos(azimuth)[:, None], np.sin(azimuth)[:, None], slope), axis=-1)
+    directions = np.stack(
+        np.broadcast_arrays(np.cos(azimuth)[:, None], np.sin(azimuth)[:, None], slope), axis=-1
+    )
     seen = srgb_to_linear(_texels(faces, directions) / 255.0).reshape(_AZIMUTHS, -1, 3)
     middle = np.median(seen, axis=1)
     if np.abs(seen - middle[:, None]).max() < _SMOOTH:
@@ -48,13 +56,18 @@ def horizon_of(pixels: NDArray[np.uint8]) -> NDArray[np.float64] | None:
 
 def _texels(faces: NDArray[np.uint8], directions: NDArray[np.float64]) -> NDArray[np.uint8]:
     """What a skybox, whose +y is up, shows in directions [..., 3] of the world that lie near the horizon."""
-    x, y, z = directions[..., 0], directions[..., 2], -directions[..., 1]
+    x = directions[..., 0]
+    y = directions[..., 2]
+    z = -directions[..., 1]
     side = np.abs(x) >= np.abs(z)
     along = np.where(side, np.abs(x), np.abs(z))
     face = np.where(side, np.where(x > 0, 0, 1), np.where(z > 0, 4, 5))
     across = np.select([face == 0, face == 1, face == 4], [-z, z, x], -x)
     size = faces.shape[1]
-    column, row = (np.clip((0.5 * (each / along + 1) * size).astype(np.int64), 0, size - 1) for each in (across, -y))
+    column, row = (
+        np.clip((0.5 * (each / along + 1) * size).astype(np.int64), 0, size - 1)
+        for each in (across, -y)
+    )
     return faces[face, row, column]
 
 
@@ -74,7 +87,9 @@ class RenderFlags:
         if scene is None:
             return cls()
         names = cls.__dataclass_fields__
-        return cls(**{name: bool(scene.flags[getattr(_FLAG, f"mjRND_{name.upper()}")]) for name in names})
+        return cls(
+            **{name: bool(scene.flags[getattr(_FLAG, f"mjRND_{name.upper()}")]) for name in names}
+        )
 
 
 def followed_flags(*, backdrop: bool) -> set[int]:

@@ -32,8 +32,8 @@ _PLAIN = 1.0, 1.0, 0.0, 0.0  # tiling of a whole texture
 class TextureMapping:
     """How a texture lies on a visual.
 
-    A point of the visual becomes coordinates. Of these the shader (texture_mapping.glsl) makes a position in a flat
-    texture, which `tiling` scales and shifts, or a direction in a cube map.
+    A point of the visual becomes coordinates. Of these the shader (texture_mapping.glsl) makes a
+    position in a flat texture, which `tiling` scales and shifts, or a direction in a cube map.
 
     Attributes
     ----------
@@ -68,7 +68,15 @@ class TextureMapping:
     @property
     def key(self) -> tuple[Any, ...]:
         """Equal for equal mappings."""
-        return self.kind, self.texture, self.scale.tobytes(), self.own, self.tiling, self.straight, self.stretch
+        return (
+            self.kind,
+            self.texture,
+            self.scale.tobytes(),
+            self.own,
+            self.tiling,
+            self.straight,
+            self.stretch,
+        )
 
     def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Coordinates [n, 3] of points [n, 3] of the visual, in its frame [m]."""
@@ -82,11 +90,13 @@ class TextureMapping:
 def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     """How MuJoCo (3.12 and later) lays the texture of a visual's material on it.
 
-    Flat textures go once round what is round, with their left edge in the xz plane where x > 0 and their upper edge
-    towards +z; a cylinder's discs, a capsule's ends and each face of a box carry a whole texture of their own. On
-    height fields, and on meshes without texture coordinates, they are projected from above.
+    Flat textures go once round what is round, with their left edge in the xz plane where x > 0 and
+    their upper edge towards +z; a cylinder's discs, a capsule's ends and each face of a box carry a
+    whole texture of their own. On height fields, and on meshes without texture coordinates, they
+    are projected from above.
     """
-    material, half = visual.material, visual.half_sizes
+    material = visual.material
+    half = visual.half_sizes
     given = visual.texture
     if given is None:
         roles = [] if material < 0 else [int(model.mat_texid[material, role]) for role in _ROLES]
@@ -97,14 +107,27 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
         return TextureMapping()
     cube = model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE
     uniform = bool(model.mat_texuniform[material]) if given is None else given.uniform
-    repeat = np.array(model.mat_texrepeat[material] if given is None else given.repeat, dtype=np.float64)
+    repeat = np.array(
+        model.mat_texrepeat[material] if given is None else given.repeat, dtype=np.float64
+    )
     times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
     factor = np.where(half > 0, half, 1.0) if cube and uniform else np.ones(3)
     if visual.kind in _WRAPPED:  # by coordinates from -factor to factor
-        kind, tiling = (MappingKind.CUBE_IMAGE, _PLAIN) if cube else (_WRAPPED[visual.kind], (*times, 0.0, 0.0))
-        straight, stretch = (half[2], half[2] / half[0]) if visual.kind == _GEOM.mjGEOM_CAPSULE else (0.0, 1.0)
+        kind, tiling = (
+            (MappingKind.CUBE_IMAGE, _PLAIN)
+            if cube
+            else (_WRAPPED[visual.kind], (*times, 0.0, 0.0))
+        )
+        straight, stretch = (
+            (half[2], half[2] / half[0]) if visual.kind == _GEOM.mjGEOM_CAPSULE else (0.0, 1.0)
+        )
         return TextureMapping(
-            kind, texture, factor / half, tiling=tiling, straight=float(straight), stretch=float(stretch)
+            kind,
+            texture,
+            factor / half,
+            tiling=tiling,
+            straight=float(straight),
+            stretch=float(stretch),
         )
     if cube:
         return TextureMapping(MappingKind.CUBE_IMAGE, texture, factor)
@@ -113,7 +136,8 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     if visual.kind in _MESHES and visual.asset >= 0 and model.mesh_texcoordadr[visual.asset] >= 0:
         return TextureMapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*times, 0.0, 0.0))
     if visual.kind == _GEOM.mjGEOM_PLANE:
-        # from the corner of the plane, or from half a texture before the origin if the plane is infinite
+        # from the corner of the plane, or from half a texture before the origin if the plane is
+        # infinite
         endless = half[:2] <= 0
         scale = 0.5 * times / np.where(endless, 1.0, half[:2])
         offset = np.where(endless, 0.0, 0.5 * times) - 0.5 * endless.any()

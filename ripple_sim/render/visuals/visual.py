@@ -21,6 +21,12 @@ MODEL_LOOK = "model"
 # The part of a height field that does not ripple.
 WALLS = "walls"
 
+_GEOM = mujoco.mjtGeom
+GEOM_OBJECT = int(mujoco.mjtObj.mjOBJ_GEOM)
+SITE_OBJECT = int(mujoco.mjtObj.mjOBJ_SITE)
+_VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
+_UNSET = [0.5, 0.5, 0.5, 1.0]  # a geom's or site's colour where the MJCF gives none
+
 
 @dataclass(frozen=True)
 class Look:
@@ -58,11 +64,15 @@ class Look:
 
 LOOKS: dict[str, Look] = {
     "rubber": Look(color=(1.0, 0.80, 0.05), roughness=0.36, sheen=0.15, coat=0.6, translucency=0.3),
-    "jelly": Look(color=(0.90, 0.07, 0.20), roughness=0.14, coat=0.8, translucency=0.7, transparency=0.5),
+    "jelly": Look(
+        color=(0.90, 0.07, 0.20), roughness=0.14, coat=0.8, translucency=0.7, transparency=0.5
+    ),
     "skin": Look(color=(0.87, 0.62, 0.52), roughness=0.48, sheen=0.3, coat=0.25, translucency=0.55),
     "clay": Look(color=(0.80, 0.52, 0.40), roughness=0.75, sheen=0.25),
     "metal": Look(color=(0.80, 0.81, 0.84), roughness=0.22, metallic=1.0),
-    "water": Look(color=(0.42, 0.76, 0.90), roughness=0.06, coat=1.0, translucency=0.15, transparency=0.9),
+    "water": Look(
+        color=(0.42, 0.76, 0.90), roughness=0.06, coat=1.0, translucency=0.15, transparency=0.9
+    ),
     MODEL_LOOK: Look(color=(0.5, 0.5, 0.5), roughness=0.42, coat=0.2),
 }
 
@@ -72,12 +82,6 @@ def find_look(name: str) -> Look:
     if name not in LOOKS:
         raise RippleError(f"look is {name!r}; valid are {', '.join(map(repr, LOOKS))}")
     return LOOKS[name]
-
-
-_GEOM = mujoco.mjtGeom
-GEOM_OBJECT, SITE_OBJECT = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_SITE)
-_VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
-_UNSET = [0.5, 0.5, 0.5, 1.0]  # a geom's or site's colour where the MJCF gives none
 
 
 class Finish(NamedTuple):
@@ -126,7 +130,8 @@ class Visual:
     corners : float32 [3 m, 8], optional
         Points, normals and texture coordinates of the corners of a flex's or a skin's triangles.
     part : str
-        Which part of a flex they are, see `flex_parts`; or `WALLS`, of a height field without its ground.
+        Which part of a flex they are, see `flex_parts`; or `WALLS`, of a height field without its
+        ground.
     finish : Finish, optional
         As a scene has it; by default the material's.
     texture : SceneTexture, optional
@@ -136,7 +141,8 @@ class Visual:
     half_size : float64 [3], optional
         Half sizes along its axes that a scene gives in place of `size` [m].
     box : (float64 [3], float64 [3]), optional
-        Centre and half sizes of the box about it in its own frame [m], of what has an asset and is no geom.
+        Centre and half sizes of the box about it in its own frame [m], of what has an asset and is
+        no geom.
     behind : bool
         Whether it is a plane that is seen from behind.
     shown_opacity : float, optional
@@ -215,16 +221,23 @@ def geom_visual(model: Any, geom: int) -> Visual:
         which, index = ("skin", skin) if skin >= 0 else ("flex", geom - first_flex(model))
         identity = index, int(mujoco.mjtObj.mjOBJ_SKIN if skin >= 0 else mujoco.mjtObj.mjOBJ_FLEX)
         paint = _paint(model, which, index)
-        return Visual(False, geom, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, *paint, identity=identity)
-    kind, size = int(model.geom_type[geom]), np.array(model.geom_size[geom], dtype=np.float64)
-    asset, paint = int(model.geom_dataid[geom]), _paint(model, "geom", geom)
+        return Visual(
+            False, geom, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, *paint, identity=identity
+        )
+    kind = int(model.geom_type[geom])
+    size = np.array(model.geom_size[geom], dtype=np.float64)
+    asset = int(model.geom_dataid[geom])
+    paint = _paint(model, "geom", geom)
     return Visual(False, geom, kind, size, asset, *paint, identity=(geom, GEOM_OBJECT))
 
 
-def paint_of(model: Any, geom: int, look: str | None) -> tuple[str, tuple[float, float, float] | None]:
+def paint_of(
+    model: Any, geom: int, look: str | None
+) -> tuple[str, tuple[float, float, float] | None]:
     """Look of a target in a model of the user's, and its sRGB colour, None where the model or the look says it.
 
-    Without a look it is rubber in the grey that MuJoCo draws what has no colour in: nobody has asked for another.
+    Without a look it is rubber in the grey that MuJoCo draws what has no colour in: nobody has
+    asked for another.
     """
     visual = geom_visual(model, geom)
     red, green, blue = visual.rgba[:3].tolist()
@@ -233,13 +246,18 @@ def paint_of(model: Any, geom: int, look: str | None) -> tuple[str, tuple[float,
 
 def site_visual(model: Any, site: int) -> Visual:
     """Site of a model."""
-    kind, size = int(model.site_type[site]), np.array(model.site_size[site], dtype=np.float64)
-    return Visual(True, site, kind, size, -1, *_paint(model, "site", site), identity=(site, SITE_OBJECT))
+    kind = int(model.site_type[site])
+    size = np.array(model.site_size[site], dtype=np.float64)
+    return Visual(
+        True, site, kind, size, -1, *_paint(model, "site", site), identity=(site, SITE_OBJECT)
+    )
 
 
 def _paint(model: Any, which: str, index: int) -> tuple[NDArray[np.float64], int, int]:
     """Colour, material and group of a geom, site, flex or skin."""
-    rgba, material, group = (getattr(model, f"{which}_{name}")[index] for name in ("rgba", "matid", "group"))
+    rgba, material, group = (
+        getattr(model, f"{which}_{name}")[index] for name in ("rgba", "matid", "group")
+    )
     if material >= 0 and np.array_equal(rgba, _UNSET):
         rgba = model.mat_rgba[material]
     return np.array(rgba, dtype=np.float64), int(material), int(group)
@@ -262,14 +280,18 @@ def host_of(model: Any, visual: Visual) -> int:
     near = np.flatnonzero(model.geom_bodyid == model.site_bodyid[visual.index])
     if not len(near):
         return -1
-    return int(near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[visual.index], axis=1))])
+    return int(
+        near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[visual.index], axis=1))]
+    )
 
 
 def box_of(model: Any, visual: Visual) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centre and half sizes of the box about a visual that is no plane, in its own frame [m]."""
     half = visual.half_sizes
     match visual.kind:
-        case _GEOM.mjGEOM_SPHERE | _GEOM.mjGEOM_ELLIPSOID | _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX:
+        case (
+            _GEOM.mjGEOM_SPHERE | _GEOM.mjGEOM_ELLIPSOID | _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX
+        ):
             return np.zeros(3), half
         case _GEOM.mjGEOM_CAPSULE:
             return np.zeros(3), half + np.array([0.0, 0.0, half[0]])
@@ -289,9 +311,17 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
         position, rotation = visual.pose
         if visual.kind == _GEOM.mjGEOM_PLANE:
             return np.array(
-                [[*position, np.linalg.norm(visual.half_sizes[:2]) if visual.half_sizes[:2].all() else np.inf]]
+                [
+                    [
+                        *position,
+                        np.linalg.norm(visual.half_sizes[:2])
+                        if visual.half_sizes[:2].all()
+                        else np.inf,
+                    ]
+                ]
             )
-        centre, half = np.zeros(3), 2 * visual.half_sizes
+        centre = np.zeros(3)
+        half = 2 * visual.half_sizes
         if visual.box is not None:
             centre, half = visual.box
         return np.array([[*(position + rotation @ centre), np.linalg.norm(half)]])
@@ -319,12 +349,16 @@ def finish_of(model: Any, visual: Visual) -> Finish:
 def look_of(model: Any, visual: Visual) -> Look:
     """Look of a visual's material; roughness is derived from MuJoCo's shininess where the material gives none."""
     red, green, blue = visual.color.tolist()
-    rgb, material, finish = (red, green, blue), visual.material, finish_of(model, visual)
+    rgb = (red, green, blue)
+    material = visual.material
+    finish = finish_of(model, visual)
     if material < 0 and finish == Finish():
         return Look(color=rgb, roughness=0.42, coat=0.2)
-    roughness, metallic = -1.0, 0.0
+    roughness = -1.0
+    metallic = 0.0
     if material >= 0:
-        roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
+        roughness = float(model.mat_roughness[material])
+        metallic = float(model.mat_metallic[material])
     if roughness < 0:
         roughness = 0.15 + 0.55 * (1.0 - finish.shininess)
     return Look(
@@ -338,8 +372,12 @@ def look_of(model: Any, visual: Visual) -> Look:
 
 def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     """Pixels of a model's texture, uint8 [height, width, 3], top row first."""
-    height, width, channels = (int(n[texture]) for n in (model.tex_height, model.tex_width, model.tex_nchannel))
+    height, width, channels = (
+        int(n[texture]) for n in (model.tex_height, model.tex_width, model.tex_nchannel)
+    )
     start = int(model.tex_adr[texture])
-    pixels = np.asarray(model.tex_data[start : start + height * width * channels]).reshape(height, width, channels)
+    pixels = np.asarray(model.tex_data[start : start + height * width * channels]).reshape(
+        height, width, channels
+    )
     colors = np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3]
     return np.ascontiguousarray(colors, dtype=np.uint8)

@@ -1,9 +1,9 @@
 """The atlas of a closed genus-0 mesh in the cube layout: rays through the cube map's texels onto its sphere map.
 
-Map coordinates are directions from the cube's centre. A ray from there through each texel gives its triangle and
-barycentric coordinates. The way back, from a triangle and a point on it to the sphere and to the nearest texel, is
-compiled, since contacts ask at every step. The analytic atlas of a sphere is the reference on which symmetry and
-accuracy are tested.
+Map coordinates are directions from the cube's centre. A ray from there through each texel gives its
+triangle and barycentric coordinates. The way back, from a triangle and a point on it to the sphere
+and to the nearest texel, is compiled, since contacts ask at every step. The analytic atlas of a
+sphere is the reference on which symmetry and accuracy are tested.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ from .convention import (
     split_at_edges,
     texel_directions,
 )
+
+STRIDE = 16  # texels from one that is found by a ray to the next
 
 
 @kernel
@@ -79,11 +81,14 @@ def texels_towards(directions: Floats, n: int) -> Ints:
     return texels
 
 
-def cast_rays(sphere: Floats, mesh: Mesh, directions: Floats, stride: int = 1) -> tuple[Ints, Floats]:
+def cast_rays(
+    sphere: Floats, mesh: Mesh, directions: Floats, stride: int = 1
+) -> tuple[Ints, Floats]:
     """Intersect rays from the origin with the sphere-mapped mesh.
 
-    Embree finds triangles in float32; the barycentrics are computed again in float64, which also moves a hit to the
-    neighbouring triangle where float32 chose wrongly and recovers rays that slipped between two triangles.
+    Embree finds triangles in float32; the barycentrics are computed again in float64, which also
+    moves a hit to the neighbouring triangle where float32 chose wrongly and recovers rays that
+    slipped between two triangles.
 
     Parameters
     ----------
@@ -93,8 +98,9 @@ def cast_rays(sphere: Floats, mesh: Mesh, directions: Floats, stride: int = 1) -
     directions : [k, 3]
         Ray directions.
     stride : int
-        Embree casts only one ray of so many. Those after it, which should be close by, walk on from its triangle to
-        their own: a texel is mostly in the triangle of the one before it, or next to that.
+        Embree casts only one ray of so many. Those after it, which should be close by, walk on from
+        its triangle to their own: a texel is mostly in the triangle of the one before it, or next
+        to that.
 
     Returns
     -------
@@ -107,19 +113,25 @@ def cast_rays(sphere: Floats, mesh: Mesh, directions: Floats, stride: int = 1) -
     AtlasError
         If a ray meets no triangle, which a fold-free map rules out.
     """
-    hits, seeds = np.full(len(directions), -1, dtype=np.int64), directions[::stride]
+    hits = np.full(len(directions), -1, dtype=np.int64)
+    seeds = directions[::stride]
     hits[::stride] = RayScene(sphere, mesh.F).cast(np.zeros_like(seeds), seeds)[0]
     barycentrics = np.empty((len(directions), 3))
     lost = _walk_to_triangles(sphere, mesh.F, mesh.beside, directions, hits, barycentrics)
     if lost:
-        raise AtlasError(f"{lost} of {len(directions)} rays meet no triangle of the sphere map; is the map fold-free?")
+        raise AtlasError(
+            f"{lost} of {len(directions)} rays meet no triangle of the sphere map; is the map "
+            f"fold-free?"
+        )
     return hits, barycentrics
 
 
 @kernel(no_cpython_wrapper=True)
 def _edge_products(sphere: Floats, corners: Ints, d: Floats) -> tuple[float, float, float]:
     """Triple products det(d, b, c) of the ray with the three edges: all >= 0 if and only if it passes inside."""
-    a, b, c = sphere[corners[0]], sphere[corners[1]], sphere[corners[2]]
+    a = sphere[corners[0]]
+    b = sphere[corners[1]]
+    c = sphere[corners[2]]
     return dot(d, cross(b, c)), dot(d, cross(c, a)), dot(d, cross(a, b))
 
 
@@ -146,13 +158,18 @@ def _walk_to_triangles(
             for f in range(len(F)):
                 x, y, z = _edge_products(sphere, F[f], d)
                 if min(x, y, z) > best and x + y + z > 0:
-                    best, triangle = min(x, y, z), f
+                    best = min(x, y, z)
+                    triangle = f
             x, y, z = _edge_products(sphere, F[triangle], d)
             if best < -1e-12:
                 lost += 1
-        x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
+        x = max(x, 0.0)
+        y = max(y, 0.0)
+        z = max(z, 0.0)
         total = x + y + z
-        barycentrics[i, 0], barycentrics[i, 1], barycentrics[i, 2] = x / total, y / total, z / total
+        barycentrics[i, 0] = x / total
+        barycentrics[i, 1] = y / total
+        barycentrics[i, 2] = z / total
         hits[i] = previous = triangle
     return lost
 
@@ -207,25 +224,27 @@ class CubeChartMap:
         return {"sphere": self.sphere}
 
 
-STRIDE = 16  # texels from one that is found by a ray to the next
-
-
 def atlas_from_sphere_map(mesh: Mesh, sphere: Floats, resolution: int) -> Atlas:
     """Atlas of a mesh for a given fold-free sphere map [vertex_count, 3] (unit vectors)."""
     directions = texel_directions(check_resolution(resolution))
-    # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
+    # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins
+    # with a ray
     stride = math.gcd(resolution, STRIDE) if directions.size > 3 * len(mesh.F) else 1
     triangles, barycentrics = cast_rays(sphere, mesh, directions.reshape(-1, 3), stride)
     corners = mesh.F[triangles]
     begins = np.arange(0, corners.size + 1, 3)
-    weights = csr_array((barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(mesh.V)))
+    weights = csr_array(
+        (barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(mesh.V))
+    )
     normals = weights @ mesh.vertex_normals
     lengths = np.linalg.norm(normals, axis=1)
     cancelled = lengths <= 1e-9  # opposite normals: any corner's will do
-    normals[cancelled], lengths[cancelled] = mesh.vertex_normals[corners[cancelled, 0]], 1.0
+    normals[cancelled] = mesh.vertex_normals[corners[cancelled, 0]]
+    lengths[cancelled] = 1.0
     normals /= lengths[:, None]
     shape = directions.shape[:3]
-    triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)
+    triangles = triangles.reshape(shape)
+    barycentrics = barycentrics.reshape(*shape, 3)
     topology = cube_topology(resolution)
     return Atlas(
         mesh=mesh,
@@ -255,7 +274,9 @@ class SphereAtlas(Atlas):
         points = check_points(points)
         length = np.linalg.norm(points, axis=1, keepdims=True)
         if not length.all():
-            raise AtlasError("the sphere's centre has no nearest surface point; give a point off the centre")
+            raise AtlasError(
+                "the sphere's centre has no nearest surface point; give a point off the centre"
+            )
         return self.radius * (points / length), points / length
 
     def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -287,14 +308,20 @@ def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
     Raises
     ------
     AtlasError
-        If the radius is not positive and finite, the resolution is invalid, or the atlas cannot fit into memory.
+        If the radius is not positive and finite, the resolution is invalid, or the atlas cannot fit
+        into memory.
     """
     n = check_resolution(resolution)
     check_memory(n)
-    directions, topology = texel_directions(n), cube_topology(n)
+    directions = texel_directions(n)
+    topology = cube_topology(n)
     halo = topology.halo
-    sw, se, nw, ne = halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, :-1], halo[:, 1:, 1:]
-    # a cell across a cube edge appears on two charts, one at a cube corner on three: it belongs to its lowest texel
+    sw = halo[:, :-1, :-1]
+    se = halo[:, :-1, 1:]
+    nw = halo[:, 1:, :-1]
+    ne = halo[:, 1:, 1:]
+    # a cell across a cube edge appears on two charts, one at a cube corner on three: it belongs to
+    # its lowest texel
     cells = np.stack([sw, se, ne, nw], axis=-1).reshape(-1, 4)
     owner = np.repeat(np.arange(6), (n + 1) ** 2)
     lowest = np.where(cells < 0, np.iinfo(np.int64).max, cells).min(axis=1)

@@ -1,15 +1,16 @@
 """The equiangular cube map: where the texels of six N x N charts lie on the sphere, and how the charts are connected.
 
-Chart order is +x, -x, +y, -y, +z, -z. A chart has a normal n and two axes u (columns) and v (rows) with u x v = n.
-Texel (chart, row, column) looks along n + tan(pi/4 a) u + tan(pi/4 b) v with a = (2 column + 1)/N - 1 and
-b = (2 row + 1)/N - 1, so that texels are equally wide in angle along both axes. A grid line that leaves a chart goes on
-as a grid line of the next one.
+Chart order is +x, -x, +y, -y, +z, -z. A chart has a normal n and two axes u (columns) and v (rows)
+with u x v = n. Texel (chart, row, column) looks along n + tan(pi/4 a) u + tan(pi/4 b) v with a = (2
+column + 1)/N - 1 and b = (2 row + 1)/N - 1, so that texels are equally wide in angle along both
+axes. A grid line that leaves a chart goes on as a grid line of the next one.
 
-A triangle that crosses an edge of the cube is cut along it. One coordinate pair a corner cannot do instead: equiangular
-coordinates continue smoothly beyond an edge, but there they leave the neighbour's grid (its rows are not the
-continuation of this chart's rows), and at 90 degrees from the chart's middle they end: a long triangle has none.
-Cut pieces lie in one chart each, with coordinates in [0, 1] that any cube-map texture or array of six layers can be
-sampled at: with a halo round each layer the result is continuous everywhere.
+A triangle that crosses an edge of the cube is cut along it. One coordinate pair a corner cannot do
+instead: equiangular coordinates continue smoothly beyond an edge, but there they leave the
+neighbour's grid (its rows are not the continuation of this chart's rows), and at 90 degrees from
+the chart's middle they end: a long triangle has none. Cut pieces lie in one chart each, with
+coordinates in [0, 1] that any cube-map texture or array of six layers can be sampled at: with a
+halo round each layer the result is continuous everywhere.
 """
 
 from __future__ import annotations
@@ -37,8 +38,27 @@ MAX_RESOLUTION = 4096
 # Memory for each texel while an atlas is built, at least [bytes].
 _TEXEL = 200
 
-# Texels that are set up in silence, and what one takes [s]: measured with `Ripples` of an ellipsoid at resolution 512.
-_MANY, _SECONDS = 1e6, 5e-6
+# Texels that are set up in silence, and what one takes [s]: measured with `Ripples` of an ellipsoid
+# at resolution 512.
+_MANY = 1e6
+_SECONDS = 5e-6
+
+# Relative to a triangle: what hangs over an edge by less counts as within, and smaller pieces are
+# left out.
+_ROUND_OFF = 1e-12
+_MOST = 8  # places for a polygon's corners
+
+# The four planes through the cube's centre that bound each chart's share of space; inwards is
+# positive.
+_SIDES = np.stack(
+    [
+        CHART_NORMALS - CHART_U,
+        CHART_NORMALS + CHART_U,
+        CHART_NORMALS - CHART_V,
+        CHART_NORMALS + CHART_V,
+    ],
+    axis=1,
+).astype(np.float64)
 
 
 def check_resolution(resolution: int) -> int:
@@ -54,19 +74,31 @@ def check_resolution(resolution: int) -> int:
 
 def check_memory(resolution: int) -> None:
     """Raise `AtlasError` if an atlas of about 6 N^2 texels cannot fit into memory, and tell of one that takes long."""
-    what, texels = f"an atlas of resolution {resolution}", 6 * resolution**2
+    what = f"an atlas of resolution {resolution}"
+    texels = 6 * resolution**2
     require_memory(AtlasError, _TEXEL * texels, what, "take a lower resolution")
     if texels > _MANY:
-        log.warning("%s has about %d million texels, which take %.0f s or more", what, texels / 1e6, _SECONDS * texels)
+        log.warning(
+            "%s has about %d million texels, which take %.0f s or more",
+            what,
+            texels / 1e6,
+            _SECONDS * texels,
+        )
 
 
 def texel_directions(resolution: int) -> Floats:
     """Unit vectors through the texel centres, shape [6, N, N, 3]."""
     offset = 2 * np.arange(resolution) + 1 - resolution
-    # tan is evaluated once per distance from the chart's middle, so that mirrored texels are mirrored to the last bit
+    # tan is evaluated once per distance from the chart's middle, so that mirrored texels are
+    # mirrored to the last bit
     tangent = np.sign(offset) * np.tan(np.pi / 4 * np.abs(offset) / resolution)
-    a, b = tangent[None, None, :, None], tangent[None, :, None, None]
-    directions = CHART_NORMALS[:, None, None, :] + a * CHART_U[:, None, None, :] + b * CHART_V[:, None, None, :]
+    a = tangent[None, None, :, None]
+    b = tangent[None, :, None, None]
+    directions = (
+        CHART_NORMALS[:, None, None, :]
+        + a * CHART_U[:, None, None, :]
+        + b * CHART_V[:, None, None, :]
+    )
     # the sum of squares in one order for all charts, for the same reason
     return directions / np.sqrt(1.0 + np.minimum(a * a, b * b) + np.maximum(a * a, b * b))
 
@@ -74,7 +106,8 @@ def texel_directions(resolution: int) -> Floats:
 def cube_chart_points(directions: Floats, resolution: int) -> tuple[Ints, Floats, Floats]:
     """Chart, row and column of directions from the cube's centre (they need not be unit vectors).
 
-    Row and column are float64 in texel units; 0.0 is the centre of the first texel. Each result has shape [k].
+    Row and column are float64 in texel units; 0.0 is the centre of the first texel. Each result has
+    shape [k].
     """
     d = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
     axis = np.argmax(np.abs(d), axis=1)
@@ -96,22 +129,14 @@ def cube_topology(resolution: int) -> TexelTopology:
     return glue(np.stack([beyond, back], axis=-1), resolution)
 
 
-# Relative to a triangle: what hangs over an edge by less counts as within, and smaller pieces are left out.
-_ROUND_OFF = 1e-12
-_MOST = 8  # places for a polygon's corners
-# The four planes through the cube's centre that bound each chart's share of space; inwards is positive.
-_SIDES = np.stack(
-    [CHART_NORMALS - CHART_U, CHART_NORMALS + CHART_U, CHART_NORMALS - CHART_V, CHART_NORMALS + CHART_V], axis=1
-).astype(np.float64)
-
-
 def split_at_edges(corners: Floats) -> Parts:
     """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
     middles = corners.sum(axis=1)
     axis = np.argmax(np.abs(middles), axis=1)
     chart = 2 * axis + (np.take_along_axis(middles, axis[:, None], axis=1)[:, 0] < 0)
     inside = (np.einsum("mki,msi->mks", corners, _SIDES[chart]) >= -_ROUND_OFF).all(axis=(1, 2))
-    whole, crossing = np.flatnonzero(inside), np.flatnonzero(~inside)
+    whole = np.flatnonzero(inside)
+    crossing = np.flatnonzero(~inside)
     owner, piece_chart, pieces = _cut(corners[crossing])
     triangle = np.concatenate([whole, crossing[owner]])
     order = np.argsort(triangle, kind="stable")
@@ -140,12 +165,16 @@ def _cut(corners: Floats) -> tuple[Ints, Ints, Floats]:
     """Cut triangles [k, 3, 3] into their parts in each chart: owner, chart, and barycentrics [pieces, 3, 3]."""
     owner, chart = np.divmod(np.arange(6 * len(corners)), 6)
     # a triangle that is cut by four planes has seven corners at most
-    polygons, sizes = np.zeros((len(owner), _MOST, 3)), np.full(len(owner), 3)
+    polygons = np.zeros((len(owner), _MOST, 3))
+    sizes = np.full(len(owner), 3)
     polygons[:, :3] = np.eye(3)
     for s in range(4):
         polygons, sizes = _clip(polygons, sizes, corners[owner], _SIDES[chart, s])
         left = sizes > 0
-        owner, chart, polygons, sizes = owner[left], chart[left], polygons[left], sizes[left]
+        owner = owner[left]
+        chart = chart[left]
+        polygons = polygons[left]
+        sizes = sizes[left]
     fan, k = np.nonzero(np.arange(2, _MOST) < sizes[:, None])
     pieces = np.stack([polygons[fan, 0], polygons[fan, k + 1], polygons[fan, k + 2]], axis=1)
     a, b, c = pieces.transpose(1, 2, 0)
@@ -155,14 +184,18 @@ def _cut(corners: Floats) -> tuple[Ints, Ints, Floats]:
 
 def _clip(polygons: Floats, sizes: Ints, corners: Floats, planes: Floats) -> tuple[Floats, Ints]:
     """Keep the parts of convex polygons, [p, 8, 3], on the inner sides of planes (Sutherland and Hodgman 1974)."""
-    clipped, count, every = np.zeros_like(polygons), np.zeros_like(sizes), np.arange(len(sizes))
+    clipped = np.zeros_like(polygons)
+    count = np.zeros_like(sizes)
+    every = np.arange(len(sizes))
     previous = polygons[every, sizes - 1]
     p = _distance(previous, corners, planes)
     for i in range(sizes.max(initial=0)):
-        here, there = polygons[:, i], i < sizes
+        here = polygons[:, i]
+        there = i < sizes
         q = _distance(here, corners, planes)
         crossing = np.flatnonzero(there & ((p >= 0) != (q >= 0)))
-        before, after = p[crossing, None], q[crossing, None]
+        before = p[crossing, None]
+        after = q[crossing, None]
         # the same to the last bit from whichever side it is looked at
         cuts = (before * here[crossing] - after * previous[crossing]) / (before - after)
         clipped[crossing, count[crossing]] = cuts
@@ -170,7 +203,8 @@ def _clip(polygons: Floats, sizes: Ints, corners: Floats, planes: Floats) -> tup
         inside = np.flatnonzero(there & (q >= 0))
         clipped[inside, count[inside]] = here[inside]
         count[inside] += 1
-        previous, p = here, q
+        previous = here
+        p = q
     return clipped, count
 
 

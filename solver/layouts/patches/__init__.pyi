@@ -23,5 +23,9 @@ from .quads import (
     cut_into_quads as cut_into_quads,
 )
 from .samples import centres as centres, locate_texels as locate_texels
-from .seamless import SeamlessMap as SeamlessMap, corner_places as corner_places, seamless_map as seamless_map
+from .seamless import (
+    SeamlessMap as SeamlessMap,
+    corner_places as corner_places,
+    seamless_map as seamless_map,
+)
 from .surface import TriangleSurface as TriangleSurface

@@ -25,10 +25,20 @@ from .quads import CELLS
 from .samples import centres, untangled
 from .seamless import Complex, SeamlessMap, follow, places_seen_from
 
+_LEAST_TEXELS = 4  # along a chart's side
+
+# Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells, but
+# not below the least.
+_TEXELS_OF_CELL = 245
+_LEAST_CELLS = 24
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PatchChartMap:
-    """Any mesh on charts; map coordinates are chart, column and row, the latter from 0 to 1. See `ChartMap`."""
+    """Any mesh on charts; map coordinates are chart, column and row, the latter from 0 to 1.
+
+    See `ChartMap`.
+    """
 
     pieces: Pieces
 
@@ -45,7 +55,8 @@ class PatchChartMap:
     def coordinates(self, mesh: Mesh, triangles: Ints, points: Floats) -> Floats:
         """Chart, column and row, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
         weights = barycentrics_in(mesh.V[mesh.F[triangles]], points)
-        piece, inside = np.empty(len(weights), np.int64), np.empty((len(weights), 3))
+        piece = np.empty(len(weights), np.int64)
+        inside = np.empty((len(weights), 3))
         _find(self._first, self.pieces.barycentrics, triangles, weights, piece, inside)
         places = np.einsum("kc,kcj->kj", inside, self.pieces.places[piece])
         return np.concatenate([self.pieces.chart[piece, None], places], axis=1)
@@ -57,7 +68,9 @@ class PatchChartMap:
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
         """Flat indices [k] of the texels in which points [k, 3] [m] lie that are on triangles [k]."""
-        return _texels_on_pieces(mesh.V[mesh.F[triangles]], self._first, self.pieces, resolution, triangles, points)
+        return _texels_on_pieces(
+            mesh.V[mesh.F[triangles]], self._first, self.pieces, resolution, triangles, points
+        )
 
     def linear_parts(self, mesh: Mesh) -> Parts:
         """The pieces."""
@@ -75,7 +88,8 @@ class PatchChartMap:
 
     def quality(self, mesh: Mesh) -> dict[str, float]:
         """Flipped pieces, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
-        pieces, flat = self.pieces, signed_areas(self.pieces.places)
+        pieces = self.pieces
+        flat = signed_areas(self.pieces.places)
         # the determinant is the share of its triangle that each piece has
         real = mesh.triangle_areas[pieces.triangle] * np.abs(np.linalg.det(pieces.barycentrics))
         even = flat * mesh.area / (int(pieces.chart.max()) + 1)
@@ -88,36 +102,55 @@ class PatchChartMap:
 
 
 @kernel
-def _find(first: Ints, corners: Floats, triangles: Ints, weights: Floats, piece: Ints, inside: Floats) -> None:
+def _find(
+    first: Ints, corners: Floats, triangles: Ints, weights: Floats, piece: Ints, inside: Floats
+) -> None:
     """Piece in which each point lies, and its barycentrics there; given triangles [k] and barycentrics [k, 3]."""
     for i in range(len(triangles)):
         piece[i], s, t = _piece_at(first, corners, triangles[i], weights[i, 0], weights[i, 1])
-        inside[i, 0], inside[i, 1], inside[i, 2] = 1 - s - t, s, t
+        inside[i, 0] = 1 - s - t
+        inside[i, 1] = s
+        inside[i, 2] = t
 
 
 @kernel
-def _piece_at(first: Ints, corners: Floats, triangle: int, x: float, y: float) -> tuple[int, float, float]:
+def _piece_at(
+    first: Ints, corners: Floats, triangle: int, x: float, y: float
+) -> tuple[int, float, float]:
     """The piece of a triangle in which a point lies, and its second and third barycentric coordinate in that."""
-    best, piece, at_s, at_t = -np.inf, min(first[triangle], len(corners) - 1), 1 / 3, 1 / 3
+    best = -np.inf
+    piece = min(first[triangle], len(corners) - 1)
+    at_s = 1 / 3
+    at_t = 1 / 3
     for p in range(first[triangle], first[triangle + 1]):
         a, b, c = corners[p]
-        ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
-        dx, dy = x - a[0], y - a[1]
+        ux = b[0] - a[0]
+        uy = b[1] - a[1]
+        vx = c[0] - a[0]
+        vy = c[1] - a[1]
+        dx = x - a[0]
+        dy = y - a[1]
         area = ux * vy - uy * vx
         if not area > 0:
             continue
-        s, t = (dx * vy - dy * vx) / area, (ux * dy - uy * dx) / area
+        s = (dx * vy - dy * vx) / area
+        t = (ux * dy - uy * dx) / area
         least = min(s, t, 1 - s - t)
         if least > best:
-            best, piece = least, p
-            s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
+            best = least
+            piece = p
+            s = min(max(s, 0.0), 1.0)
+            t = min(max(t, 0.0), 1.0)
             excess = max(s + t, 1.0)
-            at_s, at_t = s / excess, t / excess
+            at_s = s / excess
+            at_t = t / excess
     return piece, at_s, at_t
 
 
 @kernel
-def _texels_on_pieces(corners: Floats, first: Ints, pieces: Pieces, n: int, triangles: Ints, points: Floats) -> Ints:
+def _texels_on_pieces(
+    corners: Floats, first: Ints, pieces: Pieces, n: int, triangles: Ints, points: Floats
+) -> Ints:
     """Texels [k] of points [k, 3] on triangles [k], whose corners [k, 3, 3] are given [m]."""
     texels = np.empty(len(points), np.int64)
     for i in range(len(points)):
@@ -132,7 +165,9 @@ def _texels_on_pieces(corners: Floats, first: Ints, pieces: Pieces, n: int, tria
     return texels
 
 
-def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> Floats | None:
+def positions_beyond(
+    patches: PatchMap, topology: TexelTopology, positions: NDArray
+) -> Floats | None:
     """Positions with halo [C, n + 2, n + 2, 3] [m]; beyond a rim lies its point opposite to each texel.
 
     None if there is no rim. At the end of a rim, where that turns, lies its corner.
@@ -141,7 +176,8 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
         return None
     beyond = topology.with_halo(positions)
     beyond[(topology.halo < 0) | topology.rim] = np.nan
-    seamless, surface = patches.seamless, patches.surface
+    seamless = patches.seamless
+    surface = patches.surface
     sides = surface.edges.sides[surface.edges.rim, 0]
     f, k = np.divmod(sides, 3)
     corner = np.where(seamless.freedom[seamless.F[f, k]] != FIXED, k, (k + 1) % 3)
@@ -156,7 +192,9 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
         if other != chart:
             out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
             along_rows = topology.rim[other, out_r, c + 1]
-            beyond[chart, row, column] = beyond[other, out_r, c + 1] if along_rows else beyond[other, r + 1, out_c]
+            beyond[chart, row, column] = (
+                beyond[other, out_r, c + 1] if along_rows else beyond[other, r + 1, out_c]
+            )
     # points in which a single chart ends at a rim lie in the corner of its halo
     f, k = np.nonzero((surface.at_rim & (seamless.freedom == FIXED))[surface.F])
     place = seamless.shift[f, k] * (n + 1)
@@ -168,27 +206,41 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
 
 @kernel
 def _draw_rims(
-    seamless: SeamlessMap, V: Floats, sides: Ints, corner: Ints, homes: Ints, places: Complex, beyond: Floats
+    seamless: SeamlessMap,
+    V: Floats,
+    sides: Ints,
+    corner: Ints,
+    homes: Ints,
+    places: Complex,
+    beyond: Floats,
 ) -> None:
     """Put the points of sides at a rim beyond the texels opposite to them; see `places_seen_from`."""
     n = beyond.shape[1] - 2
     for side in range(len(sides)):
-        f, k = sides[side] // 3, sides[side] % 3
-        a, b = seamless.F[f, k], seamless.F[f, (k + 1) % 3]
-        anchor, p = corner[side], places[side]
+        f = sides[side] // 3
+        k = sides[side] % 3
+        a = seamless.F[f, k]
+        b = seamless.F[f, (k + 1) % 3]
+        anchor = corner[side]
+        p = places[side]
         v = seamless.F[f, anchor]
         along_row = seamless.freedom[v] == COLUMN
-        a_place, b_place = p[k], p[(k + 1) % 3]
+        a_place = p[k]
+        b_place = p[(k + 1) % 3]
         low, high = (a_place.real, b_place.real) if along_row else (a_place.imag, b_place.imag)
         first = int(np.ceil(min(low, high) * n - 0.5 - 1e-9))
         last = int(np.floor(max(low, high) * n - 0.5 + 1e-9))
         for i in range(first, last + 1):
             along = (i + 0.5) / n
             t = min(max((along - low) / (high - low), 0.0), 1.0)
-            opposite = complex(along, p[anchor].imag) if along_row else complex(p[anchor].real, along)
+            opposite = (
+                complex(along, p[anchor].imag) if along_row else complex(p[anchor].real, along)
+            )
             chart, _, z = follow(seamless, homes[side], p[anchor], opposite)
-            x, y = z.real, z.imag
-            row, column = int(np.floor(y * n)) + 1, int(np.floor(x * n)) + 1
+            x = z.real
+            y = z.imag
+            row = int(np.floor(y * n)) + 1
+            column = int(np.floor(x * n)) + 1
             if abs(y) < 1e-9:
                 row = 0
             elif abs(y - 1) < 1e-9:
@@ -199,12 +251,6 @@ def _draw_rims(
                 column = n + 1
             for j in range(3):
                 beyond[chart, row, column, j] = (1 - t) * V[a, j] + t * V[b, j]
-
-
-_LEAST_TEXELS = 4  # along a chart's side
-
-# Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells, but not below the least.
-_TEXELS_OF_CELL, _LEAST_CELLS = 245, 24
 
 
 def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
@@ -232,8 +278,10 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
     samples, offsets = untangled(mesh, patches, topology, samples, beyond)
     pieces = chart_pieces(patches)
     if offsets.any():
-        pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
-    lines, corners = np.linspace(0.0, 1.0, n + 1), np.pad(pieces.places, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
+        pieces = warped(pieces, offsets)
+        beyond = positions_beyond(patches, topology, samples.positions)
+    lines = np.linspace(0.0, 1.0, n + 1)
+    corners = np.pad(pieces.places, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
     parts = pieces.triangle, pieces.barycentrics, pieces.chart
     return Atlas(
         mesh=mesh,

@@ -1,7 +1,7 @@
 """Voronoi cells: every vertex of a surface belongs to the nearest of a few seeds, along the surface.
 
-How large cells may be: smaller on limbs and round their ends, where a large one would be stretched. Then they are cut
-apart, along smooth borders with corners and arcs between these.
+How large cells may be: smaller on limbs and round their ends, where a large one would be stretched.
+Then they are cut apart, along smooth borders with corners and arcs between these.
 """
 
 from __future__ import annotations
@@ -18,6 +18,28 @@ from ...mesh.topology import SPLITS
 from .surface import AB, BC, CA, MIDDLE, A, B, C, Patterns, TriangleSurface
 
 _LEAST = 1e-12  # of the longest link: graphs know no links of length 0
+
+_LLOYD_STEPS = 8
+_MOST_PASSES = 50
+
+# Triangles between two cells, the one vertex on its side of the border; and between three.
+_CUTS: Patterns = {
+    **{number: SPLITS[number] for number in (3, 6, 5)},
+    7: (
+        (A, AB, MIDDLE),
+        (AB, B, MIDDLE),
+        (B, BC, MIDDLE),
+        (BC, C, MIDDLE),
+        (C, CA, MIDDLE),
+        (CA, A, MIDDLE),
+    ),
+}
+_LEAST_SHARE = 0.1  # of an edge on either side of a border
+_SHARP = np.radians(125)  # angles at the rim that get a corner
+_SAMPLES = 500
+_FULL = 0.5  # share of the area of a flat disk that a geodesic disk must have
+_FEWEST = 12  # samples in a disk before it is judged
+_GROWTH = 0.5  # of the size of cells along the surface
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -46,8 +68,12 @@ class Metric:
         """The same distances in other units [n] [m]; a link takes the mean of both ends."""
         row = np.repeat(np.arange(len(unit)), np.diff(self.graph.indptr))
         column = self.graph.indices
-        lengths = self.graph.data * (self.unit[row] + self.unit[column]) / (unit[row] + unit[column])
-        return Metric(self.surface, csr_array((lengths, column, self.graph.indptr), self.graph.shape), unit)
+        lengths = (
+            self.graph.data * (self.unit[row] + self.unit[column]) / (unit[row] + unit[column])
+        )
+        return Metric(
+            self.surface, csr_array((lengths, column, self.graph.indptr), self.graph.shape), unit
+        )
 
     @functools.cached_property
     def edge_lengths(self) -> Floats:
@@ -65,7 +91,9 @@ class Metric:
 
 def distance_graph(surface: TriangleSurface) -> csr_array:
     """Vertices linked along edges, and straight across each edge between the two vertices opposite to it [m]."""
-    edges, V, F = surface.edges, surface.V, surface.F
+    edges = surface.edges
+    V = surface.V
+    F = surface.F
     inner = np.flatnonzero(~edges.rim)
     triangle, side = np.divmod(edges.sides[inner].T, 3)
     p, q = F[triangle, (side + 2) % 3]
@@ -84,7 +112,8 @@ def distance_graph(surface: TriangleSurface) -> csr_array:
 
 def _linked(ends: Ints, lengths: Floats, count: int) -> csr_array:
     """Graph of `count` nodes with the shortest of the links between each two, whose ends are [k, 2]."""
-    low, high = ends.min(axis=1), ends.max(axis=1)
+    low = ends.min(axis=1)
+    high = ends.max(axis=1)
     key = low * count + high
     order = np.lexsort((lengths, key))
     kept = order[np.diff(key[order], prepend=-1) != 0]
@@ -97,10 +126,6 @@ def _along_and_across(offset: Floats, along: Floats) -> tuple[Floats, Floats]:
     x = np.einsum("ij,ij->i", offset, along)
     square = np.einsum("ij,ij->i", offset, offset)
     return x, np.sqrt(np.maximum(square - x * x, 0.0))
-
-
-_LLOYD_STEPS = 8
-_MOST_PASSES = 50
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -138,10 +163,13 @@ def spread_seeds(metric: Metric, reach: float) -> Ints:
 
 def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     """The vertices nearest to each seed."""
-    distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
+    distance, _, source = dijkstra(
+        metric.graph, indices=seeds, min_only=True, return_predecessors=True
+    )
     number = np.full(len(metric.unit), -1)
     number[seeds] = np.arange(len(seeds))
-    label, ends = number[source], metric.surface.edges.ends
+    label = number[source]
+    ends = metric.surface.edges.ends
     # vertices that hang on their cell by no edge are given to a neighbour's
     for _ in range(_MOST_PASSES):
         inner = label[ends[:, 0]] == label[ends[:, 1]]
@@ -159,11 +187,14 @@ def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
 
 def centred_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     """Cells whose seeds moved to their middles a few times (Lloyd 1982)."""
-    V, mass = metric.surface.V, metric.masses
+    V = metric.surface.V
+    mass = metric.masses
     for _ in range(_LLOYD_STEPS):
         cells = voronoi_cells(metric, seeds)
         total = np.bincount(cells.label, mass)
-        middle = np.stack([np.bincount(cells.label, mass * V[:, k]) / total for k in range(3)], axis=1)
+        middle = np.stack(
+            [np.bincount(cells.label, mass * V[:, k]) / total for k in range(3)], axis=1
+        )
         square = ((V - middle[cells.label]) ** 2).sum(axis=1)
         order = np.lexsort((square, cells.label))
         moved = order[np.searchsorted(cells.label[order], np.arange(len(seeds)))]
@@ -171,15 +202,6 @@ def centred_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
             break
         seeds = moved
     return voronoi_cells(metric, seeds)
-
-
-# Triangles between two cells, the one vertex on its side of the border; and between three.
-_CUTS: Patterns = {
-    **{number: SPLITS[number] for number in (3, 6, 5)},
-    7: ((A, AB, MIDDLE), (AB, B, MIDDLE), (B, BC, MIDDLE), (BC, C, MIDDLE), (C, CA, MIDDLE), (CA, A, MIDDLE)),
-}
-_LEAST_SHARE = 0.1  # of an edge on either side of a border
-_SHARP = np.radians(125)  # angles at the rim that get a corner
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -192,7 +214,8 @@ class BorderedCells:
     cell : int64 [m]
         To which each triangle belongs.
     arcs : list of lists of int64 [l]
-        Of each cell, counter-clockwise, the vertices along its border from one corner to the next, both included.
+        Of each cell, counter-clockwise, the vertices along its border from one corner to the next,
+        both included.
     uncut : int
         How many vertices there were before the cut: the first ones.
     """
@@ -206,17 +229,24 @@ class BorderedCells:
 def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     """Cut the triangles between cells that are disks, and find the cells' corners.
 
-    In an inner corner three cells meet, in one at the rim two; at the rim a cell has corners of its own where that is
-    sharp, and as many more as it lacks to three.
+    In an inner corner three cells meet, in one at the rim two; at the rim a cell has corners of its
+    own where that is sharp, and as many more as it lacks to three.
     """
     surface = metric.surface
     ends = surface.edges.ends
-    label, distance = cells.label[ends], cells.distance[ends]
+    label = cells.label[ends]
+    distance = cells.distance[ends]
     between = label[:, 0] != label[:, 1]
-    place = np.clip(0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths), _LEAST_SHARE, 1 - _LEAST_SHARE)
+    place = np.clip(
+        0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths),
+        _LEAST_SHARE,
+        1 - _LEAST_SHARE,
+    )
     cut = surface.subdivided(np.where(between, place, np.nan), _CUTS)[0]
     # each triangle has a vertex of the surface before, and all of those are of its cell
-    cell = np.pad(cells.label, (0, len(cut.V) - len(surface.V)), constant_values=-1)[cut.F].max(axis=1)
+    cell = np.pad(cells.label, (0, len(cut.V) - len(surface.V)), constant_values=-1)[cut.F].max(
+        axis=1
+    )
     count = len(cells.seeds)
     meeting = np.bincount(np.unique(cut.F * count + cell[:, None]) // count, minlength=len(cut.V))
     angle = np.bincount(cut.F.ravel(), cut.angles.ravel(), len(cut.V))
@@ -238,7 +268,8 @@ def _border_loops(surface: TriangleSurface, cell: Ints, count: int) -> list[Ints
     beside = np.where(sides < 0, -1, cell[sides // 3])
     border = sides[beside[:, 0] != beside[:, 1]].ravel()
     triangle, side = np.divmod(border[border >= 0], 3)
-    tail, head = surface.F[triangle, side], surface.F[triangle, (side + 1) % 3]
+    tail = surface.F[triangle, side]
+    head = surface.F[triangle, (side + 1) % 3]
     following: list[dict[int, int]] = [{} for _ in range(count)]
     for c, u, v in zip(cell[triangle].tolist(), tail.tolist(), head.tolist(), strict=True):
         following[c][u] = v
@@ -255,7 +286,8 @@ def _arcs(V: Floats, loop: Ints, corner: Bools, on_rim: Bools) -> list[Ints]:
     """Cut a loop at its corners; more are put on its rim, far from the others, where it has too few."""
     corner = corner.copy()
     length = np.linalg.norm(np.roll(V[loop], -1, axis=0) - V[loop], axis=1)
-    place, whole = np.cumsum(length) - length, length.sum()
+    place = np.cumsum(length) - length
+    whole = length.sum()
     free = on_rim & np.roll(on_rim, 1)
     while corner.sum() < (4 if on_rim.all() else 3):
         candidates = np.flatnonzero(free & ~corner)
@@ -273,18 +305,12 @@ def _arcs(V: Floats, loop: Ints, corner: Bools, on_rim: Bools) -> list[Ints]:
     return [turned[start : end + 1] for start, end in zip([0, *ends[:-1]], ends, strict=True)]
 
 
-_SAMPLES = 500
-_FULL = 0.5  # share of the area of a flat disk that a geodesic disk must have
-_FEWEST = 12  # samples in a disk before it is judged
-_GROWTH = 0.5  # of the size of cells along the surface
-
-
 def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> Floats:
     """Radius of the cells round each vertex [m], [n], between a least and a largest one.
 
-    A cell has at most the share `reach` of the radius at which a geodesic disk round its middle has much less area than
-    a flat one, being wrapped round a limb (of a tube that radius is nearly the girth) or over its end. The metric must
-    be in metres.
+    A cell has at most the share `reach` of the radius at which a geodesic disk round its middle has
+    much less area than a flat one, being wrapped round a limb (of a tube that radius is nearly the
+    girth) or over its end. The metric must be in metres.
     """
     total = np.cumsum(metric.masses)
     count = min(_SAMPLES, len(total))

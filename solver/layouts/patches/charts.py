@@ -1,9 +1,9 @@
 """Square charts: one for each corner of a cell, from its middle to the middles of its sides.
 
-Cells are laid out as regular polygons and cut; the corners in which three of them meet are then moved to the middle
-between their middles. Sides and corners of charts are numbered as in `texels.topology`. Corner 0 of a chart lies in the
-middle of its cell, corner 2 in the corner of the cell, 1 and 3 in the middles of the cell's sides before and behind
-that corner.
+Cells are laid out as regular polygons and cut; the corners in which three of them meet are then
+moved to the middle between their middles. Sides and corners of charts are numbered as in
+`texels.topology`. Corner 0 of a chart lies in the middle of its cell, corner 2 in the corner of the
+cell, 1 and 3 in the middles of the cell's sides before and behind that corner.
 """
 
 from __future__ import annotations
@@ -22,22 +22,31 @@ from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved_ch
 Path = Ints
 Halves = list[tuple[Path, Path]]  # of each arc of a part's border
 
+# column and row of a chart's corners, counter-clockwise
+CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+
 
 def corner_charts(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sides]]:
     """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
     surface = cells.surface
-    # arcs of a single edge get a vertex in its middle, at which they are cut in half, and all cells inner vertices
+    # arcs of a single edge get a vertex in its middle, at which they are cut in half, and all cells
+    # inner vertices
     single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
     key = [len(surface.V), 1]
     chosen = np.isin(surface.edges.ends @ key, np.sort(single, axis=1) @ key)
     finer, middles, origin, _ = surface.subdivided(np.where(chosen, 0.5, np.nan))
-    middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), middles[chosen].tolist(), strict=True))
+    middle = dict(
+        zip(map(tuple, surface.edges.ends[chosen].tolist()), middles[chosen].tolist(), strict=True)
+    )
     arcs = [
-        [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each] for each in cells.arcs
+        [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each]
+        for each in cells.arcs
     ]
     cell = cells.cell[origin]
     split, origin = halved_chords(finer, cell, on_paths(finer, arcs))
-    surface, sides = cut_polygons(split, cell[origin], [[halves_of(split.V, arc) for arc in each] for each in arcs])
+    surface, sides = cut_polygons(
+        split, cell[origin], [[halves_of(split.V, arc) for arc in each] for each in arcs]
+    )
     return surface, charts_of(surface, sides), sides
 
 
@@ -49,7 +58,9 @@ def halves_of(V: Floats, arc: Path) -> tuple[Path, Path]:
     return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
 
 
-def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> tuple[TriangleSurface, list[Sides]]:
+def cut_polygons(
+    surface: TriangleSurface, part: Ints, halves: list[Halves]
+) -> tuple[TriangleSurface, list[Sides]]:
     """Lay out the first parts as regular polygons and cut them from their middles; return the sides of the charts.
 
     Parts beyond those that have a border are left alone.
@@ -57,17 +68,21 @@ def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> 
     on_border = on_paths(surface, [arc for each in halves for arc in each])
     chosen = part < len(halves)
     places = np.full((len(part), 3, 2), np.nan)
-    some = TriangleSurface(surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen])
+    some = TriangleSurface(
+        surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen]
+    )
     places[chosen] = flattened(some, part[chosen], _polygon_border(surface, halves))
     centre = central_vertices(Flat(some, part[chosen], places[chosen]), on_border)
     count = int(part.max()) + 1
     flat = Flat(surface, part, places)
     paths: list[list[Path]] = [[] for _ in halves]
     for i in range(max(map(len, halves))):
-        start, end = np.full(count, -1), np.full(count, -1)
+        start = np.full(count, -1)
+        end = np.full(count, -1)
         for number, each in enumerate(halves):
             if len(each) > i:
-                start[number], end[number] = centre[number], each[i][0][-1]
+                start[number] = centre[number]
+                end[number] = each[i][0][-1]
         border = np.pad(on_border, (0, len(flat.surface.V) - len(on_border)))
         flat, lines = cut_ray(flat, start, end, border)
         for path, line in zip(paths, lines, strict=False):
@@ -83,7 +98,9 @@ def cut_polygons(surface: TriangleSurface, part: Ints, halves: list[Halves]) -> 
 
 def _polygon_border(surface: TriangleSurface, halves: list[Halves]) -> Border:
     """Cells as regular polygons: corners on the unit circle, arcs along the sides."""
-    paths, cells, ends = [], [], []
+    paths = []
+    cells = []
+    ends = []
     for cell, arcs in enumerate(halves):
         tips = np.exp(2j * np.pi * np.arange(len(arcs) + 1) / len(arcs))
         middles = (tips[:-1] + tips[1:]) / 2
@@ -97,9 +114,6 @@ def _polygon_border(surface: TriangleSurface, halves: list[Halves]) -> Border:
     return np.repeat(cells, lengths), np.concatenate(paths), np.stack([z.real, z.imag], axis=1)
 
 
-# column and row of a chart's corners, counter-clockwise
-CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-
 Sides = tuple[Path, Path, Path, Path]
 Fans = list[list[int]]  # charts round a corner
 
@@ -107,12 +121,16 @@ Fans = list[list[int]]  # charts round a corner
 def charts_of(surface: TriangleSurface, sides: list[Sides]) -> Ints:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
     size = len(surface.V)
-    walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
+    walls = np.concatenate(
+        [np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each]
+    )
     wall = np.isin(surface.edges.ends @ [size, 1], np.sort(walls, axis=1) @ [size, 1])
     part = labels(surface.edges.sides[~wall] // 3, len(surface.F))
     number = int(part.max()) + 1
     if number != len(sides):
-        raise AtlasError(f"{len(sides)} charts came out as {number}: triangles of the surface are too thin")
+        raise AtlasError(
+            f"{len(sides)} charts came out as {number}: triangles of the surface are too thin"
+        )
     # the triangle on the inner side of the first edge of a chart's second side
     key = (surface.F * size + np.roll(surface.F, -1, axis=1)).ravel()
     order = np.argsort(key)
@@ -128,7 +146,8 @@ def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
     paths = [path for each in sides for path in each]
     lengths = [len(path) for path in paths]
     side = np.repeat(np.arange(len(paths)), lengths)
-    a, b = CORNERS[side % 4], CORNERS[(side + 1) % 4]
+    a = CORNERS[side % 4]
+    b = CORNERS[(side + 1) % 4]
     return side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None]
 
 
@@ -142,7 +161,11 @@ def on_paths(surface: TriangleSurface, sides: Sequence[Sequence[Path]]) -> Bools
 def glued_sides(sides: list[Sides]) -> Ints:
     """Charts that share a side have its first edge the other way round."""
     table = np.full((len(sides), 4, 2), -1)
-    seen = {(int(path[0]), int(path[1])): (chart, s) for chart, each in enumerate(sides) for s, path in enumerate(each)}
+    seen = {
+        (int(path[0]), int(path[1])): (chart, s)
+        for chart, each in enumerate(sides)
+        for s, path in enumerate(each)
+    }
     for chart, each in enumerate(sides):
         for s, path in enumerate(each):
             other = seen.get((int(path[-1]), int(path[-2])))
@@ -164,11 +187,14 @@ def fans_of(sides: list[Sides], glued: Ints) -> tuple[Fans, list[int]]:
     return fans, np.flatnonzero(~used).tolist()
 
 
-def with_even_corners(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> tuple[TriangleSurface, list[Sides]]:
+def with_even_corners(
+    surface: TriangleSurface, chart: Ints, sides: list[Sides]
+) -> tuple[TriangleSurface, list[Sides]]:
     """Move the corners in which three cells meet to the middle between the cells' middles.
 
-    Voronoi cells often have very short sides, along which texels would be tiny. So the three charts round a corner,
-    a triangle between three cells' middles, are joined and cut anew as the cells were.
+    Voronoi cells often have very short sides, along which texels would be tiny. So the three charts
+    round a corner, a triangle between three cells' middles, are joined and cut anew as the cells
+    were.
     """
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
@@ -182,8 +208,10 @@ def with_even_corners(surface: TriangleSurface, chart: Ints, sides: list[Sides])
     for fan in fans:
         halves.append([])
         for a, b in zip(fan, [*fan[1:], fan[0]], strict=True):
-            first, second = sides[a][0], sides[b][3]
-            if inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]]:  # else the middle stays, as the charts beyond do
+            first = sides[a][0]
+            second = sides[b][3]
+            # else the middle stays, as the charts beyond do
+            if inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]]:
                 first, second = halves_of(surface.V, np.concatenate([first, second[1:]]))
             halves[-1].append((first, second))
     split, origin = halved_chords(surface, part[chart], on_paths(surface, sides))

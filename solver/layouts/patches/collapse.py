@@ -1,11 +1,12 @@
 """Taking away vertices that only cuts have made, by half-edge collapses that fold nothing.
 
-Cuts along the borders of cells and charts leave three times as many triangles as there were, most of them slivers. Once
-the charts are known to the map, the cuts are not needed any more. In each round the best collapses are done, none of
-two neighbours, so that all are judged on the same triangles.
+Cuts along the borders of cells and charts leave three times as many triangles as there were, most
+of them slivers. Once the charts are known to the map, the cuts are not needed any more. In each
+round the best collapses are done, none of two neighbours, so that all are judged on the same
+triangles.
 
-A half-edge collapse must meet the link condition, keep every triangle inside its parent on the mesh, and turn none
-over, neither there nor on the charts.
+A half-edge collapse must meet the link condition, keep every triangle inside its parent on the
+mesh, and turn none over, neither there nor on the charts.
 """
 
 from __future__ import annotations
@@ -14,7 +15,18 @@ import numpy as np
 
 from ...kernel import Bools, Floats, Ints, kernel
 from ..energy import FIXED, FREE
-from .seamless import Complex, SeamlessMap, after, corner_place, frame_of, inverse, square, stars, turned, wedge
+from .seamless import (
+    Complex,
+    SeamlessMap,
+    after,
+    corner_place,
+    frame_of,
+    inverse,
+    square,
+    stars,
+    turned,
+    wedge,
+)
 from .surface import TriangleSurface
 
 _FLATTEST = 0.05  # double area over squared length of a triangle on the charts after a collapse
@@ -23,27 +35,39 @@ _LEAST_INSIDE = 1e-9  # double area of a triangle in its parent, in barycentric 
 # Where the triangles lie on the mesh: parent [m], and barycentrics in it of their corners [m, 3, 3]
 Parents = tuple[Ints, Floats]
 
+# of the vertices in question, in a round that is worth another
+_MOST_ROUNDS = 20
+_LEAST_SHARE = 0.01
+
 
 @kernel
-def _targets(seamless: SeamlessMap, parents: Parents, cut: Bools, at_rim: Bools) -> tuple[Floats, Ints]:
+def _targets(
+    seamless: SeamlessMap, parents: Parents, cut: Bools, at_rim: Bools
+) -> tuple[Floats, Ints]:
     """How good the best collapse of each vertex is, above 0 [n], and a corner 3 triangle + k: to where it goes."""
     n = len(seamless.z)
-    worth, target, seen = np.zeros(n), np.full(n, -1), np.full(n, -1)
+    worth = np.zeros(n)
+    target = np.full(n, -1)
+    seen = np.full(n, -1)
     for u in range(n):
-        first, last = seamless.star_start[u], seamless.star_start[u + 1]
+        first = seamless.star_start[u]
+        last = seamless.star_start[u + 1]
         if not cut[u] or seamless.freedom[u] == FIXED or first == last:
             continue
         for i in range(first, last):
-            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            f = seamless.star[i] // 3
+            k = seamless.star[i] % 3
             for j in (1, 2):
                 seen[seamless.F[f, (k + j) % 3]] = u
         for i in range(first, last):
-            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            f = seamless.star[i] // 3
+            k = seamless.star[i] % 3
             for j in range(1, 2 if seamless.freedom[u] == FREE else 3):  # each neighbour once
                 m = (k + j) % 3
                 good = _worth(seamless, parents, at_rim, u, f, k, m)
                 if good > worth[u] and _meets(seamless, u, seamless.F[f, m], seen):
-                    worth[u], target[u] = good, 3 * f + m
+                    worth[u] = good
+                    target[u] = 3 * f + m
     return worth, target
 
 
@@ -54,9 +78,11 @@ def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
     if seamless.freedom[v] == FREE and not inner:
         return False
     shared = beside = 0
-    first, last = seamless.star_start[v], seamless.star_start[v + 1]
+    first = seamless.star_start[v]
+    last = seamless.star_start[v + 1]
     for i in range(first, last):
-        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        f = seamless.star[i] // 3
+        k = seamless.star[i] % 3
         for j in (1, 2):
             w = seamless.F[f, (k + j) % 3]
             beside += w == u
@@ -64,7 +90,8 @@ def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
                 seen[w] = -2 - u
                 shared += 1
     for i in range(first, last):
-        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        f = seamless.star[i] // 3
+        k = seamless.star[i] % 3
         for j in (1, 2):
             w = seamless.F[f, (k + j) % 3]
             if seen[w] == -2 - u:
@@ -73,7 +100,9 @@ def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
 
 
 @kernel
-def _worth(seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: int, k: int, m: int) -> float:
+def _worth(
+    seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: int, k: int, m: int
+) -> float:
     """Width of the flattest triangle on the charts if u, corner k of triangle f, goes to corner m; 0 if it may not."""
     v = seamless.F[f, m]
     held = seamless.freedom[v] == FIXED
@@ -83,9 +112,12 @@ def _worth(seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: in
     goal = turned(corner_place(seamless, f, m), turn) + shift
     flattest = np.inf
     for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
-        g, c = seamless.star[i] // 3, seamless.star[i] % 3
-        p, q = (c + 1) % 3, (c + 2) % 3
-        a, b = seamless.F[g, p], seamless.F[g, q]
+        g = seamless.star[i] // 3
+        c = seamless.star[i] % 3
+        p = (c + 1) % 3
+        q = (c + 2) % 3
+        a = seamless.F[g, p]
+        b = seamless.F[g, q]
         if a == v or b == v:
             continue
         # two tips in a triangle would leave it no way to move
@@ -105,18 +137,23 @@ def _worth(seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: in
 def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: int) -> bool:
     """Whether v with corners p and q of triangle g makes a triangle inside of g's parent, as it is turned."""
     for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
-        h, c = seamless.star[i] // 3, seamless.star[i] % 3
+        h = seamless.star[i] // 3
+        c = seamless.star[i] % 3
         if parents[0][h] == parents[0][g]:
-            o, a, b = parents[1][h, c], parents[1][g, p], parents[1][g, q]
-            ux, uy, vx, vy = a[1] - o[1], a[2] - o[2], b[1] - o[1], b[2] - o[2]
+            o = parents[1][h, c]
+            a = parents[1][g, p]
+            b = parents[1][g, q]
+            ux = a[1] - o[1]
+            uy = a[2] - o[2]
+            vx = b[1] - o[1]
+            vy = b[2] - o[2]
             return ux * vy - uy * vx > _LEAST_INSIDE
     return False
 
 
-_MOST_ROUNDS, _LEAST_SHARE = 20, 0.01  # of the vertices in question, in a round that is worth another
-
-
-def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) -> tuple[TriangleSurface, SeamlessMap]:
+def without_cuts(
+    surface: TriangleSurface, seamless: SeamlessMap, cut: Bools
+) -> tuple[TriangleSurface, SeamlessMap]:
     """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
     parents = surface.parent, np.ascontiguousarray(surface.inside)
     for _ in range(_MOST_ROUNDS):
@@ -125,14 +162,24 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
         if chosen.sum() <= _LEAST_SHARE * cut.sum():
             break
         left, F, turn, shift, inside = _collapse(seamless, parents, chosen, target)
-        F, frame, turn, shift = F[left], seamless.frame[left], turn[left], shift[left]
+        F = F[left]
+        frame = seamless.frame[left]
+        turn = turn[left]
+        shift = shift[left]
         start, star = stars(F, len(seamless.z))
-        seamless = seamless._replace(F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star)
+        seamless = seamless._replace(
+            F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star
+        )
         parents = parents[0][left], inside[left]
     used, F = np.unique(seamless.F, return_inverse=True)
     start, star = stars(F, len(used))
     seamless = seamless._replace(
-        F=F, chart=seamless.chart[used], z=seamless.z[used], freedom=seamless.freedom[used], star_start=start, star=star
+        F=F,
+        chart=seamless.chart[used],
+        z=seamless.z[used],
+        freedom=seamless.freedom[used],
+        star_start=start,
+        star=star,
     )
     return TriangleSurface(surface.V[used], F, parents[0], parents[1]), seamless
 
@@ -141,24 +188,29 @@ def without_cuts(surface: TriangleSurface, seamless: SeamlessMap, cut: Bools) ->
 def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> Bools:
     """The best collapses, none of two neighbours, and none that make the same edge."""
     n = len(order)
-    chosen, blocked, made = np.zeros(n, np.bool_), np.zeros(n, np.bool_), {np.int64(-1)}
+    chosen = np.zeros(n, np.bool_)
+    blocked = np.zeros(n, np.bool_)
+    made = {np.int64(-1)}
     for u in order:
         if not worth[u] > 0.0:
             break
         if blocked[u]:
             continue
         v = seamless.F[target[u] // 3, target[u] % 3]
-        first, last = seamless.star_start[u], seamless.star_start[u + 1]
+        first = seamless.star_start[u]
+        last = seamless.star_start[u + 1]
         free = True
         for i in range(first, last):
-            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            f = seamless.star[i] // 3
+            k = seamless.star[i] % 3
             for j in (1, 2):
                 w = seamless.F[f, (k + j) % 3]
                 free = free and (min(v, w) * n + max(v, w)) not in made
         if not free:
             continue
         for i in range(first, last):
-            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            f = seamless.star[i] // 3
+            k = seamless.star[i] % 3
             for j in (1, 2):
                 w = seamless.F[f, (k + j) % 3]
                 blocked[w] = True
@@ -172,7 +224,10 @@ def _collapse(
     seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints
 ) -> tuple[Bools, Ints, Ints, Complex, Floats]:
     """Which triangles are left; of all, vertices, the changes to their frames, and where in their parents these lie."""
-    F, turn, shift, inside = seamless.F.copy(), seamless.turn.copy(), seamless.shift.copy(), parents[1].copy()
+    F = seamless.F.copy()
+    turn = seamless.turn.copy()
+    shift = seamless.shift.copy()
+    inside = parents[1].copy()
     left = np.ones(len(F), np.bool_)
     for f in range(len(F)):
         k = 0
@@ -181,7 +236,8 @@ def _collapse(
         if k == 3:
             continue
         u = seamless.F[f, k]
-        g, m = target[u] // 3, target[u] % 3
+        g = target[u] // 3
+        m = target[u] % 3
         v = seamless.F[g, m]
         if v == seamless.F[f, 0] or v == seamless.F[f, 1] or v == seamless.F[f, 2]:
             left[f] = False
@@ -191,7 +247,8 @@ def _collapse(
         F[f, k] = v
         turn[f, k], shift[f, k] = after(frame_of(seamless, g, m), through_u)
         for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
-            h, c = seamless.star[i] // 3, seamless.star[i] % 3
+            h = seamless.star[i] // 3
+            c = seamless.star[i] % 3
             if parents[0][h] == parents[0][f]:
                 for j in range(3):
                     inside[f, k, j] = parents[1][h, c, j]

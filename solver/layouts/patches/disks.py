@@ -1,8 +1,8 @@
 """Cells made disks with three corners and more, and laid out flat in convex polygons without a fold.
 
-Seeds are added and taken away until all cells are disks. In the plane each inner vertex is a mean of its neighbours
-with positive weights, so that the map is one to one (Tutte 1963, Floater 2003), whatever the weights; mean-value
-weights follow the shape of the triangles.
+Seeds are added and taken away until all cells are disks. In the plane each inner vertex is a mean
+of its neighbours with positive weights, so that the map is one to one (Tutte 1963, Floater 2003),
+whatever the weights; mean-value weights follow the shape of the triangles.
 """
 
 from __future__ import annotations
@@ -20,13 +20,18 @@ from .surface import TriangleSurface
 _MOST_ROUNDS = 200
 _FEWEST = 4  # cells of a closed surface
 
+# half-angle tangents; beyond them triangles are so bad that round-off would fold them
+_LEAST = 1e-3
+_MOST = 1e3
+
 
 def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     """Cells of one connected component, cut apart, each a disk with at least three corners.
 
-    A cell that is no disk gets a seed half-way round its shortest loop that does not shrink to a point; one with fewer
-    corners gets a further neighbour on its border or, if that was tried before, loses its seed. Cells with new
-    neighbours are centred anew, and mended once more. Raises `AtlasError` if none are found.
+    A cell that is no disk gets a seed half-way round its shortest loop that does not shrink to a
+    point; one with fewer corners gets a further neighbour on its border or, if that was tried
+    before, loses its seed. Cells with new neighbours are centred anew, and mended once more. Raises
+    `AtlasError` if none are found.
     """
     mended, bordered = _mended(metric, cells)
     if len(mended.seeds) > len(cells.seeds):
@@ -35,7 +40,8 @@ def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
 
 
 def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, BorderedCells]:
-    surface, tried = metric.surface, set[int]()
+    surface = metric.surface
+    tried = set[int]()
     for _ in range(_MOST_ROUNDS):
         bad = np.flatnonzero(_euler(surface, cells) != 1)
         if len(bad):
@@ -65,7 +71,8 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: Ints, tried: set[int
         if seed not in tried or len(cells.seeds) - len(gone) <= _FEWEST:
             tried.add(seed)
             # farthest of the vertices of other cells that have a neighbour in this one
-            own, beside = cells.label == cell, np.zeros(len(cells.label), bool)
+            own = cells.label == cell
+            beside = np.zeros(len(cells.label), bool)
             beside[ends[own[ends].any(axis=1)]] = True
             new.append(int(np.argmax(np.where(beside & ~own, cells.distance, -1.0))))
         else:
@@ -75,26 +82,34 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: Ints, tried: set[int
 
 def _euler(surface: TriangleSurface, cells: VoronoiCells) -> Ints:
     """Euler characteristic of the vertices of each cell with the edges and triangles between them."""
-    count, label = len(cells.seeds), cells.label
-    ends, corners = label[surface.edges.ends], label[surface.F]
+    count = len(cells.seeds)
+    label = cells.label
+    ends = label[surface.edges.ends]
+    corners = label[surface.F]
     edges = ends[ends[:, 0] == ends[:, 1], 0]
     triangles = corners[(corners[:, 0] == corners[:, 1]) & (corners[:, 1] == corners[:, 2]), 0]
-    vertices, links, faces = (np.bincount(each, minlength=count) for each in (label, edges, triangles))
+    vertices, links, faces = (
+        np.bincount(each, minlength=count) for each in (label, edges, triangles)
+    )
     return vertices - links + faces
 
 
 def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     """Vertex farthest along the shortest loop in a cell that does not shrink to a point.
 
-    Edges that close no such loop are those of a tree of shortest paths, and those of a tree of triangles, longest loops
-    first (Erickson and Whittlesey 2005). All that lies outside the cell counts as one triangle.
+    Edges that close no such loop are those of a tree of shortest paths, and those of a tree of
+    triangles, longest loops first (Erickson and Whittlesey 2005). All that lies outside the cell
+    counts as one triangle.
     """
-    edges, own = surface.edges, cells.label == cell
+    edges = surface.edges
+    own = cells.label == cell
     links = np.flatnonzero(own[edges.ends].all(axis=1))
     ends = edges.ends[links]
     lengths = np.maximum(surface.edge_lengths[links], np.finfo(np.float64).tiny)
     graph = csr_array(coo_array((lengths, tuple(ends.T)), shape=(len(own), len(own))))
-    distance, before = dijkstra(graph, directed=False, indices=cells.seeds[cell], return_predecessors=True)
+    distance, before = dijkstra(
+        graph, directed=False, indices=cells.seeds[cell], return_predecessors=True
+    )
     tree = (before[ends[:, 0]] == ends[:, 1]) | (before[ends[:, 1]] == ends[:, 0])
     loop = distance[ends].sum(axis=1) + lengths
     inner = own[surface.F].all(axis=1)
@@ -102,7 +117,9 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     beside = number[edges.sides[links] // 3]  # -1 at a rim: the last
     order = np.argsort(-loop, kind="stable")
     order = order[~tree[order]]
-    root, closing = list(range(int(inner.sum()) + 1)), -1  # the last edge whose two triangles are joined already
+    # the last edge whose two triangles are joined already
+    root = list(range(int(inner.sum()) + 1))
+    closing = -1
     for e, (a, b) in zip(order.tolist(), beside[order].tolist(), strict=True):
         while root[a] != a:
             root[a] = a = root[root[a]]
@@ -116,9 +133,6 @@ def _far_side(surface: TriangleSurface, cells: VoronoiCells, cell: int) -> int:
     best = ends[closing]
     return int(best[np.argmax(distance[best])])
 
-
-# half-angle tangents; beyond them triangles are so bad that round-off would fold them
-_LEAST, _MOST = 1e-3, 1e3
 
 # of the vertices on the borders of parts: part and vertex, each [b], and place [b, 2]
 Border = tuple[Ints, Ints, Floats]
@@ -138,7 +152,9 @@ def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     # mean-value weights: in corner k of a triangle, of its next vertex and of the one before
     triangles = surface.V[surface.F]
     sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-    lengths = np.maximum(np.stack([sides, np.roll(sides, 1, axis=1)], axis=2), np.finfo(np.float64).tiny)
+    lengths = np.maximum(
+        np.stack([sides, np.roll(sides, 1, axis=1)], axis=2), np.finfo(np.float64).tiny
+    )
     weights = np.clip(np.tan(surface.angles / 2), _LEAST, _MOST)[:, :, None] / lengths
     places = _solved(corners, weights, start)[corners]
     folded = np.isin(part, part[signed_areas(places) <= 0])
@@ -150,7 +166,8 @@ def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
 
 def signed_areas(places: Floats) -> Floats:
     """Areas [m] of flat triangles [m, 3, 2], positive where they are counter-clockwise."""
-    u, v = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    u = places[:, 1] - places[:, 0]
+    v = places[:, 2] - places[:, 0]
     return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
 
 
@@ -175,7 +192,9 @@ def _solved(corners: Ints, weights: Floats, start: Floats) -> Floats:
     row = np.repeat(corners, 2, axis=1).ravel()
     column = np.stack([np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)], axis=2).ravel()
     chosen = free[row]
-    matrix = csr_array((weights.ravel()[chosen], (row[chosen], column[chosen])), shape=(len(start), len(start)))
+    matrix = csr_array(
+        (weights.ravel()[chosen], (row[chosen], column[chosen])), shape=(len(start), len(start))
+    )
     total = np.asarray(matrix.sum(axis=1))
     rows = matrix[free]
     rows.data /= np.repeat(total[free], np.diff(rows.indptr))

@@ -1,11 +1,12 @@
 """The energy of a seamless map, and its relaxation: what a triangle costs that is stretched, squeezed or sheared.
 
-Areas of triangles are scaled so that a chart has area 1 on average. The energy is the mean of the Dirichlet energies of
-the map and of its inverse, each squared: 1 for an isometry, infinite at a fold. Not squared it would be brought to its
-least more easily; a higher power reduces the worst spots at the cost of others.
+Areas of triangles are scaled so that a chart has area 1 on average. The energy is the mean of the
+Dirichlet energies of the map and of its inverse, each squared: 1 for an isometry, infinite at a
+fold. Not squared it would be brought to its least more easily; a higher power reduces the worst
+spots at the cost of others.
 
-Newton steps of all vertices at once are cut short by the first triangle that would fold; sweeps over single vertices,
-each inside its star, clear such spots.
+Newton steps of all vertices at once are cut short by the first triangle that would fold; sweeps
+over single vertices, each inside its star, clear such spots.
 """
 
 from __future__ import annotations
@@ -18,8 +19,24 @@ from ...kernel import Floats, Ints, Ints32, kernel
 from ...mesh.topology import edges_of
 from ...mesh.vectors import Vector, cross, dot, subtract
 from ..energy import FIXED, TERMS, Density, Reference, descend, energy_density, expand_star
-from ..newton import CG_TOLERANCE, System, add_triangle, conjugate_gradients, descend_by_newton, line_search
-from .seamless import Complex, SeamlessMap, corner_place, rehome, rehome_vertex, square, turned, wedge
+from ..newton import (
+    CG_TOLERANCE,
+    System,
+    add_triangle,
+    conjugate_gradients,
+    descend_by_newton,
+    line_search,
+)
+from .seamless import (
+    Complex,
+    SeamlessMap,
+    corner_place,
+    rehome,
+    rehome_vertex,
+    square,
+    turned,
+    wedge,
+)
 
 CHARTS = Density(power=2, even=0.5, long=0.5, small=0.0)
 
@@ -27,24 +44,36 @@ FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
 _FLATTEST = 0.02  # least double area over squared length that the energy believes in
 _LEAST_AREA = 1e-6  # of a triangle, in units of their mean
 
-UP, COLUMNS, ROWS = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+UP = (0.0, 0.0, 1.0)
+COLUMNS = (1.0, 0.0, 0.0)
+ROWS = (0.0, 1.0, 0.0)
+
+_LONGEST_STEP = 0.5  # of a chart
+_SWEEPS = 2
+_MOST_STEPS = 30
+_CG_RANGE = 40, 200
 
 
 def reference_of(V: Floats, F: Ints, charts: int) -> Reference:
     """The triangles F [m, 3] that a map is to resemble, their areas scaled to add up to the number of charts."""
     a, b, c = (V[F[:, k]].T for k in range(3))
-    ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
-    normal, tiny = cross(ab, ac), np.finfo(np.float64).tiny
+    ab = subtract(b, a)
+    ac = subtract(c, a)
+    bc = subtract(c, b)
+    normal = cross(ab, ac)
+    tiny = np.finfo(np.float64).tiny
     double = np.sqrt(dot(normal, normal))
     area = np.maximum(double / 2, tiny)
     area = np.maximum(area, _LEAST_AREA * area.mean())
     area *= charts / area.sum()
     squares = np.stack([dot(bc, bc), dot(ac, ac), dot(ab, ab)])
-    top, every = squares.argmax(axis=0), np.arange(len(F))
+    top = squares.argmax(axis=0)
+    every = np.arange(len(F))
     # needles count as a little thicker: the corner opposite to their longest side stands higher
     double = np.maximum(np.maximum(double, _FLATTEST * squares[top, every]), tiny)
     cotangent = np.stack([dot(ab, ac), -dot(ab, bc), dot(ac, bc)]) / double
-    left, right = cotangent[(top + 1) % 3, every], cotangent[(top + 2) % 3, every]
+    left = cotangent[(top + 1) % 3, every]
+    right = cotangent[(top + 2) % 3, every]
     cotangent[top, every] = (1.0 - left * right) / np.maximum(left + right, tiny)
     return Reference(area, (cotangent / (2.0 * area)).T.ravel(), CHARTS)
 
@@ -57,24 +86,41 @@ def total_energy(seamless: SeamlessMap, reference: Reference) -> float:
 @kernel
 def energy_of(seamless: SeamlessMap, reference: Reference, triangles: Ints) -> float:
     """Energy of some triangles [k]; infinite if one is folded."""
-    total, cotangent = 0.0, reference.cotangent
+    total = 0.0
+    cotangent = reference.cotangent
     for f in triangles:
-        a, b, c = corner_place(seamless, f, 0), corner_place(seamless, f, 1), corner_place(seamless, f, 2)
+        a = corner_place(seamless, f, 0)
+        b = corner_place(seamless, f, 1)
+        c = corner_place(seamless, f, 2)
         area = 0.5 * wedge(b - a, c - a)
         if not area > FOLDED:
             return np.inf
-        h, share = 3 * f, reference.area[f]
-        dirichlet = cotangent[h] * square(c - b) + cotangent[h + 1] * square(c - a) + cotangent[h + 2] * square(b - a)
+        h = 3 * f
+        share = reference.area[f]
+        dirichlet = (
+            cotangent[h] * square(c - b)
+            + cotangent[h + 1] * square(c - a)
+            + cotangent[h + 2] * square(b - a)
+        )
         total += share * energy_density(dirichlet, share / area, reference.density)
     return total
 
 
 @kernel
-def assemble(seamless: SeamlessMap, reference: Reference, edge: Ints, ends: Ints32, system: System) -> None:
-    """Add the triangles to the system, in the vertices' own frames. `edge` [m, 3] are their edges, `ends` [e, 2]."""
+def assemble(
+    seamless: SeamlessMap, reference: Reference, edge: Ints, ends: Ints32, system: System
+) -> None:
+    """Add the triangles to the system, in the vertices' own frames.
+
+    `edge` [m, 3] are their edges, `ends` [e, 2].
+    """
     for f in range(len(seamless.F)):
-        u, v, w = seamless.F[f, 0], seamless.F[f, 1], seamless.F[f, 2]
-        i, j, k = edge[f, 0], edge[f, 1], edge[f, 2]
+        u = seamless.F[f, 0]
+        v = seamless.F[f, 1]
+        w = seamless.F[f, 2]
+        i = edge[f, 0]
+        j = edge[f, 1]
+        k = edge[f, 2]
         add_triangle(
             f,
             (u, v, w),
@@ -119,23 +165,35 @@ def scratch(seamless: SeamlessMap) -> Star:
 @kernel
 def gather(seamless: SeamlessMap, reference: Reference, v: int, origin: complex, star: Star) -> int:
     """Expand the star of a vertex about a place in its frame, from which its corners are seen; how many triangles."""
-    start, cotangent = seamless.star_start[v], reference.cotangent
+    start = seamless.star_start[v]
+    cotangent = reference.cotangent
     degree = seamless.star_start[v + 1] - start
     for i in range(degree):
-        f, k = seamless.star[start + i] // 3, seamless.star[start + i] % 3
-        following, before, back = (k + 1) % 3, (k + 2) % 3, (4 - seamless.turn[f, k]) % 4
+        f = seamless.star[start + i] // 3
+        k = seamless.star[start + i] % 3
+        following = (k + 1) % 3
+        before = (k + 2) % 3
+        back = (4 - seamless.turn[f, k]) % 4
         p = turned(corner_place(seamless, f, following) - seamless.shift[f, k], back) - origin
         q = turned(corner_place(seamless, f, before) - seamless.shift[f, k], back) - origin
-        star.first[i, 0], star.first[i, 1], star.first[i, 2] = p.real, p.imag, 1.0
-        star.second[i, 0], star.second[i, 1], star.second[i, 2] = q.real, q.imag, 1.0
-        star.shapes[i, 0], star.shapes[i, 1] = reference.area[f], cotangent[3 * f + k]
-        star.shapes[i, 2], star.shapes[i, 3] = cotangent[3 * f + following], cotangent[3 * f + before]
+        star.first[i, 0] = p.real
+        star.first[i, 1] = p.imag
+        star.first[i, 2] = 1.0
+        star.second[i, 0] = q.real
+        star.second[i, 1] = q.imag
+        star.second[i, 2] = 1.0
+        star.shapes[i, 0] = reference.area[f]
+        star.shapes[i, 1] = cotangent[3 * f + k]
+        star.shapes[i, 2] = cotangent[3 * f + following]
+        star.shapes[i, 3] = cotangent[3 * f + before]
     expand_star(UP, COLUMNS, ROWS, star.first, star.second, star.shapes, degree, star.terms)
     return degree
 
 
 @kernel
-def sweep(seamless: SeamlessMap, reference: Reference, vertices: Ints, star: Star, follow_at_once: bool) -> float:
+def sweep(
+    seamless: SeamlessMap, reference: Reference, vertices: Ints, star: Star, follow_at_once: bool
+) -> float:
     """Move some vertices, one after the other, each by a Newton step inside its star; by how much the energy fell.
 
     `star` is room for any. Each vertex is followed into its new chart at once, or left to `rehome`.
@@ -153,15 +211,10 @@ def sweep(seamless: SeamlessMap, reference: Reference, vertices: Ints, star: Sta
     return fall
 
 
-_LONGEST_STEP = 0.5  # of a chart
-_SWEEPS = 2
-_MOST_STEPS = 30
-_CG_RANGE = 40, 200
-
-
 def sweep_all(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float:
     """Move every vertex once, and follow them into their charts; return by how much the energy fell."""
-    before, vertices = seamless.z.copy(), np.arange(len(seamless.z))[:: -1 if backwards else 1].copy()
+    before = seamless.z.copy()
+    vertices = np.arange(len(seamless.z))[:: -1 if backwards else 1].copy()
     fall = sweep(seamless, reference, vertices, scratch(seamless), False)
     rehome(seamless, before)
     return fall
@@ -187,8 +240,8 @@ def newton_step(
 ) -> tuple[float, float]:
     """Move the map by one Newton step in place; return by how much the energy fell, and the step's length.
 
-    Whole steps have length 1; 0 where no step lowers the energy. `edge` [m, 3] are the edges ab, bc, ca of the
-    triangles, and `ends` [e, 2] their vertices.
+    Whole steps have length 1; 0 where no step lowers the energy. `edge` [m, 3] are the edges ab,
+    bc, ca of the triangles, and `ends` [e, 2] their vertices.
     """
     system = System.zeros(len(seamless.z), len(ends))
     energy = total_energy(seamless, reference)
@@ -206,8 +259,11 @@ def newton_step(
     slope = float((system.gradient * step).sum())
     if not slope < 0:
         return 0.0, 0.0
-    before, way = seamless.z.copy(), step @ (1, 1j)
-    bound = min(0.9 * _time_of_first_fold(seamless, way), _LONGEST_STEP / float(np.sqrt(square(way).max())))
+    before = seamless.z.copy()
+    way = step @ (1, 1j)
+    bound = min(
+        0.9 * _time_of_first_fold(seamless, way), _LONGEST_STEP / float(np.sqrt(square(way).max()))
+    )
 
     def energy_at(t: float) -> float:
         seamless.z[:] = before + t * way
@@ -223,11 +279,16 @@ def newton_step(
 def _time_of_first_fold(seamless: SeamlessMap, way: Complex) -> float:
     """The first time at which a triangle has no area, if its corners go their ways [n] in a unit of time."""
     first = np.inf
-    x, d = np.empty(3, np.complex128), np.empty(3, np.complex128)
+    x = np.empty(3, np.complex128)
+    d = np.empty(3, np.complex128)
     for f in range(len(seamless.F)):
         for k in range(3):
-            x[k], d[k] = corner_place(seamless, f, k), turned(way[seamless.F[f, k]], seamless.turn[f, k])
-        u, v, p, q = x[1] - x[0], x[2] - x[0], d[1] - d[0], d[2] - d[0]
+            x[k] = corner_place(seamless, f, k)
+            d[k] = turned(way[seamless.F[f, k]], seamless.turn[f, k])
+        u = x[1] - x[0]
+        v = x[2] - x[0]
+        p = d[1] - d[0]
+        q = d[2] - d[0]
         c = wedge(u, v)
         b = wedge(u, q) + p.real * v.imag - p.imag * v.real
         a = wedge(p, q)

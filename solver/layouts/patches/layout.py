@@ -1,10 +1,10 @@
 """From the triangles of a mesh to charts: components, cells, quads, relaxation.
 
-Tips of cones move over the surface. They sit on vertices, where the cells' corners and middles happened to be, and a
-tip in the wrong place strains the map round it until texels beside it fold. So a tip may move on to a neighbouring
-vertex, if that lowers the energy: what was a cone's vertex becomes a free one, and its neighbour is fixed on the tip.
-Frames change only in the two stars: a turn round the old vertex is now nothing, a turn round the new one what the old
-one's was.
+Tips of cones move over the surface. They sit on vertices, where the cells' corners and middles
+happened to be, and a tip in the wrong place strains the map round it until texels beside it fold.
+So a tip may move on to a neighbouring vertex, if that lowers the energy: what was a cone's vertex
+becomes a free one, and its neighbour is fixed on the tip. Frames change only in the two stars: a
+turn round the old vertex is now nothing, a turn round the new one what the old one's was.
 """
 
 from __future__ import annotations
@@ -20,12 +20,35 @@ from ..energy import FIXED, FREE, Density, Reference, star_energy
 from .collapse import without_cuts
 from .energy import Star, energy_of, gather, reference_of, relax_all, scratch, sweep, sweep_all
 from .quads import CELLS, Quads, large_quads_of, quads_of
-from .seamless import Frame, SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned, wedge
+from .seamless import (
+    Frame,
+    SeamlessMap,
+    after,
+    follow,
+    frame_of,
+    inverse,
+    seamless_map,
+    turned,
+    wedge,
+)
 from .surface import TriangleSurface
 
 _LAYERS = 3  # of vertices that a tip's move may move
 _SWEEPS = 3  # over the vertices round a tip, before it is judged
 _WORTH = 1e-3  # share of the energy round a tip that a move must save
+
+_MOST = 4 / 3  # times as many has a mesh in parts of uneven sizes
+_FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
+_NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
+
+# by so much more or less than its share of charts a part is cut again, so often
+_MISJUDGED = 0.1
+_TRIES = 3
+
+# before the tips move and after: stop when a step saves less than this share of the energy
+_ROUGH = 5e-3
+_FINE = 2e-3
+_MOST_MOVES = 5  # of a tip, by an edge each
 
 
 def move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints) -> Ints:
@@ -44,7 +67,9 @@ def _move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints, star: St
             h = seamless.star[i]
             u = seamless.F[h // 3, (h % 3 + 1) % 3]
             corner = 3 * (h // 3) + (h % 3 + 1) % 3
-            if seamless.freedom[u] != FREE or not (_fan(seamless, v, h, fan[0]) and _fan(seamless, u, corner, fan[1])):
+            if seamless.freedom[u] != FREE or not (
+                _fan(seamless, v, h, fan[0]) and _fan(seamless, u, corner, fan[1])
+            ):
                 continue
             stamp += 1
             vertices, triangles = _around(seamless, v, u, mark, stamp)
@@ -58,7 +83,8 @@ def _move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints, star: St
 @kernel
 def _fan(seamless: SeamlessMap, v: int, h: int, fan: Ints) -> bool:
     """Corners of v, counter-clockwise from corner h; whether they go all round it."""
-    first, last = seamless.star_start[v], seamless.star_start[v + 1]
+    first = seamless.star_start[v]
+    last = seamless.star_start[v + 1]
     for i in range(last - first):
         fan[i] = h
         wanted = seamless.F[h // 3, (h % 3 + 2) % 3]
@@ -79,12 +105,16 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
     Nothing if there is another tip among their neighbours. `mark` [n + m] holds older stamps.
     """
     n = len(seamless.z)
-    vertices, triangles = [v, u], [np.int64(0) for _ in range(0)]
+    vertices = [v, u]
+    triangles = [np.int64(0) for _ in range(0)]
     mark[v] = mark[u] = stamp
-    first, last = 0, 2
+    first = 0
+    last = 2
     for layer in range(_LAYERS):
         for at in range(first, last):
-            for i in range(seamless.star_start[vertices[at]], seamless.star_start[vertices[at] + 1]):
+            for i in range(
+                seamless.star_start[vertices[at]], seamless.star_start[vertices[at] + 1]
+            ):
                 h = seamless.star[i]
                 w = seamless.F[h // 3, (h % 3 + 1) % 3]
                 if layer == 0 and seamless.freedom[w] == FIXED and w != v:
@@ -92,7 +122,8 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
                 if mark[w] != stamp:
                     mark[w] = stamp
                     vertices.append(w)
-        first, last = last, len(vertices)
+        first = last
+        last = len(vertices)
     for w in vertices:
         for i in range(seamless.star_start[w], seamless.star_start[w + 1]):
             f = seamless.star[i] // 3
@@ -103,12 +134,23 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
 
 
 @kernel
-def _moved(seamless: SeamlessMap, reference: Reference, vertices: Ints, triangles: Ints, fan: Ints, star: Star) -> bool:
+def _moved(
+    seamless: SeamlessMap,
+    reference: Reference,
+    vertices: Ints,
+    triangles: Ints,
+    fan: Ints,
+    star: Star,
+) -> bool:
     """Try to move a tip; whether it stays there."""
     before = energy_of(seamless, reference, triangles)
-    z, chart, freedom = seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices]
-    turn, shift = seamless.turn[triangles], seamless.shift[triangles]
-    v, u = vertices[0], vertices[1]
+    z = seamless.z[vertices]
+    chart = seamless.chart[vertices]
+    freedom = seamless.freedom[vertices]
+    turn = seamless.turn[triangles]
+    shift = seamless.shift[triangles]
+    v = vertices[0]
+    u = vertices[1]
     _change_frames(seamless, v, u, fan)
     degree = gather(seamless, reference, v, 0j, star)
     _put_into_star(seamless, v, u, star, degree, reference.density)
@@ -124,29 +166,41 @@ def _moved(seamless: SeamlessMap, reference: Reference, vertices: Ints, triangle
             sweep(seamless, reference, vertices, star, True)
         if energy_of(seamless, reference, triangles) < (1.0 - _WORTH) * before:
             return True
-    seamless.z[vertices], seamless.chart[vertices], seamless.freedom[vertices] = z, chart, freedom
-    seamless.turn[triangles], seamless.shift[triangles] = turn, shift
+    seamless.z[vertices] = z
+    seamless.chart[vertices] = chart
+    seamless.freedom[vertices] = freedom
+    seamless.turn[triangles] = turn
+    seamless.shift[triangles] = shift
     return False
 
 
 @kernel
-def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: int, density: Density) -> None:
+def _put_into_star(
+    seamless: SeamlessMap, u: int, v: int, star: Star, degree: int, density: Density
+) -> None:
     """Put u, in the frame that it begins with, on a way from v, where its star's energy is least and nothing folded."""
     start = seamless.star_start[u]
     z = left = right = middle = 0j
     for i in range(degree):
-        f, k = seamless.star[start + i] // 3, seamless.star[start + i] % 3
-        p, q = complex(star.first[i, 0], star.first[i, 1]), complex(star.second[i, 0], star.second[i, 1])
+        f = seamless.star[start + i] // 3
+        k = seamless.star[start + i] % 3
+        p = complex(star.first[i, 0], star.first[i, 1])
+        q = complex(star.second[i, 0], star.second[i, 1])
         middle += (p + q) / (2 * degree)
         if seamless.F[f, (k + 1) % 3] == v:
-            z, left = p, q
+            z = p
+            left = q
         elif seamless.F[f, (k + 2) % 3] == v:
-            z, right = q, p
-    # between the directions to left and right, as long as the shorter: the sum of both sides' normals, inwards
-    a, b = left - z, right - z
+            z = q
+            right = p
+    # between the directions to left and right, as long as the shorter: the sum of both sides'
+    # normals, inwards
+    a = left - z
+    b = right - z
     inward = 1j * (a / abs(a) - b / abs(b))
     inward = inward * (min(abs(a), abs(b)) / abs(inward)) if abs(inward) > 1e-9 else a
-    least, best = np.inf, z
+    least = np.inf
+    best = z
     for way in range(2):
         goal, share, trials = (middle, 0.65, 16) if way == 0 else (z + inward, 0.4, 40)
         t = 0.65
@@ -154,7 +208,8 @@ def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: in
             p = z + t * (goal - z)
             energy = star_energy(star.terms, degree, density, (p.real, p.imag, 0.0))
             if energy < least:
-                least, best = energy, p
+                least = energy
+                best = p
             elif least < np.inf:
                 break
             t *= share
@@ -166,10 +221,14 @@ def _put_into_star(seamless: SeamlessMap, u: int, v: int, star: Star, degree: in
 @kernel
 def _enter_chart(seamless: SeamlessMap, u: int) -> None:
     """Find the chart in which u lies, on a straight way from a neighbour, and take its frame."""
-    first, last = seamless.star_start[u], seamless.star_start[u + 1]
-    f, k, j = 0, 0, -1
+    first = seamless.star_start[u]
+    last = seamless.star_start[u + 1]
+    f = 0
+    k = 0
+    j = -1
     for i in range(first, last):
-        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        f = seamless.star[i] // 3
+        k = seamless.star[i] % 3
         for m in (1, 2):
             if j < 0 and seamless.freedom[seamless.F[f, (k + m) % 3]] != FIXED:
                 j = m
@@ -178,10 +237,13 @@ def _enter_chart(seamless: SeamlessMap, u: int) -> None:
     w = seamless.F[f, (k + j) % 3]
     change = after(frame_of(seamless, f, k), inverse(frame_of(seamless, f, (k + j) % 3)))
     goal = turned(seamless.z[u], change[0]) + change[1]
-    seamless.chart[u], onward, seamless.z[u] = follow(seamless, seamless.chart[w], seamless.z[w], goal)
+    seamless.chart[u], onward, seamless.z[u] = follow(
+        seamless, seamless.chart[w], seamless.z[w], goal
+    )
     back = inverse(after(change, onward))
     for i in range(first, last):
-        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        f = seamless.star[i] // 3
+        k = seamless.star[i] % 3
         seamless.turn[f, k], seamless.shift[f, k] = after(back, frame_of(seamless, f, k))
 
 
@@ -196,35 +258,31 @@ def _change_frames(seamless: SeamlessMap, v: int, u: int, fan: Ints) -> None:
     frame = 0, 0j
     for i in range(degree):
         h = fan[0, i]
-        f, k = h // 3, h % 3
+        f = h // 3
+        k = h % 3
         seamless.turn[f, k], seamless.shift[f, k] = frame
         g = fan[0, (i + 1) % degree]
         frame = after(frame, _change(seamless, f, (k + 2) % 3, g // 3, (g % 3 + 1) % 3))
     # the triangles of u see the tip, clockwise from the first, which was v's too
     for i in range(around):
         h = fan[1, (around - i) % around]
-        f, k = h // 3, h % 3
+        f = h // 3
+        k = h % 3
         if i > 0:
             before = fan[1, (around - i + 1) % around]
             turn, shift = _change(seamless, before // 3, (before % 3 + 1) % 3, f, (k + 2) % 3)
             tip = turned(tip, turn) + shift
-        seamless.turn[f, k], seamless.shift[f, k] = 0, tip
-    seamless.z[u], seamless.freedom[u], seamless.freedom[v] = 0.0, FIXED, FREE
+        seamless.turn[f, k] = 0
+        seamless.shift[f, k] = tip
+    seamless.z[u] = 0.0
+    seamless.freedom[u] = FIXED
+    seamless.freedom[v] = FREE
 
 
 @kernel
 def _change(seamless: SeamlessMap, f: int, k: int, g: int, m: int) -> Frame:
     """From the frame of triangle f to that of g, which share a free vertex: corner k of one and m of the other."""
     return after(inverse(frame_of(seamless, f, k)), frame_of(seamless, g, m))
-
-
-_MOST = 4 / 3  # times as many has a mesh in parts of uneven sizes
-_FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
-_NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
-_MISJUDGED, _TRIES = 0.1, 3  # by so much more or less than its share of charts a part is cut again, so often
-
-_ROUGH, _FINE = 5e-3, 2e-3  # before the tips move and after: stop when a step saves less than this share of the energy
-_MOST_MOVES = 5  # of a tip, by an edge each
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -238,19 +296,24 @@ class PatchMap:
 def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
     """Lay a manifold, oriented mesh out on charts, without a fold; on about so many cells of four to six charts.
 
-    Where the largest part allows it charts are large, one for each of some more cells. Raises `AtlasError` if its
-    triangles are too thin, or no cells are found.
+    Where the largest part allows it charts are large, one for each of some more cells. Raises
+    `AtlasError` if its triangles are too thin, or no cells are found.
     """
     parts, counts, shares = _components(V, F, cells)
     widest = int(shares.argmax())
     first = large_quads_of(parts[widest], counts[widest])
     large = first is not None
-    quads = [first if first and i == widest else quads_of(part, counts[i], large) for i, part in enumerate(parts)]
+    quads = [
+        first if first and i == widest else quads_of(part, counts[i], large)
+        for i, part in enumerate(parts)
+    ]
     wanted = shares * sum(len(each.glued) for each in quads)
-    # cells are mended until they are disks with corners enough, which changes their number: a part that has come to
-    # more or less than the charts that its area should have is cut again, and the best of the tries kept
+    # cells are mended until they are disks with corners enough, which changes their number: a part
+    # that has come to more or less than the charts that its area should have is cut again, and the
+    # best of the tries kept
     for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
-        latest, count = quads[i], counts[i]
+        latest = quads[i]
+        count = counts[i]
         for _ in range(_TRIES):
             charts = len(latest.glued)
             count, before = max(1, round(count * float(np.sqrt(wanted[i] / charts)))), count
@@ -260,7 +323,9 @@ def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
                 latest = quads_of(parts[i], count, large)
             except AtlasError:  # what there was before is good
                 break
-            quads[i] = min(quads[i], latest, key=lambda each: abs(np.log(len(each.glued) / wanted[i])))
+            quads[i] = min(
+                quads[i], latest, key=lambda each: abs(np.log(len(each.glued) / wanted[i]))
+            )
     whole = _joined(quads)
     surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)
     relax(surface.V, seamless)
@@ -289,9 +354,12 @@ def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], 
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
     areas = TriangleSurface.of(V, F).areas
     share = np.bincount(of, areas / areas.sum()).astype(np.float64)
-    # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
+    # a small part has a few cells at least; where others have more, its texels are less tiny beside
+    # theirs
     small = share[share >= min(_NEGLIGIBLE, share.max())].min()
-    count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
+    count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(
+        int
+    )
     parts = []
     for each in range(len(number)):
         faces = np.flatnonzero(of == each)
@@ -308,7 +376,9 @@ def _joined(parts: list[Quads]) -> Quads:
     charts = np.cumsum([0, *(len(each.glued) for each in parts)])
     surface = TriangleSurface(
         np.concatenate([each.surface.V for each in parts]),
-        np.concatenate([each.surface.F + first for each, first in zip(parts, vertices, strict=False)]),
+        np.concatenate(
+            [each.surface.F + first for each, first in zip(parts, vertices, strict=False)]
+        ),
         np.concatenate([each.surface.parent for each in parts]),
         np.concatenate([each.surface.inside for each in parts]),
     )

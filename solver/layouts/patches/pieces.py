@@ -1,7 +1,8 @@
 """The triangles of a map onto charts, cut along the charts' borders; and cut again where texels have left their places.
 
-The texel centres of a chart and its border are the nodes of a lattice of triangles. Moved nodes move the triangles, and
-each is laid out again as it was: a texel is then found at its own row and column, wherever on the surface it lies.
+The texel centres of a chart and its border are the nodes of a lattice of triangles. Moved nodes
+move the triangles, and each is laid out again as it was: a texel is then found at its own row and
+column, wherever on the surface it lies.
 """
 
 from __future__ import annotations
@@ -43,14 +44,17 @@ def chart_pieces(patches: PatchMap) -> Pieces:
     seamless = patches.seamless
     corner, homes, z = places_on_charts(seamless)
     places = np.stack([z.real, z.imag], axis=-1)
-    # squares of the plane that each reaches into, from one to that before another; whole numbers lie on borders
+    # squares of the plane that each reaches into, from one to that before another; whole numbers
+    # lie on borders
     first = np.floor(places.min(axis=1) + 1e-12).astype(np.int64)
     last = np.maximum(np.ceil(places.max(axis=1) - 1e-12).astype(np.int64), first + 1)
     cut = _filled(_cut_at_borders, seamless, corner, homes, places, first, last)
     triangle = patches.surface.parent[cut.triangle]
     order = np.argsort(triangle, kind="stable")
     barycentrics = cut.barycentrics @ patches.surface.inside[cut.triangle]
-    return Pieces(triangle[order], barycentrics[order], cut.chart[order], np.clip(cut.places[order], 0.0, 1.0))
+    return Pieces(
+        triangle[order], barycentrics[order], cut.chart[order], np.clip(cut.places[order], 0.0, 1.0)
+    )
 
 
 def _filled(cut: Any, *given: Any) -> Pieces:
@@ -67,14 +71,23 @@ def _filled(cut: Any, *given: Any) -> Pieces:
 
 @kernel
 def _cut_at_borders(
-    seamless: SeamlessMap, corner: Ints, homes: Ints, seen: Floats, first: Ints, last: Ints, room: Pieces
+    seamless: SeamlessMap,
+    corner: Ints,
+    homes: Ints,
+    seen: Floats,
+    first: Ints,
+    last: Ints,
+    room: Pieces,
 ) -> int:
     """Fill in the pieces as far as there is room, and return how many there are."""
     count = 0
-    whole, spare = np.empty((3, 5)), np.empty((MOST_CORNERS, 5))
-    column, square = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
+    whole = np.empty((3, 5))
+    spare = np.empty((MOST_CORNERS, 5))
+    column = np.empty((MOST_CORNERS, 5))
+    square = np.empty((MOST_CORNERS, 5))
     for f in range(len(seen)):
-        k, p = corner[f], seen[f]
+        k = corner[f]
+        p = seen[f]
         _fill_in(p, whole)
         for i in range(first[f, 0], last[f, 0]):
             width = clip(whole, 3, float(i), 0.0, 1.0, 0.0, 0, spare)
@@ -87,16 +100,20 @@ def _cut_at_borders(
                 middle = 0j
                 for c in range(corners):
                     middle += complex(square[c, 0], square[c, 1])
-                target, (turn, shift), _ = follow(seamless, homes[f], complex(p[k, 0], p[k, 1]), middle / corners)
+                target, (turn, shift), _ = follow(
+                    seamless, homes[f], complex(p[k, 0], p[k, 1]), middle / corners
+                )
                 for c in range(1, corners - 1):
                     if count < len(room.chart):
-                        room.triangle[count], room.chart[count] = f, target
+                        room.triangle[count] = f
+                        room.chart[count] = target
                         for to in range(3):
                             of = c + to - 1 if to > 0 else 0
                             for m in range(3):
                                 room.barycentrics[count, to, m] = square[of, 2 + m]
                             place = turned(complex(square[of, 0], square[of, 1]), turn) + shift
-                            room.places[count, to, 0], room.places[count, to, 1] = place.real, place.imag
+                            room.places[count, to, 0] = place.real
+                            room.places[count, to, 1] = place.imag
                     count += 1
     return count
 
@@ -105,7 +122,8 @@ def _cut_at_borders(
 def _fill_in(places: Floats, whole: Floats) -> None:
     """Places of a triangle's corners, [3, 2], and their barycentrics, [3, 5] together; slices compile slowly."""
     for k in range(3):
-        whole[k, 0], whole[k, 1] = places[k, 0], places[k, 1]
+        whole[k, 0] = places[k, 0]
+        whole[k, 1] = places[k, 1]
         for m in range(3):
             whole[k, 2 + m] = 1.0 if m == k else 0.0
 
@@ -122,7 +140,8 @@ def _area(corners: Floats, count: int) -> float:
 
 def warped(pieces: Pieces, offsets: Floats) -> Pieces:
     """Pieces of a map whose texels have moved by `offsets` [C, n, n, 2] (column, row, in texels)."""
-    n, moved = offsets.shape[1], np.pad(offsets, ((0, 0), (1, 1), (1, 1), (0, 0)))
+    n = offsets.shape[1]
+    moved = np.pad(offsets, ((0, 0), (1, 1), (1, 1), (0, 0)))
     # squares of the lattice of which a corner moves, [C, n + 1, n + 1]
     away = (moved != 0).any(axis=-1)
     bent = away[:, :-1, :-1] | away[:, 1:, :-1] | away[:, :-1, 1:] | away[:, 1:, 1:]
@@ -135,23 +154,36 @@ def warped(pieces: Pieces, offsets: Floats) -> Pieces:
     last = np.minimum(np.floor(pieces.places.max(axis=1) * n).astype(np.int64) + 3, n + 1)
     cut = _filled(_cut_at_lattice, pieces, nodes, bent, first, last)
     barycentrics = cut.barycentrics @ pieces.barycentrics[cut.triangle]
-    return Pieces(pieces.triangle[cut.triangle], barycentrics, cut.chart, np.clip(cut.places, 0.0, 1.0))
+    return Pieces(
+        pieces.triangle[cut.triangle], barycentrics, cut.chart, np.clip(cut.places, 0.0, 1.0)
+    )
 
 
 @kernel
-def _cut_at_lattice(pieces: Pieces, nodes: Floats, bent: Bools, first: Ints, last: Ints, room: Pieces) -> int:
+def _cut_at_lattice(
+    pieces: Pieces, nodes: Floats, bent: Bools, first: Ints, last: Ints, room: Pieces
+) -> int:
     """Fill in the parts of pieces as far as there is room, and return how many there are."""
     count = 0
-    whole, corner, node = np.empty((3, 5)), np.empty((3, 5)), np.empty((4, 4))
-    part, spare = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
+    whole = np.empty((3, 5))
+    corner = np.empty((3, 5))
+    node = np.empty((4, 4))
+    part = np.empty((MOST_CORNERS, 5))
+    spare = np.empty((MOST_CORNERS, 5))
     for p in range(len(pieces.triangle)):
-        home, place = pieces.chart[p], pieces.places[p]
-        left, right, low, high = first[p, 0], last[p, 0], first[p, 1], last[p, 1]
+        home = pieces.chart[p]
+        place = pieces.places[p]
+        left = first[p, 0]
+        right = last[p, 0]
+        low = first[p, 1]
+        high = last[p, 1]
         _fill_in(place, whole)
         if not bent[home, low:high, left:right].any():
             if count < len(room.chart):
-                room.triangle[count], room.chart[count] = p, home
-                room.barycentrics[count], room.places[count] = whole[:, 2:], place
+                room.triangle[count] = p
+                room.chart[count] = home
+                room.barycentrics[count] = whole[:, 2:]
+                room.places[count] = place
             count += 1
             continue
         for i in range(low, high):
@@ -159,24 +191,36 @@ def _cut_at_lattice(pieces: Pieces, nodes: Floats, bent: Bools, first: Ints, las
                 for k in range(4):
                     node[k] = nodes[home, i + k // 2, j + (k + 1) // 2 % 2]
                 for t in range(2):
-                    a, b, c = node[0], node[1 + t], node[2 + t]
+                    a = node[0]
+                    b = node[1 + t]
+                    c = node[2 + t]
                     corners = clip(whole, 3, a[0], a[1], a[1] - b[1], b[0] - a[0], -1, part)
                     corners = clip(part, corners, b[0], b[1], b[1] - c[1], c[0] - b[0], -1, spare)
                     corners = clip(spare, corners, c[0], c[1], c[1] - a[1], a[0] - c[0], -1, part)
-                    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
+                    ux = b[0] - a[0]
+                    uy = b[1] - a[1]
+                    vx = c[0] - a[0]
+                    vy = c[1] - a[1]
                     double = ux * vy - uy * vx
                     for m in range(1, corners - 1):
-                        corner[0], corner[1], corner[2] = part[0], part[m], part[m + 1]
+                        corner[0] = part[0]
+                        corner[1] = part[m]
+                        corner[2] = part[m + 1]
                         for k in range(3):
-                            # taken along with the triangle abc, from where its corners lie to where they lay
-                            dx, dy = corner[k, 0] - a[0], corner[k, 1] - a[1]
-                            s, r = (dx * vy - dy * vx) / double, (ux * dy - uy * dx) / double
+                            # taken along with the triangle abc, from where its corners lie to where
+                            # they lay
+                            dx = corner[k, 0] - a[0]
+                            dy = corner[k, 1] - a[1]
+                            s = (dx * vy - dy * vx) / double
+                            r = (ux * dy - uy * dx) / double
                             corner[k, 0] = (1.0 - s - r) * a[2] + s * b[2] + r * c[2]
                             corner[k, 1] = (1.0 - s - r) * a[3] + s * b[3] + r * c[3]
                         if _area(corner, 3) < LEAST:
                             continue
                         if count < len(room.chart):
-                            room.triangle[count], room.chart[count] = p, home
-                            room.barycentrics[count], room.places[count] = corner[:, 2:], corner[:, :2]
+                            room.triangle[count] = p
+                            room.chart[count] = home
+                            room.barycentrics[count] = corner[:, 2:]
+                            room.places[count] = corner[:, :2]
                         count += 1
     return count

@@ -1,14 +1,15 @@
 """A connected component of a mesh, cut into cells and these into quads: square charts, laid out.
 
-Triangles between cells' middles are joined in pairs to quads, so that charts are large. Where as many quads meet round
-a cell's middle as its curvature asks for, the map onto the charts is strained least. By Gauss and Bonnet a cone where v
-quads meet has the curvature (4 - v) pi / 2; so v should be 4 less the curvature of the cell in right angles. Any
-pairing follows from another by alternating paths: joints are closed and opened in turn (Berge 1957). All short ones are
-tried, until none makes the pairing better.
+Triangles between cells' middles are joined in pairs to quads, so that charts are large. Where as
+many quads meet round a cell's middle as its curvature asks for, the map onto the charts is strained
+least. By Gauss and Bonnet a cone where v quads meet has the curvature (4 - v) pi / 2; so v should
+be 4 less the curvature of the cell in right angles. Any pairing follows from another by alternating
+paths: joints are closed and opened in turn (Berge 1957). All short ones are tried, until none makes
+the pairing better.
 
-Chart a of a cell and the next one b round a corner lie at the same side of a triangle between cells' middles, which is
-called by a: from the middle of a's cell to that of b's. Beyond it lies another triangle, or, at a rim, the two charts
-round a corner, which are joined too.
+Chart a of a cell and the next one b round a corner lie at the same side of a triangle between
+cells' middles, which is called by a: from the middle of a's cell to that of b's. Beyond it lies
+another triangle, or, at a rim, the two charts round a corner, which are joined too.
 """
 
 from __future__ import annotations
@@ -42,9 +43,25 @@ FEWEST = 3  # quads round a middle
 _TOO_FEW = 100.0  # what each costs that is missing
 _EXTRA = 2.0  # what one costs by which there are too many or too few, beyond the first
 _SHAPE = 0.5  # what the logarithm of the ratio of a quad's diagonals costs, squared
-_LONGEST, _LONGER = 11, 16  # joints that a path closes, at most; where else triangles would be left
+# joints that a path closes, at most; where else triangles would be left
+_LONGEST = 11
+_LONGER = 16
 _MOST_PASSES = 20
 _WORTH = 1e-6
+
+CELLS = 96  # of a mesh, where there are texels enough for them
+_LARGE = 1.5  # times as many cells, where quads are large
+_CORNERS = 6  # of a cell
+_RADIUS = 0.75  # of a cell, over the root of its share of the area
+_REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
+_SMALLEST = 0.85  # of the radius of cells elsewhere
+
+# length of a surface over its width, times the number of its cells: at 88**2 charts take a minute
+_FARTHEST = 100**2
+_TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
+
+# times as many cells, where round-off folds a triangle: other cuts fold none
+_OTHER_COUNTS = (2, 3, 5)
 
 
 class Pairing(NamedTuple):
@@ -62,7 +79,12 @@ class Pairing(NamedTuple):
 
 
 def chosen_joints(
-    triangles: Ints, middles: Ints, shape: Floats, triangle_count: int, corners: Ints, wanted: Floats
+    triangles: Ints,
+    middles: Ints,
+    shape: Floats,
+    triangle_count: int,
+    corners: Ints,
+    wanted: Floats,
 ) -> Ints | None:
     """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
 
@@ -84,7 +106,8 @@ def chosen_joints(
     Returns
     -------
     int64 [l] or None
-        At most one with a triangle that stays alone; None if no way is found with three quads round every middle.
+        At most one with a triangle that stays alone; None if no way is found with three quads round
+        every middle.
     """
     kept = np.flatnonzero((triangles[:, 1] >= 0) | (triangle_count % 2 == 1))
     ends = triangles[kept]
@@ -94,9 +117,13 @@ def chosen_joints(
         return kept[:0]
     ends = np.where(ends < 0, triangle_count, ends)
     start, order = counting_sort(ends.T.ravel(), np.arange(ends.size), nodes)
-    taken, cost = np.where(inner[:, None], middles[kept], -1), np.where(inner, _SHAPE * shape[kept] ** 2, 0.0)
-    closed, passed = np.full(nodes, -1), np.zeros(nodes, bool)
-    pairing = Pairing(start, order % len(kept), ends, taken, cost, closed, corners.copy(), wanted, passed)
+    taken = np.where(inner[:, None], middles[kept], -1)
+    cost = np.where(inner, _SHAPE * shape[kept] ** 2, 0.0)
+    closed = np.full(nodes, -1)
+    passed = np.zeros(nodes, bool)
+    pairing = Pairing(
+        start, order % len(kept), ends, taken, cost, closed, corners.copy(), wanted, passed
+    )
     if not _paired(pairing) or pairing.quads.min() < FEWEST:
         return None
     return kept[np.unique(pairing.closed)]
@@ -122,8 +149,11 @@ def _paired(pairing: Pairing) -> bool:
 def _improve(pairing: Pairing, e: int) -> bool:
     """Close an open joint, and pair what that leaves; whether that is better."""
     a, b = pairing.ends[e]
-    f, g = pairing.closed[a], pairing.closed[b]
-    cost = _set_joint(pairing, f, False) + _set_joint(pairing, g, False) + _set_joint(pairing, e, True)
+    f = pairing.closed[a]
+    g = pairing.closed[b]
+    cost = (
+        _set_joint(pairing, f, False) + _set_joint(pairing, g, False) + _set_joint(pairing, e, True)
+    )
     left = pairing.ends[f, 0] + pairing.ends[f, 1] - a
     pairing.passed[a] = pairing.passed[b] = True
     better = _augment(pairing, left, _LONGEST, -_WORTH - cost)
@@ -141,16 +171,24 @@ def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
 
     All alternating paths that close up to `most` joints are tried, depth first.
     """
-    path, best_path, cost = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-    nodes, following = np.empty(most, np.int64), np.empty(most, np.int64)
-    nodes[0], following[0], cost[0] = node, pairing.start[node], 0.0
-    length, best, best_length = 0, np.inf, 0
+    path = np.empty(most, np.int64)
+    best_path = np.empty(most, np.int64)
+    cost = np.empty(most)
+    nodes = np.empty(most, np.int64)
+    following = np.empty(most, np.int64)
+    nodes[0] = node
+    following[0] = pairing.start[node]
+    cost[0] = 0.0
+    length = 0
+    best = np.inf
+    best_length = 0
     pairing.passed[node] = True
     while length >= 0:
         if following[length] == pairing.start[nodes[length] + 1]:
             length -= 1
             if length >= 0:  # back over a closed joint and an open one
-                e, beyond = path[length], nodes[length + 1]
+                e = path[length]
+                beyond = nodes[length + 1]
                 other = pairing.ends[e, 0] + pairing.ends[e, 1] - nodes[length]
                 _change(pairing, e, 1)
                 _change(pairing, pairing.closed[other], -1)
@@ -167,7 +205,8 @@ def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
             total = cost[length] + _change(pairing, e, -1)
             _change(pairing, e, 1)
             if total < best:
-                best, best_length = total, length + 1
+                best = total
+                best_length = length + 1
                 for i in range(best_length):
                     best_path[i] = path[i]
         elif length + 1 < most:
@@ -175,7 +214,8 @@ def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
             pairing.passed[other] = pairing.passed[beyond] = True
             cost[length + 1] = cost[length] + _change(pairing, f, 1) + _change(pairing, e, -1)
             length += 1
-            nodes[length], following[length] = beyond, pairing.start[beyond]
+            nodes[length] = beyond
+            following[length] = pairing.start[beyond]
     pairing.passed[node] = False
     if not best < limit:
         return False
@@ -207,7 +247,9 @@ def _change(pairing: Pairing, e: int, quads: int) -> float:
             for sign in (-1.0, 1.0):
                 count = pairing.quads[v]
                 off = abs(count - pairing.wanted[v])
-                cost += sign * (off + _EXTRA * max(off - 1.0, 0.0) + _TOO_FEW * max(FEWEST - count, 0))
+                cost += sign * (
+                    off + _EXTRA * max(off - 1.0, 0.0) + _TOO_FEW * max(FEWEST - count, 0)
+                )
                 if sign < 0.0:
                     pairing.quads[v] += quads
     return cost
@@ -234,31 +276,55 @@ def joined(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> list[Si
     alone = triangles[chosen, 1] < 0
     new: list[Sides] = []
     for a in first[chosen[~alone]]:  # two triangles, joined over the side a
-        b, beyond = glued[a, 1, 0], glued[a, 0, 0]
-        p, q, r, s = (_whole(sides, glued, each) for each in (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0]))
-        new.append((p, q, r, s))
-    for a in first[chosen[alone]]:  # a fourth corner in the middle of side a; the charts at the rim beyond stay apart
         b = glued[a, 1, 0]
-        new.append((sides[a][0], sides[b][3], _whole(sides, glued, b), _whole(sides, glued, glued[b, 1, 0])))
+        beyond = glued[a, 0, 0]
+        p, q, r, s = (
+            _whole(sides, glued, each) for each in (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0])
+        )
+        new.append((p, q, r, s))
+    # a fourth corner in the middle of side a; the charts at the rim beyond stay apart
+    for a in first[chosen[alone]]:
+        b = glued[a, 1, 0]
+        new.append(
+            (
+                sides[a][0],
+                sides[b][3],
+                _whole(sides, glued, b),
+                _whole(sides, glued, glued[b, 1, 0]),
+            )
+        )
     new += _at_rim(sides, glued, rest, glued[first[chosen[alone]], 0, 0])
     return None if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any() else new
 
 
-def _joints(V: Floats, sides: list[Sides], glued: Ints, fans: Fans) -> tuple[Ints, Ints, Floats, Ints]:
+def _joints(
+    V: Floats, sides: list[Sides], glued: Ints, fans: Fans
+) -> tuple[Ints, Ints, Floats, Ints]:
     """Joints as `chosen_joints` takes them, with charts for their cells, and what they are called."""
     fan = np.full(len(sides), -1)
     fan[np.array(fans, np.int64).reshape(-1, 3)] = np.arange(len(fans))[:, None]
     found = []
     for a in np.flatnonzero(fan >= 0).tolist():
-        b, beyond = int(glued[a, 1, 0]), int(glued[a, 0, 0])
-        # the other triangle calls it otherwise; two triangles with two sides in common would be glued to themselves
-        if fan[beyond] < 0 or (a < glued[beyond, 2, 0] and (fan[glued[fans[fan[a]], 0, 0]] == fan[beyond]).sum() == 1):
+        b = int(glued[a, 1, 0])
+        beyond = int(glued[a, 0, 0])
+        # the other triangle calls it otherwise; two triangles with two sides in common would be
+        # glued to themselves
+        if fan[beyond] < 0 or (
+            a < glued[beyond, 2, 0] and (fan[glued[fans[fan[a]], 0, 0]] == fan[beyond]).sum() == 1
+        ):
             found.append((a, b, glued[b, 1, 0], glued[beyond, 1, 0], beyond))
     first, second, third, fourth, other = np.array(found, dtype=np.int64).reshape(-1, 5).T
     middle = V[[each[0][0] for each in sides]]
-    inside, across = (np.linalg.norm(middle[p] - middle[q], axis=1) for p, q in ((first, second), (third, fourth)))
+    inside, across = (
+        np.linalg.norm(middle[p] - middle[q], axis=1) for p, q in ((first, second), (third, fourth))
+    )
     shape = np.log(np.maximum(across, 1e-300) / np.maximum(inside, 1e-300))
-    return np.stack([fan[first], fan[other]], axis=1), np.stack([first, second], axis=1), shape, first
+    return (
+        np.stack([fan[first], fan[other]], axis=1),
+        np.stack([first, second], axis=1),
+        shape,
+        first,
+    )
 
 
 def _whole(sides: list[Sides], glued: Ints, a: int) -> Path:
@@ -270,7 +336,8 @@ def _at_rim(sides: list[Sides], glued: Ints, rest: list[int], apart: Ints) -> li
     """Charts at the rim: those round a corner are joined, but for some that stay apart, called by the second one."""
     new = []
     for b in rest:
-        a, before = int(glued[b, 2, 0]), int(glued[b, 1, 0])
+        a = int(glued[b, 2, 0])
+        before = int(glued[b, 1, 0])
         if a < 0 and before < 0:
             new.append(sides[b])
         elif a >= 0:
@@ -333,18 +400,9 @@ def _laid_out(cells: BorderedCells, surface: TriangleSurface, sides: list[Sides]
     folded = int((signed_areas(places) <= 0).sum())
     if folded:
         raise AtlasError(f"{folded} triangles of the surface are too thin to be laid out flat")
-    return Quads(surface, chart, places, glued_sides(sides), np.arange(len(surface.V)) >= cells.uncut)
-
-
-CELLS = 96  # of a mesh, where there are texels enough for them
-_LARGE = 1.5  # times as many cells, where quads are large
-_CORNERS = 6  # of a cell
-_RADIUS = 0.75  # of a cell, over the root of its share of the area
-_REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
-_SMALLEST = 0.85  # of the radius of cells elsewhere
-_FARTHEST = 100**2  # length of a surface over its width, times the number of its cells: at 88**2 charts take a minute
-_TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
-_OTHER_COUNTS = (2, 3, 5)  # times as many cells, where round-off folds a triangle: other cuts fold none
+    return Quads(
+        surface, chart, places, glued_sides(sides), np.arange(len(surface.V)) >= cells.uncut
+    )
 
 
 def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
@@ -383,11 +441,14 @@ def _cells_of(part: TriangleSurface, count: int) -> BorderedCells:
     area = part.areas.sum()
     if count * _length(part) > _FARTHEST:
         raise AtlasError(
-            f"the surface is about {_length(part):.2g} times as long as wide, too long for charts: shorten what "
+            f"the surface is about {_length(part):.2g} times as long as wide, too long for charts: "
+            f"shorten what "
             "sticks out of it, or scale it alike along all axes"
         )
-    metric, reach = Metric.of(refined(part, np.sqrt(area / (_TRIANGLES / CELLS * count)))), np.inf
+    metric = Metric.of(refined(part, np.sqrt(area / (_TRIANGLES / CELLS * count))))
+    reach = np.inf
     if count > 1:
         largest = _RADIUS * np.sqrt(area / count)
-        metric, reach = metric.in_units(cell_sizes(metric, _REACH, (_SMALLEST * largest, largest))), 1.0
+        metric = metric.in_units(cell_sizes(metric, _REACH, (_SMALLEST * largest, largest)))
+        reach = 1.0
     return disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach)))

@@ -1,9 +1,10 @@
 """Where texels lie on a surface: the triangles of a seamless map, drawn on the charts as on a screen.
 
-Then texels are moved a little where the texel mesh is folded, though the map is not. Samples of a fold-free map may
-still lie in the wrong order on the surface: astride of a knife edge, whose two sides they see from above and from
-below, or round the tip of a cone. There each texel tries the other places of its square, on a fine lattice, and takes
-the one where the corners between its neighbours face outwards.
+Then texels are moved a little where the texel mesh is folded, though the map is not. Samples of a
+fold-free map may still lie in the wrong order on the surface: astride of a knife edge, whose two
+sides they see from above and from below, or round the tip of a cone. There each texel tries the
+other places of its square, on a fine lattice, and takes the one where the corners between its
+neighbours face outwards.
 """
 
 from __future__ import annotations
@@ -21,7 +22,18 @@ from .layout import PatchMap
 from .seamless import Complex, SeamlessMap, follow, places_on_charts, wedge
 
 _MARGIN = 0.1  # sine of a corner that is wide enough
-_BESIDE = ((0, 1), (1, 0), (0, -1), (-1, 0))  # row and column of a texel's neighbours, counter-clockwise
+# row and column of a texel's neighbours, counter-clockwise
+_BESIDE = ((0, 1), (1, 0), (0, -1), (-1, 0))
+
+# barycentric coordinates of a texel outside of all triangles may be so far below 0
+_ROUND_OFF = 1e-7
+_REACH = 2  # of triangles, in charts beyond that in which they begin
+_LATTICE = 7  # places along a texel's side; odd, so that one is the centre
+_PULL = 0.02  # to the centre of its square, for each texel's width squared
+_FLATTEST = 0.2  # least corner of the moved lattice on its chart, in units of a square's
+_SWEEPS = 6
+_ROUNDS = 6
+_AROUND = 2  # texels round a folded one that may move
 
 
 class Texels(NamedTuple):
@@ -46,13 +58,19 @@ def _place(texels: Texels, chart: int, row: int, column: int) -> Floats:
 def _fault(texels: Texels, flat: int) -> float:
     """How badly the four corners of a texel between its neighbours face outwards: 1 and more if one is folded."""
     n = texels.halo.shape[1] - 2
-    chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
-    o, normal = texels.positions[flat], texels.normals[flat]
+    chart = flat // (n * n)
+    row = flat // n % n + 1
+    column = flat % n + 1
+    o = texels.positions[flat]
+    normal = texels.normals[flat]
     fault = 0.0
     for i, j in _BESIDE:
-        p, q = _place(texels, chart, row + i, column + j), _place(texels, chart, row + j, column - i)
-        a, b = subtract(p, o), subtract(q, o)
-        facing, size = dot(cross(a, b), normal), np.sqrt(dot(a, a) * dot(b, b))
+        p = _place(texels, chart, row + i, column + j)
+        q = _place(texels, chart, row + j, column - i)
+        a = subtract(p, o)
+        b = subtract(q, o)
+        facing = dot(cross(a, b), normal)
+        size = np.sqrt(dot(a, a) * dot(b, b))
         # NaN, where there is no neighbour, is not below the margin
         if facing < _MARGIN * size:
             fault += (1.0 if facing < 0.0 else 0.0) + (_MARGIN - facing / max(size, 1e-300)) ** 2
@@ -63,7 +81,9 @@ def _fault(texels: Texels, flat: int) -> float:
 def faults(texels: Texels, flat: int) -> float:
     """Faults of a texel and of its four neighbours, added up."""
     n = texels.halo.shape[1] - 2
-    chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
+    chart = flat // (n * n)
+    row = flat // n % n + 1
+    column = flat % n + 1
     total = _fault(texels, flat)
     for i, j in _BESIDE:
         other = texels.halo[chart, row + i, column + j]
@@ -79,10 +99,6 @@ def folded(texels: Texels) -> Bools:
     for flat in range(len(result)):
         result[flat] = _fault(texels, flat) >= 1.0
     return result
-
-
-_ROUND_OFF = 1e-7  # barycentric coordinates of a texel outside of all triangles may be so far below 0
-_REACH = 2  # of triangles, in charts beyond that in which they begin
 
 
 def locate_texels(seamless: SeamlessMap, n: int) -> tuple[Ints, Floats]:
@@ -101,28 +117,44 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
     """The same in some charts [k] alone; -1 where a triangle may be missed that reaches far over other charts."""
     number = np.full(len(seamless.glued), -1)
     number[charts] = np.arange(len(charts))
-    near, beside = number >= 0, seamless.glued[..., 0]
+    near = number >= 0
+    beside = seamless.glued[..., 0]
     for _ in range(_REACH):
         near |= (near[beside] & (beside >= 0)).any(axis=1)
     corner, homes, places = places_on_charts(seamless)
-    triangles, barycentrics, best = _draw(seamless, np.flatnonzero(near[homes]), corner, homes, places, number, n)
+    triangles, barycentrics, best = _draw(
+        seamless, np.flatnonzero(near[homes]), corner, homes, places, number, n
+    )
     triangles[best < -_ROUND_OFF] = -1
     return triangles, barycentrics
 
 
 @kernel
 def _draw(
-    seamless: SeamlessMap, chosen: Ints, corner: Ints, homes: Ints, places: Complex, number: Ints, n: int
+    seamless: SeamlessMap,
+    chosen: Ints,
+    corner: Ints,
+    homes: Ints,
+    places: Complex,
+    number: Ints,
+    n: int,
 ) -> tuple[Ints, Floats, Floats]:
     """Find the texels of the charts that have a number in chosen triangles; see `places_on_charts`.
 
-    Returns the triangle of each, -1 where there is none, and its barycentric coordinates, and the least of these.
+    Returns the triangle of each, -1 where there is none, and its barycentric coordinates, and the
+    least of these.
     """
-    shape, slack = (number.max() + 1, n, n), 1e-9
-    triangles, barycentrics, best = np.full(shape, -1), np.zeros((*shape, 3)), np.full(shape, -np.inf)
+    shape = (number.max() + 1, n, n)
+    slack = 1e-9
+    triangles = np.full(shape, -1)
+    barycentrics = np.zeros((*shape, 3))
+    best = np.full(shape, -np.inf)
     for f in chosen:
-        home, k, p = homes[f], corner[f], places[f]
-        u, v = p[1] - p[0], p[2] - p[0]
+        home = homes[f]
+        k = corner[f]
+        p = places[f]
+        u = p[1] - p[0]
+        v = p[2] - p[0]
         area = wedge(u, v)
         first = int(np.ceil((min(p[0].imag, p[1].imag, p[2].imag) - slack) * n - 0.5))
         last = int(np.floor((max(p[0].imag, p[1].imag, p[2].imag) + slack) * n - 0.5))
@@ -131,17 +163,27 @@ def _draw(
         for i in range(first, last + 1):
             for j in range(left, right + 1):
                 z = complex((j + 0.5) / n, (i + 0.5) / n)
-                s, t = wedge(z - p[0], v) / area, wedge(u, z - p[0]) / area
+                s = wedge(z - p[0], v) / area
+                t = wedge(u, z - p[0]) / area
                 least = min(s, t, 1 - s - t)
                 if least < -1e-6:
                     continue
                 found, _, place = follow(seamless, home, p[k], z)
-                chart, row, column = number[found], int(np.floor(place.imag * n)), int(np.floor(place.real * n))
-                if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
+                chart = number[found]
+                row = int(np.floor(place.imag * n))
+                column = int(np.floor(place.real * n))
+                if (
+                    chart < 0
+                    or not (0 <= row < n and 0 <= column < n)
+                    or least <= best[chart, row, column]
+                ):
                     continue
-                best[chart, row, column], triangles[chart, row, column] = least, f
+                best[chart, row, column] = least
+                triangles[chart, row, column] = f
                 inside = barycentrics[chart, row, column]
-                inside[0], inside[1], inside[2] = 1 - s - t, s, t
+                inside[0] = 1 - s - t
+                inside[1] = s
+                inside[2] = t
     return triangles, barycentrics, best
 
 
@@ -188,46 +230,51 @@ def centres(mesh: Mesh, patches: PatchMap, n: int) -> Samples:
     return sampled(mesh, patches, *locate_texels(patches.seamless, n))
 
 
-_LATTICE = 7  # places along a texel's side; odd, so that one is the centre
-_PULL = 0.02  # to the centre of its square, for each texel's width squared
-_FLATTEST = 0.2  # least corner of the moved lattice on its chart, in units of a square's
-_SWEEPS, _ROUNDS = 6, 6
-_AROUND = 2  # texels round a folded one that may move
-
-
 def untangled(
     mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: Floats | None
 ) -> tuple[Samples, Floats]:
     """Move texels at the centres of their squares to where fewer are folded; `beyond` as in `TexelMesh`.
 
-    Returns them, and the column and row by which each has moved, in texels, below 0.5, [C, n, n, 2].
+    Returns them, and the column and row by which each has moved, in texels, below 0.5, [C, n, n,
+    2].
     """
     charts, n, _ = topology.shape
     outside = np.full((charts, n + 2, n + 2, 3), np.nan)
     if beyond is not None:
         outside[topology.rim] = beyond[topology.rim]
     offsets = np.zeros((charts, n + 2, n + 2, 2), np.int64)
-    small, weights = samples.small.copy(), samples.weights.copy()
-    positions, normals = samples.positions.reshape(-1, 3).copy(), samples.normals.reshape(-1, 3).copy()
+    small = samples.small.copy()
+    weights = samples.weights.copy()
+    positions = samples.positions.reshape(-1, 3).copy()
+    normals = samples.normals.reshape(-1, 3).copy()
     texels = Texels(topology.halo, topology.rim, outside, positions, normals, offsets)
     for _ in range(_ROUNDS):
         near = folded(texels).reshape(topology.shape)
         for _ in range(_AROUND):
             halo = topology.with_halo(near)
-            near = np.any([halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0)
+            near = np.any(
+                [halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0
+            )
         active = np.flatnonzero(near)
         if not len(active):
             break
         chosen, index = np.unique(active // (n * n), return_inverse=True)
         places = sampled(mesh, patches, *locate_in_charts(patches.seamless, n * _LATTICE, chosen))
         number = np.searchsorted(chosen, np.arange(charts))
-        candidates = np.where((places.small >= 0)[..., None], places.positions, np.nan), places.normals
+        candidates = (
+            np.where((places.small >= 0)[..., None], places.positions, np.nan),
+            places.normals,
+        )
         for i in range(_SWEEPS):
             if not _improve(texels, number, *candidates, active[:: 1 if i % 2 == 0 else -1].copy()):
                 break
         chart, row, column = np.unravel_index(active, topology.shape)
         moved = offsets[chart, row + 1, column + 1]
-        at = index, row * _LATTICE + _LATTICE // 2 + moved[:, 1], column * _LATTICE + _LATTICE // 2 + moved[:, 0]
+        at = (
+            index,
+            row * _LATTICE + _LATTICE // 2 + moved[:, 1],
+            column * _LATTICE + _LATTICE // 2 + moved[:, 0],
+        )
         changed = moved.any(axis=1)
         small[chart[changed], row[changed], column[changed]] = places.small[at][changed]
         weights[chart[changed], row[changed], column[changed]] = places.weights[at][changed]
@@ -237,19 +284,23 @@ def untangled(
 @kernel
 def _fits(offsets: Floats, row: int, column: int) -> bool:
     """Whether the four squares of the lattice round a texel have wide corners after its move, on its chart."""
-    n, least = offsets.shape[0] - 2, _FLATTEST * _LATTICE * _LATTICE
-    x, y = np.empty(4), np.empty(4)
+    n = offsets.shape[0] - 2
+    least = _FLATTEST * _LATTICE * _LATTICE
+    x = np.empty(4)
+    y = np.empty(4)
     for i in range(row - 1, row + 1):
         for j in range(column - 1, column + 1):
             for k in range(4):
-                r, c = i + (1 if k >= 2 else 0), j + (1 if k == 1 or k == 2 else 0)
+                r = i + (1 if k >= 2 else 0)
+                c = j + (1 if k == 1 or k == 2 else 0)
                 # the border of the chart lies half a texel beyond the last ones, and does not move
                 x[k] = _LATTICE * min(max(float(c), 0.5), n + 0.5) + offsets[r, c, 0]
                 y[k] = _LATTICE * min(max(float(r), 0.5), n + 0.5) + offsets[r, c, 1]
             share = 0.5 if i == 0 or i == n else 1.0
             share *= 0.5 if j == 0 or j == n else 1.0
             for k in range(4):
-                a, b = (k + 1) % 4, (k + 3) % 4
+                a = (k + 1) % 4
+                b = (k + 3) % 4
                 if (x[a] - x[k]) * (y[b] - y[k]) - (y[a] - y[k]) * (x[b] - x[k]) < least * share:
                     return False
     return True
@@ -259,25 +310,34 @@ def _fits(offsets: Floats, row: int, column: int) -> bool:
 def _improve(texels: Texels, number: Ints, positions: Floats, normals: Floats, active: Ints) -> int:
     """Move each of these texels to its best place, one after the other; return how many moved.
 
-    Places that texels of some charts may take, [k, n m, n m, 3] [m], NaN where unknown, with their normals; `number`
-    [C] is that of a chart among these.
+    Places that texels of some charts may take, [k, n m, n m, 3] [m], NaN where unknown, with their
+    normals; `number` [C] is that of a chart among these.
     """
-    n, half = texels.halo.shape[1] - 2, _LATTICE // 2
+    n = texels.halo.shape[1] - 2
+    half = _LATTICE // 2
     moved = 0
     for flat in active:
-        chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
-        index, offset = number[chart], texels.offsets[chart, row, column]
-        ox, oy = offset[0], offset[1]
-        point, normal = texels.positions[flat].copy(), texels.normals[flat].copy()
+        chart = flat // (n * n)
+        row = flat // n % n + 1
+        column = flat % n + 1
+        index = number[chart]
+        offset = texels.offsets[chart, row, column]
+        ox = offset[0]
+        oy = offset[1]
+        point = texels.positions[flat].copy()
+        normal = texels.normals[flat].copy()
         least = faults(texels, flat) + _PULL * (ox * ox + oy * oy) / (_LATTICE * _LATTICE)
         if least < 1e-12:
             continue
-        best_x, best_y = ox, oy
+        best_x = ox
+        best_y = oy
         for i in range(-half, half + 1):
             for j in range(-half, half + 1):
                 pull = _PULL * (i * i + j * j) / (_LATTICE * _LATTICE)
-                offset[0], offset[1] = j, i
-                r, c = (row - 1) * _LATTICE + half + i, (column - 1) * _LATTICE + half + j
+                offset[0] = j
+                offset[1] = i
+                r = (row - 1) * _LATTICE + half + i
+                c = (column - 1) * _LATTICE + half + j
                 if pull >= least or not _fits(texels.offsets[chart], row, column):
                     continue
                 texels.positions[flat] = positions[index, r, c]
@@ -286,12 +346,17 @@ def _improve(texels: Texels, number: Ints, positions: Floats, normals: Floats, a
                     continue
                 fault = faults(texels, flat) + pull
                 if fault < least - 1e-9:
-                    least, best_x, best_y = fault, j, i
-        offset[0], offset[1] = best_x, best_y
+                    least = fault
+                    best_x = j
+                    best_y = i
+        offset[0] = best_x
+        offset[1] = best_y
         if best_x == ox and best_y == oy:
-            texels.positions[flat], texels.normals[flat] = point, normal
+            texels.positions[flat] = point
+            texels.normals[flat] = normal
         else:
-            r, c = (row - 1) * _LATTICE + half + best_y, (column - 1) * _LATTICE + half + best_x
+            r = (row - 1) * _LATTICE + half + best_y
+            c = (column - 1) * _LATTICE + half + best_x
             texels.positions[flat] = positions[index, r, c]
             texels.normals[flat] = normals[index, r, c]
             moved += 1

@@ -1,13 +1,14 @@
 """A map onto charts that knows no borders: its vertices may move from one chart to the next.
 
-Each vertex has a place in the frame of its chart, the complex number column + i row, both from 0 to 1. Each triangle
-has a frame too, that of the chart where it lay first, continued beyond that chart's border; a turn by right angles and
-a whole shift take the places of its corners there. Where other than four charts meet, the surface of all charts has the
-tip of a cone: there sits a fixed vertex, so that every triangle is flat. A map without a folded triangle is then one to
-one: it winds once round each tip, and covers each chart once.
+Each vertex has a place in the frame of its chart, the complex number column + i row, both from 0 to
+1. Each triangle has a frame too, that of the chart where it lay first, continued beyond that
+chart's border; a turn by right angles and a whole shift take the places of its corners there. Where
+other than four charts meet, the surface of all charts has the tip of a cone: there sits a fixed
+vertex, so that every triangle is flat. A map without a folded triangle is then one to one: it winds
+once round each tip, and covers each chart once.
 
-A change from one frame to another is a turn by right angles, counter-clockwise, then a whole shift. A vertex that
-leaves its chart takes place and frame of the chart that it enters.
+A change from one frame to another is a turn by right angles, counter-clockwise, then a whole shift.
+A vertex that leaves its chart takes place and frame of the chart that it enters.
 """
 
 from __future__ import annotations
@@ -27,6 +28,10 @@ Complex: TypeAlias = NDArray[np.complex128]
 
 Frame: TypeAlias = tuple[int, complex]  # turn and shift
 _OWN = 0, 0j
+
+# what a vector is multiplied with for each turn
+_TURNS = np.array([1, 1j, -1, -1j])
+_MOST_CHARTS = 64
 
 
 @kernel
@@ -53,10 +58,6 @@ def inverse(frame: Frame) -> Frame:
     return back, -turned(frame[1], back)
 
 
-# what a vector is multiplied with for each turn
-_TURNS = np.array([1, 1j, -1, -1j])
-
-
 @shared
 def wedge(u: Any, v: Any) -> Any:
     """Double area of the triangle between two vectors, positive where v lies on the left of u."""
@@ -80,7 +81,8 @@ class SeamlessMap(NamedTuple):
     turn: Ints  # [m, 3], right angles from the vertex's frame to the triangle's
     shift: Complex  # [m, 3], after that
     glued: Ints  # [C, 4, 2]
-    side_turn: Ints  # [C, 4], from the frame of each chart to that of the chart beyond each of its sides
+    # [C, 4], from the frame of each chart to that of the chart beyond each of its sides
+    side_turn: Ints
     side_shift: Complex  # [C, 4], after that
     star_start: Ints  # [n + 1], where the corners of each vertex begin
     star: Ints  # [3 m], corners 3 triangle + k by vertex
@@ -89,17 +91,34 @@ class SeamlessMap(NamedTuple):
 def seamless_map(quads: Quads) -> SeamlessMap:
     """The map that the quads begin with."""
     surface = quads.surface
-    F, count = surface.F, len(surface.V)
-    twin, joined = np.full(3 * len(F), -1), surface.edges.sides[~surface.edges.rim]
+    F = surface.F
+    count = len(surface.V)
+    twin = np.full(3 * len(F), -1)
+    joined = surface.edges.sides[~surface.edges.rim]
     twin[joined] = joined[:, ::-1]
     # across glued sides: side s of one chart runs against side t of the other
-    here, there, corners = np.arange(4), quads.glued[..., 1], CORNERS @ (1, 1j)
+    here = np.arange(4)
+    there = quads.glued[..., 1]
+    corners = CORNERS @ (1, 1j)
     side_turn = (there + 2 - here) % 4
     side_shift = corners[(there + 1) % 4] - _TURNS[side_turn] * corners[here]
-    chart, z, freedom = np.zeros(count, np.int64), np.zeros(count, np.complex128), np.full(count, FREE)
-    turn, shift = np.zeros(F.shape, np.int64), np.zeros(F.shape, np.complex128)
+    chart = np.zeros(count, np.int64)
+    z = np.zeros(count, np.complex128)
+    freedom = np.full(count, FREE)
+    turn = np.zeros(F.shape, np.int64)
+    shift = np.zeros(F.shape, np.complex128)
     seamless = SeamlessMap(
-        F, quads.chart, chart, z, freedom, turn, shift, quads.glued, side_turn, side_shift, *stars(F, count)
+        F,
+        quads.chart,
+        chart,
+        z,
+        freedom,
+        turn,
+        shift,
+        quads.glued,
+        side_turn,
+        side_shift,
+        *stars(F, count),
     )
     _connect(seamless, twin, quads.places[..., 0] + 1j * quads.places[..., 1])
     return seamless
@@ -165,11 +184,16 @@ def _connect(seamless: SeamlessMap, twin: Ints, places: Complex) -> None:
             h = t + 1 if t % 3 < 2 else t - 2
             if h == first:
                 break
-        first, at_rim, frame, crossed = h, twin[h] < 0, _OWN, 0
+        first = h
+        at_rim = twin[h] < 0
+        frame = _OWN
+        crossed = 0
         place = places[h // 3, h % 3]
-        seamless.chart[v], seamless.z[v] = chart[h // 3], place
+        seamless.chart[v] = chart[h // 3]
+        seamless.z[v] = place
         while True:  # counter-clockwise, from one chart to the next
-            f, k = h // 3, h % 3
+            f = h // 3
+            k = h % 3
             seamless.turn[f, k], seamless.shift[f, k] = frame
             before = h + 2 if k == 0 else h - 1
             t = twin[before]
@@ -177,25 +201,28 @@ def _connect(seamless: SeamlessMap, twin: Ints, places: Complex) -> None:
                 break
             if chart[t // 3] != chart[f]:
                 c = chart[f]
-                side = _side_of(places[f, k], places[f, before % 3], seamless.glued[c], chart[t // 3])
+                side = _side_of(
+                    places[f, k], places[f, before % 3], seamless.glued[c], chart[t // 3]
+                )
                 frame = after(frame, (seamless.side_turn[c, side], seamless.side_shift[c, side]))
                 crossed += 1
             h = t
             if h == first:
                 break
         if at_rim:
-            f, k = first // 3, first % 3
+            f = first // 3
+            k = first % 3
             side = _side_of(places[f, k], places[f, (k + 1) % 3], seamless.glued[chart[f]], -1)
             seamless.freedom[v] = COLUMN if side % 2 == 0 else ROW
         corner = (place.real == 0 or place.real == 1) and (place.imag == 0 or place.imag == 1)
         if corner and crossed != (1 if at_rim else 4):  # the tip of a cone
-            seamless.freedom[v], seamless.z[v] = FIXED, 0.0
+            seamless.freedom[v] = FIXED
+            seamless.z[v] = 0.0
             for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
-                f, k = seamless.star[i] // 3, seamless.star[i] % 3
-                seamless.turn[f, k], seamless.shift[f, k] = 0, places[f, k]
-
-
-_MOST_CHARTS = 64
+                f = seamless.star[i] // 3
+                k = seamless.star[i] % 3
+                seamless.turn[f, k] = 0
+                seamless.shift[f, k] = places[f, k]
 
 
 @kernel
@@ -217,28 +244,38 @@ def rehome_vertex(seamless: SeamlessMap, v: int, p: complex) -> None:
         seamless.freedom[v] = COLUMN + ROW - seamless.freedom[v]
     back = inverse(change)
     for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
-        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        f = seamless.star[i] // 3
+        k = seamless.star[i] % 3
         seamless.turn[f, k], seamless.shift[f, k] = after(back, frame_of(seamless, f, k))
 
 
 @kernel
 def follow(seamless: SeamlessMap, chart: int, p: complex, q: complex) -> tuple[int, Frame, complex]:
     """Go straight from p, in a chart, to q, in its frame: the chart in which q lies, the change there, and q there."""
-    change, came = _OWN, -1
+    change = _OWN
+    came = -1
     for _ in range(_MOST_CHARTS):
         # the side through which the way leaves the square
-        side, least = -1, 1.0
+        side = -1
+        least = 1.0
         if q.imag < 0.0 and came != 0 and p.imag / (p.imag - q.imag) < least:
-            side, least = 0, p.imag / (p.imag - q.imag)
+            side = 0
+            least = p.imag / (p.imag - q.imag)
         if q.real > 1.0 and came != 1 and (1.0 - p.real) / (q.real - p.real) < least:
-            side, least = 1, (1.0 - p.real) / (q.real - p.real)
+            side = 1
+            least = (1.0 - p.real) / (q.real - p.real)
         if q.imag > 1.0 and came != 2 and (1.0 - p.imag) / (q.imag - p.imag) < least:
-            side, least = 2, (1.0 - p.imag) / (q.imag - p.imag)
+            side = 2
+            least = (1.0 - p.imag) / (q.imag - p.imag)
         if q.real < 0.0 and came != 3 and p.real / (p.real - q.real) < least:
-            side, least = 3, p.real / (p.real - q.real)
+            side = 3
+            least = p.real / (p.real - q.real)
         if side < 0 or seamless.glued[chart, side, 0] < 0:
             break
-        turn, shift = seamless.side_turn[chart, side], seamless.side_shift[chart, side]
-        p, q, change = turned(p, turn) + shift, turned(q, turn) + shift, after(change, (turn, shift))
+        turn = seamless.side_turn[chart, side]
+        shift = seamless.side_shift[chart, side]
+        p = turned(p, turn) + shift
+        q = turned(q, turn) + shift
+        change = after(change, (turn, shift))
         chart, came = seamless.glued[chart, side]
     return chart, change, q

@@ -1,7 +1,8 @@
 """The triangles of a mesh, cut into smaller ones that know where they came from.
 
-They are cut in the middle of edges, long ones and those that join two points of a border; along straight lines, from
-the middles of flat polygons to the middles of their sides; and along the borders of cells.
+They are cut in the middle of edges, long ones and those that join two points of a border; along
+straight lines, from the middles of flat polygons to the middles of their sides; and along the
+borders of cells.
 """
 
 from __future__ import annotations
@@ -19,6 +20,13 @@ from ...mesh.topology import SPLITS, Edges, corner_angles, edges_of, triangle_ar
 A, B, C, AB, BC, CA, MIDDLE = range(7)
 
 Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
+
+_ON_RAY = 1e-9  # of the size of a polygon
+_MOST_ROUNDS = 100
+
+# of a part; of one that has more to begin with, so many times as many
+_MOST_TRIANGLES = 40_000
+_MOST_GROWTH = 3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -74,7 +82,9 @@ class TriangleSurface:
         at_rim[self.edges.ends[self.edges.rim]] = True
         return at_rim
 
-    def subdivided(self, places: Floats, patterns: Patterns = SPLITS) -> tuple[TriangleSurface, Ints, Ints, Floats]:
+    def subdivided(
+        self, places: Floats, patterns: Patterns = SPLITS
+    ) -> tuple[TriangleSurface, Ints, Ints, Floats]:
         """Cut edges, and the triangles beside them.
 
         Parameters
@@ -82,8 +92,9 @@ class TriangleSurface:
         places : float64 [e]
             Where each edge is cut, between 0 at its first end and 1; NaN where it is not.
         patterns : dict, optional
-            For each set of cut sides of a triangle (1 for ab, 2 for bc, 4 for ca, added up) the triangles to put in
-            its place, by the seven points named in this module; they are put in the order of these sets.
+            For each set of cut sides of a triangle (1 for ab, 2 for bc, 4 for ca, added up) the
+            triangles to put in its place, by the seven points named in this module; they are put in
+            the order of these sets.
 
         Returns
         -------
@@ -96,7 +107,8 @@ class TriangleSurface:
         weights : float64 [m, 3, 3]
             Barycentric coordinates in that one, of its corners.
         """
-        edges, count = self.edges, len(self.V)
+        edges = self.edges
+        count = len(self.V)
         cut = np.flatnonzero(~np.isnan(places))
         middles = np.full(len(edges.ends), -1)
         middles[cut] = count + np.arange(len(cut))
@@ -106,38 +118,51 @@ class TriangleSurface:
         sets = ((middles[edges.of] >= 0) * (1, 2, 4)).sum(axis=1)
         touched = np.flatnonzero(sets)
         nodes, local = self._nodes(touched, middles, places)
-        central = [number for number, triangles in patterns.items() if any(MIDDLE in each for each in triangles)]
+        central = [
+            number
+            for number, triangles in patterns.items()
+            if any(MIDDLE in each for each in triangles)
+        ]
         inner = np.flatnonzero(np.isin(sets[touched], central))
         nodes[inner, MIDDLE] = count + len(cut) + np.arange(len(inner))
         points.append(np.einsum("ij,ijk->ik", local[inner, MIDDLE], self.V[self.F[touched[inner]]]))
         whole = np.flatnonzero(sets == 0)
-        F, weights, origin = [self.F[whole]], [np.broadcast_to(np.eye(3), (len(whole), 3, 3))], [whole]
+        F = [self.F[whole]]
+        weights = [np.broadcast_to(np.eye(3), (len(whole), 3, 3))]
+        origin = [whole]
         for number, triangles in patterns.items():
             chosen = np.flatnonzero(sets[touched] == number)
             for triangle in triangles:
                 F.append(nodes[chosen][:, triangle])
                 weights.append(local[chosen][:, triangle])
                 origin.append(touched[chosen])
-        source, share = np.concatenate(origin), np.concatenate(weights)
-        parent, inside = self.parent[source], share @ self.inside[source]
-        return TriangleSurface(np.concatenate(points), np.concatenate(F), parent, inside), middles, source, share
+        source = np.concatenate(origin)
+        share = np.concatenate(weights)
+        parent = self.parent[source]
+        inside = share @ self.inside[source]
+        return (
+            TriangleSurface(np.concatenate(points), np.concatenate(F), parent, inside),
+            middles,
+            source,
+            share,
+        )
 
     def _nodes(self, triangles: Ints, middles: Ints, places: Floats) -> tuple[Ints, Floats]:
         """Vertices [k, 7] of the named points of triangles [k], and their barycentrics [k, 7, 3]."""
-        nodes, local = np.full((len(triangles), 7), -1), np.zeros((len(triangles), 7, 3))
-        nodes[:, :3], local[:, :3] = self.F[triangles], np.eye(3)
+        nodes = np.full((len(triangles), 7), -1)
+        local = np.zeros((len(triangles), 7, 3))
+        nodes[:, :3] = self.F[triangles]
+        local[:, :3] = np.eye(3)
         for k in range(3):
             edge = self.edges.of[triangles, k]
             nodes[:, 3 + k] = middles[edge]
             forward = self.edges.ends[edge, 0] == self.F[triangles, k]
             t = np.where(forward, places[edge], 1 - places[edge])
-            local[:, 3 + k, k], local[:, 3 + k, (k + 1) % 3] = 1 - t, t
+            local[:, 3 + k, k] = 1 - t
+            local[:, 3 + k, (k + 1) % 3] = t
         corners = np.where(np.isnan(local[:, 3:6]), 0.0, local[:, 3:6]).sum(axis=1)
         local[:, MIDDLE] = corners / np.maximum(corners.sum(axis=1, keepdims=True), 1e-300)
         return nodes, local
-
-
-_ON_RAY = 1e-9  # of the size of a polygon
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -174,7 +199,8 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
         The vertices along each line, from start to end.
     """
     surface = flat.surface
-    origin, target = _place_of(flat, start), _place_of(flat, end)
+    origin = _place_of(flat, start)
+    target = _place_of(flat, end)
     direction = (target - origin) / np.linalg.norm(target - origin, axis=1, keepdims=True)
     offset = flat.places - origin[flat.part][:, None]
     toward = direction[flat.part][:, None]
@@ -185,14 +211,17 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
     beside[on_ray] = 0.0
     sides = surface.edges.sides
     triangle, k = np.divmod(sides[:, 0], 3)
-    p, q = beside[triangle, k], beside[triangle, (k + 1) % 3]
+    p = beside[triangle, k]
+    q = beside[triangle, (k + 1) % 3]
     crossed = (p * q < 0) & (sides[:, 1] >= 0)
     crossed &= flat.part[triangle] == flat.part[np.where(crossed, sides[:, 1], sides[:, 0]) // 3]
     t = np.where(crossed, p / np.where(crossed, p - q, 1.0), np.nan)
     distance = (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3]
     crossed &= distance > 0
     forward = surface.edges.ends[:, 0] == surface.F[triangle, k]
-    finer, middles, source, weights = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan))
+    finer, middles, source, weights = surface.subdivided(
+        np.where(crossed, np.where(forward, t, 1 - t), np.nan)
+    )
     touched, corner = np.nonzero(on_ray)
     at_vertices = np.stack([flat.part[touched], surface.F[touched, corner], reach[touched, corner]])
     on_edges = np.stack([flat.part[triangle[crossed]], middles[crossed], distance[crossed]])
@@ -212,11 +241,9 @@ def _place_of(flat: Flat, vertex: Ints) -> Floats:
     return places
 
 
-_MOST_ROUNDS = 100
-_MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
-
-
-def halved_chords(surface: TriangleSurface, part: Ints, on_border: Bools) -> tuple[TriangleSurface, Ints]:
+def halved_chords(
+    surface: TriangleSurface, part: Ints, on_border: Bools
+) -> tuple[TriangleSurface, Ints]:
     """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side.
 
     Returns the finer surface, and the triangle from before in which each of its triangles lies.
@@ -236,7 +263,9 @@ def refined(surface: TriangleSurface, longest: float) -> TriangleSurface:
     most = max(_MOST_TRIANGLES, _MOST_GROWTH * len(surface.F))
     for _ in range(_MOST_ROUNDS):
         lengths = surface.edge_lengths
-        own = np.take_along_axis(surface.edges.of, lengths[surface.edges.of].argmax(axis=1)[:, None], axis=1)
+        own = np.take_along_axis(
+            surface.edges.of, lengths[surface.edges.of].argmax(axis=1)[:, None], axis=1
+        )
         chosen = np.zeros(len(lengths), bool)
         chosen[own] = True
         chosen &= lengths > longest

@@ -1,8 +1,9 @@
 """Proof that a sphere map is a bijection, how evenly it spreads area, and how it is turned to lie well on the cube.
 
-A map is rotated under the cube until the atlas's narrowest texels are as wide as possible. On the sphere a texel is
-1.09 of the mean width at the middle of a chart and 0.77, in one direction, at the middle of an edge of the cube. Where
-the map itself is narrow, at the roots of limbs, this decides how long the time step may be.
+A map is rotated under the cube until the atlas's narrowest texels are as wide as possible. On the
+sphere a texel is 1.09 of the mean width at the middle of a chart and 0.77, in one direction, at the
+middle of an edge of the cube. Where the map itself is narrow, at the roots of limbs, this decides
+how long the time step may be.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ NEGLIGIBLE = 1e-2  # share of the narrowness that no rotation need look at
 class Certificate:
     """What `certify` found.
 
-    A map whose triangles all keep their orientation and together cover the sphere's 4 pi once is a bijection: a point
-    covered twice would make the sum of solid angles larger.
+    A map whose triangles all keep their orientation and together cover the sphere's 4 pi once is a
+    bijection: a point covered twice would make the sum of solid angles larger.
     """
 
     flipped: int  # triangles whose triple product is not positive
@@ -39,7 +40,8 @@ class Certificate:
 def certify(F: NDArray[np.integer], S: Floats) -> Certificate:
     """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3]."""
     a, b, c = (S[F[:, j]].T for j in range(3))
-    ab, ac = subtract(b, a), subtract(c, a)
+    ab = subtract(b, a)
+    ac = subtract(c, a)
     triple = dot(a, cross(ab, ac))
     flipped = np.count_nonzero(~(triple > 4.0 * EPSILON * np.sqrt(dot(ab, ab) * dot(ac, ac))))
     solid_angle = np.sum(solid_angles(F, S))
@@ -61,7 +63,9 @@ def stretch(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     How many times wider than in an ideal even grid the texels are there.
     """
     real = triangle_areas(V, F)
-    return np.sqrt(4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny))
+    return np.sqrt(
+        4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny)
+    )
 
 
 def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
@@ -74,22 +78,31 @@ def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     upper = 0.5 * (trace + np.sqrt(np.maximum(trace * trace - 4 * determinant, 0)))
     narrowest = area * (upper / np.maximum(determinant, LEAST_SQUARE * upper)) ** SHARPNESS
     order = np.argsort(-narrowest, kind="stable")
-    count = int(np.searchsorted(np.cumsum(narrowest[order]), (1 - NEGLIGIBLE) * np.sum(narrowest))) + 1
+    count = (
+        int(np.searchsorted(np.cumsum(narrowest[order]), (1 - NEGLIGIBLE) * np.sum(narrowest))) + 1
+    )
     narrow = S[order[:count]], metric[order[:count]], area[order[:count]]
-    least, widest = np.inf, np.eye(3)
+    least = np.inf
+    widest = np.eye(3)
     for rotation in spread_rotations(CANDIDATES):
         narrowness = _narrowness(rotation, *narrow, least)
         if narrowness < least:
-            least, widest = narrowness, rotation
+            least = narrowness
+            widest = rotation
     return S @ widest.T
 
 
 def spread_rotations(count: int) -> Floats:
     """Rotation matrices spread evenly over all, [count, 3, 3]: super-Fibonacci spirals (Alexa 2022)."""
     s = np.arange(count) + 0.5
-    inner, outer = np.sqrt(s / count), np.sqrt(1 - s / count)
-    alpha, beta = 2 * np.pi * s / np.sqrt(2), 2 * np.pi * s / 1.533751168755204288
-    x, y, z, w = inner * np.sin(alpha), inner * np.cos(alpha), outer * np.sin(beta), outer * np.cos(beta)
+    inner = np.sqrt(s / count)
+    outer = np.sqrt(1 - s / count)
+    alpha = 2 * np.pi * s / np.sqrt(2)
+    beta = 2 * np.pi * s / 1.533751168755204288
+    x = inner * np.sin(alpha)
+    y = inner * np.cos(alpha)
+    z = outer * np.sin(beta)
+    w = outer * np.cos(beta)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -104,11 +117,18 @@ def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Float
     The average lets a sliver count no more than it covers.
     """
     (i, j, k), (real_i, real_j, real_k) = ([P[F[:, c]].T for c in range(3)] for P in (S, V))
-    e, g, real_e, real_g = subtract(j, i), subtract(k, i), subtract(real_j, real_i), subtract(real_k, real_i)
+    e = subtract(j, i)
+    g = subtract(k, i)
+    real_e = subtract(real_j, real_i)
+    real_g = subtract(real_k, real_i)
     normal = cross(e, g)
     square = dot(normal, normal)
-    p, q = cross(g, normal), cross(normal, e)  # over the square: one along e and zero along g, and vice versa
-    ee, eg, gg = dot(real_e, real_e), dot(real_e, real_g), dot(real_g, real_g)
+    # over the square: one along e and zero along g, and vice versa
+    p = cross(g, normal)
+    q = cross(normal, e)
+    ee = dot(real_e, real_e)
+    eg = dot(real_e, real_g)
+    gg = dot(real_g, real_g)
     share = np.sqrt(square) / 6.0
     scale = share / (square * square)
 
@@ -117,7 +137,9 @@ def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Float
 
     area = at_vertices(share)
     sums = [
-        at_vertices(scale * (ee * p[a] * p[b] + eg * (p[a] * q[b] + q[a] * p[b]) + gg * q[a] * q[b]))
+        at_vertices(
+            scale * (ee * p[a] * p[b] + eg * (p[a] * q[b] + q[a] * p[b]) + gg * q[a] * q[b])
+        )
         for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     ]
     return np.stack(sums, axis=1) / area[:, None], area
@@ -145,22 +167,32 @@ def _narrowness(rotation: Floats, S: Floats, metric: Floats, area: Floats, limit
     total = 0.0
     for v in range(len(S)):
         p = row(S, v)
-        x, y, z = dot(row(rotation, 0), p), dot(row(rotation, 1), p), dot(row(rotation, 2), p)
+        x = dot(row(rotation, 0), p)
+        y = dot(row(rotation, 1), p)
+        z = dot(row(rotation, 2), p)
         main = 0 if abs(x) >= max(abs(y), abs(z)) else 1 if abs(y) >= abs(z) else 2
-        along, across = (main + 1) % 3, (main + 2) % 3
+        along = (main + 1) % 3
+        across = (main + 2) % 3
         local = (x, y, z)
         depth = abs(local[main])
-        # from the direction (u, v, 1) depth: its slope in the texel's angle, arctan u, is (e_u - u depth p) / cos^2
-        a, b = local[along] / depth, local[across] / depth
-        du, dv = depth * (1.0 + a * a), depth * (1.0 + b * b)
-        e, g = row(rotation, along), row(rotation, across)
-        s, t = local[along], local[across]
+        # from the direction (u, v, 1) depth: its slope in the texel's angle, arctan u, is (e_u - u
+        # depth p) / cos^2
+        a = local[along] / depth
+        b = local[across] / depth
+        du = depth * (1.0 + a * a)
+        dv = depth * (1.0 + b * b)
+        e = row(rotation, along)
+        g = row(rotation, across)
+        s = local[along]
+        t = local[across]
         first = (du * (e[0] - s * p[0]), du * (e[1] - s * p[1]), du * (e[2] - s * p[2]))
         second = (dv * (g[0] - t * p[0]), dv * (g[1] - t * p[1]), dv * (g[2] - t * p[2]))
         m = metric[v]
-        ee, gg = _aligned_product(m, first, first), _aligned_product(m, second, second)
+        ee = _aligned_product(m, first, first)
+        gg = _aligned_product(m, second, second)
         eg = _aligned_product(m, first, second)
-        trace, determinant = ee + gg, ee * gg - eg * eg
+        trace = ee + gg
+        determinant = ee * gg - eg * eg
         upper = 0.5 * (trace + np.sqrt(max(trace * trace - 4.0 * determinant, 0.0)))
         total += area[v] * (upper / max(determinant, LEAST_SQUARE * upper)) ** SHARPNESS
         if total > limit:

@@ -1,10 +1,12 @@
 """The conformal sphere map of Choi, Lam and Lui (FLASH, 2015).
 
-One triangle is cut out and the rest laid flat inside it by a harmonic map, which an inverse stereographic projection
-puts on the sphere. Angles suffer near the cut, at the north pole. So the map is projected from the south pole, where
-the cut lies in the middle of the plane, and composed with the quasi-conformal map that undoes the distortion.
+One triangle is cut out and the rest laid flat inside it by a harmonic map, which an inverse
+stereographic projection puts on the sphere. Angles suffer near the cut, at the north pole. So the
+map is projected from the south pole, where the cut lies in the middle of the plane, and composed
+with the quasi-conformal map that undoes the distortion.
 
-It keeps angles, not areas: limbs shrink beyond use, and badly shaped meshes fold. The progressive map does neither.
+It keeps angles, not areas: limbs shrink beyond use, and badly shaped meshes fold. The progressive
+map does neither.
 """
 
 from __future__ import annotations
@@ -48,12 +50,14 @@ def conformal_sphere_map(V: Real, F: Triangles) -> Real:
     """
     V = np.asarray(V, dtype=np.float64)
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", MatrixRankWarning)  # a singular system gives NaN, which is not certified
+        # a singular system gives NaN, which is not certified
+        warnings.simplefilter("ignore", MatrixRankWarning)
         S = _repair_north(V, F, _harmonic_map(V, F))
     certificate = certify(F, S)
     if not certificate.valid:
         raise SphereMapError(
-            f"the conformal sphere map folds {certificate.flipped} of {len(F)} triangles; it needs well-shaped "
+            f"the conformal sphere map folds {certificate.flipped} of {len(F)} triangles; it needs "
+            f"well-shaped "
             'triangles and a compact shape; use method="progressive", which never folds'
         )
     return S
@@ -61,15 +65,23 @@ def conformal_sphere_map(V: Real, F: Triangles) -> Real:
 
 def _harmonic_map(V: Real, F: Triangles) -> Real:
     """Sphere map that is harmonic but for one triangle, the most regular one, which becomes the north pole's."""
-    sides = np.stack([np.linalg.norm(V[F[:, (j + 2) % 3]] - V[F[:, (j + 1) % 3]], axis=1) for j in range(3)], axis=1)
+    sides = np.stack(
+        [np.linalg.norm(V[F[:, (j + 2) % 3]] - V[F[:, (j + 1) % 3]], axis=1) for j in range(3)],
+        axis=1,
+    )
     cut = int(np.argmin(np.ptp(sides, axis=1) / np.sum(sides, axis=1)))
     a, b, c = V[F[cut]]
     across = (c - a) @ (b - a) / np.linalg.norm(b - a)
-    corners = np.array([0, np.linalg.norm(b - a), across + 1j * np.sqrt((c - a) @ (c - a) - across**2)])
+    corners = np.array(
+        [0, np.linalg.norm(b - a), across + 1j * np.sqrt((c - a) @ (c - a) - across**2)]
+    )
     # each triangle in a plane of its own: the sides from its first corner to the second and third
-    u, v = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
-    length, unit = np.linalg.norm(u, axis=1), np.ones(len(F))
-    e, f = length + 0j, (np.einsum("ij,ij->i", u, v) + 1j * np.linalg.norm(np.cross(u, v), axis=1)) / length
+    u = V[F[:, 1]] - V[F[:, 0]]
+    v = V[F[:, 2]] - V[F[:, 0]]
+    length = np.linalg.norm(u, axis=1)
+    unit = np.ones(len(F))
+    e = length + 0j
+    f = (np.einsum("ij,ij->i", u, v) + 1j * np.linalg.norm(np.cross(u, v), axis=1)) / length
     plane = _solve_dirichlet(_stiffness(e, f, unit, 0 * unit, unit, F, len(V)), F[cut], corners)
     plane -= plane.mean()
 
@@ -83,18 +95,27 @@ def _harmonic_map(V: Real, F: Triangles) -> Real:
 def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
     """Make the map conformal also near the north pole."""
     plane = _from_south(S)
-    e, f = plane[F[:, 1]] - plane[F[:, 0]], plane[F[:, 2]] - plane[F[:, 0]]
-    u, v = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
+    e = plane[F[:, 1]] - plane[F[:, 0]]
+    f = plane[F[:, 2]] - plane[F[:, 0]]
+    u = V[F[:, 1]] - V[F[:, 0]]
+    v = V[F[:, 2]] - V[F[:, 0]]
     det = e.real * f.imag - e.imag * f.real
     dx = (u * f.imag[:, None] - v * e.imag[:, None]) / det[:, None]
     dy = (v * e.real[:, None] - u * f.real[:, None]) / det[:, None]
     xx, xy, yy = (np.einsum("ij,ij->i", p, q) for p, q in ((dx, dx), (dx, dy), (dy, dy)))
     # Beltrami coefficient of the map from the plane to the mesh
     beltrami = (xx - yy + 2j * xy) / (xx + yy + 2 * np.sqrt(np.maximum(xx * yy - xy * xy, 0)))
-    rho, tau = beltrami.real, beltrami.imag
+    rho = beltrami.real
+    tau = beltrami.imag
     rest = 1 - rho * rho - tau * tau
     stiffness = _stiffness(
-        e, f, ((rho - 1) ** 2 + tau * tau) / rest, -2 * tau / rest, ((rho + 1) ** 2 + tau * tau) / rest, F, len(V)
+        e,
+        f,
+        ((rho - 1) ** 2 + tau * tau) / rest,
+        -2 * tau / rest,
+        ((rho + 1) ** 2 + tau * tau) / rest,
+        F,
+        len(V),
     )
     southern = np.argsort(S[:, 2], kind="stable")[: max(round(SOUTHERN_SHARE * len(V)), 3)]
     return _to_sphere(_solve_dirichlet(stiffness, southern, plane[southern])) * [1, 1, -1]
@@ -107,21 +128,30 @@ def _stiffness(
     area = 0.5 * np.abs(e.real * f.imag - e.imag * f.real)
     sides = np.stack([f - e, -f, e], axis=1)
     # a hat function's gradient is its opposite side turned by a quarter, over twice the area
-    gx, gy = sides.imag, -sides.real
-    flux_x, flux_y = xx[:, None] * gx + xy[:, None] * gy, xy[:, None] * gx + yy[:, None] * gy
-    entries = (gx[:, :, None] * flux_x[:, None, :] + gy[:, :, None] * flux_y[:, None, :]) / (4 * area[:, None, None])
-    rows, columns = np.repeat(F, 3, axis=1).ravel(), np.tile(F, 3).ravel()
+    gx = sides.imag
+    gy = -sides.real
+    flux_x = xx[:, None] * gx + xy[:, None] * gy
+    flux_y = xy[:, None] * gx + yy[:, None] * gy
+    entries = (gx[:, :, None] * flux_x[:, None, :] + gy[:, :, None] * flux_y[:, None, :]) / (
+        4 * area[:, None, None]
+    )
+    rows = np.repeat(F, 3, axis=1).ravel()
+    columns = np.tile(F, 3).ravel()
     return sparse.csr_matrix((entries.ravel(), (rows, columns)), shape=(vertex_count, vertex_count))
 
 
-def _solve_dirichlet(stiffness: sparse.csr_matrix, fixed: NDArray[np.integer], values: Complex) -> Complex:
+def _solve_dirichlet(
+    stiffness: sparse.csr_matrix, fixed: NDArray[np.integer], values: Complex
+) -> Complex:
     """Solve stiffness z = 0 at the free vertices, with z = values at the fixed ones."""
     z = np.zeros(stiffness.shape[0], dtype=np.complex128)
     z[fixed] = values
     free = np.setdiff1d(np.arange(len(z)), fixed)
     if len(free):
         right = -(stiffness[free] @ z)
-        parts = spsolve(stiffness[free][:, free].tocsc(), np.stack([right.real, right.imag], axis=1))
+        parts = spsolve(
+            stiffness[free][:, free].tocsc(), np.stack([right.real, right.imag], axis=1)
+        )
         z[free] = parts[..., 0] + 1j * parts[..., 1]
     return z
 

@@ -1,10 +1,12 @@
 """Levels of detail of a mesh, and their reference triangles: the shape and area each should have on the sphere.
 
-*Carried area.* A collapsed vertex hands its share of the real surface on to the vertex it merges with. So a limb that a
-coarse level no longer shows still gets its share of the sphere there, and finds the room when it comes back.
+*Carried area.* A collapsed vertex hands its share of the real surface on to the vertex it merges
+with. So a limb that a coarse level no longer shows still gets its share of the sphere there, and
+finds the room when it comes back.
 
-The reference has the triangle's real shape, pulled towards an equilateral one where it is a sliver (a sliver's
-cotangents would drown its neighbours' energy), and on the coarsest levels, where real shapes mean little.
+The reference has the triangle's real shape, pulled towards an equilateral one where it is a sliver
+(a sliver's cotangents would drown its neighbours' energy), and on the coarsest levels, where real
+shapes mean little.
 """
 
 from __future__ import annotations
@@ -19,34 +21,45 @@ from ...mesh.vectors import Vector, cross, dot, row, subtract
 from ..energy import Reference
 from .decimation import CornerTable, following, gather_star, preceding
 
+SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
+
 
 class Level(NamedTuple):
     """Triangles of a level, its edges, and the star of each vertex; h is one of the level's 3 m half-edges."""
 
     tail: Ints32  # [3 m] vertex where a half-edge starts
     edge: Ints32  # [3 m] edge that a half-edge lies on
-    ends: Ints32  # [e, 2] vertices of an edge; the half-edge that starts at the first one is the lower-numbered
+    # [e, 2] vertices of an edge; the half-edge that starts at the first one is the lower-numbered
+    ends: Ints32
     star_start: Ints32  # [n + 1] where the neighbours of a vertex begin in `ring`
     ring: Ints32  # [3 m] neighbours of each vertex, counterclockwise
     star: Ints32  # [3 m] the half-edges to them
 
 
-def build_level(table: CornerTable, vertices: NDArray[np.integer], triangles: NDArray[np.integer]) -> Level:
+def build_level(
+    table: CornerTable, vertices: NDArray[np.integer], triangles: NDArray[np.integer]
+) -> Level:
     """Level made of the given vertices and triangles of a (partly collapsed) corner table."""
     corners = (3 * triangles[:, None] + np.arange(3)).ravel()
-    vertex_number, corner_number = _renumber(vertices, len(table.leaving)), _renumber(corners, len(table.tail))
-    tail, twin = vertex_number[table.tail[corners]], corner_number[table.twin[corners]]
+    vertex_number = _renumber(vertices, len(table.leaving))
+    corner_number = _renumber(corners, len(table.tail))
+    tail = vertex_number[table.tail[corners]]
+    twin = corner_number[table.twin[corners]]
     lower = np.flatnonzero(np.arange(len(twin)) < twin)
     edge = np.empty(len(twin), dtype=np.int32)
     edge[lower] = edge[twin[lower]] = np.arange(len(lower))
     ends = np.stack([tail[lower], tail[twin[lower]]], axis=1)
     star_start = np.concatenate([[0], np.cumsum(np.bincount(tail))]).astype(np.int32)
     star = np.empty(star_start[-1], dtype=np.int32)
-    h, place, end = table.leaving[vertices], star_start[:-1], star_start[1:]
+    h = table.leaving[vertices]
+    place = star_start[:-1]
+    end = star_start[1:]
     while len(h):  # one half-edge further counterclockwise round every vertex that has more
         star[place] = h
         left = np.flatnonzero(place + 1 < end)
-        h, place, end = table.twin[preceding(h[left])], place[left] + 1, end[left]
+        h = table.twin[preceding(h[left])]
+        place = place[left] + 1
+        end = end[left]
     ring = vertex_number[table.tail[table.twin[star]]]
     return Level(tail, edge, ends, star_start, ring, corner_number[star])
 
@@ -54,7 +67,12 @@ def build_level(table: CornerTable, vertices: NDArray[np.integer], triangles: ND
 def star_shapes(star: Ints32, reference: Reference) -> Floats:
     """References of the triangles left of the half-edges `star`, as `expand_star` takes them, shape [3 m, 4]."""
     cotangent = reference.cotangent
-    columns = reference.area[star // 3], cotangent[star], cotangent[following(star)], cotangent[preceding(star)]
+    columns = (
+        reference.area[star // 3],
+        cotangent[star],
+        cotangent[following(star)],
+        cotangent[preceding(star)],
+    )
     return np.stack(columns, axis=1)
 
 
@@ -64,9 +82,6 @@ def _renumber(kept: NDArray[np.integer], count: int) -> Ints32:
     return number
 
 
-SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
-
-
 class RealSurface(NamedTuple):
     """The surface as a level should resemble it."""
 
@@ -74,7 +89,8 @@ class RealSurface(NamedTuple):
     carried: Floats  # [n] real area that each vertex stands for
     load: Floats  # [n] carried area over the area that the level shows
     trust: float  # in [0, 1], from equal equilateral triangles to the real ones
-    sliver: float  # shape quality (1 is equilateral) below which a reference is pulled towards equilateral
+    # shape quality (1 is equilateral) below which a reference is pulled towards equilateral
+    sliver: float
     mean: float  # reference area of an average triangle
 
 
@@ -93,7 +109,8 @@ def _area(a: Vector, b: Vector, c: Vector) -> float:
 @kernel
 def update_load(v: int, star: Ints32, degree: int, tail: Ints32, surface: RealSurface) -> None:
     """Find the load of v: the area it carries over its share of the real area that the level still shows."""
-    V, shown = surface.V, 0.0
+    V = surface.V
+    shown = 0.0
     for i in range(degree):
         h = 3 * (star[i] // 3)
         shown += _area(row(V, tail[h]), row(V, tail[h + 1]), row(V, tail[h + 2]))
@@ -104,22 +121,37 @@ def update_load(v: int, star: Ints32, degree: int, tail: Ints32, surface: RealSu
 @kernel
 def update_triangle(f: int, tail: Ints32, surface: RealSurface, reference: Reference) -> None:
     """Set the reference of triangle f from its real shape and the loads of its corners."""
-    u, v, w = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
-    a, b, c = row(surface.V, u), row(surface.V, v), row(surface.V, w)
-    e0, e1, e2 = subtract(c, b), subtract(a, c), subtract(b, a)
-    q0, q1, q2 = dot(e0, e0), dot(e1, e1), dot(e2, e2)
+    u = tail[3 * f]
+    v = tail[3 * f + 1]
+    w = tail[3 * f + 2]
+    a = row(surface.V, u)
+    b = row(surface.V, v)
+    c = row(surface.V, w)
+    e0 = subtract(c, b)
+    e1 = subtract(a, c)
+    e2 = subtract(b, a)
+    q0 = dot(e0, e0)
+    q1 = dot(e1, e1)
+    q2 = dot(e2, e2)
     real = _area(a, b, c)
     third = (q0 + q1 + q2) / 3.0
     if third > 1e-28:
         quality = 4.0 / np.sqrt(3.0) * real / third
         pull = max(1.0 - min(quality / surface.sliver, 1.0), 1.0 - surface.trust)
-        q0, q1, q2 = q0 + pull * (third - q0), q1 + pull * (third - q1), q2 + pull * (third - q2)
+        q0 = q0 + pull * (third - q0)
+        q1 = q1 + pull * (third - q1)
+        q2 = q2 + pull * (third - q2)
     else:
         q0 = q1 = q2 = 1.0
-    area = max(real * (surface.load[u] + surface.load[v] + surface.load[w]) / 3.0, SMALLEST_SHARE * surface.mean)
+    area = max(
+        real * (surface.load[u] + surface.load[v] + surface.load[w]) / 3.0,
+        SMALLEST_SHARE * surface.mean,
+    )
     if surface.trust < 1.0:
         area = area**surface.trust * surface.mean ** (1.0 - surface.trust)
-    four_areas = np.sqrt(max(2.0 * (q0 * q1 + q1 * q2 + q2 * q0) - (q0 * q0 + q1 * q1 + q2 * q2), 1e-300))
+    four_areas = np.sqrt(
+        max(2.0 * (q0 * q1 + q1 * q2 + q2 * q0) - (q0 * q0 + q1 * q1 + q2 * q2), 1e-300)
+    )
     scale = 0.5 / (four_areas * area)
     reference.area[f] = area
     reference.cotangent[3 * f] = scale * (q1 + q2 - q0)
@@ -129,7 +161,11 @@ def update_triangle(f: int, tail: Ints32, surface: RealSurface, reference: Refer
 
 @kernel
 def update_level(
-    vertices: Ints32, triangles: Ints32, table: CornerTable, surface: RealSurface, reference: Reference
+    vertices: Ints32,
+    triangles: Ints32,
+    table: CornerTable,
+    surface: RealSurface,
+    reference: Reference,
 ) -> None:
     """Set the references of a whole level, their areas summing to the sphere's 4 pi."""
     star = np.empty(len(surface.V), np.int32)

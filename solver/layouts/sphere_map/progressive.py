@@ -1,16 +1,17 @@
 """The progressive sphere map: collapse to a tetrahedron, put it on the sphere, bring the vertices back level by level.
 
-In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the carried area (`level`),
-and a triple-product barrier with Newton steps on every level (`energy`, `newton`).
+In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the
+carried area (`level`), and a triple-product barrier with Newton steps on every level (`energy`,
+`newton`).
 
-Each vertex comes back inside the kernel of its star, so that no triangle ever folds. Next to the vertex v it was merged
-with, the kernel is the wedge between the great circles through v and the two neighbours they share, left and right. The
-bisector of that wedge always leads into it.
+Each vertex comes back inside the kernel of its star, so that no triangle ever folds. Next to the
+vertex v it was merged with, the kernel is the wedge between the great circles through v and the two
+neighbours they share, left and right. The bisector of that wedge always leads into it.
 
-Each level is relaxed: by sweeps over single vertices first, then by Newton steps of all at once. A sweep moves one
-vertex after the other by a Newton step in its tangent plane. A step never folds a triangle, since a fold has infinite
-energy. Sweeps get out of states where the global Newton method sticks (a long cigar), and remove what is rough; what is
-smooth is the work of `newton`.
+Each level is relaxed: by sweeps over single vertices first, then by Newton steps of all at once. A
+sweep moves one vertex after the other by a Newton step in its tangent plane. A step never folds a
+triangle, since a fold has infinite energy. Sweeps get out of states where the global Newton method
+sticks (a long cigar), and remove what is rough; what is smooth is the work of `newton`.
 """
 
 from __future__ import annotations
@@ -24,24 +25,85 @@ from ...errors import SphereMapError
 from ...kernel import Floats, Ints32, kernel
 from ...mesh.topology import triangle_areas
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
-from ..energy import FOLDED, FREE, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
-from ..newton import CG_TOLERANCE, System, add_triangle, conjugate_gradients, descend_by_newton, line_search
+from ..energy import (
+    FOLDED,
+    FREE,
+    TERMS,
+    Density,
+    Reference,
+    descend,
+    energy_density,
+    expand_star,
+    star_energy,
+)
+from ..newton import (
+    CG_TOLERANCE,
+    System,
+    add_triangle,
+    conjugate_gradients,
+    descend_by_newton,
+    line_search,
+)
 from .certificate import align, certify
-from .decimation import CornerTable, corner_table, decimate, following, gather_star, preceding, undo_collapse
-from .level import Level, RealSurface, build_level, carry, star_shapes, update_level, update_load, update_triangle
+from .decimation import (
+    CornerTable,
+    corner_table,
+    decimate,
+    following,
+    gather_star,
+    preceding,
+    undo_collapse,
+)
+from .level import (
+    Level,
+    RealSurface,
+    build_level,
+    carry,
+    star_shapes,
+    update_level,
+    update_load,
+    update_triangle,
+)
 
-# Long edges cost as much as short ones: the operator's error comes from long texels, at the roots of limbs, and its
-# time step from narrow ones. With the wall 99.9 % of most surfaces have texels less than twice too wide.
+# Long edges cost as much as short ones: the operator's error comes from long texels, at the roots
+# of limbs, and its time step from narrow ones. With the wall 99.9 % of most surfaces have texels
+# less than twice too wide.
 SPHERE = Density(power=4, even=1.0, long=1.0, small=0.55**16)
 
-MOST_SWEEPS, TIRED_SWEEP = 5, 0.1  # stop when a sweep lowers the energy by less than this share
-MOST_NEWTON_STEPS, TIRED_NEWTON = 20, 5e-3  # stop when two steps in a row do
-LARGE, TIRED_LARGE = 8000, 1.5e-2  # vertices of a level that is content with less
+# stop when a sweep lowers the energy by less than this share
+MOST_SWEEPS = 5
+TIRED_SWEEP = 0.1
+# stop when two steps in a row do
+MOST_NEWTON_STEPS = 20
+TIRED_NEWTON = 5e-3
+# vertices of a level that is content with less
+LARGE = 8000
+TIRED_LARGE = 1.5e-2
 CG_RANGE = 10, 60
 EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck: start over from the sweeps
 MOST_ROUNDS = 4
 LONGEST_STEP = 0.7  # of a vertex [rad]
 HORIZON = 1.2  # Newton steps beyond which no fold is looked for
+
+TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
+GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
+
+# vertices of a level: equal equilateral references until, real shapes from
+EQUAL_UNTIL = 12
+REAL_FROM = 100
+
+# shape quality below which a reference is pulled towards equilateral
+COARSE_SLIVER = 0.5
+FINE_SLIVER = 0.15
+
+# from one level to the next, below and above CAREFUL_UNTIL vertices
+SLOW_GROWTH = 1.25
+FAST_GROWTH = 2.0
+CAREFUL_UNTIL = 30
+
+# in the real triangles, each tried when the one before gave no certified map
+TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)
+CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
 
 
 def relax_level(level: Level, S: Floats, reference: Reference) -> None:
@@ -67,15 +129,25 @@ def relax_level(level: Level, S: Floats, reference: Reference) -> None:
 @kernel
 def total_energy(tail: Ints32, S: Floats, reference: Reference) -> float:
     """Energy of the whole map S; infinite if a triangle is folded."""
-    total, cotangent = 0.0, reference.cotangent
+    total = 0.0
+    cotangent = reference.cotangent
     for f in range(len(tail) // 3):
-        h, area = 3 * f, reference.area[f]
-        a, b, c = row(S, tail[h]), row(S, tail[h + 1]), row(S, tail[h + 2])
-        ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+        h = 3 * f
+        area = reference.area[f]
+        a = row(S, tail[h])
+        b = row(S, tail[h + 1])
+        c = row(S, tail[h + 2])
+        ab = subtract(b, a)
+        ac = subtract(c, a)
+        bc = subtract(c, b)
         triple = dot(a, cross(ab, ac))
         if not triple > FOLDED:
             return np.inf
-        dirichlet = cotangent[h] * dot(bc, bc) + cotangent[h + 1] * dot(ac, ac) + cotangent[h + 2] * dot(ab, ab)
+        dirichlet = (
+            cotangent[h] * dot(bc, bc)
+            + cotangent[h + 1] * dot(ac, ac)
+            + cotangent[h + 2] * dot(ab, ab)
+        )
         total += area * energy_density(dirichlet, 2.0 * area / triple, reference.density)
     return total
 
@@ -87,12 +159,17 @@ def tangent_frame(p: Vector) -> tuple[Vector, Vector]:
     return x, cross(p, x)
 
 
-def newton_step(level: Level, S: Floats, reference: Reference, cg_steps: int) -> tuple[float, float]:
+def newton_step(
+    level: Level, S: Floats, reference: Reference, cg_steps: int
+) -> tuple[float, float]:
     """Move S by one Newton step in place, its direction found by up to `cg_steps` steps of conjugate gradients.
 
-    Returns by how much the energy fell, 0 where no step lowers it, and the step's length, 1 for a whole Newton step.
+    Returns by how much the energy fell, 0 where no step lowers it, and the step's length, 1 for a
+    whole Newton step.
     """
-    system, x, y = System.zeros(len(S), len(level.ends)), np.empty_like(S), np.empty_like(S)
+    system = System.zeros(len(S), len(level.ends))
+    x = np.empty_like(S)
+    y = np.empty_like(S)
     energy = assemble(level, S, reference, x, y, system)
     step = conjugate_gradients(level.ends, system, cg_steps, CG_TOLERANCE)
     slope = float(np.sum(system.gradient * step))
@@ -107,23 +184,33 @@ def newton_step(level: Level, S: Floats, reference: Reference, cg_steps: int) ->
         ahead *= (1.0 / np.sqrt(dot(ahead.T, ahead.T)))[:, None]
         return ahead
 
-    t, lower = line_search(energy, slope, bound, lambda t: total_energy(level.tail, moved(t), reference))
+    t, lower = line_search(
+        energy, slope, bound, lambda t: total_energy(level.tail, moved(t), reference)
+    )
     if t > 0.0:
         S[:] = moved(t)
     return energy - lower, t
 
 
 @kernel
-def assemble(level: Level, S: Floats, reference: Reference, x: Floats, y: Floats, system: System) -> float:
+def assemble(
+    level: Level, S: Floats, reference: Reference, x: Floats, y: Floats, system: System
+) -> float:
     """Fill in the tangents x, y [n, 3] of the map S, add its triangles to the system, and return its energy."""
     for v in range(len(S)):
         (x[v, 0], x[v, 1], x[v, 2]), (y[v, 0], y[v, 1], y[v, 2]) = tangent_frame(row(S, v))
     radial = np.zeros(len(S))
-    tail, edge, ends = level.tail, level.edge, level.ends
+    tail = level.tail
+    edge = level.edge
+    ends = level.ends
     total = 0.0
     for f in range(len(tail) // 3):
-        u, v, w = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
-        i, j, k = edge[3 * f], edge[3 * f + 1], edge[3 * f + 2]
+        u = tail[3 * f]
+        v = tail[3 * f + 1]
+        w = tail[3 * f + 2]
+        i = edge[3 * f]
+        j = edge[3 * f + 1]
+        k = edge[3 * f + 2]
         energy, (at_u, at_v, at_w) = add_triangle(
             f,
             (u, v, w),
@@ -140,7 +227,8 @@ def assemble(level: Level, S: Floats, reference: Reference, x: Floats, y: Floats
         radial[w] += at_w
     diagonal = system.diagonal
     for v in range(len(S)):
-        # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the radial slope
+        # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the
+        # radial slope
         shift = max(-radial[v], 0.0) + 1e-8 * (diagonal[v, 0] + diagonal[v, 2])
         diagonal[v, 0] += shift
         diagonal[v, 2] += shift
@@ -155,14 +243,22 @@ def _time_of_first_fold(tail: Ints32, S: Floats, velocity: Floats) -> float:
     """
     first = np.inf
     for f in range(len(tail) // 3):
-        i, j, k = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
-        p, dp = row(S, i), row(velocity, i)
-        e, g = subtract(row(S, j), p), subtract(row(S, k), p)
-        de, dg = subtract(row(velocity, j), dp), subtract(row(velocity, k), dp)
-        n0, n2 = cross(e, g), cross(de, dg)
+        i = tail[3 * f]
+        j = tail[3 * f + 1]
+        k = tail[3 * f + 2]
+        p = row(S, i)
+        dp = row(velocity, i)
+        e = subtract(row(S, j), p)
+        g = subtract(row(S, k), p)
+        de = subtract(row(velocity, j), dp)
+        dg = subtract(row(velocity, k), dp)
+        n0 = cross(e, g)
+        n2 = cross(de, dg)
         n1 = combine(1.0, cross(de, g), 1.0, cross(e, dg))
-        c0, c3 = dot(p, n0), dot(dp, n2)
-        c1, c2 = dot(dp, n0) + dot(p, n1), dot(dp, n1) + dot(p, n2)
+        c0 = dot(p, n0)
+        c3 = dot(dp, n2)
+        c1 = dot(dp, n0) + dot(p, n1)
+        c2 = dot(dp, n1) + dot(p, n2)
         if abs(c1) * HORIZON + abs(c2) * HORIZON**2 + abs(c3) * HORIZON**3 < 0.9 * c0:
             continue
         low = high = 0.0
@@ -191,11 +287,13 @@ def sweep(level: Level, S: Floats, shapes: Floats, density: Density, backwards: 
     largest = 0
     for v in range(count):
         largest = max(largest, level.star_start[v + 1] - level.star_start[v])
-    ring, terms = np.empty((largest + 1, 3)), np.empty((largest, TERMS))
+    ring = np.empty((largest + 1, 3))
+    terms = np.empty((largest, TERMS))
     fall = 0.0
     for i in range(count):
         v = count - 1 - i if backwards else i
-        first, last = level.star_start[v], level.star_start[v + 1]
+        first = level.star_start[v]
+        last = level.star_start[v + 1]
         for k in range(last - first):
             ring[k, 0], ring[k, 1], ring[k, 2] = row(S, level.ring[first + k])
         ring[last - first, 0], ring[last - first, 1], ring[last - first, 2] = row(ring, 0)
@@ -209,25 +307,18 @@ def relax_vertex(
 ) -> float:
     """Move v to lower the energy of its star; return by how much it fell.
 
-    `ring` [degree + 1, 3] are its neighbours, counterclockwise, and the first again, `shapes` as in `expand_star`, and
-    `terms` is room for what it fills.
+    `ring` [degree + 1, 3] are its neighbours, counterclockwise, and the first again, `shapes` as in
+    `expand_star`, and `terms` is room for what it fills.
     """
     p = row(S, v)
     x, y = tangent_frame(p)
     expand_star(p, x, y, ring, ring[1:], shapes, degree, terms)
     fall, move = descend(terms, degree, density, 1.0, FREE)
     if fall > 0.0:
-        S[v, 0], S[v, 1], S[v, 2] = unit(combine(1.0, combine(move[0], x, move[1], y), 1.0 + move[2], p))
+        S[v, 0], S[v, 1], S[v, 2] = unit(
+            combine(1.0, combine(move[0], x, move[1], y), 1.0 + move[2], p)
+        )
     return fall
-
-
-TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
-GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
-EQUAL_UNTIL, REAL_FROM = 12, 100  # vertices of a level: equal equilateral references until, real shapes from
-COARSE_SLIVER, FINE_SLIVER = 0.5, 0.15  # shape quality below which a reference is pulled towards equilateral
-SLOW_GROWTH, FAST_GROWTH = 1.25, 2.0  # from one level to the next, below and above CAREFUL_UNTIL vertices
-CAREFUL_UNTIL = 30
-TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)  # in the real triangles, each tried when the one before gave no certified map
 
 
 def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
@@ -250,12 +341,15 @@ def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
     SphereMapError
         No such map was found.
     """
-    # centred, scaled to an area of 4 pi, and rounded, so that place and size of the mesh do not change the map: without
-    # rounding, the last bits would decide between the many equivalent ways out of a symmetric coarse level
+    # centred, scaled to an area of 4 pi, and rounded, so that place and size of the mesh do not
+    # change the map: without rounding, the last bits would decide between the many equivalent ways
+    # out of a symmetric coarse level
     V = V - np.mean(V, axis=0, dtype=np.float64)
     V = np.rint(V * np.sqrt(4 * np.pi / np.sum(triangle_areas(V, F))) * GRID) / GRID
     # along a Morton curve neighbours in space come close together in memory
-    cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(np.int64)
+    cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(
+        np.int64
+    )
     code = np.zeros(len(V), dtype=np.int64)
     for bit in range(10):
         for axis in range(3):
@@ -270,26 +364,35 @@ def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
         certificate = certify(F, S)
         if certificate.valid:
             turned = align(V, F, S)
-            return turned if certify(F, turned).valid else S  # round-off can fold the tiniest triangles
+            # round-off can fold the tiniest triangles
+            return turned if certify(F, turned).valid else S
     raise SphereMapError(
-        f"no fold-free sphere map was found: {certificate.flipped} of {len(F)} triangles are folded, the solid angle "
-        f"is {certificate.solid_angle:.6g} instead of 4 pi; simplify or remesh the mesh, and remove its slivers"
+        f"no fold-free sphere map was found: {certificate.flipped} of {len(F)} triangles are "
+        f"folded, the solid angle "
+        f"is {certificate.solid_angle:.6g} instead of 4 pi; simplify or remesh the mesh, and "
+        f"remove its slivers"
     )
 
 
 def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     n = len(V)
-    carried = np.full(n, 1e-3 * 4 * np.pi / n)  # every vertex gets some room, even if its triangles have no area
+    # every vertex gets some room, even if its triangles have no area
+    carried = np.full(n, 1e-3 * 4 * np.pi / n)
     carried += np.bincount(F.ravel(), np.repeat(triangle_areas(V, F) / 3, 3), n)
     table = corner_table(F, n)
     log = decimate(table, V)
-    removed, kept = table.tail[log], table.tail[table.twin[log]]
+    removed = table.tail[log]
+    kept = table.tail[table.twin[log]]
     carry(removed, kept, carried)
     # how many vertices the first level has that shows a vertex or a triangle
-    vertex_since, triangle_since = np.full(n, 4), np.full(len(F), 4)
+    vertex_since = np.full(n, 4)
+    triangle_since = np.full(len(F), 4)
     arrival = n - np.arange(len(log))
-    vertex_since[removed] = triangle_since[log // 3] = triangle_since[table.twin[log] // 3] = arrival
-    vertices, triangles = np.flatnonzero(vertex_since == 4), np.flatnonzero(triangle_since == 4)
+    vertex_since[removed] = triangle_since[log // 3] = triangle_since[table.twin[log] // 3] = (
+        arrival
+    )
+    vertices = np.flatnonzero(vertex_since == 4)
+    triangles = np.flatnonzero(triangle_since == 4)
 
     S = np.zeros((n, 3))
     # the four that are left, in the order in which no triangle is inside out
@@ -298,15 +401,20 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)), SPHERE)
     load = np.ones(n)
     for size in _level_sizes(n):
-        shape_trust = trust * min(max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0)
+        shape_trust = trust * min(
+            max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0
+        )
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
         surface = RealSurface(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
         update_level(vertices, triangles, table, surface, reference)
         insert_vertices(log[n - size : n - len(vertices)], table, surface, S, reference)
-        vertices, triangles = np.flatnonzero(vertex_since <= size), np.flatnonzero(triangle_since <= size)
+        vertices = np.flatnonzero(vertex_since <= size)
+        triangles = np.flatnonzero(triangle_since <= size)
         update_level(vertices, triangles, table, surface, reference)
         level_S = S[vertices]
-        shown = Reference(reference.area[triangles], reference.cotangent.reshape(-1, 3)[triangles].ravel(), SPHERE)
+        shown = Reference(
+            reference.area[triangles], reference.cotangent.reshape(-1, 3)[triangles].ravel(), SPHERE
+        )
         relax_level(build_level(table, vertices, triangles), level_S, shown)
         S[vertices] = level_S
     return S
@@ -314,7 +422,8 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
 
 def _level_sizes(n: int) -> list[int]:
     """Vertex counts of the levels, from just above four to n."""
-    sizes, size = [], 4.0
+    sizes = []
+    size = 4.0
     while size < n:
         size = size * (SLOW_GROWTH if size < CAREFUL_UNTIL else FAST_GROWTH) + 1
         sizes.append(min(int(size), n))
@@ -323,26 +432,39 @@ def _level_sizes(n: int) -> list[int]:
     return sizes
 
 
-CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
-
-
 @kernel
 def _gather(
-    neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, ring: Floats, shapes: Floats
+    neighbours: Ints32,
+    degree: int,
+    tail: Ints32,
+    S: Floats,
+    reference: Reference,
+    ring: Floats,
+    shapes: Floats,
 ) -> None:
     """Fill in what `relax_vertex` asks for, from the half-edges to the neighbours."""
     cotangent = reference.cotangent
     for i in range(degree):
         h = neighbours[i]
         ring[i, 0], ring[i, 1], ring[i, 2] = row(S, tail[following(h)])
-        shapes[i, 0], shapes[i, 1] = reference.area[h // 3], cotangent[h]
-        shapes[i, 2], shapes[i, 3] = cotangent[following(h)], cotangent[preceding(h)]
+        shapes[i, 0] = reference.area[h // 3]
+        shapes[i, 1] = cotangent[h]
+        shapes[i, 2] = cotangent[following(h)]
+        shapes[i, 3] = cotangent[preceding(h)]
     ring[degree, 0], ring[degree, 1], ring[degree, 2] = row(ring, 0)
 
 
 @kernel
 def _place(
-    v: int, left: int, right: int, S: Floats, ring: Floats, shapes: Floats, degree: int, density: Density, terms: Floats
+    v: int,
+    left: int,
+    right: int,
+    S: Floats,
+    ring: Floats,
+    shapes: Floats,
+    degree: int,
+    density: Density,
+    terms: Floats,
 ) -> Vector:
     """Where the energy of a new vertex's star is least among trial points on the ways from v."""
     start = row(S, v)
@@ -352,15 +474,22 @@ def _place(
     for i in range(degree):
         middle = combine(1.0, middle, 1.0, row(ring, i))
     inward = combine(1.0, unit(cross(start, row(S, left))), 1.0, unit(cross(row(S, right), start)))
-    least, best = np.inf, start
-    for goal, share, trials in ((unit(middle), 0.65, 16), (unit(combine(1.0, start, 1.0, unit(inward))), 0.4, 40)):
+    least = np.inf
+    best = start
+    for goal, share, trials in (
+        (unit(middle), 0.65, 16),
+        (unit(combine(1.0, start, 1.0, unit(inward))), 0.4, 40),
+    ):
         t = 1.0
         for _ in range(trials):
             p = unit(combine(1.0 - t, start, t, goal))
             move = subtract(p, start)
-            energy = star_energy(terms, degree, density, (dot(move, x), dot(move, y), dot(move, start)))
+            energy = star_energy(
+                terms, degree, density, (dot(move, x), dot(move, y), dot(move, start))
+            )
             if energy < least:
-                least, best = energy, p
+                least = energy
+                best = p
             elif least < np.inf:
                 break
             t *= share
@@ -370,17 +499,25 @@ def _place(
 
 
 @kernel
-def insert_vertices(log: Ints32, table: CornerTable, surface: RealSurface, S: Floats, reference: Reference) -> None:
+def insert_vertices(
+    log: Ints32, table: CornerTable, surface: RealSurface, S: Floats, reference: Reference
+) -> None:
     """Undo the collapses in `log`, latest first, and relax round every new vertex.
 
     A vertex that finds no place leaves a fold behind, which the certificate will find.
     """
-    tail, density = table.tail, reference.density
-    neighbours, others = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
-    ring, shapes, terms = np.empty((len(S) + 1, 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS))
-    other_ring, other_shapes = np.empty((CROWDED + 1, 3)), np.empty((CROWDED, 4))
+    tail = table.tail
+    density = reference.density
+    neighbours = np.empty(len(S), np.int32)
+    others = np.empty(len(S), np.int32)
+    ring = np.empty((len(S) + 1, 3))
+    shapes = np.empty((len(S), 4))
+    terms = np.empty((len(S), TERMS))
+    other_ring = np.empty((CROWDED + 1, 3))
+    other_shapes = np.empty((CROWDED, 4))
     for h in log[::-1]:
-        u, v = tail[h], tail[table.twin[h]]
+        u = tail[h]
+        v = tail[table.twin[h]]
         undo_collapse(table, h)
         surface.carried[v] -= surface.carried[u]
         for w in (v, u):
@@ -390,7 +527,8 @@ def insert_vertices(log: Ints32, table: CornerTable, surface: RealSurface, S: Fl
             for i in range(degree):
                 update_triangle(neighbours[i] // 3, tail, surface, reference)
         _gather(neighbours, degree, tail, S, reference, ring, shapes)
-        left, right = tail[preceding(h)], tail[preceding(table.twin[h])]
+        left = tail[preceding(h)]
+        right = tail[preceding(table.twin[h])]
         S[u, 0], S[u, 1], S[u, 2] = _place(v, left, right, S, ring, shapes, degree, density, terms)
         relax_vertex(u, S, ring, shapes, degree, density, terms)
         for i in range(degree):

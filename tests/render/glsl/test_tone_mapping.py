@@ -11,7 +11,9 @@ SHOULDER = 0.72
 
 
 def mapped(gl, radiance, linear=0):
-    return evaluated(gl, FILE, "vec4(tone_mapped(x.rgb), 1.0)", np.asarray(radiance, dtype=float), LINEAR=linear)[:, :3]
+    return evaluated(
+        gl, FILE, "vec4(tone_mapped(x.rgb), 1.0)", np.asarray(radiance, dtype=float), LINEAR=linear
+    )[:, :3]
 
 
 def test_the_shader_and_numpy_agree(gl):
@@ -22,7 +24,9 @@ def test_the_shader_and_numpy_agree(gl):
 
 def test_below_the_shoulder_it_is_the_srgb_curve(gl):
     rng = np.random.default_rng(0)
-    radiance = np.concatenate([rng.uniform(0, SHOULDER, (1000, 3)), rng.uniform(0, 0.01, (200, 3)), np.zeros((1, 3))])
+    radiance = np.concatenate(
+        [rng.uniform(0, SHOULDER, (1000, 3)), rng.uniform(0, 0.01, (200, 3)), np.zeros((1, 3))]
+    )
     np.testing.assert_allclose(mapped(gl, radiance), linear_to_srgb(radiance), atol=2e-5)
 
 
@@ -40,7 +44,10 @@ def test_there_is_no_step_at_the_shoulder(gl):
     """Neither in brightness nor in contrast."""
     strength = SHOULDER + np.linspace(-0.02, 0.02, 401)
     grey = srgb_to_linear(mapped(gl, np.repeat(strength[:, None], 3, axis=1)))[:, 0]
-    slope = np.polyfit(strength[:190], grey[:190], 1)[0], np.polyfit(strength[210:], grey[210:], 1)[0]
+    slope = (
+        np.polyfit(strength[:190], grey[:190], 1)[0],
+        np.polyfit(strength[210:], grey[210:], 1)[0],
+    )
     assert np.abs(np.diff(grey)).max() < 1.2e-4
     assert slope[0] == pytest.approx(1.0, abs=1e-3)
     assert 0.85 < slope[1] < 1.0
@@ -64,7 +71,9 @@ def test_frames_of_linear_light_keep_it_as_far_as_half_floats_reach(gl):
 def test_dithering_moves_a_colour_by_half_a_code_at_most_and_by_nothing_on_average(gl):
     """The values around a pixel round to codes whose mean is the colour."""
     color = np.full((256 * 64, 1), 100.3 / 255)
-    dithered = evaluated(gl, FILE, "vec4(dithered(x.xxx), 1.0)", color, LINEAR=0)[:, 0].astype(np.float64)
+    dithered = evaluated(gl, FILE, "vec4(dithered(x.xxx), 1.0)", color, LINEAR=0)[:, 0].astype(
+        np.float64
+    )
     assert np.abs(255 * dithered - 100.3).max() <= 0.5 + 1e-4
     codes = np.round(255 * dithered)
     assert set(codes) == {100.0, 101.0}

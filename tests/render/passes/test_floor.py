@@ -21,15 +21,22 @@ CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 
 def test_the_floor_is_the_highest_of_the_planes_that_face_up_most() -> None:
     places = 'pos="0 0 -1"', "", 'pos="0 0 9" euler="90 0 0"', 'pos="0 0 9" euler="180 0 0"'
     low, high, wall, ceiling = (f'<geom type="plane" size="0 0 1" {place}/>' for place in places)
-    for planes, floor in ((low + wall + high + ceiling, 2), (high + low, 0), (ceiling + wall, None), ("", None)):
+    for planes, floor in (
+        (low + wall + high + ceiling, 2),
+        (high + low, 0),
+        (ceiling + wall, None),
+        ("", None),
+    ):
         model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{planes}</worldbody></mujoco>")
         assert find_floor(model, []) == floor
 
 
 def test_a_small_plane_is_no_floor() -> None:
     """Nor a wall; an infinite plane is one before a large one, and an opaque one before water over it."""
-    ground, large = '<geom type="plane" size="0 0 1"/>', '<geom type="plane" size="9 9 1" pos="0 0 .1"/>'
-    table, ball = '<geom type="plane" size=".8 .6 1" pos="0 0 .5"/>', '<geom size=".3" pos="0 0 .8"/>'
+    ground = '<geom type="plane" size="0 0 1"/>'
+    large = '<geom type="plane" size="9 9 1" pos="0 0 .1"/>'
+    table = '<geom type="plane" size=".8 .6 1" pos="0 0 .5"/>'
+    ball = '<geom size=".3" pos="0 0 .8"/>'
     water = '<geom type="plane" size="0 0 1" pos="0 0 .2" rgba="0 0 1 .4"/>'
     wall = '<geom type="plane" size="0 0 1" zaxis="1 0 0"/>'
     for body, floor in (
@@ -62,8 +69,11 @@ def test_floor_texture_repeats_as_in_mujoco(gl):
     asset = CHECKER.format(64, 'texuniform="true"')
     frame = frame_of(gl, '<geom type="plane" size="0 0 .1" material="c"/>', asset=asset)
     pixels = int(0.5 * SIZE[1] / (2 * 4.0 * np.tan(np.radians(20))))  # half a square
-    y, x = SIZE[1] // 2, SIZE[0] // 2
-    quarters = np.array([[frame[y + b * pixels, x + a * pixels].mean() for a in (-1, 1)] for b in (-1, 1)])
+    y = SIZE[1] // 2
+    x = SIZE[0] // 2
+    quarters = np.array(
+        [[frame[y + b * pixels, x + a * pixels].mean() for a in (-1, 1)] for b in (-1, 1)]
+    )
     assert max(abs(quarters[0, 0] - quarters[1, 1]), abs(quarters[0, 1] - quarters[1, 0])) < 15
     assert abs(quarters[0, 0] - quarters[0, 1]) > 100
 
@@ -101,8 +111,14 @@ def test_alpha_leaves_no_texture_of_the_floor(gl):
 def test_sites_hide_no_sky(gl):
     """Under a wide site the floor stays as light as without it where no lamp shines."""
     roof = '<site type="box" size=".5 .5 .02" pos="0 0 .4" rgba="1 0 0 1"/>'
-    light = {"visual": '<headlight ambient=".5 .5 .5" diffuse="0 0 0"/>', "lighting": "model", "camera": FRONT}
-    frames = [frame_of(gl, FLOOR + body, **light) for body in (roof, roof.replace("site", "geom"), "")]
+    light = {
+        "visual": '<headlight ambient=".5 .5 .5" diffuse="0 0 0"/>',
+        "lighting": "model",
+        "camera": FRONT,
+    }
+    frames = [
+        frame_of(gl, FLOOR + body, **light) for body in (roof, roof.replace("site", "geom"), "")
+    ]
     under = np.s_[78:82, 75:85]
     site, geom, none = (frame[under].mean() for frame in frames)
     assert abs(site - none) < 1
@@ -117,7 +133,8 @@ def test_a_ceiling_has_the_colour_and_the_light_of_the_floor_below(gl):
     light = {"visual": '<headlight active="0"/>', "lighting": "model"}
     below = Camera((0.0, 0.0, 0.45), 1.2, 90.0, 12.0, 40.0)
     frame = light_of(gl, floor + plate + sun, camera=below, **light)
-    ceiling, ground = frame[52:60, 70:90].mean(axis=(0, 1)), frame[-4:].mean(axis=(0, 1))
+    ceiling = frame[52:60, 70:90].mean(axis=(0, 1))
+    ground = frame[-4:].mean(axis=(0, 1))
     assert ceiling[0] > 8 * ceiling[1]
     assert 0.5 * ground[0] < ceiling[0] < ground[0]
 
@@ -145,7 +162,10 @@ LAMPS = {
     "spot": '<light pos="1 -1 2" dir="-.5 .5 -1" cutoff="25" castshadow="true"/>',
     "studio": "",
 }
-SOLIDS = '<geom type="sphere" size=".2" pos="0 0 .2"/><geom type="capsule" size=".05 .3" pos=".6 .2 .5"/>'
+SOLIDS = (
+    '<geom type="sphere" size=".2" pos="0 0 .2"/><geom type="capsule" size=".05 .3" pos=".6 '
+    '.2 .5"/>'
+)
 
 
 def backgrounds(gl, monkeypatch, size, body: str, **options) -> list[np.ndarray]:
@@ -169,7 +189,11 @@ def test_the_interpolated_background_is_that_of_each_pixel(gl, monkeypatch, lamp
 @pytest.mark.parametrize(
     "solid",
     [
-        '<geom type="ellipsoid" size=".1 .3 .1" pos=".2 0 .4"/><geom type="box" size=".03 .2 .4" pos="-.3 0 .4"/>',
+        (
+            '<geom type="ellipsoid" size=".1 .3 .1" pos=".2 0 .4"/><geom type="box" size=".03 .2 '
+            '.4" '
+            'pos="-.3 0 .4"/>'
+        ),
         '<geom type="box" size=".2 .2 .2" pos="0 0 .2" euler="0 0 20" rgba=".8 .2 .2 .6"/>',
     ],
     ids=["wide", "transparent"],
@@ -184,7 +208,9 @@ def test_interpolated_penumbras_end_where_those_of_each_pixel_do(gl, monkeypatch
 def test_the_colour_of_a_large_image_takes_little_memory() -> None:
     """All its texels as numbers would take 2 GB; some of them, of what is mixed evenly, have the same mean."""
     body = '<worldbody><geom type="plane" size="1 1 1" material="c"/></worldbody>'
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><asset>{CHECKER.format(4096, '')}</asset>{body}</mujoco>")
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><asset>{CHECKER.format(4096, '')}</asset>{body}</mujoco>"
+    )
     assets = Assets(model, MagicMock())
     assets.texture = MagicMock()
     tracemalloc.start()

@@ -15,12 +15,15 @@ METRE = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))  # of the floor, seen from 
 
 def test_every_light_with_castshadow_casts_its_shadow_where_geometry_says(gl):
     """Each of four suns, from four sides, darkens the floor where the ball stands in its way."""
-    sun = '<light directional="true" pos="0 0 3" dir="{} {} -1" diffuse=".2 .2 .2" castshadow="{}"/>'
+    sun = (
+        '<light directional="true" pos="0 0 3" dir="{} {} -1" diffuse=".2 .2 .2" castshadow="{}"/>'
+    )
     ways = [(1, 0), (-1, 0), (0, 1), (0, -1)]
     plain = frame_of(gl, FLOOR + BALL + "".join(sun.format(*way, "false") for way in ways))
     shaded = frame_of(gl, FLOOR + BALL + "".join(sun.format(*way, "true") for way in ways))
     for x, y in ways:  # the ball's middle, 0.8 m up, casts its shadow 0.8 m away
-        column, row = int(SIZE[0] / 2 + 0.8 * x * METRE), int(SIZE[1] / 2 - 0.8 * y * METRE)
+        column = int(SIZE[0] / 2 + 0.8 * x * METRE)
+        row = int(SIZE[1] / 2 - 0.8 * y * METRE)
         here = np.s_[row - 2 : row + 2, column - 2 : column + 2]
         assert shaded[here].mean() < plain[here].mean() - 6
     beside = np.s_[:8, :8]
@@ -28,8 +31,13 @@ def test_every_light_with_castshadow_casts_its_shadow_where_geometry_says(gl):
 
 
 def test_more_lights_than_can_cast_shadows_shine_all_the_same(gl):
-    suns = "".join(SUN.format(x, "true").replace(".8 .8 .8", ".1 .1 .1") for x in np.linspace(-1, 1, 6))
-    assert frame_of(gl, FLOOR + BALL + suns)[:8].mean() > frame_of(gl, FLOOR + BALL, lighting="model")[:8].mean() + 20
+    suns = "".join(
+        SUN.format(x, "true").replace(".8 .8 .8", ".1 .1 .1") for x in np.linspace(-1, 1, 6)
+    )
+    assert (
+        frame_of(gl, FLOOR + BALL + suns)[:8].mean()
+        > frame_of(gl, FLOOR + BALL, lighting="model")[:8].mean() + 20
+    )
 
 
 def test_a_near_light_and_a_sun_cast_shadows_side_by_side(gl):
@@ -37,8 +45,13 @@ def test_a_near_light_and_a_sun_cast_shadows_side_by_side(gl):
     sun = SUN.format(-1.0, "{}").replace(".8 .8 .8", ".4 .4 .4")
     spot = SPOT.format(-1.0, 0.5).replace("/>", ' castshadow="{}"/>')
     places = [int(SIZE[0] / 2 + x * METRE) for x in (-0.8, 0.75)]
-    frames = (frame_of(gl, FLOOR + BALL + sun.format(casts) + spot.format(casts)) for casts in ("false", "true"))
-    plain, shaded = (np.array([frame[56:64, x - 3 : x + 3].mean() for x in places]) for frame in frames)
+    frames = (
+        frame_of(gl, FLOOR + BALL + sun.format(casts) + spot.format(casts))
+        for casts in ("false", "true")
+    )
+    plain, shaded = (
+        np.array([frame[56:64, x - 3 : x + 3].mean() for x in places]) for frame in frames
+    )
     assert (shaded < plain - 6).all()
 
 
@@ -46,13 +59,17 @@ def test_a_near_light_and_a_sun_cast_shadows_side_by_side(gl):
 def test_a_penumbra_is_as_wide_as_the_light_and_the_height_make_it(gl, below):
     """A sun of tangent 0.05 shines past the edge of a plate 1.4 m up, under 45 degrees: what is below lies 2 m behind.
 
-    A solid casts shadows, too: it lies in the shadow map itself. Both are dark, so that the tone curve is straight.
+    A solid casts shadows, too: it lies in the shadow map itself. Both are dark, so that the tone
+    curve is straight.
     """
     plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
     size = (640, 480)
     body = below.replace(".8 .8 .8", ".3 .3 .3") + plate + SUN
-    shaded, plain = (light_of(gl, body.format(1.0, casts), size=size) for casts in ("true", "false"))
-    taken = (plain - shaded)[: size[1] // 2, size[0] // 2, 1]  # from beyond the shadow to its middle
+    shaded, plain = (
+        light_of(gl, body.format(1.0, casts), size=size) for casts in ("true", "false")
+    )
+    # from beyond the shadow to its middle
+    taken = (plain - shaded)[: size[1] // 2, size[0] // 2, 1]
     share = 1 - taken / taken[-size[1] // 20 :].mean()
     width = (np.argmax(share < 0.1) - np.argmax(share < 0.9)) / (METRE * size[1] / SIZE[1])
     # of a disc's light, 0.9 and 0.1 pass at 0.69 of its radius
@@ -72,7 +89,9 @@ def test_penumbras_have_neither_noise_nor_hatching(gl):
 def test_shadows_have_the_resolution_of_the_frame(gl, below):
     """Across the edge of a plate's shadow, pixels differ as much from the one before as from the one behind."""
     plate = '<geom type="box" size=".9 .5 .01" pos="-1.4 0 1.4"/>'
-    rows = frame_of(gl, below + plate + SUN.format(1.0, "true"), size=(320, 240))[40:120, 150:170, 1].mean(axis=1)
+    rows = frame_of(gl, below + plate + SUN.format(1.0, "true"), size=(320, 240))[
+        40:120, 150:170, 1
+    ].mean(axis=1)
     steps = np.abs(np.diff(rows))
     assert steps[::2].sum() == pytest.approx(steps[1::2].sum(), rel=0.2)
 
@@ -103,7 +122,8 @@ def test_shadows_on_translucent_things_are_softer(gl):
         seen = {"targets": {"b": ball_surface(look)}, "size": (320, 240)}
         shaded, plain = (light_of(gl, body.format(flag), **seen) for flag in ("true", "false"))
         lit = (shaded / plain)[118:122, 140:155].mean(axis=0)  # beside the lamp's highlight
-        steepest[look] = np.abs(np.diff(lit, axis=0)).max(axis=0) / np.ptp(lit, axis=0)  # whatever else lights it
+        # whatever else lights it
+        steepest[look] = np.abs(np.diff(lit, axis=0)).max(axis=0) / np.ptp(lit, axis=0)
     assert steepest["skin"][0] < 0.85 * steepest["clay"][0]
 
 
@@ -126,7 +146,9 @@ def test_blockers_are_means_over_all_texels_of_the_map(gl, resources, frame):
     maps.fit(frame, [sun], np.zeros(3), 1.0)
     frame.bind()
     rng = np.random.default_rng(5)
-    depth = np.where(rng.random((maps.size, maps.size)) < 0.6, rng.random((maps.size, maps.size)), 1.0).astype("f4")
+    depth = np.where(
+        rng.random((maps.size, maps.size)) < 0.6, rng.random((maps.size, maps.size)), 1.0
+    ).astype("f4")
     with gl as ctx:
         maps._depth.write(depth)
         maps.find_blockers(ctx)
@@ -145,14 +167,18 @@ PLATE = '<geom type="box" size=".3 .3 .01" pos="-1 0 1" rgba=".5 .5 .5 {}"/>'
 
 def floor_at(frame, x, y=0.0, half=2):
     """Linear light of the floor about a point [m], [2 half, 2 half, 3]."""
-    column, row = int(SIZE[0] / 2 + x * METRE), int(SIZE[1] / 2 - y * METRE)
+    column = int(SIZE[0] / 2 + x * METRE)
+    row = int(SIZE[1] / 2 - y * METRE)
     return srgb_to_linear(frame[row - half : row + half, column - half : column + half] / 255)
 
 
 @pytest.mark.parametrize("opacity", [0.2, 0.5, 0.8])
 def test_a_transparent_geom_takes_its_opacity_of_the_light(gl, opacity):
     """A plate 1 m up throws its shadow 1 m to the right."""
-    shaded, full = (frame_of(gl, DARK_FLOOR + PLATE.format(each) + SUN.format(1.0, "true")) for each in (opacity, 1.0))
+    shaded, full = (
+        frame_of(gl, DARK_FLOOR + PLATE.format(each) + SUN.format(1.0, "true"))
+        for each in (opacity, 1.0)
+    )
     plain = frame_of(gl, DARK_FLOOR + PLATE.format(1.0) + SUN.format(1.0, "false"))
     open_floor, under, dark = (floor_at(frame, 0.0) for frame in (plain, shaded, full))
     share = (open_floor - under).mean() / (open_floor - dark).mean()
@@ -162,16 +188,26 @@ def test_a_transparent_geom_takes_its_opacity_of_the_light(gl, opacity):
 
 def test_a_body_under_glass_keeps_its_shadow(gl):
     """A small plate under a large pane: its shadow is as dark as without the pane, the pane's lighter about it."""
-    body = DARK_FLOOR + '<geom type="box" size=".1 .3 .01" pos="-.2 0 .4" rgba=".5 .5 .5 1"/>' + SUN.format(1.0, "true")
+    body = (
+        DARK_FLOOR
+        + '<geom type="box" size=".1 .3 .01" pos="-.2 0 .4" rgba=".5 .5 .5 1"/>'
+        + SUN.format(1.0, "true")
+    )
     bare, covered = (frame_of(gl, body + pane) for pane in ("", PLATE.format(0.4)))
-    np.testing.assert_allclose(floor_at(covered, 0.2, half=1), floor_at(bare, 0.2, half=1), atol=0.02)
+    np.testing.assert_allclose(
+        floor_at(covered, 0.2, half=1), floor_at(bare, 0.2, half=1), atol=0.02
+    )
 
 
 def test_water_is_a_lens(gl):
     """Its shadow is dark towards the rim; the light in the middle has its colour."""
-    body = '<geom name="b" type="sphere" size=".5" pos="-1 0 1"/>' + DARK_FLOOR + SUN.format(1.0, "{}")
+    body = (
+        '<geom name="b" type="sphere" size=".5" pos="-1 0 1"/>' + DARK_FLOOR + SUN.format(1.0, "{}")
+    )
     kinds = ("false", "clay"), ("true", "water"), ("true", "clay")
-    plain, water, clay = (frame_of(gl, body.format(flag), targets={"b": ball_surface(look)}) for flag, look in kinds)
+    plain, water, clay = (
+        frame_of(gl, body.format(flag), targets={"b": ball_surface(look)}) for flag, look in kinds
+    )
     open_floor, middle, dark = (floor_at(frame, 0.0) for frame in (plain, water, clay))
     rim = floor_at(water, 0.0, 0.4)
     assert (rim - dark).max() < 0.3 * (open_floor - dark).max()
@@ -182,7 +218,8 @@ def test_water_is_a_lens(gl):
 def test_no_light_is_taken_beside_a_penumbra(gl):
     """Where a box's shadow shows, what is plainly shaded is a few pixels away."""
     box = '<geom type="box" size=".5 .5 .5" pos="-.5 .2 .5" euler="0 0 40" rgba=".9 .1 .2 .4"/>'
-    body, size = DARK_FLOOR + box + SUN, (320, 240)
+    body = DARK_FLOOR + box + SUN
+    size = (320, 240)
     shaded, plain = (frame_of(gl, body.format(1.0, flag), size=size) for flag in ("true", "false"))
     taken = (plain - shaded).max(axis=2)
     assert distance_transform_edt(taken < 5)[taken >= 2].max() < 6
@@ -190,7 +227,9 @@ def test_no_light_is_taken_beside_a_penumbra(gl):
 
 def test_a_wide_penumbra_has_no_pattern_where_blocks_of_the_floor_are_interpolated(gl):
     body = '<geom name="b" type="sphere" size=".5" pos="0 0 1.5"/>' + DARK_FLOOR
-    frame = frame_of(gl, body, targets={"b": ball_surface("water")}, lighting="studio", size=(1280, 960))
+    frame = frame_of(
+        gl, body, targets={"b": ball_surface("water")}, lighting="studio", size=(1280, 960)
+    )
     across = frame[480, 920:1240, 1]
     assert np.ptp(across) > 50
     assert np.abs(np.diff(across, 2)).max() <= 2

@@ -9,7 +9,14 @@ from surfaces import grid
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples
 from ripple_sim.render.surfaces import MovingOcclusion, MovingVertices
-from ripple_sim.render.visuals import bake, bounding_radius, cast, frames_about, shapes, smooth_normals
+from ripple_sim.render.visuals import (
+    bake,
+    bounding_radius,
+    cast,
+    frames_about,
+    shapes,
+    smooth_normals,
+)
 from ripple_sim.solver import HeightMap, sphere_atlas
 from ripple_sim.solver.waves import MovedGradients
 
@@ -53,11 +60,14 @@ def test_a_dent_gets_as_dark_as_one_that_was_there_from_the_beginning(divisions)
     moving, baked = occlusion(ball.shell, ball.faces)
     V, depth = dented(ball.shell)
     from_scratch = cast(V, ball.faces, frames_about(smooth_normals(V, ball.faces)), 64, 1.0)
-    moved, cavity = moving(V), depth > 0.6
+    moved = moving(V)
+    cavity = depth > 0.6
     assert from_scratch[cavity, 0].mean() < baked[cavity, 0].mean() - 0.3
     assert_allclose(moved[cavity, 0].mean(), from_scratch[cavity, 0].mean(), atol=0.09)
     for column in range(3):
-        assert rms(moved[:, column] - from_scratch[:, column]) < 0.25 * rms(from_scratch[:, column] - baked[:, column])
+        assert rms(moved[:, column] - from_scratch[:, column]) < 0.25 * rms(
+            from_scratch[:, column] - baked[:, column]
+        )
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -132,7 +142,9 @@ def test_a_rigid_motion_takes_points_and_normals_along():
 
 def test_normals_stay_across_a_stretched_surface():
     points = ATLAS.positions.reshape(-1, 3)
-    _, _, normals = MovingVertices(ATLAS.mesh.V, ATLAS.mesh.F, points, points, points)(ATLAS.mesh.V * [1, 1, 2])
+    _, _, normals = MovingVertices(ATLAS.mesh.V, ATLAS.mesh.F, points, points, points)(
+        ATLAS.mesh.V * [1, 1, 2]
+    )
     exact = points / [1, 1, 2]
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
     assert_allclose(normals, exact, atol=0.06)
@@ -146,7 +158,8 @@ def test_gradients_are_those_on_the_moved_surface():
     assert_allclose(moved[:, 1:-1, 1:-1, :3], still[:, 1:-1, 1:-1, :3] @ MATRIX.T / 2, atol=2e-3)
 
 
-@pytest.mark.parametrize("resolution", [8, 40])  # a sphere of more than 32 is drawn with another mesh than its own
+# a sphere of more than 32 is drawn with another mesh than its own
+@pytest.mark.parametrize("resolution", [8, 40])
 def test_a_frame_shows_the_surface_where_it_is(resolution):
     model, data = posed(
         """<mujoco><worldbody><light pos="0 0 3"/><geom name="target" type="sphere" size=".2" rgba="1 0 0 1"/>

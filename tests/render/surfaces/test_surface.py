@@ -32,7 +32,8 @@ def test_a_colour_is_the_given_one_or_the_models_or_the_looks(geom, given, shown
     """A video once took the look's colour where a loop of one's own took the geom's."""
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><asset><material name="green" rgba="0 .8 0 1"/>'
-        '<texture name="t" type="2d" builtin="checker" width="8" height="8"/><material name="checked" texture="t"/>'
+        '<texture name="t" type="2d" builtin="checker" width="8" height="8"/><material '
+        'name="checked" texture="t"/>'
         f'</asset><worldbody><geom type="sphere" size="0.5" {geom}/></worldbody></mujoco>'
     )
     assert target_color(model, 0, "jelly", given) == pytest.approx(shown)
@@ -69,10 +70,17 @@ def facets(seed: int):
 
 
 def areas(corners: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    return (
+        np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        / 2
+    )
 
 
-MESHES = {f"ball {d} {s}": ball_mesh(d, s) for d, s in ((1, 0), (2, 1), (5, 2), (9, 3))} | {"facets": facets(4)}
+MESHES = {f"ball {d} {s}": ball_mesh(d, s) for d, s in ((1, 0), (2, 1), (5, 2), (9, 3))} | {
+    "facets": facets(4)
+}
 
 
 @pytest.fixture(params=MESHES)
@@ -85,10 +93,12 @@ def pair(request):
 def test_no_gap_opens_and_no_area_is_lost(pair):
     F, attributes, cut = pair
     assert len(cut.F) > len(F)
-    before, after = areas(attributes[F][:, :, :3]), areas(cut.attributes[cut.F][:, :, :3])
+    before = areas(attributes[F][:, :, :3])
+    after = areas(cut.attributes[cut.F][:, :, :3])
     assert after.sum() == pytest.approx(before.sum(), rel=1e-10)
     _, place = np.unique(cut.attributes[:, :3].round(9), axis=0, return_inverse=True)
-    closed = place.ravel()[cut.F]  # by numbers that are the same where positions are, but for round-off
+    # by numbers that are the same where positions are, but for round-off
+    closed = place.ravel()[cut.F]
     sides = np.concatenate([closed[:, [0, 1]], closed[:, [1, 2]], closed[:, [2, 0]]])
     directed, count = np.unique(sides, axis=0, return_counts=True)
     assert count.max() == 1
@@ -97,7 +107,8 @@ def test_no_gap_opens_and_no_area_is_lost(pair):
 
 def test_every_triangle_lies_in_one_chart_on_its_side_with_unit_normals(pair):
     _, _, cut = pair
-    chart, corners = cut.chart[cut.F], cut.attributes[cut.F]
+    chart = cut.chart[cut.F]
+    corners = cut.attributes[cut.F]
     assert (chart == chart[:, :1]).all()
     # in its share of space the chart's own axis is the nearest of the six
     along = np.einsum("fki,ci->fkc", corners[:, :, 6:], CHART_NORMALS)
@@ -117,13 +128,17 @@ def test_vertices_are_the_same_on_both_sides_of_a_border_and_nowhere_else(pair):
     pairs = np.unique(np.column_stack([by_value.ravel(), cut.same]), axis=0)
     assert len(np.unique(pairs[:, 0])) == len(pairs) == len(np.unique(pairs[:, 1]))
     # once for each chart, no more
-    assert len(np.unique(np.column_stack([cut.attributes, cut.chart]), axis=0)) == len(cut.attributes)
+    assert len(np.unique(np.column_stack([cut.attributes, cut.chart]), axis=0)) == len(
+        cut.attributes
+    )
     assert np.unique(cut.same, return_counts=True)[1].max() == 3  # at the cube's corners
 
 
 def test_texture_coordinates_keep_their_jump_where_a_seam_crosses_a_border():
     """Two triangles with a common side over an edge of the cube: a texture ends on one side and begins on the other."""
-    V = np.array([[1.0, 0.1, 0.5], [1.0, 0.1, -0.5], [0.5, -0.6, 1.0], [0.5, 0.8, 1.0], [0.5, 0.1, 1.0]])
+    V = np.array(
+        [[1.0, 0.1, 0.5], [1.0, 0.1, -0.5], [0.5, -0.6, 1.0], [0.5, 0.8, 1.0], [0.5, 0.1, 1.0]]
+    )
     V = V[[0, 4, 2, 0, 4, 3]] * 2
     normal = np.tile([0.8, 0.0, 0.6], (6, 1))
     u = np.array([1.0, 1.0, 0.7, 0.0, 0.0, 0.3])
@@ -133,7 +148,9 @@ def test_texture_coordinates_keep_their_jump_where_a_seam_crosses_a_border():
     assert len(np.unique(cut.chart)) == 2
     values = cut.attributes[cut.F][:, :, 9]
     assert ((values >= 0.7 - 1e-9).all(axis=1) | (values <= 0.3 + 1e-9).all(axis=1)).all()
-    on_seam = (np.abs(cut.attributes[:, 1] - 0.2) < 1e-9) & (np.abs(cut.attributes[:, 0] - cut.attributes[:, 2]) < 1e-9)
+    on_seam = (np.abs(cut.attributes[:, 1] - 0.2) < 1e-9) & (
+        np.abs(cut.attributes[:, 0] - cut.attributes[:, 2]) < 1e-9
+    )
     assert sorted(cut.attributes[on_seam, 9].round(9)) == [0.0, 0.0, 1.0, 1.0]
     assert len(np.unique(cut.same[on_seam])) == 1
 
@@ -158,7 +175,9 @@ COLORS = np.arange(9, dtype=np.uint8).reshape(3, 3)
 
 
 def test_what_is_no_heatmap_is_refused(gl) -> None:
-    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='.5'/><geom size='.1'/></worldbody></mujoco>")
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='.5'/><geom size='.1'/></worldbody></mujoco>"
+    )
     plain = ball_surface("clay")
     mapped = Surface(plain.V, plain.F, plain.charts, heatmap_colors=COLORS)
     halo = np.zeros((6, plain.charts.page.block, plain.charts.page.block), np.float32)
@@ -170,7 +189,10 @@ def test_what_is_no_heatmap_is_refused(gl) -> None:
             renderer.set_heatmap(0, halo, 0.0)
         with pytest.raises(RippleError, match="geom 1 is no target; the targets' geoms are: 0"):
             renderer.set_heatmap(1, halo, 1.0)
-    with Renderer(gl, model, {0: plain}, size=(32, 24)) as renderer, pytest.raises(RippleError, match="has no heatmap"):
+    with (
+        Renderer(gl, model, {0: plain}, size=(32, 24)) as renderer,
+        pytest.raises(RippleError, match="has no heatmap"),
+    ):
         renderer.set_heatmap(0, halo, 1.0)
 
 

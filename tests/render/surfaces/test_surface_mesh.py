@@ -5,7 +5,14 @@ import pytest
 from sphere_height_maps import cube_charts, height_map_of
 
 from ripple_sim.render import HeightMapTextures
-from ripple_sim.render.surfaces import DIRECTION, POSITION, UV, Displacement, SurfaceVertices, spline_heights
+from ripple_sim.render.surfaces import (
+    DIRECTION,
+    POSITION,
+    UV,
+    Displacement,
+    SurfaceVertices,
+    spline_heights,
+)
 from ripple_sim.render.visuals import Occluders
 from ripple_sim.solver.mesh import Edges
 from ripple_sim.solver.texels import ChartPage
@@ -21,11 +28,17 @@ class NoGeoms:
     geom_xpos = np.zeros((0, 3))
 
 
-def vertices_at(chart, uv, positions=None, directions=None, midpoints=0, page=PAGE) -> SurfaceVertices:
+def vertices_at(
+    chart, uv, positions=None, directions=None, midpoints=0, page=PAGE
+) -> SurfaceVertices:
     """Vertices at places in charts; the last of them are midpoints, at least one that is never used."""
-    chart, uv = np.append(chart, 0), np.concatenate([uv, [[0.5, 0.5]]])
-    positions, directions = (None if each is None else [*each, [0.0, 0.0, 1.0]] for each in (positions, directions))
-    count, midpoints = len(chart), midpoints + 1
+    chart = np.append(chart, 0)
+    uv = np.concatenate([uv, [[0.5, 0.5]]])
+    positions, directions = (
+        None if each is None else [*each, [0.0, 0.0, 1.0]] for each in (positions, directions)
+    )
+    count = len(chart)
+    midpoints += 1
     attributes = np.zeros((count, UV.stop))
     attributes[:, POSITION] = 0.0 if positions is None else positions
     attributes[:, DIRECTION] = [0.0, 0.0, 1.0] if directions is None else directions
@@ -76,8 +89,11 @@ def spline_sum(height_map: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.
 
     centres = np.arange(-1, N + 1)
     column, row = (N * uv - 0.5).T
-    in_rows, in_columns = weight(row[:, None] - centres), weight(column[:, None] - centres)
-    return np.einsum("ki,kj,kij->k", in_rows, in_columns, height_map[chart, ..., 3].astype(np.float64))
+    in_rows = weight(row[:, None] - centres)
+    in_columns = weight(column[:, None] - centres)
+    return np.einsum(
+        "ki,kj,kij->k", in_rows, in_columns, height_map[chart, ..., 3].astype(np.float64)
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -89,7 +105,8 @@ def test_gpu_and_cpu_look_up_the_same_height(resources, seed):
     height = displaced(resources, vertices_at(chart, uv), height_map)[:, 2]
     np.testing.assert_allclose(height, expected, atol=0.02)
     place = PAGE.places(chart, uv)
-    on_chart, row, column = PAGE.locate(np.minimum(place, place - 1e-9))  # a border belongs to its own chart
+    # a border belongs to its own chart
+    on_chart, row, column = PAGE.locate(np.minimum(place, place - 1e-9))
     grid = np.stack([row, column], axis=1)
     nearest = np.clip(np.floor(grid + 0.5), 0, N - 1)
     texel = np.column_stack([on_chart, nearest]).astype(np.int32)
@@ -98,14 +115,18 @@ def test_gpu_and_cpu_look_up_the_same_height(resources, seed):
 
 
 def test_the_height_is_the_same_from_both_charts_of_a_border(resources):
-    """With the halo that the charts of a cube have. The middle of charts 0 and 2's common edge, and its neighbours."""
+    """With the halo that the charts of a cube have.
+
+    The middle of charts 0 and 2's common edge, and its neighbours.
+    """
     directions = np.stack([np.ones(9), np.ones(9), np.linspace(-0.8, 0.8, 9)], axis=1)
 
     def height(d):
         return np.sin(5 * d[..., 0] - 3 * d[..., 1] + 4 * d[..., 2])
 
     height_map = height_map_of(height, np.zeros_like)
-    charts, values = cube_charts(directions), []
+    charts = cube_charts(directions)
+    values = []
     for chart in np.full((2, 9), [[0], [2]]):
         vertices = vertices_at(chart, charts.map.uv(directions, chart), page=charts.page)
         values.append(displaced(resources, vertices, height_map, page=charts.page)[:, 2])
@@ -122,7 +143,9 @@ def test_vertices_move_along_their_direction_and_then_into_the_world(resources):
     origin = np.array([0.5, -2.0, 7.0])
     height_map = np.zeros((6, N + 2, N + 2, 4), np.float32)
     height_map[..., 3] = -0.3
-    moved = displaced(resources, vertices_at(chart, uv, positions, directions), height_map, (rotation, origin, 0))
+    moved = displaced(
+        resources, vertices_at(chart, uv, positions, directions), height_map, (rotation, origin, 0)
+    )
     expected = (positions - 0.3 * directions) @ rotation.T + origin
     np.testing.assert_allclose(moved[:, :3], expected, atol=1e-5)
     np.testing.assert_array_equal(moved[:, 3], 1.0)  # nothing hides the sky

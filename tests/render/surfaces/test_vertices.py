@@ -24,14 +24,18 @@ def test_vertices_and_midpoints_lie_on_the_ball_and_point_outwards(vertices):
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 0.5, atol=2e-3)
     outwards = position / np.linalg.norm(position, axis=1, keepdims=True)
     for columns in (surfaces.DIRECTION, surfaces.NORMAL):
-        np.testing.assert_allclose(np.linalg.norm(vertices.attributes[:, columns], axis=1), 1.0, atol=1e-9)
+        np.testing.assert_allclose(
+            np.linalg.norm(vertices.attributes[:, columns], axis=1), 1.0, atol=1e-9
+        )
         np.testing.assert_allclose(vertices.attributes[:, columns], outwards, atol=0.02)
     np.testing.assert_allclose(vertices.attributes[:, surfaces.BAKED][:, 0], 1.0, atol=1e-5)
 
 
 def test_heights_at_one_point_are_looked_up_in_one_place(vertices):
     """Also at midpoints of edges along a border."""
-    points = np.concatenate([vertices.attributes[:, POSITION], vertices.attributes[:, surfaces.DIRECTION]], axis=1)
+    points = np.concatenate(
+        [vertices.attributes[:, POSITION], vertices.attributes[:, surfaces.DIRECTION]], axis=1
+    )
     _, point = np.unique(points, axis=0, return_inverse=True)
     pairs = np.unique(np.column_stack([point.ravel(), vertices.lookups]), axis=0)
     assert len(pairs) == len(np.unique(point)) < len(points)
@@ -42,22 +46,30 @@ def test_heights_at_one_point_are_looked_up_in_one_place(vertices):
 def test_midpoints_come_last_and_lie_halfway_on_the_map(vertices):
     count = len(vertices.edges.ends)
     coordinates = vertices.attributes[:, surfaces.COORDINATES]
-    np.testing.assert_allclose(coordinates[-count:], coordinates[vertices.edges.ends].mean(axis=1), atol=1e-12)
+    np.testing.assert_allclose(
+        coordinates[-count:], coordinates[vertices.edges.ends].mean(axis=1), atol=1e-12
+    )
     assert vertices.F.max() < len(coordinates) - count
 
 
 def test_a_wave_over_the_edges_of_a_box_is_a_smooth_curve():
     """Of 8 texels a length, at the worst moment: the chords of its curve are off by less than a fiftieth."""
-    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom type="box" size=".5 .4 .3"/></worldbody></mujoco>')
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="box" size=".5 .4 .3"/></worldbody></mujoco>'
+    )
     atlas = target_atlas(model, 0, 32)
     surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), "clay")
     made = surfaces.surface_vertices(surface, 0.02, 40_000)
     ends = made.edges.ends
     along = made.attributes[ends][..., POSITION]
-    creases = np.flatnonzero((np.abs(along) > np.array([0.5, 0.4, 0.3]) - 1e-9).all(axis=1).sum(axis=1) == 2)
+    creases = np.flatnonzero(
+        (np.abs(along) > np.array([0.5, 0.4, 0.3]) - 1e-9).all(axis=1).sum(axis=1) == 2
+    )
     texel = np.sqrt(atlas.areas.mean())
     # the box's edges from end to end, on both of their sides
-    assert np.linalg.norm(along[creases, 1] - along[creases, 0], axis=1).sum() == pytest.approx(2 * 4 * 2.4)
+    assert np.linalg.norm(along[creases, 1] - along[creases, 0], axis=1).sum() == pytest.approx(
+        2 * 4 * 2.4
+    )
     wave = 2 * np.pi / (8 * texel) * along[creases].sum(axis=-1)
     # the phase of the wave whose crest is in an edge's middle
     departure = 1 - np.cos((wave[:, 1] - wave[:, 0]) / 2)
@@ -69,7 +81,9 @@ def test_a_surface_counts_v_from_below_and_a_model_from_above(vertices):
     attributes[:, surfaces.UV] = [[0, 0], [1, 0], [0.25, 1], [0.5, 0.75]]
     own = surfaces.mapped_coordinates(attributes, TextureMapping(own=True))
     np.testing.assert_allclose(own, [[0, 1, 0], [1, 1, 0], [0.25, 0, 0], [0.5, 0.25, 0]])
-    by_place = surfaces.mapped_coordinates(attributes, TextureMapping(scale=np.array([1.0, 2.0, 4.0])))
+    by_place = surfaces.mapped_coordinates(
+        attributes, TextureMapping(scale=np.array([1.0, 2.0, 4.0]))
+    )
     np.testing.assert_allclose(by_place, attributes[:, POSITION] * [1, 2, 4])
 
 

@@ -8,7 +8,8 @@ from ripple_sim.render.visuals import bake, corner_normals, shapes, smooth_norma
 
 def test_normals_are_smooth_below_the_crease_angle_and_sharp_above():
     cube = shapes.box(1)
-    V, F = cube.positions(np.ones(3), np.full(3, 1e-9)), cube.faces
+    V = cube.positions(np.ones(3), np.full(3, 1e-9))
+    F = cube.faces
     big = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) > 1.0
     welded, index = np.unique(np.round(V, 6), axis=0, return_inverse=True)
     F = index.ravel()[F[big]]
@@ -52,7 +53,9 @@ def test_the_size_of_a_mesh_changes_nothing_and_a_flat_one_is_thin(flattening):
     ball = shapes.ball(6)
     V = ball.shell * [1.0, 1.0, flattening]
     normals = smooth_normals(V, ball.faces)
-    first, second = (bake(scale * V + offset, ball.faces, normals) for scale, offset in ((1, 0), (1e-3, 5e-3)))
+    first, second = (
+        bake(scale * V + offset, ball.faces, normals) for scale, offset in ((1, 0), (1e-3, 5e-3))
+    )
     np.testing.assert_allclose(first, second, atol=5e-3)
     assert first[:, 1].mean() < 4 / 3 * (0.4 if flattening == 0.1 else 1.1)
 
@@ -63,10 +66,15 @@ def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_n
     V = slab.positions(np.array([1.0, 1.0, 0.04]), np.full(3, 0.01))
     F = np.concatenate([slab.faces, slab.faces + len(V)])
     normals = np.concatenate([slab.shell, slab.shell])
-    inner = np.concatenate([slab.core[:, 2] > 0, slab.core[:, 2] < 0]) & (np.abs(normals[:, 2]) > 0.99)
+    inner = np.concatenate([slab.core[:, 2] > 0, slab.core[:, 2] < 0]) & (
+        np.abs(normals[:, 2]) > 0.99
+    )
     assert inner.any()
     aside = np.array([0.0, 0.0, 0.5])
-    near, far = (bake(np.concatenate([V - gap * aside, V + gap * aside]), F, normals)[:, 0] for gap in (0.2, 8.0))
+    near, far = (
+        bake(np.concatenate([V - gap * aside, V + gap * aside]), F, normals)[:, 0]
+        for gap in (0.2, 8.0)
+    )
     # the smoothing mixes the corners of the inner sides with their edges, which see the sky
     assert near[inner].max() < 0.9
     assert near[inner].mean() < near[~inner].mean() - 0.1
@@ -76,7 +84,8 @@ def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_n
 def test_the_inner_side_of_an_open_surface_sees_what_the_outer_side_of_the_turned_one_sees():
     ball = shapes.ball(8)
     bowl = ball.faces[(ball.shell[ball.faces][:, :, 2] < 0.1).all(axis=1)]
-    one, turned = bake(ball.shell, bowl, ball.shell), bake(ball.shell, bowl[:, ::-1], -ball.shell)
+    one = bake(ball.shell, bowl, ball.shell)
+    turned = bake(ball.shell, bowl[:, ::-1], -ball.shell)
     used = np.unique(bowl)
     np.testing.assert_allclose(one[used, 2], turned[used, 0], atol=0.02)
     assert one[used, 2].max() < 0.97 < one[used, 0].min()

@@ -30,24 +30,43 @@ def test_sites_of_visible_groups_are_drawn_like_geoms(gl):
     as_site = frame_of(gl, FLOOR + site.format('rgba=".8 .2 .2 1"'), camera=FRONT)
     ball = (as_body[..., 0] - as_body[..., 2] > 60) & (as_site[..., 0] - as_site[..., 2] > 60)
     assert ball.sum() > 400
-    upper = ball & (np.arange(SIZE[1])[:, None] < 45)  # of the floor's light the body shades itself a little
+    # of the floor's light the body shades itself a little
+    upper = ball & (np.arange(SIZE[1])[:, None] < 45)
     np.testing.assert_allclose(as_site[upper], as_body[upper], atol=16)
-    np.testing.assert_array_equal(frame_of(gl, FLOOR + site.format('group="3"'), camera=FRONT), plain)
+    np.testing.assert_array_equal(
+        frame_of(gl, FLOOR + site.format('group="3"'), camera=FRONT), plain
+    )
     clear = frame_of(gl, FLOOR + site.format('rgba=".8 .2 .2 .3"'), camera=FRONT)
-    assert (as_site[ball][:, 0] - as_site[ball][:, 2]).mean() > 2 * (clear[ball][:, 0] - clear[ball][:, 2]).mean() > 10
-    green = frame_of(gl, site.format('material="g"'), asset='<material name="g" rgba="0 .8 0 1"/>', camera=FRONT)
+    assert (
+        (as_site[ball][:, 0] - as_site[ball][:, 2]).mean()
+        > 2 * (clear[ball][:, 0] - clear[ball][:, 2]).mean()
+        > 10
+    )
+    green = frame_of(
+        gl, site.format('material="g"'), asset='<material name="g" rgba="0 .8 0 1"/>', camera=FRONT
+    )
     assert (green[ball][:, 1] > green[ball][:, 0] + 60).mean() > 0.9
 
 
 def test_a_material_answers_light_as_it_says():
-    """Roughness is taken where it is given; otherwise more shininess is less of it. Reflectance is a coat."""
+    """Roughness is taken where it is given; otherwise more shininess is less of it.
+
+    Reflectance is a coat.
+    """
 
     def look(attributes: str):
-        return look_of(model := textured_model('<geom size=".1" material="m"/>', attributes), geom_visual(model, 0))
+        return look_of(
+            model := textured_model('<geom size=".1" material="m"/>', attributes),
+            geom_visual(model, 0),
+        )
 
     metal = look('roughness="0.3" metallic="1" shininess="0.9"')
     assert (metal.roughness, metal.metallic) == (pytest.approx(0.3), 1.0)
-    assert look('shininess="0"').roughness > look('shininess="0.5"').roughness > look('shininess="1"').roughness
+    assert (
+        look('shininess="0"').roughness
+        > look('shininess="0.5"').roughness
+        > look('shininess="1"').roughness
+    )
     assert look('reflectance="0.4"').coat == pytest.approx(0.4)
     assert look('emission="0.7"').emission == pytest.approx(0.7)
     assert look("").metallic == 0.0
@@ -84,7 +103,9 @@ def bound(resources, model, data, focus) -> np.ndarray:
     occluders = Occluders(resources, model, np.arange(model.ngeom))
     with resources.gl:
         occluders.bind(data, np.array(focus, dtype=float))
-        return np.frombuffer(occluders._buffer.read(), np.float32).reshape(-1, 2, 4)[: min(model.ngeom, MAX_OCCLUDERS)]
+        return np.frombuffer(occluders._buffer.read(), np.float32).reshape(-1, 2, 4)[
+            : min(model.ngeom, MAX_OCCLUDERS)
+        ]
 
 
 def test_capsules_fade_out_before_they_leave_the_list(resources):
@@ -107,15 +128,20 @@ def test_capsules_fade_out_before_they_leave_the_list(resources):
 def test_an_object_has_the_bits_of_all_that_darken_it_by_a_hundredth_but_not_its_own(gl, resources):
     """Whatever is left out hides less than a hundredth of the sky from any point of the object."""
     rng = np.random.default_rng(7)
-    places, sizes = rng.uniform(-2, 2, (MAX_OCCLUDERS, 3)), rng.uniform(0.02, 0.2, MAX_OCCLUDERS)
+    places = rng.uniform(-2, 2, (MAX_OCCLUDERS, 3))
+    sizes = rng.uniform(0.02, 0.2, MAX_OCCLUDERS)
     geom = '<geom type="capsule" size="{0} {1}" pos="{2} {3} {4}"/>'
-    model, data = geoms_of("".join(geom.format(r, 2 * r, *place) for r, place in zip(sizes, places, strict=True)))
+    model, data = geoms_of(
+        "".join(geom.format(r, 2 * r, *place) for r, place in zip(sizes, places, strict=True))
+    )
     occluders = Occluders(resources, model, np.arange(model.ngeom))
     with gl:
         occluders.bind(data, np.zeros(3))
     bits = np.arange(MAX_OCCLUDERS)
     geom_of_bit = occluders._bound_geoms
-    near = occluders.near(np.column_stack([places, np.full(len(places), 0.1)]), np.arange(len(places)))
+    near = occluders.near(
+        np.column_stack([places, np.full(len(places), 0.1)]), np.arange(len(places))
+    )
     assert near.any() and (near < 2**MAX_OCCLUDERS - 1).all()
     for geom, mask in enumerate(near[:2]):
         own = int(bits[geom_of_bit == geom][0])
@@ -130,7 +156,9 @@ def visibility(gl, points, normal, near=1):
     return evaluated(gl, "glsl/occluders.glsl", expression, np.atleast_2d(points))[:, 0]
 
 
-def test_a_geom_hides_more_of_the_sky_the_nearer_it_is_and_none_from_itself_or_from_behind(gl, resources):
+def test_a_geom_hides_more_of_the_sky_the_nearer_it_is_and_none_from_itself_or_from_behind(
+    gl, resources
+):
     model, data = geoms_of('<geom type="sphere" size=".3"/>')
     bound(resources, model, data, [0, 0, 0])
     away = np.linspace(0.3, 30.0, 60)
@@ -152,7 +180,8 @@ def test_a_long_geom_is_as_near_as_its_nearest_point(gl, resources):
     assert visibility(gl, [[3.5, 0, -0.5]], "0, 0, 1")[0] > beside[0]
 
 
-GEOM, FLEX = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_FLEX
+GEOM = mujoco.mjtObj.mjOBJ_GEOM
+FLEX = mujoco.mjtObj.mjOBJ_FLEX
 TENDON = """<body name="a" pos="0 0 .5"><joint type="slide"/><geom size=".02"/><site name="s" euler="180 0 0"/></body>
 <site name="w" pos=".6 0 .5"/>"""
 SHEET = """<flexcomp name="f" type="grid" count="3 3 1" spacing=".2 .2 .1" dim="2" pos="0 0 .5" rgba="1 0 0 1">
@@ -160,7 +189,10 @@ SHEET = """<flexcomp name="f" type="grid" count="3 3 1" spacing=".2 .2 .1" dim="
 
 
 def test_tendons_flexes_and_skins_are_drawn_and_what_has_no_surface_is_told_once(gl):
-    spatial = '<tendon><spatial width=".05" rgba="1 0 0 1"><site site="s"/><site site="w"/></spatial></tendon>'
+    spatial = (
+        '<tendon><spatial width=".05" rgba="1 0 0 1"><site site="s"/><site '
+        'site="w"/></spatial></tendon>'
+    )
     cable = SHEET.replace("3 3 1", "3 1 1").replace('dim="2"', 'dim="1" radius=".05"')
     for body, rest in ((TENDON, spatial), (SHEET, ""), (cable, "")):
         model, data = posed(f"<mujoco><worldbody>{FLOOR}{body}</worldbody>{rest}</mujoco>")
@@ -170,7 +202,10 @@ def test_tendons_flexes_and_skins_are_drawn_and_what_has_no_surface_is_told_once
         assert (red - green > 60).sum() > 50
     ray = '<sensor><rangefinder site="s"/></sensor>'
     model, data = posed(f"<mujoco><worldbody>{FLOOR}{TENDON}</worldbody>{ray}</mujoco>")
-    with Renderer(gl, model, {}, size=SIZE) as renderer, pytest.warns(RippleWarning, match="mjGEOM_LINE") as told:
+    with (
+        Renderer(gl, model, {}, size=SIZE) as renderer,
+        pytest.warns(RippleWarning, match="mjGEOM_LINE") as told,
+    ):
         renderer.render(data, {}, FRONT)
         data.qpos[0] += 0.01
         mujoco.mj_forward(model, data)
@@ -180,7 +215,9 @@ def test_tendons_flexes_and_skins_are_drawn_and_what_has_no_surface_is_told_once
 
 def test_a_flex_without_texture_coordinates_has_none():
     model, data = posed(f"<mujoco><worldbody>{SHEET}</worldbody></mujoco>")
-    scene, option, camera = mujoco.MjvScene(model, 9), mujoco.MjvOption(), mujoco.MjvCamera()
+    scene = mujoco.MjvScene(model, 9)
+    option = mujoco.MjvOption()
+    camera = mujoco.MjvCamera()
     mujoco.mjv_updateScene(model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
     scene.flextexcoord[:] = np.nan  # MuJoCo leaves there what was in memory
     (visual,) = visuals_in(model, scene, scene.geoms[0])
@@ -201,14 +238,17 @@ def test_a_flex_without_texture_coordinates_has_none():
 def test_a_flex_has_the_parts_that_the_options_show(flags, parts):
     thick = SHEET.replace("dim=", 'radius=".02" dim=')
     model, data = posed(f"<mujoco><worldbody>{thick}</worldbody></mujoco>")
-    scene, option, camera = mujoco.MjvScene(model, 9), mujoco.MjvOption(), mujoco.MjvCamera()
+    scene = mujoco.MjvScene(model, 9)
+    option = mujoco.MjvOption()
+    camera = mujoco.MjvCamera()
     for flag, value in flags.items():
         option.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = value
     mujoco.mjv_updateScene(model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
     visuals = {visual.part: visual for visual in visuals_in(model, scene, scene.geoms[0])}
     assert set(visuals) == parts
     for part in parts - {"faces"}:  # tubes and balls of the flex's radius, facing outwards
-        points, normals = visuals[part].corners[:, :3].astype(float), visuals[part].corners[:, 3:6]
+        points = visuals[part].corners[:, :3].astype(float)
+        normals = visuals[part].corners[:, 3:6]
         V = data.flexvert_xpos.reshape(-1, 3)
         apart = np.linalg.norm(points[:, None] - 0.02 * normals[:, None] - V, axis=2)
         np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-6)
@@ -222,8 +262,12 @@ def test_flexes_that_stand_for_geoms_are_not_drawn(gl):
     spec = mesh_spec((V, F))
     for drawn in (False, True):
         if drawn:
-            spec.add_flex(name="other", dim=2, vertbody=["base"], vert=1.1 * V.ravel(), elem=F.ravel())
+            spec.add_flex(
+                name="other", dim=2, vertbody=["base"], vert=1.1 * V.ravel(), elem=F.ravel()
+            )
         model = spec.compile()
         with Renderer(gl, model, {}, size=SIZE) as renderer:
-            image = renderer.surfaces(forwarded(model), {}, Camera(tuple(model.stat.center), 0.3, 90.0, -20.0))
+            image = renderer.surfaces(
+                forwarded(model), {}, Camera(tuple(model.stat.center), 0.3, 90.0, -20.0)
+            )
         assert {-1, int(FLEX if drawn else GEOM)} == set(np.unique(image.identity[..., 1]))

@@ -6,7 +6,16 @@ from mujoco_models import posed
 from shader_functions import evaluated
 
 from ripple_sim.render.camera import Pose
-from ripple_sim.render.visuals import LOOKS, Assets, Look, ObjectTable, Occluders, find_look, instances_of, visuals_of
+from ripple_sim.render.visuals import (
+    LOOKS,
+    Assets,
+    Look,
+    ObjectTable,
+    Occluders,
+    find_look,
+    instances_of,
+    visuals_of,
+)
 from ripple_sim.solver import RippleError
 
 XML = """<mujoco><worldbody>
@@ -23,14 +32,20 @@ def visuals(resources):
 
     def update(eye, pixels, sharp=False):
         for each in drawn:
-            each.update(data, Pose(np.asarray(eye), np.eye(3), 1.0, fovy=90.0), 2 * pixels, occluders, sharp)
+            each.update(
+                data, Pose(np.asarray(eye), np.eye(3), 1.0, fovy=90.0), 2 * pixels, occluders, sharp
+            )
 
     return drawn, data, update
 
 
 def of_kind(drawn, count, site=False):
     """The opaque draw call of so many geoms, or that of the site."""
-    return next(each for each in drawn if len(each.numbers) == count and not each.transparent and each.occludes != site)
+    return next(
+        each
+        for each in drawn
+        if len(each.numbers) == count and not each.transparent and each.occludes != site
+    )
 
 
 def test_geoms_of_one_shape_are_drawn_together_and_transparent_ones_alone(visuals):
@@ -54,10 +69,13 @@ def test_poses_are_those_of_the_data(visuals):
     np.testing.assert_allclose(site._records["origin"], data.site_xpos, atol=1e-6)
 
 
-def test_nearer_and_larger_frames_need_more_segments_and_then_edges_are_within_a_quarter_of_a_pixel(visuals):
+def test_nearer_and_larger_frames_need_more_segments_and_then_edges_are_within_a_quarter_of_a_pixel(
+    visuals,
+):
     drawn, data, update = visuals
     both = of_kind(drawn, 2)
-    eye, segments = np.array([1.0, -4.0, 3.0]), []
+    eye = np.array([1.0, -4.0, 3.0])
+    segments = []
     for pixels in (1.0, 30.0, 100.0, 300.0, 1000.0):
         update(eye, pixels)
         segments.append(both._segments)
@@ -74,9 +92,12 @@ def test_where_shapes_are_measured_each_round_one_has_the_segments_that_it_needs
     balls = "".join(f'<geom size=".1" pos="{x} 0 0"/>' for x in (0.0, 1.0, 8.0, 60.0))
     model, data = posed(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
     (drawn,) = instances_of(Assets(model, resources), visuals_of(model, range(model.ngeom)))
-    eye, pixels = np.array([-0.4, 0.0, 0.0]), 300.0
+    eye = np.array([-0.4, 0.0, 0.0])
+    pixels = 300.0
     pose = Pose(eye, np.eye(3), 1.0, fovy=90.0)
-    drawn.update(data, pose, 2 * int(pixels), Occluders(resources, model, np.arange(model.ngeom)), sharp=True)
+    drawn.update(
+        data, pose, 2 * int(pixels), Occluders(resources, model, np.arange(model.ngeom)), sharp=True
+    )
     segments = {}
     for level, buffer, count in drawn._draws:
         records = np.frombuffer(buffer.read(), dtype=drawn._records.dtype)[:count]
@@ -121,7 +142,9 @@ def test_shaders_find_a_look_in_its_row(gl, table):
     number = table.add(LOOK, 17, opacity=0.25, size=2.5, heatmap=True, height_map=4)
     row = f"object_at({number})"
     np.testing.assert_allclose(read(gl, table, f"{row}.base")[0], [0.4, 0.5, 0.6, 0.7], rtol=1e-6)
-    np.testing.assert_allclose(read(gl, table, f"{row}.volume")[0], [0.8, 0.9, 1.5, 0.25], rtol=1e-6)
+    np.testing.assert_allclose(
+        read(gl, table, f"{row}.volume")[0], [0.8, 0.9, 1.5, 0.25], rtol=1e-6
+    )
     np.testing.assert_allclose(read(gl, table, f"{row}.place")[0], [17, 2.5, 0, 1])
     np.testing.assert_allclose(read(gl, table, f"{row}.height_map")[0, :2], [4, 1])
     np.testing.assert_allclose(read(gl, table, "object_at(0).height_map")[0, :2], [0, 0])
@@ -135,7 +158,9 @@ def test_the_rotation_turns_gradients_into_the_world(gl, table):
     for axis, unit in enumerate(("1, 0, 0", "0, 1, 0", "0, 0, 1")):
         turned = read(gl, table, f"vec4(object_at({number}).rotation * vec3({unit}), 0.0)")[0, :3]
         np.testing.assert_allclose(turned, rotation[:, axis], atol=1e-6)
-    np.testing.assert_allclose(read(gl, table, "vec4(object_at(int(x.x)).place.z)", 2)[:, 0], [0, 0.125])
+    np.testing.assert_allclose(
+        read(gl, table, "vec4(object_at(int(x.x)).place.z)", 2)[:, 0], [0, 0.125]
+    )
 
 
 @pytest.mark.parametrize("name", ["chrome", "", "Rubber"])
@@ -148,8 +173,16 @@ def test_an_unknown_look_is_named_with_all_valid_ones(name):
 @pytest.mark.parametrize("name", LOOKS)
 def test_looks_are_within_the_limits_that_the_shaders_count_on(name):
     look = find_look(name)
-    shares = [*look.color, look.roughness, look.metallic, look.coat, look.translucency, look.transparency]
+    shares = [
+        *look.color,
+        look.roughness,
+        look.metallic,
+        look.coat,
+        look.translucency,
+        look.transparency,
+    ]
     assert all(0 <= share <= 1 for share in shares)
     assert look.sheen >= 0
     assert look.emission == 0  # nothing shines unless a model says so
-    assert not (look.metallic and (look.translucency or look.transparency))  # light does not pass through metal
+    # light does not pass through metal
+    assert not (look.metallic and (look.translucency or look.transparency))

@@ -24,18 +24,28 @@ def names(gl, model, places, camera=FROM_X, targets=None) -> str:
         frame = renderer.render(forwarded(model), {}, camera).astype(float)
     found = ""
     for x, y in places:
-        column, row = SIZE // 2 + x, SIZE // 2 - y
+        column = SIZE // 2 + x
+        row = SIZE // 2 - y
         rgb = frame[row - 1 : row + 2, column - 1 : column + 2].mean(axis=(0, 1))
         bright = rgb > 0.5 * (rgb.min() + rgb.max())
-        found += {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 0): "y"}.get(tuple(bright.astype(int)), "?")
+        found += {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 0): "y"}.get(
+            tuple(bright.astype(int)), "?"
+        )
     return found
 
 
 def corners(distance: int) -> list[tuple[int, int]]:
-    return [(-distance, distance), (distance, distance), (-distance, -distance), (distance, -distance)]
+    return [
+        (-distance, distance),
+        (distance, distance),
+        (-distance, -distance),
+        (distance, -distance),
+    ]
 
 
-@pytest.mark.parametrize(("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")])
+@pytest.mark.parametrize(
+    ("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")]
+)
 def test_a_target_has_its_texture_as_other_geoms_do(gl, shape, look):
     model = textured_model(f'<geom type="{shape}" size=".4 .2" material="m"/>')
     ball = shapes.ball(12)
@@ -52,15 +62,31 @@ def test_the_first_role_for_colours_is_found_among_layers(gl):
     roles = '<layer role="normal" texture="n"/><layer role="rgb" texture="t"/>'
     layers = f'<material name="m" specular="0">{roles}</material>'
     flat = '<texture name="n" type="2d" builtin="flat" rgb1=".5 .5 1" width="8" height="8"/>'
-    model = textured_model('<geom type="sphere" size=".4" material="m"/>', asset=flat, material=layers)
+    model = textured_model(
+        '<geom type="sphere" size=".4" material="m"/>', asset=flat, material=layers
+    )
     assert names(gl, model, corners(9)) == "gryb"
 
 
 def test_the_colour_of_the_geom_or_else_of_the_material_multiplies_the_texture(gl):
     """Yellow times red is red, and so on; a geom without a colour takes the material's."""
     yellow = [(10, -10)]
-    assert names(gl, textured_model('<geom type="box" size=".4 .4 .4" material="m" rgba="1 0 0 1"/>'), yellow) == "r"
-    assert names(gl, textured_model('<geom type="box" size=".4 .4 .4" material="m"/>', 'rgba="0 1 0 1"'), yellow) == "g"
+    assert (
+        names(
+            gl,
+            textured_model('<geom type="box" size=".4 .4 .4" material="m" rgba="1 0 0 1"/>'),
+            yellow,
+        )
+        == "r"
+    )
+    assert (
+        names(
+            gl,
+            textured_model('<geom type="box" size=".4 .4 .4" material="m"/>', 'rgba="0 1 0 1"'),
+            yellow,
+        )
+        == "g"
+    )
 
 
 SHELF = "".join(
@@ -99,26 +125,39 @@ def colours(frame) -> np.ndarray:
 
 
 @pytest.mark.skipif(
-    tuple(map(int, mujoco.__version__.split(".")[:2])) < (3, 12), reason="MuJoCo laid pictures otherwise before 3.12"
+    tuple(map(int, mujoco.__version__.split(".")[:2])) < (3, 12),
+    reason="MuJoCo laid pictures otherwise before 3.12",
 )
 def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
     flat = ('texuniform="false"', 'texuniform="true" texrepeat="3 2"', 'texrepeat="2.5 1"')
-    variants = [("2d", text) for text in flat] + [("cube", f'texuniform="{each}"') for each in ("false", "true")]
+    variants = [("2d", text) for text in flat] + [
+        ("cube", f'texuniform="{each}"') for each in ("false", "true")
+    ]
     body = SHELF + '<geom type="plane" size="0 0 .1" pos="0 0 -9"/>'
     models = [textured_model(body, text, kind=kind) for kind, text in variants]
     paths = [str(tmp_path / f"{i}.mjb") for i in range(len(models))]
     for model, path in zip(models, paths, strict=True):
         mujoco.mj_saveModel(model, path, None)
-    done = ended("-c", THEIRS, tmp_path / "theirs.npy", *paths, env={**os.environ, "MUJOCO_GL": "egl"})
+    done = ended(
+        "-c", THEIRS, tmp_path / "theirs.npy", *paths, env={**os.environ, "MUJOCO_GL": "egl"}
+    )
     if done.returncode:
         pytest.skip(f"MuJoCo's renderer does not run here: {done.stderr[-200:]}")
-    for model, theirs, variant in zip(models, np.load(tmp_path / "theirs.npy"), variants, strict=True):
+    for model, theirs, variant in zip(
+        models, np.load(tmp_path / "theirs.npy"), variants, strict=True
+    ):
         with Renderer(gl, model, {}, size=(320, 240), lighting="studio") as renderer:
-            ours = renderer.render(forwarded(model), {}, Camera((0.0, 0.0, 0.0), 4.2, 70.0, -50.0, 45.0))
-        theirs_shows, ours_shows = colours(theirs), colours(ours)
+            ours = renderer.render(
+                forwarded(model), {}, Camera((0.0, 0.0, 0.0), 4.2, 70.0, -50.0, 45.0)
+            )
+        theirs_shows = colours(theirs)
+        ours_shows = colours(ours)
         # away from edges, where they show a clear colour
         bright = theirs.max(axis=2).astype(int) - theirs.min(axis=2) > 150
-        same = np.stack([minimum_filter(c, 5) | ~maximum_filter(c, 5) for c in np.moveaxis(theirs_shows, 2, 0)], axis=2)
+        same = np.stack(
+            [minimum_filter(c, 5) | ~maximum_filter(c, 5) for c in np.moveaxis(theirs_shows, 2, 0)],
+            axis=2,
+        )
         inside = minimum_filter(bright, 5) & same.all(axis=2)
         agree = (theirs_shows == ours_shows).all(axis=2)[inside]
         assert inside.sum() > 3000, variant

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver import Atlas, GLError, Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
+from ripple_sim.solver import (
+    Atlas,
+    GLError,
+    Material,
+    SolverError,
+    TexelMesh,
+    WaveSolver,
+    sphere_atlas,
+    texel_atlas,
+)
 from ripple_sim.solver.backends import auto_backend, backend, make_backend
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.layouts import build_atlas
@@ -22,7 +31,9 @@ def north(atlas: Atlas) -> np.ndarray:
 
 def maps(atlas: Atlas) -> Material:
     """Every coefficient a map of random numbers."""
-    rng, shape, z = np.random.default_rng(8), atlas.areas.shape, atlas.positions[..., 2]
+    rng = np.random.default_rng(8)
+    shape = atlas.areas.shape
+    z = atlas.positions[..., 2]
     return Material(
         speed=rng.uniform(0, 0.6, shape) * (z < 0.1),
         damping=rng.uniform(0, 1, shape),
@@ -37,14 +48,18 @@ def maps(atlas: Atlas) -> Material:
 
 FEATURES: dict[str, Callable[[Atlas], Material]] = {
     "plain": lambda atlas: Material(speed=1.0),
-    "damping and density maps": lambda atlas: Material(1.0, damping=0.3 * north(atlas), density=1.0 + north(atlas)),
+    "damping and density maps": lambda atlas: Material(
+        1.0, damping=0.3 * north(atlas), density=1.0 + north(atlas)
+    ),
     "speed map": lambda atlas: Material(speed=1.0 + 0.5 * atlas.positions[..., 0]),
     "reflecting region": lambda atlas: Material(speed=1.0 * ~north(atlas)),
     "fixed": lambda atlas: Material(speed=1.0, fixed=north(atlas)),
     "viscosity": lambda atlas: Material(speed=1.0, viscosity=1e-3),
     "bending and viscosity": lambda atlas: Material(speed=0.5, bending=1e-4, viscosity=1e-3),
     "every map": maps,
-    "yield map": lambda atlas: Material(speed=1.0, yield_height=np.where(north(atlas), 5e-3, np.inf), stiffness=10.0),
+    "yield map": lambda atlas: Material(
+        speed=1.0, yield_height=np.where(north(atlas), 5e-3, np.inf), stiffness=10.0
+    ),
 }
 
 
@@ -93,10 +108,8 @@ def test_gl_equals_cpu_at_any_resolution(gl_backend: str, resolution: int) -> No
 @pytest.mark.parametrize("operator", ["fem", "paper", "uncorrected", "dynamic-paint"])
 def test_gl_equals_cpu(animal: Atlas, gl_backend: str, operator: str) -> None:
     animal = build_atlas(animal.mesh, 24)
-    rng, limits = (
-        np.random.default_rng(5),
-        {"speed": (0.2, 0.6), "damping": (0, 1), "stiffness": (0, 5), "density": (1, 2)},
-    )
+    rng = np.random.default_rng(5)
+    limits = {"speed": (0.2, 0.6), "damping": (0, 1), "stiffness": (0, 5), "density": (1, 2)}
     maps = {name: rng.uniform(*between, animal.areas.shape) for name, between in limits.items()}
     material = Material(**maps, viscosity=1e-4)
 
@@ -123,14 +136,20 @@ MATERIALS = {
 @pytest.mark.parametrize(
     ("texels", "rim"),
     [
-        *((each, "free") for each in (square(11), polygon(3, 8), polygon(5, 9), polygon(6, 12), flat_torus(10))),
+        *(
+            (each, "free")
+            for each in (square(11), polygon(3, 8), polygon(5, 9), polygon(6, 12), flat_torus(10))
+        ),
         (two_squares(7), "free"),
         (polygon(5, 12), "fixed"),
     ],
     ids=lambda each: each if isinstance(each, str) else str(each.shape),
 )
-def test_gl_equals_cpu_on_any_topology(gl_backend: str, texels: TexelMesh, rim: str, material: str) -> None:
-    atlas, heights = texel_atlas(texels), []
+def test_gl_equals_cpu_on_any_topology(
+    gl_backend: str, texels: TexelMesh, rim: str, material: str
+) -> None:
+    atlas = texel_atlas(texels)
+    heights = []
     start = np.random.default_rng(4).standard_normal(texels.shape).astype(np.float32)
     for name in ("cpu", gl_backend):
         waves = WaveSolver(atlas, MATERIALS[material], backend=name, rim=rim)
@@ -148,8 +167,12 @@ def operator() -> WaveOperator:
 
 
 @pytest.mark.parametrize("name", ["cuda", "", "CPU"])
-def test_an_unknown_backend_is_named_beside_the_valid_ones(operator: WaveOperator, name: str) -> None:
-    with pytest.raises(SolverError, match=f"backend '{name}' does not exist; valid are 'auto', 'gl', 'cpu'"):
+def test_an_unknown_backend_is_named_beside_the_valid_ones(
+    operator: WaveOperator, name: str
+) -> None:
+    with pytest.raises(
+        SolverError, match=f"backend '{name}' does not exist; valid are 'auto', 'gl', 'cpu'"
+    ):
         make_backend(name, operator)
 
 
@@ -169,13 +192,22 @@ def hardware(opengl: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> G
     backend.measured.cache_clear()
 
 
-def test_auto_takes_what_was_measured_to_be_faster(hardware: GLContext, operator: WaveOperator, monkeypatch):
+def test_auto_takes_what_was_measured_to_be_faster(
+    hardware: GLContext, operator: WaveOperator, monkeypatch
+):
     """A GPU that takes 1 ms for any number of texels, a processor that takes 1 ms for 4,000."""
     known = backend.Measured((1000.0, 8000.0), (1e-3, 1e-3), (0.25e-3, 2e-3))
     monkeypatch.setattr(backend, "measure", lambda gl: known)
-    assert [auto_backend(texels) for texels in (16, 3900, 4100, 10**6)] == ["cpu", "cpu", "gl", "gl"]
+    assert [auto_backend(texels) for texels in (16, 3900, 4100, 10**6)] == [
+        "cpu",
+        "cpu",
+        "gl",
+        "gl",
+    ]
     assert make_backend("auto", operator).name == "cpu"
-    assert str(known) == "1,000 texels: 1.00 ms GL, 0.25 ms CPU; 8,000 texels: 1.00 ms GL, 2.00 ms CPU"
+    assert (
+        str(known) == "1,000 texels: 1.00 ms GL, 0.25 ms CPU; 8,000 texels: 1.00 ms GL, 2.00 ms CPU"
+    )
 
 
 def test_a_machine_is_measured_once(hardware: GLContext, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +220,9 @@ def test_a_machine_is_measured_once(hardware: GLContext, monkeypatch: pytest.Mon
     assert auto_backend(10**6) == first.faster(10**6)
 
 
-def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(operator: WaveOperator, monkeypatch: pytest.MonkeyPatch):
+def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(
+    operator: WaveOperator, monkeypatch: pytest.MonkeyPatch
+):
     def fail(device: int | None) -> None:
         raise GLError("no OpenGL 4.3 context")
 

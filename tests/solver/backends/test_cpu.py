@@ -17,15 +17,21 @@ class DenseWaves:
 
     def __init__(self, operator: WaveOperator, height: np.ndarray, velocity: np.ndarray) -> None:
         self._operator = operator
-        self.h, self.v = height.ravel().astype(float), velocity.ravel().astype(float)
+        self.h = height.ravel().astype(float)
+        self.v = velocity.ravel().astype(float)
         self.dent = np.zeros_like(self.h)
-        self.forces, self.acceleration = np.zeros_like(self.h), 0.0
+        self.forces = np.zeros_like(self.h)
+        self.acceleration = 0.0
         size = len(self.h)
         self._tension, self._viscosity = (
             np.zeros((size, size)) if stencil is None else -stiffness_matrix(stencil).toarray()
             for stencil in (operator.stencil, operator.viscosity_stencil)
         )
-        self._bending = np.zeros((size, size)) if operator.bending is None else operator.bending.stiffness.toarray()
+        self._bending = (
+            np.zeros((size, size))
+            if operator.bending is None
+            else operator.bending.stiffness.toarray()
+        )
 
     def advance(self, substeps: int, dt: float) -> None:
         operator = self._operator
@@ -70,10 +76,14 @@ def ramp(texels: TexelMesh) -> np.ndarray:
 
 MATERIALS = {
     "plain": lambda x: Material(speed=1.0),
-    "maps": lambda x: Material(speed=ramp(x), damping=2 * ramp(x), stiffness=5 * ramp(x), density=ramp(x)[:, ::-1]),
+    "maps": lambda x: Material(
+        speed=ramp(x), damping=2 * ramp(x), stiffness=5 * ramp(x), density=ramp(x)[:, ::-1]
+    ),
     "viscous plate": lambda x: Material(speed=0.5, bending=1e-3, viscosity=1e-2, damping=0.5),
     "plate alone": lambda x: Material(speed=0.0, bending=1e-3 * ramp(x)),
-    "yields, partly fixed": lambda x: Material(1.0, stiffness=3.0, yield_height=0.4 * ramp(x), fixed=ramp(x) > 1.3),
+    "yields, partly fixed": lambda x: Material(
+        1.0, stiffness=3.0, yield_height=0.4 * ramp(x), fixed=ramp(x) > 1.3
+    ),
 }
 
 
@@ -104,23 +114,32 @@ def test_waves_are_those_of_whole_matrices(mesh: str, material: str, substeps: i
     operator = operator_of(texels, MATERIALS[material](texels))
     height = noise(texels, 1) * operator.free
     velocity = noise(texels, 2) * operator.free
-    dense, backend = DenseWaves(operator, height, velocity), started(operator, height, velocity)
+    dense = DenseWaves(operator, height, velocity)
+    backend = started(operator, height, velocity)
     loaded = np.unique([0, texels.areas.size // 2])
-    dense.forces[loaded], dense.acceleration = 0.3, -0.7
+    dense.forces[loaded] = 0.3
+    dense.acceleration = -0.7
     backend.load(loaded, np.full(len(loaded), 0.3), -0.7)
     for _ in range(2):
         for waves in (dense, backend):
             waves.advance(substeps, step_of(operator))
     expected = [(dense.h + dense.dent), dense.v, dense.dent]
-    for now, then in zip((backend.height(), backend.velocity(), backend.dent()), expected, strict=True):
+    for now, then in zip(
+        (backend.height(), backend.velocity(), backend.dent()), expected, strict=True
+    ):
         np.testing.assert_allclose(now.ravel(), then, atol=2e-5 * max(1.0, np.abs(then).max()))
 
 
 def test_few_loops_are_compiled_for_all_materials() -> None:
     texels = MESHES["torus"]
-    maps, before = (0.0, 1.0, ramp(texels)), len(advance.signatures)
-    for damping, stiffness, density, bending in itertools.product(maps, maps, maps[1:], (0.0, 1e-3)):
-        material = Material(speed=1.0, damping=damping, stiffness=stiffness, density=density, bending=bending)
+    maps = (0.0, 1.0, ramp(texels))
+    before = len(advance.signatures)
+    for damping, stiffness, density, bending in itertools.product(
+        maps, maps, maps[1:], (0.0, 1e-3)
+    ):
+        material = Material(
+            speed=1.0, damping=damping, stiffness=stiffness, density=density, bending=bending
+        )
         operator = operator_of(texels, material)
         for keeps_volume in (False, True):
             CPUBackend(operator, keeps_volume=keeps_volume).advance(1, step_of(operator))
@@ -130,8 +149,10 @@ def test_few_loops_are_compiled_for_all_materials() -> None:
 def test_waves_without_damping_run_back_to_where_they_came_from() -> None:
     texels = MESHES["corner of five"]
     operator = operator_of(texels, Material(speed=1.0, stiffness=2.0, bending=1e-3))
-    height, velocity = noise(texels, 4), noise(texels, 5)
-    backend, dt = started(operator, height, velocity), step_of(operator)
+    height = noise(texels, 4)
+    velocity = noise(texels, 5)
+    backend = started(operator, height, velocity)
+    dt = step_of(operator)
     backend.advance(50, dt)
     assert np.abs(backend.height() - height).max() > 0.5
     backend.set_velocity(-backend.velocity())
@@ -157,13 +178,17 @@ def test_reading_shows_copies_and_changes_nothing(material: str) -> None:
     before = [backend.height().copy(), backend.velocity().copy(), backend.dent().copy()]
     for read in (backend.height, backend.velocity, backend.dent):
         read()[:] = np.nan
-    for now, then in zip([backend.height(), backend.velocity(), backend.dent()], before, strict=True):
+    for now, then in zip(
+        [backend.height(), backend.velocity(), backend.dent()], before, strict=True
+    ):
         np.testing.assert_array_equal(now, then)
 
 
 @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("texel", [(0, 0, 0), (4, 2, 2)])
-def test_one_height_that_is_no_number_is_noticed(poison: float, texel: tuple[int, int, int]) -> None:
+def test_one_height_that_is_no_number_is_noticed(
+    poison: float, texel: tuple[int, int, int]
+) -> None:
     texels = MESHES["corner of five"]
     backend = CPUBackend(operator_of(texels, Material(speed=1.0)))
     height = noise(texels, 1)

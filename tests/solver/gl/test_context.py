@@ -17,7 +17,14 @@ import pytest
 from programs import ended
 
 from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
-from ripple_sim.solver.gl import GLContext, create_context, current_context, is_software, load_shader, shared_context
+from ripple_sim.solver.gl import (
+    GLContext,
+    create_context,
+    current_context,
+    is_software,
+    load_shader,
+    shared_context,
+)
 
 
 def test_solvers_that_share_shaders_keep_their_own_coefficients(gl_backend: str) -> None:
@@ -93,7 +100,9 @@ def test_solvers_in_several_threads_take_turns(gl_backend: str) -> None:
         np.testing.assert_array_equal(a, b)
 
 
-def test_a_thread_that_never_leaves_the_context_is_named(gl_backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thread_that_never_leaves_the_context_is_named(
+    gl_backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("ripple_sim.solver.gl.context._PATIENCE", 0.05)
     errors = []
 
@@ -137,7 +146,10 @@ def test_a_fork_is_told_to_be_spawned_and_auto_takes_the_cpu(opengl: None) -> No
     """
     lines = printed(script).splitlines()
     assert len(lines) == 3 and lines[1] == "cpu"
-    assert all("is a fork; start processes with multiprocessing's method 'spawn'" in lines[i] for i in (0, 2))
+    assert all(
+        "is a fork; start processes with multiprocessing's method 'spawn'" in lines[i]
+        for i in (0, 2)
+    )
 
 
 PROCESSOR = [
@@ -147,7 +159,8 @@ PROCESSOR = [
     "SWR (LLVM 12.0.0, 256 bits)",
     "LLVMPIPE",
 ]
-AMD, INTEL = "AMD Radeon RX 6800 (radeonsi, navi21, LLVM 15.0.7, DRM 3.49)", "Mesa Intel(R) UHD Graphics 620 (KBL GT2)"
+AMD = "AMD Radeon RX 6800 (radeonsi, navi21, LLVM 15.0.7, DRM 3.49)"
+INTEL = "Mesa Intel(R) UHD Graphics 620 (KBL GT2)"
 GPU = [AMD, INTEL, "NVIDIA H200/PCIe/SSE2", "Apple M1", "D3D12 (NVIDIA GeForce RTX 3080)"]
 
 
@@ -162,31 +175,46 @@ def test_a_device_that_does_not_exist_is_named_in_the_error(opengl: None, device
         create_context(device)
 
 
-def test_the_device_that_the_user_has_chosen_for_mujoco_is_ours_too(opengl: None, monkeypatch) -> None:
+def test_the_device_that_the_user_has_chosen_for_mujoco_is_ours_too(
+    opengl: None, monkeypatch
+) -> None:
     made = []
     create = moderngl.create_context
-    monkeypatch.setattr("moderngl.create_context", lambda **settings: made.append(settings) or create(**settings))
+    monkeypatch.setattr(
+        "moderngl.create_context", lambda **settings: made.append(settings) or create(**settings)
+    )
     monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "0")
     create_context(None).release()
     assert [settings["device_index"] for settings in made] == [0]
     monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "99")
-    with pytest.raises(GLError, match=r"EGL device 99, which MUJOCO_EGL_DEVICE_ID names \(.+\); devices are counted"):
+    with pytest.raises(
+        GLError,
+        match=r"EGL device 99, which MUJOCO_EGL_DEVICE_ID names \(.+\); devices are counted",
+    ):
         GLContext()
     create_context(0).release()  # what the program asks for comes first
 
 
 @pytest.mark.parametrize("value", ["", "gpu", "1.5"])
-def test_a_device_for_mujoco_that_is_no_number_is_refused(opengl: None, monkeypatch, value: str) -> None:
+def test_a_device_for_mujoco_that_is_no_number_is_refused(
+    opengl: None, monkeypatch, value: str
+) -> None:
     monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", value)
-    with pytest.raises(GLError, match=f"MUJOCO_EGL_DEVICE_ID must be the number of an EGL device.*got '{value}'"):
+    with pytest.raises(
+        GLError, match=f"MUJOCO_EGL_DEVICE_ID must be the number of an EGL device.*got '{value}'"
+    ):
         create_context(None)
 
 
-def test_a_device_below_zero_is_refused_before_anything_is_read_there(opengl: None, monkeypatch) -> None:
+def test_a_device_below_zero_is_refused_before_anything_is_read_there(
+    opengl: None, monkeypatch
+) -> None:
     with pytest.raises(GLError, match="there is no EGL device -1; devices are counted from 0"):
         create_context(-1)
     monkeypatch.setenv("MUJOCO_EGL_DEVICE_ID", "-1")
-    with pytest.raises(GLError, match="there is no EGL device -1, which MUJOCO_EGL_DEVICE_ID names"):
+    with pytest.raises(
+        GLError, match="there is no EGL device -1, which MUJOCO_EGL_DEVICE_ID names"
+    ):
         create_context(None)
 
 
@@ -216,7 +244,9 @@ NO_DEVICES = "requested device index 0, but found 0 devices"
 
 
 @pytest.mark.parametrize(("reason", "devices"), [(NO_DEVICES, 8), ("libEGL.so not loaded", 1)])
-def test_without_any_device_the_error_says_what_to_install(monkeypatch, reason: str, devices: int) -> None:
+def test_without_any_device_the_error_says_what_to_install(
+    monkeypatch, reason: str, devices: int
+) -> None:
     """A library that cannot be loaded is not asked again for every device."""
     asked = []
 
@@ -232,10 +262,15 @@ def test_without_any_device_the_error_says_what_to_install(monkeypatch, reason: 
     assert len(asked) == 3 * 2 * devices  # of three versions
 
 
-def test_a_driver_that_is_too_old_is_named_with_its_version_and_the_one_needed(opengl: None) -> None:
+def test_a_driver_that_is_too_old_is_named_with_its_version_and_the_one_needed(
+    opengl: None,
+) -> None:
     code = "from ripple_sim.solver.gl import create_context; create_context(None)"
     result = ended("-c", code, env={**os.environ, "MESA_GL_VERSION_OVERRIDE": "4.0"})
-    assert re.search(r"GLError: .+ has OpenGL 4\.0; rendering needs 4\.1 or later, backend 'gl' 4\.3", result.stderr)
+    assert re.search(
+        r"GLError: .+ has OpenGL 4\.0; rendering needs 4\.1 or later, backend 'gl' 4\.3",
+        result.stderr,
+    )
 
 
 @pytest.mark.parametrize("system", ["darwin", "win32"])
@@ -261,7 +296,9 @@ def is_freed(created: Any) -> bool:
     return type(created.mglo).__name__ == "InvalidObject"
 
 
-def test_what_is_discarded_in_the_middle_of_a_frame_is_freed_at_the_next_entry_from_outside(opengl: None) -> None:
+def test_what_is_discarded_in_the_middle_of_a_frame_is_freed_at_the_next_entry_from_outside(
+    opengl: None,
+) -> None:
     gl = shared_context()
     with gl as ctx:
         drawn, forgotten = (ctx.simple_framebuffer((2, 2)) for _ in range(2))
@@ -292,7 +329,9 @@ def test_freeing_in_a_thread_does_not_wait_for_another_that_draws(opengl: None) 
         assert is_freed(buffer)
 
 
-def test_python_looks_for_no_garbage_in_a_frame_so_that_no_finalizer_of_others_leaves_the_context(opengl: None) -> None:
+def test_python_looks_for_no_garbage_in_a_frame_so_that_no_finalizer_of_others_leaves_the_context(
+    opengl: None,
+) -> None:
     """MuJoCo's contexts release all that the thread has current, when they are collected."""
     collected = []
 
@@ -333,24 +372,30 @@ void main() { result = factor * value + more + number.x + texelFetch(picture, iv
 """
 
 
-def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(opengl, tmp_path, monkeypatch):
+def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(
+    opengl, tmp_path, monkeypatch
+):
     (tmp_path / "pooled_shaders").mkdir()
     (tmp_path / "pooled_shaders" / "__init__.py").touch()
     (tmp_path / "pooled_shaders" / "scale.glsl").write_text(_SHADER)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "pooled_shaders", raising=False)
     gl = shared_context()
-    first, other = (gl.program("pooled_shaders", "scale", "result", BLOCK=3, UNIT=5) for _ in range(2))
+    first, other = (
+        gl.program("pooled_shaders", "scale", "result", BLOCK=3, UNIT=5) for _ in range(2)
+    )
     assert other is not first  # two at a time have uniforms of their own
     with gl:
-        first["factor"], first["more"] = 5.0, 1.0
+        first["factor"] = 5.0
+        first["more"] = 1.0
     gl.release(first)
     again = gl.program("pooled_shaders", "scale", "result", BLOCK=3, UNIT=5)
     assert again is first
     with gl as ctx:
         assert (again["factor"].value, again["more"].value) == (3.0, 0.0)
         # what it captures, and reads at the unit and the binding that its source names
-        given, got = ctx.buffer(np.arange(3, dtype="f4")), ctx.buffer(reserve=12)
+        given = ctx.buffer(np.arange(3, dtype="f4"))
+        got = ctx.buffer(reserve=12)
         ctx.buffer(np.full(4, 50.0, "f4")).bind_to_uniform_block(3)
         ctx.texture((1, 1), 1, np.full(1, 700.0, "f4"), dtype="f4").use(5)
         ctx.simple_framebuffer((1, 1)).use()
@@ -359,8 +404,12 @@ def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(opengl, tm
         np.testing.assert_allclose(np.frombuffer(got.read(), "f4"), [750.0, 753.0, 756.0])
 
 
-@pytest.mark.parametrize(("free", "ours", "expected"), [(1e6, True, "true"), (1e9, True, None), (1e9, False, "true")])
-def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(free, ours, expected, monkeypatch) -> None:
+@pytest.mark.parametrize(
+    ("free", "ours", "expected"), [(1e6, True, "true"), (1e9, True, None), (1e9, False, "true")]
+)
+def test_mesa_keeps_no_shaders_on_a_disk_that_is_nearly_full_or_not_ours(
+    free, ours, expected, monkeypatch
+) -> None:
     """Its cache is mapped into memory: a page for which the disk has no room ends the process by a bus error."""
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=free))
     monkeypatch.setattr("os.access", lambda *_: ours)
@@ -379,7 +428,10 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "some_shaders", raising=False)
     files = {
-        "passes/one.glsl": '#version 430\n#include "shared/outer.glsl"\n#include "shared/inner.glsl"\nvoid main() {}\n',
+        "passes/one.glsl": (
+            '#version 430\n#include "shared/outer.glsl"\n#include '
+            '"shared/inner.glsl"\nvoid main() {}\n'
+        ),
         "shared/outer.glsl": '#include "shared/inner.glsl"\n// outer, HALF\n',
         "shared/inner.glsl": "// inner, N\n",
         "passes/lost.glsl": '#version 430\n#include "shared/none.glsl"\n',
@@ -392,7 +444,10 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 def test_includes_are_put_in_once_and_defines_at_the_top(package: str) -> None:
     text = load_shader(package, "passes/one", N=8, HALF=0.5, OTHER=1)
-    assert text == "#version 430\n#define N 8\n#define HALF 0.5\n// inner, N\n\n// outer, HALF\n\n\nvoid main() {}\n"
+    assert text == (
+        "#version 430\n#define N 8\n#define HALF 0.5\n// inner, N\n\n// outer, HALF\n\n\nvoid "
+        "main() {}\n"
+    )
 
 
 def test_a_missing_file_is_named_and_a_shader_starts_with_its_version(package: str) -> None:

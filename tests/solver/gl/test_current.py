@@ -14,7 +14,9 @@ from ripple_sim.solver.gl import GLContext, create_context, current_context, sha
 from ripple_sim.solver.gl.current import EGLCurrent, load_egl
 
 
-def test_a_program_keeps_its_context_and_surfaces_where_ours_is_made_and_entered(opengl: None) -> None:
+def test_a_program_keeps_its_context_and_surfaces_where_ours_is_made_and_entered(
+    opengl: None,
+) -> None:
     with own_context() as own:
         assert own.draw != own.read
         ours = GLContext()
@@ -27,13 +29,17 @@ def test_a_program_keeps_its_context_and_surfaces_where_ours_is_made_and_entered
         with pytest.raises(GLError):
             create_context(99)
         assert EGLCurrent.of_thread() == own
-        waves = WaveSolver(sphere_atlas(1.0, 4), Material(), backend="gl" if ours.computes else "cpu")
+        waves = WaveSolver(
+            sphere_atlas(1.0, 4), Material(), backend="gl" if ours.computes else "cpu"
+        )
         waves.add_impulse([0.0, 0.0, 1.0], 1.0, 0.8)
         waves.step(0.1)
         assert waves.height.any()
         assert EGLCurrent.of_thread() == own
         with ThreadPoolExecutor(1) as threads:  # another thread has none, before and after
-            assert threads.submit(lambda: (ours.__enter__(), ours.__exit__(None, None, None))).result()
+            assert threads.submit(
+                lambda: (ours.__enter__(), ours.__exit__(None, None, None))
+            ).result()
             assert threads.submit(current_context).result() is None
         assert EGLCurrent.of_thread() == own
     assert current_context() is None
@@ -50,7 +56,8 @@ def test_an_error_in_our_block_leaves_the_program_its_context(gl_backend: str) -
 
 
 def test_a_thread_creates_the_kind_of_contexts_that_it_did_before(opengl: None) -> None:
-    egl, embedded = load_egl(), 0x30A0
+    egl = load_egl()
+    embedded = 0x30A0
     before = egl.eglQueryAPI()
     egl.eglBindAPI(embedded)
     try:
@@ -60,10 +67,14 @@ def test_a_thread_creates_the_kind_of_contexts_that_it_did_before(opengl: None) 
         egl.eglBindAPI(before)
 
 
-def test_where_the_program_destroys_its_context_meanwhile_none_is_current_afterwards(opengl: None) -> None:
+def test_where_the_program_destroys_its_context_meanwhile_none_is_current_afterwards(
+    opengl: None,
+) -> None:
     with own_context() as own:
         with shared_context():
-            assert load_egl().eglDestroyContext(ctypes.c_void_p(own.display), ctypes.c_void_p(own.context))
+            assert load_egl().eglDestroyContext(
+                ctypes.c_void_p(own.display), ctypes.c_void_p(own.context)
+            )
         assert current_context() is None
 
 
@@ -77,7 +88,10 @@ def test_our_context_is_left_even_where_an_interrupted_entry_left_it_current(ope
 
 def test_somebody_who_takes_the_context_away_while_it_draws_is_reported(opengl: None) -> None:
     """As MuJoCo does, whose renderers release all that their thread has, whenever they are collected."""
-    with pytest.raises(GLError, match=r"was left while it drew.*Close other renderers"), shared_context():
+    with (
+        pytest.raises(GLError, match=r"was left while it drew.*Close other renderers"),
+        shared_context(),
+    ):
         load_egl().eglReleaseThread()
     with shared_context() as ctx:
         assert ctx.error == "GL_NO_ERROR"
@@ -130,7 +144,8 @@ def colors(begin: str, **environment: str) -> list[str]:
 
 
 @pytest.mark.skipif(
-    not find_library("OSMesa"), reason="needs OSMesa (on Debian and Ubuntu: apt-get install libosmesa6)"
+    not find_library("OSMesa"),
+    reason="needs OSMesa (on Debian and Ubuntu: apt-get install libosmesa6)",
 )
 def test_a_program_that_draws_into_memory_keeps_its_context(opengl: None) -> None:
     assert colors(IN_MEMORY, PYOPENGL_PLATFORM="osmesa") == ["0.2", "0.4", "0.8", "0.6"]

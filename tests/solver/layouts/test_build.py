@@ -19,7 +19,9 @@ def ball_mesh() -> Mesh:
     return Mesh.from_arrays(*icosphere(2))
 
 
-def test_cache_is_used_verified_and_rebuilt(ball_mesh: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cache_is_used_verified_and_rebuilt(
+    ball_mesh: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     first = build_atlas(ball_mesh, 8)
     assert "sphere_map" in first.timings
@@ -33,7 +35,11 @@ def test_cache_is_used_verified_and_rebuilt(ball_mesh: Mesh, tmp_path: Path, mon
     build_atlas(Mesh(2 * ball_mesh.V, ball_mesh.F), 8)
     [other] = set((tmp_path / "ripple-sim").iterdir()) - {file}
     middle = len(whole) // 2
-    for spoilt in (whole[:500], whole[:middle] + bytes([whole[middle] ^ 16]) + whole[middle + 1 :], other.read_bytes()):
+    for spoilt in (
+        whole[:500],
+        whole[:middle] + bytes([whole[middle] ^ 16]) + whole[middle + 1 :],
+        other.read_bytes(),
+    ):
         file.write_bytes(spoilt)
         rebuilt = build_atlas(ball_mesh, 8)
         assert "cache" not in rebuilt.timings
@@ -41,7 +47,9 @@ def test_cache_is_used_verified_and_rebuilt(ball_mesh: Mesh, tmp_path: Path, mon
         assert "cache" in build_atlas(ball_mesh, 8).timings
 
 
-def test_unwritable_cache_only_costs_time(ball_mesh: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unwritable_cache_only_costs_time(
+    ball_mesh: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "ripple-sim").write_text("a file where the folder should be")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert build_atlas(ball_mesh, 8).resolution == 8
@@ -52,7 +60,9 @@ def test_unknown_method_lists_the_valid_ones(ball_mesh: Mesh) -> None:
         build_atlas(ball_mesh, 8, method="mercator")
 
 
-def test_a_known_sphere_map_is_taken_and_has_a_file_of_its_own(ball_mesh: Mesh, tmp_path: Path, monkeypatch) -> None:
+def test_a_known_sphere_map_is_taken_and_has_a_file_of_its_own(
+    ball_mesh: Mesh, tmp_path: Path, monkeypatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     known = ball_mesh.V / np.linalg.norm(ball_mesh.V, axis=1, keepdims=True)
     first, again = (build_atlas(ball_mesh, 8, sphere=known) for _ in range(2))
@@ -62,7 +72,9 @@ def test_a_known_sphere_map_is_taken_and_has_a_file_of_its_own(ball_mesh: Mesh, 
     assert "cache" not in build_atlas(ball_mesh, 8).timings
 
 
-@pytest.mark.parametrize("change", [lambda S: -S, lambda S: S[:-1], lambda S: 2 * S, lambda S: np.nan * S])
+@pytest.mark.parametrize(
+    "change", [lambda S: -S, lambda S: S[:-1], lambda S: 2 * S, lambda S: np.nan * S]
+)
 def test_a_sphere_map_of_something_else_is_refused(change, ball_mesh: Mesh) -> None:
     known = ball_mesh.V / np.linalg.norm(ball_mesh.V, axis=1, keepdims=True)
     with pytest.raises(SphereMapError, match="no fold-free sphere map of the mesh"):
@@ -76,7 +88,13 @@ def test_save_and_load(animal: Atlas, tmp_path: Path, layout: str) -> None:
     animal.save(tmp_path / "deep" / "animal.npz")
     loaded = load_atlas(tmp_path / "deep" / "animal.npz")
     assert loaded.layout == layout
-    for name in ("positions", "normals", "triangles", "barycentrics", *(["sphere"] if layout == "cube" else [])):
+    for name in (
+        "positions",
+        "normals",
+        "triangles",
+        "barycentrics",
+        *(["sphere"] if layout == "cube" else []),
+    ):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(animal, name))
     np.testing.assert_array_equal(loaded.texels.beyond, animal.texels.beyond)
     np.testing.assert_array_equal(loaded.locate(animal.mesh.V), animal.locate(animal.mesh.V))
@@ -86,7 +104,9 @@ def test_save_and_load(animal: Atlas, tmp_path: Path, layout: str) -> None:
 
 
 SEEDS = st.integers(0, 2**32 - 1)
-EXAMPLES = settings(max_examples=5, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+EXAMPLES = settings(
+    max_examples=5, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 
 
 def revolved(height: np.ndarray, radius: np.ndarray, around: int) -> tuple[np.ndarray, np.ndarray]:
@@ -95,12 +115,22 @@ def revolved(height: np.ndarray, radius: np.ndarray, around: int) -> tuple[np.nd
     angle = 2 * np.pi / around * np.arange(around)
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     side = radius[:, None, None] * ring + height[:, None, None] * [0, 0, 1]
-    V = np.vstack([side.reshape(-1, 3), [[0, 0, 2 * height[0] - height[1]], [0, 0, 2 * height[-1] - height[-2]]]])
-    i, j = np.arange(around), np.roll(np.arange(around), -1)
-    bottom, top = np.full(around, n * around), np.full(around, n * around + 1)
+    V = np.vstack(
+        [
+            side.reshape(-1, 3),
+            [[0, 0, 2 * height[0] - height[1]], [0, 0, 2 * height[-1] - height[-2]]],
+        ]
+    )
+    i = np.arange(around)
+    j = np.roll(np.arange(around), -1)
+    bottom = np.full(around, n * around)
+    top = np.full(around, n * around + 1)
     first = np.stack([i, j, around + j, around + i], axis=1)
     quads = np.concatenate([first + k for k in range(0, (n - 1) * around, around)])
-    caps = [np.stack([bottom, j, i], axis=1), np.stack([top, (n - 1) * around + i, (n - 1) * around + j], axis=1)]
+    caps = [
+        np.stack([bottom, j, i], axis=1),
+        np.stack([top, (n - 1) * around + i, (n - 1) * around + j], axis=1),
+    ]
     return V, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], *caps])
 
 
@@ -116,7 +146,9 @@ def sound_atlas(V: np.ndarray, F: np.ndarray, starved: float = 0.0) -> Atlas:
     assert (atlas.barycentrics >= 0).all()
     np.testing.assert_allclose(atlas.barycentrics.sum(axis=-1), 1, rtol=1e-12)
     points = np.einsum("fijk,fijkl->fijl", atlas.barycentrics, mesh.V[mesh.F[atlas.triangles]])
-    np.testing.assert_allclose(atlas.positions, points, rtol=1e-12, atol=1e-12 * np.abs(mesh.V).max())
+    np.testing.assert_allclose(
+        atlas.positions, points, rtol=1e-12, atol=1e-12 * np.abs(mesh.V).max()
+    )
     np.testing.assert_allclose(np.linalg.norm(atlas.normals, axis=-1), 1, rtol=1e-9)
     return atlas
 
@@ -136,7 +168,9 @@ def test_chains_of_blobs(seed: int, blobs: int, neck: float, around: int) -> Non
     rng = np.random.default_rng(seed)
     place = np.linspace(0, blobs, 16 * blobs + 1)
     size = np.interp(place, np.arange(blobs + 1), rng.uniform(0.4, 1, blobs + 1))
-    sound_atlas(*revolved(2 * place, size * (neck + (1 - neck) * np.abs(np.sin(np.pi * place))), around))
+    sound_atlas(
+        *revolved(2 * place, size * (neck + (1 - neck) * np.abs(np.sin(np.pi * place))), around)
+    )
 
 
 def test_a_hard_shape_gives_the_same_bits_again() -> None:
@@ -147,7 +181,9 @@ def test_a_hard_shape_gives_the_same_bits_again() -> None:
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-def test_charts_that_take_long_are_told_of(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+def test_charts_that_take_long_are_told_of(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     build = sys.modules[build_atlas.__module__]
     monkeypatch.setattr(build, "_TOLD_EVERY", 0.01)
     monkeypatch.setattr(build, "patch_atlas", lambda mesh, resolution: time.sleep(0.2))

@@ -7,7 +7,14 @@ import pytest
 from eigenvalues import errors_against, of_polyhedron
 from genus_zero import icosphere, stretched, thin_limb
 
-from ripple_sim.scenes.shapes import DUCK_FILE, LIMBED_FILE, capsule, polygonise, smooth_union, sphere
+from ripple_sim.scenes.shapes import (
+    DUCK_FILE,
+    LIMBED_FILE,
+    capsule,
+    polygonise,
+    smooth_union,
+    sphere,
+)
 from ripple_sim.solver import Atlas, AtlasError, Mesh, MeshError, build_atlas, load_atlas, load_mesh
 from ripple_sim.solver.layouts import build
 from ripple_sim.solver.layouts.choice import LONGEST_TEXEL, elongation, texel_length
@@ -17,7 +24,9 @@ from ripple_sim.solver.layouts.choice import LONGEST_TEXEL, elongation, texel_le
 def crab() -> Mesh:
     """A ball with four thin legs."""
     feet = ((0.7, 0.4, 0.0), (0.7, -0.4, 0.0), (-0.7, 0.4, 0.0), (-0.7, -0.4, 0.0))
-    solid = smooth_union(0.05, sphere((0, 0, 0), 0.25), *(capsule((0, 0, 0), foot, 0.07) for foot in feet))
+    solid = smooth_union(
+        0.05, sphere((0, 0, 0), 0.25), *(capsule((0, 0, 0), foot, 0.07) for foot in feet)
+    )
     return Mesh.from_arrays(*polygonise(solid, ((-0.8, -0.5, -0.3), (0.8, 0.5, 0.3)), 0.04))
 
 
@@ -28,11 +37,15 @@ def crab_atlas(crab: Mesh) -> Atlas:
 
 def test_elongation_is_the_ratio_of_the_singular_values() -> None:
     rng = np.random.default_rng(0)
-    corners, places = rng.normal(size=(50, 3, 3)), rng.normal(size=(50, 3, 2))
+    corners = rng.normal(size=(50, 3, 3))
+    places = rng.normal(size=(50, 3, 2))
     for k in range(50):
-        sides, flat = corners[k, 1:] - corners[k, 0], places[k, 1:] - places[k, 0]
+        sides = corners[k, 1:] - corners[k, 0]
+        flat = places[k, 1:] - places[k, 0]
         large, small = np.linalg.svd(np.linalg.solve(flat, sides), compute_uv=False)
-        assert elongation(corners[k : k + 1], places[k : k + 1])[0] == pytest.approx(large / small, rel=1e-9)
+        assert elongation(corners[k : k + 1], places[k : k + 1])[0] == pytest.approx(
+            large / small, rel=1e-9
+        )
 
 
 def test_a_triangle_without_area_is_not_long() -> None:
@@ -53,7 +66,9 @@ def test_length_does_not_depend_on_how_a_mesh_is_cut_or_scaled() -> None:
     fine_V, fine_F = icosphere(5)
     squash = np.array([1.0, 1.0, 0.2])
     coarse = texel_length(Mesh.from_arrays(V * squash, F), V)
-    assert texel_length(Mesh.from_arrays(40 * fine_V * squash, fine_F), fine_V) == pytest.approx(coarse, rel=0.05)
+    assert texel_length(Mesh.from_arrays(40 * fine_V * squash, fine_F), fine_V) == pytest.approx(
+        coarse, rel=0.05
+    )
 
 
 @pytest.mark.parametrize(
@@ -82,20 +97,26 @@ def test_limbs_get_patches_and_the_atlas_says_why(crab: Mesh, crab_atlas: Atlas)
     assert cube.notes == ()
 
 
-def test_the_lowest_modes_in_which_limbs_swing_are_more_exact(crab: Mesh, crab_atlas: Atlas) -> None:
+def test_the_lowest_modes_in_which_limbs_swing_are_more_exact(
+    crab: Mesh, crab_atlas: Atlas
+) -> None:
     exact = of_polyhedron(crab, 0)
     cube = build_atlas(crab, 32, cache=False, layout="cube")
     assert errors_against(exact, crab_atlas)[:4].max() < 0.3 * errors_against(exact, cube)[:4].max()
 
 
-def test_the_choice_is_kept_in_the_cache(crab: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_choice_is_kept_in_the_cache(
+    crab: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     # other layouts of the same mesh do not decide it
     build_atlas(crab, 8, layout="cube")
     first = build_atlas(crab, 8)
     assert first.layout == "patches"
     assert {"sphere_map", "patch_map"} <= first.timings.keys()
-    monkeypatch.setitem(build.SPHERE_MAPS, "progressive", lambda V, F: pytest.fail("the sphere map is asked again"))
+    monkeypatch.setitem(
+        build.SPHERE_MAPS, "progressive", lambda V, F: pytest.fail("the sphere map is asked again")
+    )
     again = build_atlas(crab, 8)
     assert again.timings.keys() == {"cache"}
     assert again.notes == first.notes

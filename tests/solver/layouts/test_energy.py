@@ -16,7 +16,13 @@ from ripple_sim.solver.layouts import (
     star_slopes,
     tangent_move,
 )
-from ripple_sim.solver.layouts.sphere_map import SPHERE, star_shapes, sweep, tangent_frame, total_energy
+from ripple_sim.solver.layouts.sphere_map import (
+    SPHERE,
+    star_shapes,
+    sweep,
+    tangent_frame,
+    total_energy,
+)
 
 # Dirichlet energy and area ratio of maps that shrink, keep and stretch, evenly and not
 STRETCHES = [(2.0, 1.0), (2.5, 1.0), (0.7, 0.3), (0.5, 0.25), (1.2, 0.1), (9.0, 4.0)]
@@ -31,7 +37,8 @@ def test_derivatives_of_the_density_are_those_of_differences(density, d, j):
     def derivatives(d, j):
         return density_derivatives(d, j, density)
 
-    e, f = 1e-5 * d, 1e-5 * j
+    e = 1e-5 * d
+    f = 1e-5 * j
     value, *slopes = derivatives(d, j)
     assert value == pytest.approx(w(d, j), rel=1e-13)
     np.testing.assert_allclose(slopes[0], (w(d + e, j) - w(d - e, j)) / (2 * e), rtol=1e-6)
@@ -56,14 +63,17 @@ def test_small_areas_meet_a_wall_of_the_sixteenth_power():
 @pytest.mark.parametrize("d, j", [(2.0, 0.7), (3.0, 1.3), (5.0, 0.2)])
 def test_but_for_the_wall_a_map_costs_as_much_as_its_inverse(d: float, j: float):
     without = SPHERE._replace(small=0.0)
-    assert energy_density(d, 1 / j, without) == pytest.approx(energy_density(d / j**2, j, without), rel=1e-13)
+    assert energy_density(d, 1 / j, without) == pytest.approx(
+        energy_density(d / j**2, j, without), rel=1e-13
+    )
 
 
 def singular_values(triangle, image):
     """Of the linear map from one triangle [3, 3] in space to another."""
 
     def flat(corners):
-        e, f = corners[1] - corners[0], corners[2] - corners[0]
+        e = corners[1] - corners[0]
+        f = corners[2] - corners[0]
         x = e / np.linalg.norm(e)
         y = f - (f @ x) * x
         y /= np.linalg.norm(y)
@@ -90,7 +100,11 @@ def test_energy_of_a_folded_map_is_infinite(place):
     level, reference = whole_level(V, F)
     assert np.isfinite(total_energy(level.tail, V, reference))
     S = V.copy()
-    S[0] = {"beyond its star": -V[0], "on its neighbour": V[level.ring[0]], "not a number": np.full(3, np.nan)}[place]
+    S[0] = {
+        "beyond its star": -V[0],
+        "on its neighbour": V[level.ring[0]],
+        "not a number": np.full(3, np.nan),
+    }[place]
     assert total_energy(level.tail, S, reference) == np.inf
 
 
@@ -105,7 +119,18 @@ def gradients(A):
 
 
 @pytest.mark.parametrize(
-    ("s1", "s2"), [(1, 1), (1.1, 0.9), (2, 2), (0.3, 0.3), (2, 0.5), (0.6, 0.4), (0.5, 0.1), (3, 0.01), (1.5, 1.4)]
+    ("s1", "s2"),
+    [
+        (1, 1),
+        (1.1, 0.9),
+        (2, 2),
+        (0.3, 0.3),
+        (2, 0.5),
+        (0.6, 0.4),
+        (0.5, 0.1),
+        (3, 0.01),
+        (1.5, 1.4),
+    ],
 )
 @pytest.mark.parametrize("area", [1.0, 0.01])
 def test_projected_hessian_is_the_positive_part_of_the_full_one(s1, s2, area):
@@ -127,8 +152,12 @@ def test_projected_hessian_is_the_positive_part_of_the_full_one(s1, s2, area):
 
 AXES = [tuple(sign * each) for each in np.eye(3) for sign in (1.0, -1.0)]
 # the frame changes its recipe where |x| = 0.6
-BORDER = [(x, 0.0, np.sqrt(1 - x * x)) for x in (0.6, np.nextafter(0.6, 0), np.nextafter(0.6, 1), -0.6)]
-RANDOM = [tuple(each / np.linalg.norm(each)) for each in np.random.default_rng(0).standard_normal((10, 3))]
+BORDER = [
+    (x, 0.0, np.sqrt(1 - x * x)) for x in (0.6, np.nextafter(0.6, 0), np.nextafter(0.6, 1), -0.6)
+]
+RANDOM = [
+    tuple(each / np.linalg.norm(each)) for each in np.random.default_rng(0).standard_normal((10, 3))
+]
 
 
 @pytest.mark.parametrize("p", [*AXES, *BORDER, *RANDOM])
@@ -153,10 +182,12 @@ def test_a_sweep_lowers_the_energy_by_what_it_says(backwards):
 
 def star_terms(level, S, reference, v):
     """What `expand_star` says of one vertex's star."""
-    first, last = level.star_start[v], level.star_start[v + 1]
+    first = level.star_start[v]
+    last = level.star_start[v + 1]
     x, y = tangent_frame(tuple(S[v]))
     terms = np.empty((last - first, TERMS))
-    ring, shapes = S[level.ring[first:last]], star_shapes(level.star, reference)[first:last]
+    ring = S[level.ring[first:last]]
+    shapes = star_shapes(level.star, reference)[first:last]
     expand_star(tuple(S[v]), x, y, ring, np.roll(ring, -1, axis=0), shapes, last - first, terms)
     return terms, np.array(x), np.array(y)
 
@@ -173,7 +204,9 @@ def test_the_expanded_star_knows_the_energy_of_every_place(v):
         moved = S.copy()
         moved[v] += move[0] * x + move[1] * y + move[2] * S[v]
         assert np.linalg.norm(moved[v]) == pytest.approx(1, abs=1e-15)
-        rise = star_energy(terms, len(terms), SPHERE, move) - star_energy(terms, len(terms), SPHERE, (0.0, 0.0, 0.0))
+        rise = star_energy(terms, len(terms), SPHERE, move) - star_energy(
+            terms, len(terms), SPHERE, (0.0, 0.0, 0.0)
+        )
         expected = total_energy(level.tail, moved, reference) - at_rest
         assert rise == pytest.approx(expected, rel=1e-6, abs=1e-11 * at_rest)
 
@@ -182,14 +215,17 @@ def test_slopes_of_the_expanded_star_are_those_of_its_energy():
     V, F = crumpled()
     level, reference = whole_level(V, F)
     terms, *_ = star_terms(level, icosphere(3)[0], reference, 7)
-    degree, h = len(terms), 1e-4
+    degree = len(terms)
+    h = 1e-4
 
     def at(a, b):
         return star_energy(terms, degree, SPHERE, tangent_move(a, b, 1.0))
 
     energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, SPHERE, 1.0)
     assert energy == pytest.approx(at(0.0, 0.0), rel=1e-14)
-    assert [gx, gy] == pytest.approx([(at(h, 0) - at(-h, 0)) / (2 * h), (at(0, h) - at(0, -h)) / (2 * h)], rel=1e-4)
+    assert [gx, gy] == pytest.approx(
+        [(at(h, 0) - at(-h, 0)) / (2 * h), (at(0, h) - at(0, -h)) / (2 * h)], rel=1e-4
+    )
     assert hxx == pytest.approx((at(h, 0) - 2 * energy + at(-h, 0)) / h**2, rel=1e-3)
     assert hyy == pytest.approx((at(0, h) - 2 * energy + at(0, -h)) / h**2, rel=1e-3)
     mixed = (at(h, h) - at(h, -h) - at(-h, h) + at(-h, -h)) / (4 * h**2)
@@ -203,8 +239,13 @@ def test_newton_gradient_is_the_slope_of_the_energy():
     frames, (gradient, _, _), _ = assembled(level, S, reference)
     direction = np.random.default_rng(1).standard_normal(gradient.shape)
     velocity = np.einsum("ni,nij->nj", direction, frames)
-    ahead, behind = ((S + t * velocity) / np.linalg.norm(S + t * velocity, axis=1)[:, None] for t in (1e-6, -1e-6))
-    slope = (total_energy(level.tail, ahead, reference) - total_energy(level.tail, behind, reference)) / 2e-6
+    ahead, behind = (
+        (S + t * velocity) / np.linalg.norm(S + t * velocity, axis=1)[:, None]
+        for t in (1e-6, -1e-6)
+    )
+    slope = (
+        total_energy(level.tail, ahead, reference) - total_energy(level.tail, behind, reference)
+    ) / 2e-6
     assert slope == pytest.approx(np.sum(gradient * direction), rel=1e-5)
 
 

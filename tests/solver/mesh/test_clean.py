@@ -4,7 +4,18 @@ import re
 
 import numpy as np
 import pytest
-from all_kinds import BALL, band, crumbs, cube, klein_bottle, needles, punctured_ball, shuffled, thickened_graph, voxels
+from all_kinds import (
+    BALL,
+    band,
+    crumbs,
+    cube,
+    klein_bottle,
+    needles,
+    punctured_ball,
+    shuffled,
+    thickened_graph,
+    voxels,
+)
 from hypothesis import given, settings, strategies as st
 from sound import assert_sound, assert_unchanged_when_read_again
 
@@ -31,7 +42,9 @@ def made(V: np.ndarray, F: np.ndarray) -> Mesh:
     assert_unchanged_when_read_again(mesh)
     assert mesh.area == pytest.approx(areas(V, F).sum(), rel=1e-9)
     assert mesh.corner_uv is not None
-    np.testing.assert_allclose(integral(mesh.V, mesh.F, mesh.corner_uv), integral(V, F, uv), rtol=1e-9)
+    np.testing.assert_allclose(
+        integral(mesh.V, mesh.F, mesh.corner_uv), integral(V, F, uv), rtol=1e-9
+    )
     return mesh
 
 
@@ -68,13 +81,17 @@ def test_every_hole_of_a_ball_is_a_rim_that_runs_round_it(holes: int) -> None:
         assert rim[0] == rim.min()
         # seen from outside the surface lies to the left, so the rim runs clockwise round the hole
         P = mesh.V[rim]
-        assert np.einsum("ij,ij->", np.cross(P, np.roll(P, -1, axis=0)), P) == pytest.approx(0, abs=1e-12)
+        assert np.einsum("ij,ij->", np.cross(P, np.roll(P, -1, axis=0)), P) == pytest.approx(
+            0, abs=1e-12
+        )
         assert np.cross(P, np.roll(P, -1, axis=0)).sum(axis=0) @ P.mean(axis=0) < 0
 
 
 @pytest.mark.parametrize("half_twists", range(4))
 @pytest.mark.parametrize("loose", [False, True])
-def test_bands_keep_two_rims_and_moebius_bands_are_cut_across(half_twists: int, loose: bool) -> None:
+def test_bands_keep_two_rims_and_moebius_bands_are_cut_across(
+    half_twists: int, loose: bool
+) -> None:
     V, F = band(half_twists)
     mesh = made(*shuffled(V, F, half_twists, turned=0.3, loose=loose))
     cut = [note for note in mesh.notes if "one-sided" in note]
@@ -110,7 +127,11 @@ def test_a_thousand_parts_stay_a_thousand() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_a_few_triangles_are_a_mesh(count: int) -> None:
-    for V, F in (needles(count), needles(count, 0.5), (np.random.default_rng(0).uniform(size=(3 * count, 3)), None)):
+    for V, F in (
+        needles(count),
+        needles(count, 0.5),
+        (np.random.default_rng(0).uniform(size=(3 * count, 3)), None),
+    ):
         given = np.arange(3 * count).reshape(-1, 3) if F is None else F
         mesh = made(V, given)
         assert mesh.component_count == (count if F is None else 1)
@@ -156,7 +177,10 @@ corner = st.tuples(*[st.integers(0, 2)] * 3)
 
 
 @quick
-@given(F=st.lists(st.lists(st.integers(0, 9), **three, unique=True), min_size=1, max_size=40), seed=st.integers(0, 9))
+@given(
+    F=st.lists(st.lists(st.integers(0, 9), **three, unique=True), min_size=1, max_size=40),
+    seed=st.integers(0, 9),
+)
 def test_any_triangles_between_ten_points_become_a_mesh(F: list[list[int]], seed: int) -> None:
     distinct = list({tuple(sorted(triangle)): triangle for triangle in F}.values())
     made(np.random.default_rng(seed).uniform(size=(10, 3)), np.array(distinct))
@@ -218,18 +242,25 @@ def test_deletions_leave_rims(deleted, flipped) -> None:
     F = np.array(BALL.faces)
     F[flipped] = F[flipped][:, ::-1]
     F = np.delete(F, deleted, axis=0)
-    _, counts = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    _, counts = np.unique(
+        np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True
+    )
     mesh = mended_or_refused(np.array(BALL.vertices), F)
     assert mesh is not None
     assert not mesh.closed
     assert sum(map(len, mesh.rims)) == (counts == 1).sum()
-    assert mesh.component_count > 1 or (np.einsum("ij,ij->i", mesh.vertex_normals, mesh.V) > 0).all()
+    assert (
+        mesh.component_count > 1 or (np.einsum("ij,ij->i", mesh.vertex_normals, mesh.V) > 0).all()
+    )
 
 
 @quick
 @given(deleted=faces, doubled=faces, flipped=faces, rewired=corners, target=vertices, joined=pairs)
-def test_any_damage_is_mended_or_refused(deleted, doubled, flipped, rewired, target, joined) -> None:
-    V, F = np.array(BALL.vertices), np.array(BALL.faces)
+def test_any_damage_is_mended_or_refused(
+    deleted, doubled, flipped, rewired, target, joined
+) -> None:
+    V = np.array(BALL.vertices)
+    F = np.array(BALL.faces)
     for face, corner in rewired:
         F[face, corner] = target
     F[flipped] = F[flipped][:, ::-1]
@@ -239,7 +270,10 @@ def test_any_damage_is_mended_or_refused(deleted, doubled, flipped, rewired, tar
 
 
 @quick
-@given(values=st.lists(st.floats(width=64), min_size=9, max_size=9), where=st.lists(vertices, **three, unique=True))
+@given(
+    values=st.lists(st.floats(width=64), min_size=9, max_size=9),
+    where=st.lists(vertices, **three, unique=True),
+)
 def test_any_coordinates_are_mended_or_refused(values, where) -> None:
     V = np.array(BALL.vertices)
     V[where] = np.array(values).reshape(3, 3)
@@ -254,20 +288,27 @@ def animal() -> Atlas:
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_units_do_not_matter(animal: Atlas, scale: float) -> None:
-    atlas = build_atlas(Mesh.from_arrays(animal.mesh.V * scale, animal.mesh.F), animal.resolution, cache=False)
+    atlas = build_atlas(
+        Mesh.from_arrays(animal.mesh.V * scale, animal.mesh.F), animal.resolution, cache=False
+    )
     np.testing.assert_allclose(atlas.positions / scale, animal.positions, atol=1e-9)
     np.testing.assert_allclose(atlas.areas / scale**2, animal.areas, rtol=1e-6)
     lengths = {"edge_min", "edge_max"}
     for name, value in animal.quality().items():
-        assert atlas.quality()[name] == pytest.approx(value * (scale if name in lengths else 1), rel=1e-6)
+        assert atlas.quality()[name] == pytest.approx(
+            value * (scale if name in lengths else 1), rel=1e-6
+        )
 
 
 def test_place_does_not_matter(animal: Atlas) -> None:
-    # far from the origin the vertices are rounded otherwise, and another turn of the cube may seem the best
+    # far from the origin the vertices are rounded otherwise, and another turn of the cube may seem
+    # the best
     mesh = Mesh.from_arrays(animal.mesh.V + np.array([300.0, -20.0, 1.0]), animal.mesh.F)
     quality = build_atlas(mesh, animal.resolution, cache=False).quality()
     for name, value in animal.quality().items():
-        assert quality[name] == pytest.approx(value, rel=0.25 if name in ("edge_min", "edge_max") else 0.05)
+        assert quality[name] == pytest.approx(
+            value, rel=0.25 if name in ("edge_min", "edge_max") else 0.05
+        )
 
 
 @pytest.mark.parametrize(("gap", "parts"), [(3e-8, 1), (1e-3, 2)])

@@ -83,7 +83,9 @@ def test_nodes_of_a_scene_are_put_where_their_transforms_say(tmp_path: Path) -> 
 
 def test_scaled_mirrored_and_nested_nodes(tmp_path: Path) -> None:
     scene = trimesh.Scene()
-    scene.add_geometry(BALL, node_name="ball", parent_node_name="arm", transform=np.diag([-2, 1, 1, 1]))
+    scene.add_geometry(
+        BALL, node_name="ball", parent_node_name="arm", transform=np.diag([-2, 1, 1, 1])
+    )
     scene.graph.update(frame_to="arm", frame_from="world", matrix=np.diag([1.0, 3.0, 1.0, 1.0]))
     scene.export(tmp_path / "nested.glb")
     mesh = load_mesh(tmp_path / "nested.glb")
@@ -113,11 +115,17 @@ def test_texture_of_a_glb_is_kept(tmp_path: Path) -> None:
         ("continued.obj", obj(CORNERS, QUADS).replace("f 1 2", "f 1 \\\n2")),
         ("comments.obj", "# box\n" + obj(CORNERS, QUADS).replace("\n", " # corner\n")),
         ("colours.obj", obj([(*c, 0.5, 0.5, 0.5) for c in CORNERS], QUADS)),
-        ("groups.obj", obj(CORNERS, QUADS, "mtllib none.mtl", "o box", "g side", "usemtl red", "s 1")),
+        (
+            "groups.obj",
+            obj(CORNERS, QUADS, "mtllib none.mtl", "o box", "g side", "usemtl red", "s 1"),
+        ),
         ("quads.off", off(CORNERS, QUADS)),
         ("marked.off", "\ufeff" + off(CORNERS, QUADS)),
         ("one_line.off", off(CORNERS, QUADS).replace("OFF\n", "OFF ")),
-        ("comments.off", "# box\n" + off(CORNERS, QUADS).replace("OFF\n", "OFF # text\n\n# counts\n")),
+        (
+            "comments.off",
+            "# box\n" + off(CORNERS, QUADS).replace("OFF\n", "OFF # text\n\n# counts\n"),
+        ),
         ("colours.off", off([(*c, 255, 0, 0, 255) for c in CORNERS], QUADS, "COFF")),
         ("normals.off", off([(*c, 0, 0, 1) for c in CORNERS], QUADS, "NOFF")),
     ],
@@ -139,7 +147,10 @@ def test_materials_and_uv_seams_keep_every_corners_coordinates(tmp_path: Path) -
     text = [f"v {x} {y} {z}" for x, y, z in CORNERS] + ["mtllib some.mtl"]
     for k, quad in enumerate(QUADS):
         text += [f"vt {k + u} {v}" for u, v in ((0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5))]
-        text += [f"usemtl material{k}", "f " + " ".join(f"{i + 1}/{4 * k + j + 1}" for j, i in enumerate(quad))]
+        text += [
+            f"usemtl material{k}",
+            "f " + " ".join(f"{i + 1}/{4 * k + j + 1}" for j, i in enumerate(quad)),
+        ]
     mesh = load_mesh(written(tmp_path, "seams.obj", "\n".join(text)))
     assert mesh.corner_uv is not None and mesh.uv is not None
     assert (len(mesh.V), mesh.corner_uv.shape, mesh.uv.shape) == (8, (12, 3, 2), (8, 2))
@@ -148,7 +159,9 @@ def test_materials_and_uv_seams_keep_every_corners_coordinates(tmp_path: Path) -
         quad = QUADS[int(k)]
         for vertex, pair in zip(triangle, pairs, strict=True):
             j = quad.index(CORNERS.index(tuple(mesh.V[vertex])))
-            np.testing.assert_array_equal(pair - [k, 0], [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)][j])
+            np.testing.assert_array_equal(
+                pair - [k, 0], [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)][j]
+            )
 
 
 def test_faces_without_texture_coordinates_among_others_are_read(tmp_path: Path) -> None:
@@ -158,7 +171,9 @@ def test_faces_without_texture_coordinates_among_others_are_read(tmp_path: Path)
     assert sorted(np.unique(mesh.corner_uv)) == [0, 0.5]
 
 
-TEXT, BINARY = (ply(CORNERS, QUADS, layout, length="int") for layout in ("ascii", "binary_little_endian"))
+TEXT, BINARY = (
+    ply(CORNERS, QUADS, layout, length="int") for layout in ("ascii", "binary_little_endian")
+)
 MANY = b"vertex 900000000000"
 
 
@@ -179,9 +194,17 @@ def refusal(path: Path) -> str:
     ("name", "content", "said"),
     [
         ("empty.obj", "", "is empty"),
-        ("points.obj", obj(CORNERS, []), "no triangles, only 8 points; make a surface of them first"),
+        (
+            "points.obj",
+            obj(CORNERS, []),
+            "no triangles, only 8 points; make a surface of them first",
+        ),
         ("edges.obj", obj(CORNERS, [(0, 1)]), "no triangles"),
-        ("huge.obj", obj(CORNERS, [*QUADS, (0, 1, 999_999_999)]), "line 15 refers to vertex 1000000000.*1 to 8"),
+        (
+            "huge.obj",
+            obj(CORNERS, [*QUADS, (0, 1, 999_999_999)]),
+            "line 15 refers to vertex 1000000000.*1 to 8",
+        ),
         ("huger.obj", obj(CORNERS, QUADS) + f"f 1 2 {10**30}\n", "line 15.*not a corner"),
         ("zero.obj", obj(CORNERS, QUADS) + "f 0 1 2\n", "line 15 refers to vertex 0"),
         ("back.obj", obj(CORNERS, QUADS) + "f -9 1 2\n", "line 15 refers to vertex 0"),
@@ -193,7 +216,11 @@ def refusal(path: Path) -> str:
         ("early.off", off(CORNERS, QUADS)[:60], "ends early"),
         ("counts.off", "OFF\nmany 3\n", "numbers of vertices and faces"),
         ("range.off", off(CORNERS, [*QUADS, (0, 1, 8)]), "outside 0 to 7"),
-        ("missing.off", off(CORNERS, QUADS).replace("4 0 1 3 2", "4 0 1 3"), "has 3 corners instead of 4"),
+        (
+            "missing.off",
+            off(CORNERS, QUADS).replace("4 0 1 3 2", "4 0 1 3"),
+            "has 3 corners instead of 4",
+        ),
         ("cloud.ply", ply(CORNERS, [], "ascii"), "no triangles, only 8 points"),
         ("missing.ply", TEXT.replace(b"4 0 1 3 2", b"4 0 1 3"), "ends before the 6 rows"),
         ("junk.ply", b"\x00\x01", "no header from ply to end_header"),
@@ -202,7 +229,11 @@ def refusal(path: Path) -> str:
         ("less.ply", TEXT.replace(b"4 0 1 3 2", b"-1 0 1 3 2"), "ends before the 6 rows"),
         ("minus.ply", with_length(-1), "ends before"),
         ("endless.ply", with_length(2**31 - 1), "ends before"),
-        ("range.ply", ply(CORNERS, [*QUADS, (0, 1, 8)], "ascii"), "vertices 0 to 8; valid is 0 to 7"),
+        (
+            "range.ply",
+            ply(CORNERS, [*QUADS, (0, 1, 8)], "ascii"),
+            "vertices 0 to 8; valid is 0 to 7",
+        ),
         ("type.ply", TEXT.replace(b"uchar red", b"colour red"), "'property colour red'"),
         ("flat.ply", TEXT.replace(b"float z", b"float w"), "no vertices with x, y and z"),
         ("junk.glb", b"glTF junk", "damaged or not a GLB file"),
@@ -212,14 +243,36 @@ def refusal(path: Path) -> str:
         ("noending", "hello", "unknown ending"),
         # what promises more than it holds is refused at once, and no memory asked for
         ("promise.stl", b"\x00" * 80 + struct.pack("<I", 2**32 - 1) + b"\x00" * 50, "no triangles"),
-        ("promise.ply", BINARY.replace(b"vertex 8", MANY), "ends before the 900000000000 rows of its element vertex"),
-        ("rows.ply", TEXT.replace(b"vertex 8", MANY), "ends before the 900000000000 rows of its element vertex"),
-        ("faces.ply", TEXT.replace(b"face 6", b"face 900000000000"), "ends before the 900000000000 rows"),
-        ("promise.off", b"OFF\n900000000000 900000000000 0\n0 0 0\n", "900000000000 faces are announced, 1 lines"),
-        ("promise.glb", b"glTF" + struct.pack("<III", 2, 2**32 - 1, 2**32 - 1) + b"JSON{}", "no triangles"),
+        (
+            "promise.ply",
+            BINARY.replace(b"vertex 8", MANY),
+            "ends before the 900000000000 rows of its element vertex",
+        ),
+        (
+            "rows.ply",
+            TEXT.replace(b"vertex 8", MANY),
+            "ends before the 900000000000 rows of its element vertex",
+        ),
+        (
+            "faces.ply",
+            TEXT.replace(b"face 6", b"face 900000000000"),
+            "ends before the 900000000000 rows",
+        ),
+        (
+            "promise.off",
+            b"OFF\n900000000000 900000000000 0\n0 0 0\n",
+            "900000000000 faces are announced, 1 lines",
+        ),
+        (
+            "promise.glb",
+            b"glTF" + struct.pack("<III", 2, 2**32 - 1, 2**32 - 1) + b"JSON{}",
+            "no triangles",
+        ),
     ],
 )
-def test_what_cannot_be_read_is_said_in_one_line(tmp_path: Path, name: str, content, said: str) -> None:
+def test_what_cannot_be_read_is_said_in_one_line(
+    tmp_path: Path, name: str, content, said: str
+) -> None:
     message = refusal(written(tmp_path, name, content))
     assert re.search(said, message), message
 
@@ -229,7 +282,9 @@ def test_folders_fifos_and_missing_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "folder.obj").mkdir()
     assert "is a folder" in refusal(tmp_path / "folder.obj")
     os.mkfifo(tmp_path / "fifo.obj")
-    assert "fifo.obj' is not a regular file; give the path of an OBJ" in refusal(tmp_path / "fifo.obj")
+    assert "fifo.obj' is not a regular file; give the path of an OBJ" in refusal(
+        tmp_path / "fifo.obj"
+    )
     assert "does not exist" in refusal(tmp_path / "missing.obj")
     assert "does not exist" in refusal(tmp_path / "missing" / "deep.obj")
     (tmp_path / "dangling.obj").symlink_to(tmp_path / "nothing.obj")
@@ -238,7 +293,9 @@ def test_folders_fifos_and_missing_files_are_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", ["stat", "open"])
-def test_a_place_without_permission_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
+def test_a_place_without_permission_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
     path = written(tmp_path, "box.obj", obj(CORNERS, QUADS))
     original = getattr(Path, method)
 
@@ -252,9 +309,14 @@ def test_a_place_without_permission_is_named(tmp_path: Path, monkeypatch: pytest
 
 
 def test_nothing_but_the_error_is_said(tmp_path: Path) -> None:
-    broken = trimesh.creation.box().export(file_type="stl_ascii").replace("normal 0", "normal zero", 1)
+    broken = (
+        trimesh.creation.box().export(file_type="stl_ascii").replace("normal 0", "normal zero", 1)
+    )
     path = written(tmp_path, "broken.stl", broken)
-    code = f"from ripple_sim.solver import load_mesh\ntry: load_mesh({str(path)!r})\nexcept Exception: pass"
+    code = (
+        f"from ripple_sim.solver import load_mesh\ntry: load_mesh({str(path)!r})\nexcept "
+        f"Exception: pass"
+    )
     assert ended("-c", code, check=True).stderr == ""
 
 
@@ -264,4 +326,6 @@ def test_a_gltf_whose_buffer_is_a_fifo_does_not_wait_for_it(tmp_path: Path, kind
     content = {"asset": {"version": "2.0"}, kind: [{"uri": "a%20pipe", "byteLength": 12}]}
     (tmp_path / "mesh.gltf").write_text(json.dumps(content))
     said = refusal(tmp_path / "mesh.gltf")
-    assert re.search(r"mesh\.gltf' cannot be read: it names 'a%20pipe', which .* not a regular file", said)
+    assert re.search(
+        r"mesh\.gltf' cannot be read: it names 'a%20pipe', which .* not a regular file", said
+    )

@@ -16,7 +16,10 @@ from ripple_sim.solver.mesh import vertex_normals
         (lambda V, F: (V, F[1:]), r"open: 3 boundary edges round 1 hole \(one near \(.*repair"),
         (lambda V, F: (V, F[:2]), "open: 4 boundary edges round 1 hole"),
         (lambda V, F: (np.vstack([V, V + 3]), np.vstack([F, F + 8])), "2 separate parts"),
-        (lambda V, F: (np.vstack([V, [[5, 5, 5]]]), np.vstack([F, [[0, 1, 8]]])), "2 separate parts.*and open.*cut"),
+        (
+            lambda V, F: (np.vstack([V, [[5, 5, 5]]]), np.vstack([F, [[0, 1, 8]]])),
+            "2 separate parts.*and open.*cut",
+        ),
         (lambda V, F: (np.vstack([V, V + 1]), np.vstack([F, F + 8])), "2 separate parts"),
         (lambda V, F: (V * [1, 1, 0], F), "open|no volume"),
         (lambda V, F: torus(), "genus 1"),
@@ -35,7 +38,8 @@ def test_normals_of_a_sphere_are_radial() -> None:
 
 
 def test_the_normal_of_a_spike_points_outwards_of_the_one_triangle_that_faces_elsewhere() -> None:
-    # many narrow triangles face up, two wide ones down and to the side: their mean would point into those
+    # many narrow triangles face up, two wide ones down and to the side: their mean would point into
+    # those
     angle = np.concatenate([np.linspace(0, np.pi, 24), [1.5 * np.pi]])
     rim = np.stack([np.cos(angle), np.sin(angle), np.where(angle > np.pi, -6.0, -0.1)], axis=1)
     V = np.concatenate([[[0.0, 0.0, 0.0]], rim])
@@ -43,7 +47,10 @@ def test_the_normal_of_a_spike_points_outwards_of_the_one_triangle_that_faces_el
     mesh = Mesh.from_arrays(V, F)
     a, b, c = mesh.V[mesh.F].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
-    cosine = np.einsum("mkj,mj->mk", mesh.vertex_normals[mesh.F], normal) / np.linalg.norm(normal, axis=1)[:, None]
+    cosine = (
+        np.einsum("mkj,mj->mk", mesh.vertex_normals[mesh.F], normal)
+        / np.linalg.norm(normal, axis=1)[:, None]
+    )
     assert cosine.min() > 0.1
     spun = vertex_normals(V[:, [1, 2, 0]], F)
     np.testing.assert_allclose(spun, mesh.vertex_normals[:, [1, 2, 0]], atol=1e-9)
@@ -113,7 +120,8 @@ def test_two_bodies_that_touch_stay_two(bodies, volume: float, loose: bool, turn
 
 
 def test_a_wall_comes_off_the_floor_on_which_it_stands() -> None:
-    left, right = square((0, 0, 0), (1, 0, 0), (1, 2, 0), (0, 2, 0)), square((1, 0, 0), (2, 0, 0), (2, 2, 0), (1, 2, 0))
+    left = square((0, 0, 0), (1, 0, 0), (1, 2, 0), (0, 2, 0))
+    right = square((1, 0, 0), (2, 0, 0), (2, 2, 0), (1, 2, 0))
     wall = square((1, 0, 0), (1, 2, 0), (1, 2, 1), (1, 0, 1))
     mesh = sound(*merged(left, right, wall))
     assert mesh.component_count == 2
@@ -134,7 +142,8 @@ def test_an_inner_wall_comes_off_its_box() -> None:
 
 
 def test_a_fin_comes_off_and_the_ball_stays_closed() -> None:
-    V, F = np.array(BALL.vertices), np.array(BALL.faces)
+    V = np.array(BALL.vertices)
+    F = np.array(BALL.faces)
     a, b = F[0, :2]
     mesh = sound(np.vstack([V, 2 * V[a]]), np.vstack([[[a, b, len(V)]], F]))
     assert mesh.component_count == 2

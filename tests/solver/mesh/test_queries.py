@@ -12,11 +12,14 @@ def test_triangles_without_area_and_triangles_in_one_place() -> None:
     F = np.array([[0, 0, 0], [0, 1, 2], [1, 1, 2], *[[0, 1, 3]] * 9])
     points = np.array([[0.0, 0, 1], [1.5, -1, 0], [3, 0, 0], [0.2, 0.2, -2], [-1, 5, 0]])
     _, closest = ClosestPoints(V, F)(points)
-    np.testing.assert_allclose(closest, [[0, 0, 0], [1.5, 0, 0], [2, 0, 0], [0.2, 0.2, 0], [0, 1, 0]], atol=1e-15)
+    np.testing.assert_allclose(
+        closest, [[0, 0, 0], [1.5, 0, 0], [2, 0, 0], [0.2, 0.2, 0], [0, 1, 0]], atol=1e-15
+    )
 
 
 def hits(solid: trimesh.Trimesh, xy: list) -> np.ndarray:
-    V, xy = np.array(solid.vertices), np.array(xy, dtype=float).reshape(-1, 2)
+    V = np.array(solid.vertices)
+    xy = np.array(xy, dtype=float).reshape(-1, 2)
     return downward_hits(RayScene(V, np.array(solid.faces)), xy, V[:, 2].max())[1]
 
 
@@ -50,4 +53,6 @@ def test_heights_follow_size_and_place_of_the_mesh(size: float, offset: list[flo
     solid.apply_translation(offset)
     solid.apply_scale(size)
     x, y, z = offset
-    assert hits(solid, [[size * (x + 0.1), size * (y - 0.2)]]) == pytest.approx([size * (z + 0.5)], rel=1e-5)
+    assert hits(solid, [[size * (x + 0.1), size * (y - 0.2)]]) == pytest.approx(
+        [size * (z + 0.5)], rel=1e-5
+    )

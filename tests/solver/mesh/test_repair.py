@@ -28,7 +28,8 @@ class TestRepair:
 
     @pytest.mark.parametrize("name", ["open", "NaN", "two parts", "ring"])
     def test_holes_are_closed_and_all_else_stays(self, name: str) -> None:
-        V, F = np.array(BALL.vertices), np.array(BALL.faces)
+        V = np.array(BALL.vertices)
+        F = np.array(BALL.faces)
         if name == "open":
             F = F[6:]
         elif name == "NaN":
@@ -37,7 +38,8 @@ class TestRepair:
             V, F = np.vstack([V, 0.1 * V + 5]), np.vstack([F[4:], F + len(V)])
         else:
             ring = trimesh.creation.torus(1.0, 0.3)
-            V, F = np.array(ring.vertices), np.array(ring.faces)[3:]
+            V = np.array(ring.vertices)
+            F = np.array(ring.faces)[3:]
         uv = np.random.default_rng(0).uniform(size=(len(F), 3, 2))
         mesh = repaired(Soup(V, F, uv), "ball")
         assert_sound(mesh)
@@ -45,7 +47,9 @@ class TestRepair:
         assert mesh.component_count == (2 if name == "two parts" else 1)
         assert mesh.genus[0] == (name == "ring")
         if name != "ring":
-            assert mesh.volume == pytest.approx(BALL.volume * (1.001 if name == "two parts" else 1), rel=0.25)
+            assert mesh.volume == pytest.approx(
+                BALL.volume * (1.001 if name == "two parts" else 1), rel=0.25
+            )
         assert any(note.startswith("hole closed: ") for note in mesh.notes)
         finite = np.isfinite(V[F]).all(axis=(1, 2))
         assert mesh.corner_uv is not None
@@ -57,7 +61,8 @@ class TestRepair:
 
     def test_the_teapot_keeps_its_spout_its_handle_and_its_lid(self) -> None:
         path = known_mesh("bad/several-parts-teapot.obj")
-        before, mesh = load_mesh(path), load_mesh(path, repair=True)
+        before = load_mesh(path)
+        mesh = load_mesh(path, repair=True)
         assert mesh.closed
         assert mesh.component_count == before.component_count == 4
         np.testing.assert_allclose(np.ptp(mesh.V, axis=0), np.ptp(before.V, axis=0))
@@ -81,7 +86,9 @@ class TestRepair:
             repaired(Soup(np.full((3, 3), np.nan), np.array([[0, 1, 2]])), "dust")
 
 
-def test_without_pymeshfix_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pymeshfix_the_message_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "pymeshfix", None)
     with pytest.raises(MeshError, match=r"open.*pip install 'ripple-sim\[repair\]'"):
         repaired(Soup(np.array(BALL.vertices), np.array(BALL.faces)[1:]), "ball")

@@ -9,15 +9,22 @@ import SimpleITK
 
 from ripple_sim.solver import MeshError, load_volume
 
-CENTRE, RADIUS = np.array([0.02, -0.03, 0.05]), 0.012  # m, in the patient's frame
-SPACING, ORIGIN = np.array([0.002, 0.0015, 0.003]), np.array([0.0, -0.05, 0.03])
+# m, in the patient's frame
+CENTRE = np.array([0.02, -0.03, 0.05])
+RADIUS = 0.012
+SPACING = np.array([0.002, 0.0015, 0.003])
+ORIGIN = np.array([0.0, -0.05, 0.03])
 # i goes to the back, j to the right, k to the head
 TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def scan(directions: np.ndarray, origin: np.ndarray) -> SimpleITK.Image:
     """A ball of bone in soft tissue, as a scanner's grid has it."""
-    nodes = np.stack(np.meshgrid(*map(np.arange, (20, 27, 14)), indexing="ij"), axis=-1) * SPACING @ directions.T
+    nodes = (
+        np.stack(np.meshgrid(*map(np.arange, (20, 27, 14)), indexing="ij"), axis=-1)
+        * SPACING
+        @ directions.T
+    )
     depth = RADIUS - np.linalg.norm(nodes + origin - CENTRE, axis=-1)
     image = SimpleITK.GetImageFromArray(np.clip(4e5 * depth + 300, -1000, 3000).astype(np.int16).T)
     image.SetSpacing((1e3 * SPACING).tolist())
@@ -34,8 +41,16 @@ def write_series(image: SimpleITK.Image, folder: Path) -> None:
     for k in range(image.GetDepth()):
         flat = image[:, :, k]
         position = image.TransformIndexToPhysicalPoint((0, 0, k))
-        tags = {"0020|000e": "1.2.3.4", "0020|0032": "\\".join(map(str, position)), "0008|0060": "CT"}
-        tags |= {"0020|0037": "\\".join(map(str, np.reshape(image.GetDirection(), (3, 3))[:, :2].T.ravel()))}
+        tags = {
+            "0020|000e": "1.2.3.4",
+            "0020|0032": "\\".join(map(str, position)),
+            "0008|0060": "CT",
+        }
+        tags |= {
+            "0020|0037": "\\".join(
+                map(str, np.reshape(image.GetDirection(), (3, 3))[:, :2].T.ravel())
+            )
+        }
         for tag, value in (tags | {"0020|0013": str(k), "0018|0050": "3"}).items():
             flat.SetMetaData(tag, value)
         writer.SetFileName(str(folder / f"{(5 * k) % 14:02}.dcm"))
@@ -44,7 +59,9 @@ def write_series(image: SimpleITK.Image, folder: Path) -> None:
 
 @pytest.mark.parametrize("ending", ["nii.gz", "nrrd", "dicom"])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_scan_lies_where_the_patient_lay_in_metres(tmp_path: Path, ending: str, turned: bool) -> None:
+def test_a_scan_lies_where_the_patient_lay_in_metres(
+    tmp_path: Path, ending: str, turned: bool
+) -> None:
     directions = TURNED if turned else np.eye(3)
     image = scan(directions, np.array([0.04, -0.05, 0.03]) if turned else ORIGIN)
     path = tmp_path / ending
@@ -58,7 +75,9 @@ def test_a_scan_lies_where_the_patient_lay_in_metres(tmp_path: Path, ending: str
     assert np.abs(away / RADIUS - 1).max() < 0.03
     normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
     assert ((normals * (V[F].mean(axis=1) - CENTRE)).sum(axis=1) >= -1e-12).all()  # outwards
-    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(4 * np.pi * RADIUS**2, rel=0.05)
+    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(
+        4 * np.pi * RADIUS**2, rel=0.05
+    )
 
 
 def test_an_array_of_numpy_takes_its_spacing_and_place_from_the_caller(tmp_path: Path) -> None:
@@ -70,7 +89,9 @@ def test_an_array_of_numpy_takes_its_spacing_and_place_from_the_caller(tmp_path:
         np.testing.assert_allclose(mine, other, atol=1e-12)
 
 
-def test_what_is_no_volume_is_refused_with_what_is_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_no_volume_is_refused_with_what_is_valid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     np.save(tmp_path / "plain.npy", np.zeros((2, 2, 2)))
     np.save(tmp_path / "words.npy", np.array(["a", "b"]))
     (tmp_path / "broken.nii").write_bytes(b"no scan")

@@ -29,7 +29,9 @@ def test_a_ball_gets_a_larger_ball() -> None:
 
 
 def test_bodies_that_pass_through_each_other_get_one_surface_without_what_lies_inside() -> None:
-    found = wrap(joined(sphere(3), moved(sphere(3), (1, 0, 0)), moved(sphere(3), (0.4, 0.3, 0), 0.4)), 0.03)
+    found = wrap(
+        joined(sphere(3), moved(sphere(3), (1, 0, 0)), moved(sphere(3), (0.4, 0.3, 0), 0.4)), 0.03
+    )
     assert found.mesh.component_count == 1
     assert found.mesh.genus.tolist() == [0]
     apart = np.linalg.norm(found.mesh.V, axis=1), np.linalg.norm(found.mesh.V - [1, 0, 0], axis=1)
@@ -39,16 +41,20 @@ def test_bodies_that_pass_through_each_other_get_one_surface_without_what_lies_i
 
 
 def test_pieces_that_are_far_apart_get_a_surface_each_and_near_ones_share_one() -> None:
-    near, far = 2.1, 2.8
+    near = 2.1
+    far = 2.8
     for centre, parts in (near, 1), (far, 2):
         found = wrap(joined(sphere(3), moved(sphere(3), (centre, 0, 0))), 0.04)
         assert found.mesh.component_count == parts
-    assert found.mesh.notes[-1].startswith("wrapped, 0.192 m off: 2 parts in 2 closed surfaces with 0 handles, ")
+    assert found.mesh.notes[-1].startswith(
+        "wrapped, 0.192 m off: 2 parts in 2 closed surfaces with 0 handles, "
+    )
 
 
 def test_a_shell_with_a_small_hole_is_solid_and_one_with_a_wide_hole_stays_hollow() -> None:
     ball = sphere(4)
-    V, F = ball.V, ball.F
+    V = ball.V
+    F = ball.F
     top = V[F].mean(axis=1)[:, 2]
     solid = wrap(Mesh.from_arrays(V, F[top < 0.997]), 0.05).mesh
     hollow = wrap(Mesh.from_arrays(V, F[top < 0.7]), 0.05).mesh
@@ -62,7 +68,8 @@ def test_a_ring_keeps_its_hole_even_as_a_thousand_bits(cracked: bool) -> None:
     V, F = torus()
     if cracked:
         middle = V[F].mean(axis=1, keepdims=True)
-        V, F = (middle + 0.95 * (V[F] - middle)).reshape(-1, 3), np.arange(F.size).reshape(-1, 3)
+        V = (middle + 0.95 * (V[F] - middle)).reshape(-1, 3)
+        F = np.arange(F.size).reshape(-1, 3)
     mesh = Mesh.from_arrays(V, F)
     found = wrap(mesh, 0.03)
     assert mesh.component_count == (len(F) if cracked else 1)
@@ -84,17 +91,23 @@ def test_the_surface_carries_the_object_along() -> None:
     np.testing.assert_allclose(found.barycentrics.sum(axis=1), 1)
     assert found.barycentrics.min() > -1e-9
     nearest = np.sqrt(igl.point_mesh_squared_distance(mesh.V, found.mesh.V, found.mesh.F)[0])
-    np.testing.assert_allclose(np.linalg.norm(found.interpolate(found.mesh.V) - mesh.V, axis=1), nearest, atol=1e-12)
+    np.testing.assert_allclose(
+        np.linalg.norm(found.interpolate(found.mesh.V) - mesh.V, axis=1), nearest, atol=1e-12
+    )
     # a linear field is interpolated without error
     slope = np.array([0.3, -0.2, 0.5])
     V = found.mesh.V
-    np.testing.assert_allclose(found.interpolate(V @ slope), found.interpolate(V) @ slope, atol=1e-12)
+    np.testing.assert_allclose(
+        found.interpolate(V @ slope), found.interpolate(V) @ slope, atol=1e-12
+    )
 
 
 def test_units_and_place_do_not_matter() -> None:
-    V, F = np.array(BALL.vertices) * [1, 2, 0.5], np.array(BALL.faces)
+    V = np.array(BALL.vertices) * [1, 2, 0.5]
+    F = np.array(BALL.faces)
     for scale, shift in (1e-3, 0), (1e3, 5e3):
-        here, there = wrap(Mesh.from_arrays(V, F), 0.05), wrap(Mesh.from_arrays(V * scale + shift, F), 0.05)
+        here = wrap(Mesh.from_arrays(V, F), 0.05)
+        there = wrap(Mesh.from_arrays(V * scale + shift, F), 0.05)
         assert there.mesh.area == pytest.approx(here.mesh.area * scale**2, rel=1e-3)
 
 

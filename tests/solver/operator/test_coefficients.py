@@ -40,17 +40,30 @@ FIRST_WRONG = np.array([[[1.0, -2.5], [np.nan, 1.0]]])
 @pytest.mark.parametrize(
     ("check", "name", "value", "said"),
     [
-        *((check_numbers, name, 0.0, f"{name} is 0 .*greater than 0 and at least 1e-12, up to 1e") for name in STRICT),
-        *((check_numbers, name, 1e-13, f"{name} is 1e-13 .*greater than 0 and at least 1e-12") for name in STRICT),
+        *(
+            (check_numbers, name, 0.0, f"{name} is 0 .*greater than 0 and at least 1e-12, up to 1e")
+            for name in STRICT
+        ),
+        *(
+            (check_numbers, name, 1e-13, f"{name} is 1e-13 .*greater than 0 and at least 1e-12")
+            for name in STRICT
+        ),
         (check_numbers, "density", np.inf, "is inf (?!.*or infinity)"),
-        (check_numbers, "speed", FIRST_WRONG, r"speed is -2\.5 m/s; valid is a finite number, 0 or greater, up to 1e"),
+        (
+            check_numbers,
+            "speed",
+            FIRST_WRONG,
+            r"speed is -2\.5 m/s; valid is a finite number, 0 or greater, up to 1e",
+        ),
         *(
             (check_mask, "fixed", value, "has type .*; valid is bool")
             for value in (0, 1.0, "yes", np.ones((6, 4, 4), "i1"))
         ),
     ],
 )
-def test_what_is_refused_is_named_with_what_is_valid(check, name: str, value: object, said: str) -> None:
+def test_what_is_refused_is_named_with_what_is_valid(
+    check, name: str, value: object, said: str
+) -> None:
     check_numbers("yield_height", np.inf)  # alone may be infinite
     with pytest.raises(SolverError, match=said):
         check(name, value)
@@ -59,25 +72,37 @@ def test_what_is_refused_is_named_with_what_is_valid(check, name: str, value: ob
 @pytest.mark.parametrize("shape", [(3,), (4, 4), (6, 4, 5), (6, 4, 4, 1)])
 def test_arrays_that_are_no_charts_are_named_by_their_shape(shape: tuple[int, ...]) -> None:
     for check, values in ((check_numbers, np.ones(shape)), (check_mask, np.ones(shape, bool))):
-        with pytest.raises(SolverError, match=r"has shape \(.*\); valid is a number or \[C, n, n\]") as refused:
+        with pytest.raises(
+            SolverError, match=r"has shape \(.*\); valid is a number or \[C, n, n\]"
+        ) as refused:
             check("damping", values)
         assert str(shape) in str(refused.value)
 
 
 # which the plots compare with as well
 EXACT = runpy.run_path(str(Path(__file__).parents[3] / "examples" / "plots" / "layer_mode.py"))
-lowest_square, group_speed = EXACT["lowest_square"], EXACT["group_speed"]
-MODULUS, VISCOSITY, DENSITY = 3000.0, 0.5, 1100.0
-SQUARE, RELAXATION = MODULUS / DENSITY, VISCOSITY / MODULUS  # c_T^2 [m^2/s^2], eta / G [s]
+lowest_square = EXACT["lowest_square"]
+group_speed = EXACT["group_speed"]
+MODULUS = 3000.0
+VISCOSITY = 0.5
+DENSITY = 1100.0
+# c_T^2 [m^2/s^2], eta / G [s]
+SQUARE = MODULUS / DENSITY
+RELAXATION = VISCOSITY / MODULUS
 
 
 @pytest.mark.parametrize(
-    ("depth", "short"), [*((depth, False) for depth in (1.3, 1.8, 2.5, 4.0, 6.0, 8.0)), (5.0, True), (12.0, True)]
+    ("depth", "short"),
+    [*((depth, False) for depth in (1.3, 1.8, 2.5, 4.0, 6.0, 8.0)), (5.0, True), (12.0, True)],
 )
-def test_frequency_and_decay_of_a_standing_wave_are_those_of_the_exact_mode(depth: float, short: bool) -> None:
+def test_frequency_and_decay_of_a_standing_wave_are_those_of_the_exact_mode(
+    depth: float, short: bool
+) -> None:
     q = 4 * np.pi
     atlas = texel_atlas(flat_torus(32))
-    waves = WaveSolver(atlas, Material.layer(MODULUS, VISCOSITY, DENSITY, depth / q, short), backend="cpu")
+    waves = WaveSolver(
+        atlas, Material.layer(MODULUS, VISCOSITY, DENSITY, depth / q, short), backend="cpu"
+    )
     dt = 2 * 2 * np.pi / np.sqrt(SQUARE * lowest_square(depth) * (q / depth) ** 2) / 400
     frequency, rate = swing(waves, np.cos(q * atlas.positions[..., 0]), dt, 400)
     square = SQUARE * q**2 / depth**2 * lowest_square(depth)
@@ -87,7 +112,8 @@ def test_frequency_and_decay_of_a_standing_wave_are_those_of_the_exact_mode(dept
 
 
 def test_short_waves_have_the_phase_and_group_speed_of_the_exact_mode() -> None:
-    material, step = Material.layer(1.0, 0.0, 1.0, 1.0, short=True), 1e-3
+    material = Material.layer(1.0, 0.0, 1.0, 1.0, short=True)
+    step = 1e-3
     for q in (5.0, 6.5, 9.0, 14.0, 25.0, 40.0):
         below, here, above = (frequency(material, q + d) for d in (-step, 0, step))
         assert here == pytest.approx(np.sqrt(lowest_square(q)), rel=0.03)
@@ -106,14 +132,25 @@ def test_a_thin_layer_is_stiffer_and_sooner_still_than_a_thick_one() -> None:
 
 
 def test_jelly_is_a_layer() -> None:
-    jelly, layer = Material.jelly(800.0, 3.0, 0.2, 900.0), Material.layer(800.0, 3.0, 900.0, 0.2)
-    assert (jelly.speed, jelly.stiffness, jelly.damping) == (layer.speed, layer.stiffness, layer.damping)
+    jelly = Material.jelly(800.0, 3.0, 0.2, 900.0)
+    layer = Material.layer(800.0, 3.0, 900.0, 0.2)
+    assert (jelly.speed, jelly.stiffness, jelly.damping) == (
+        layer.speed,
+        layer.stiffness,
+        layer.damping,
+    )
 
 
-@pytest.mark.parametrize(("thickness", "words"), [(1e-3, "take a resolution of"), (20.0, "take a thinner layer")])
-def test_a_layer_whose_waves_the_atlas_has_no_room_for_is_warned_of(thickness: float, words: str) -> None:
+@pytest.mark.parametrize(
+    ("thickness", "words"), [(1e-3, "take a resolution of"), (20.0, "take a thinner layer")]
+)
+def test_a_layer_whose_waves_the_atlas_has_no_room_for_is_warned_of(
+    thickness: float, words: str
+) -> None:
     with pytest.warns(RippleWarning, match=words):
-        WaveSolver(sphere_atlas(1.0, 16), Material.layer(MODULUS, thickness=thickness), backend="cpu")
+        WaveSolver(
+            sphere_atlas(1.0, 16), Material.layer(MODULUS, thickness=thickness), backend="cpu"
+        )
 
 
 def test_a_layer_that_suits_the_atlas_is_not_warned_of() -> None:

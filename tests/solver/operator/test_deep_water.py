@@ -35,7 +35,8 @@ def test_it_is_the_dense_root_within_a_thousandth(atlas: Atlas, root: HalfLaplac
 
 def test_it_is_symmetric_and_gives_nothing_of_a_constant(atlas: Atlas, root: HalfLaplacian) -> None:
     a, b = np.random.default_rng(0).normal(size=(2, *atlas.areas.shape))
-    forth, back = (atlas.areas * a * root(b)).sum(), (atlas.areas * b * root(a)).sum()
+    forth = (atlas.areas * a * root(b)).sum()
+    back = (atlas.areas * b * root(a)).sum()
     assert forth == pytest.approx(back, rel=1e-10)
     assert (atlas.areas * a * root(a)).sum() > 0
     assert np.abs(root(np.ones_like(a))).max() < 1e-9 * root.most
@@ -56,7 +57,8 @@ def test_waves_of_a_sphere_are_of_its_harmonics(atlas: Atlas, root: HalfLaplacia
         assert share == pytest.approx(np.sqrt(degree * (degree + 1)) / 0.3, rel=0.02)
 
 
-DENSITY, GRAVITY = 1000.0, 9.81
+DENSITY = 1000.0
+GRAVITY = 9.81
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +73,9 @@ def water(q: float, ratio: float, viscosity: float = 0.0) -> Material:
 
 def swung(atlas: Atlas, material: Material, q: float) -> tuple[float, float]:
     waves = WaveSolver(atlas, material, backend="cpu")
-    return swing(waves, np.cos(q * atlas.positions[..., 0]), 2 * np.pi / frequency(material, q) / 40, 60)
+    return swing(
+        waves, np.cos(q * atlas.positions[..., 0]), 2 * np.pi / frequency(material, q) / 40, 60
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.3, 1.0, 3.0, 30.0])
@@ -83,7 +87,8 @@ def test_waves_run_as_gravity_and_tension_want_them_to(torus: Atlas, ratio: floa
 
 
 def test_waves_die_as_the_viscosity_wants_them_to(torus: Atlas) -> None:
-    q, viscosity = 4 * np.pi, 2e-3
+    q = 4 * np.pi
+    viscosity = 2e-3
     _, rate = swung(torus, water(q, 1.0, viscosity), q)
     assert rate == pytest.approx(2 * viscosity * q**2, rel=0.03)
 
@@ -106,7 +111,8 @@ def test_energy_and_volume_stay_and_a_copy_goes_on_as_the_original(torus: Atlas)
 
 def test_a_push_gives_the_energy_that_theory_says(torus: Atlas) -> None:
     """An impulse wave J cos(q x) per area makes v = -(q / rho) J cos(q x), and the kinetic energy J^2 q A / (4 rho)."""
-    q, impulse = 4 * np.pi, 3.0
+    q = 4 * np.pi
+    impulse = 3.0
     waves = WaveSolver(torus, water(q, 1.0), backend="cpu")
     wave = np.cos(q * torus.positions[..., 0])
     dt = 1e-6
@@ -141,6 +147,10 @@ def test_held_parts_stay_and_reflect(torus: Atlas) -> None:
 )
 def test_what_a_fluid_cannot_do_is_refused(coefficients: dict, message: str) -> None:
     with pytest.raises(SolverError, match=message):
-        WaveSolver(sphere_atlas(1.0, 8), Material(**{**vars(Material.water()), **coefficients}), backend="cpu")
+        WaveSolver(
+            sphere_atlas(1.0, 8),
+            Material(**{**vars(Material.water()), **coefficients}),
+            backend="cpu",
+        )
     with pytest.raises(SolverError, match="gravity is 0"):
         Material.water(gravity=0.0)

@@ -26,7 +26,10 @@ BENDING = 2e5 * 0.05**3 / 12 / (1 - 0.25**2) / (800.0 * 0.05)
 DISPERSION = {
     "membrane": (Material.membrane(tension=18.0, density=2.0), lambda k2: 18.0 / 2.0 * k2),
     "plate": (Material.plate(**PLATE), lambda k2: BENDING * k2**2),
-    "both on springs": (Material(speed=0.7, bending=0.02, stiffness=3.0), lambda k2: 0.7**2 * k2 + 0.02 * k2**2 + 3.0),
+    "both on springs": (
+        Material(speed=0.7, bending=0.02, stiffness=3.0),
+        lambda k2: 0.7**2 * k2 + 0.02 * k2**2 + 3.0,
+    ),
 }
 
 
@@ -35,20 +38,27 @@ DISPERSION = {
 def test_frequencies_are_those_of_the_dispersion_relation(model: str, degree: int) -> None:
     material, square = DISPERSION[model]
     omega = np.sqrt(square(degree * (degree + 1)))
-    # where the mode passes through zero its amplitude shows the error of the frequency: 0.02 is a quarter of a per cent
+    # where the mode passes through zero its amplitude shows the error of the frequency: 0.02 is a
+    # quarter of a per cent
     time = 2.5 * np.pi / omega if model == "membrane" else 2.25 * np.pi / omega
     bound = 0.05 if model == "plate" else 0.02
     assert amplitude(material, degree, time) == pytest.approx(np.cos(omega * time), abs=bound)
 
 
 def test_plate_frequencies_converge_at_second_order() -> None:
-    # a quarter of a period before the mode's zero the amplitude is steepest: it shows the error of the frequency
+    # a quarter of a period before the mode's zero the amplitude is steepest: it shows the error of
+    # the frequency
     omega = np.sqrt(0.03) * 20
-    errors = [abs(amplitude(Material(speed=0, bending=0.03), 4, 2.5 * np.pi / omega, n=n)) for n in (16, 32, 64)]
+    errors = [
+        abs(amplitude(Material(speed=0, bending=0.03), 4, 2.5 * np.pi / omega, n=n))
+        for n in (16, 32, 64)
+    ]
     assert (orders(errors) > 1.8).all()
 
 
-def test_plate_conserves_energy_and_its_step_is_stable_and_close_to_the_limit(animal: Atlas) -> None:
+def test_plate_conserves_energy_and_its_step_is_stable_and_close_to_the_limit(
+    animal: Atlas,
+) -> None:
     waves = WaveSolver(animal, Material.plate(thickness=0.002), backend="cpu")
     waves.add_impulse(animal.mesh.V[100], 1.0, 0.06)
     waves.step(5 * waves.stable_timestep)
@@ -61,19 +71,25 @@ def test_plate_conserves_energy_and_its_step_is_stable_and_close_to_the_limit(an
 
 @pytest.mark.parametrize("degree", [2, 4])
 def test_stiffness_and_both_dampings_are_those_of_theory(degree: int) -> None:
-    speed, nu, across = 0.85, 0.0055, 9.9
+    speed = 0.85
+    nu = 0.0055
+    across = 9.9
     square = degree * (degree + 1) + across
     rate = nu * square / 2
     omega = np.sqrt(speed**2 * square - rate**2)
     material = Material(speed=speed, stiffness=speed**2 * across, viscosity=nu, damping=nu * across)
     for time in (0.4, 1.7):
-        decaying = np.exp(-rate * time) * (np.cos(omega * time) + rate / omega * np.sin(omega * time))
+        decaying = np.exp(-rate * time) * (
+            np.cos(omega * time) + rate / omega * np.sin(omega * time)
+        )
         assert amplitude(material, degree, time, n=24) == pytest.approx(decaying, abs=0.015)
     assert abs(amplitude(material, degree, 200.0, n=16)) < 0.02
 
 
 def test_dent_leaves_what_energy_beyond_the_yield_height_pays_for() -> None:
-    k, limit, v = 400.0, 0.01, 1.0
+    k = 400.0
+    limit = 0.01
+    v = 1.0
     dent = Material.dent(limit, stiffness=k, speed=1.0, damping=0.0)
     waves = WaveSolver(sphere_atlas(1.0, 4), dent, backend="cpu", conserve_volume=False)
     waves.velocity = np.full((6, 4, 4), -v)
@@ -98,7 +114,9 @@ def test_dent_is_elastic_below_the_yield_height(animal: Atlas) -> None:
 
 
 def test_dent_stays_when_the_waves_have_died(animal: Atlas) -> None:
-    waves = WaveSolver(animal, Material.dent(0.002, stiffness=100.0, speed=0.2, damping=8.0), backend="cpu")
+    waves = WaveSolver(
+        animal, Material.dent(0.002, stiffness=100.0, speed=0.2, damping=8.0), backend="cpu"
+    )
     waves.add_impulse(animal.mesh.V[100], 0.02, 0.06)
     waves.step(4.0)
     dent = waves.dent
@@ -116,7 +134,10 @@ def test_dent_stays_when_the_waves_have_died(animal: Atlas) -> None:
         (lambda: Material.plate(modulus=-1.0), "modulus is -1.0 Pa"),
         (lambda: Material.plate(poisson=0.7), "poisson is 0.7"),
         (lambda: Material.jelly(thickness=0.0), "thickness is 0.0 m"),
-        (lambda: Material.layer(1.0, thickness=[]), r"thickness is \[\] m; valid is .* or one at every texel"),
+        (
+            lambda: Material.layer(1.0, thickness=[]),
+            r"thickness is \[\] m; valid is .* or one at every texel",
+        ),
         (lambda: Material.membrane(tension=np.inf), "tension is inf N/m"),
         (lambda: Material.dent(0.0), "yield_height is 0 m"),
         (lambda: Material(viscosity=np.zeros((6, 4, 5))), "shape"),

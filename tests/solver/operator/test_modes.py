@@ -5,7 +5,16 @@ import pytest
 from hand_made import flat_charts, polygon, square, square_eigenvalues
 from modes import swing
 
-from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, build_operator, modes, sphere_atlas, texel_atlas
+from ripple_sim.solver import (
+    Atlas,
+    Material,
+    SolverError,
+    WaveSolver,
+    build_operator,
+    modes,
+    sphere_atlas,
+    texel_atlas,
+)
 from ripple_sim.solver.operator import decay_time, elastic_matrix, frequency
 
 RADIUS = 0.5
@@ -46,7 +55,9 @@ def test_a_sphere_rings_in_each_of_its_harmonics(ball: Atlas, material: Material
     numbers = np.maximum(np.sqrt(degrees * (degrees + 1)) / RADIUS, 1e-9)
     exact = [frequency(material, q) / (2 * np.pi) for q in numbers]
     np.testing.assert_allclose(found.frequencies, exact, rtol=0.012)
-    np.testing.assert_allclose(found.decay_times, [decay_time(material, q) for q in numbers], rtol=0.015)
+    np.testing.assert_allclose(
+        found.decay_times, [decay_time(material, q) for q in numbers], rtol=0.015
+    )
     linear = found.shapes[degrees == 1].reshape(3, -1).T
     axes = ball.positions.reshape(-1, 3)
     assert np.abs(axes @ np.linalg.lstsq(axes, linear)[0] - linear).max() < 0.005
@@ -80,7 +91,9 @@ def test_in_time_a_mode_rings_down_at_its_frequency_and_decay(law: str, rim: str
 
 
 @pytest.mark.parametrize("texels", [1.3, 3.0])
-def test_a_layer_of_few_texels_rings_at_its_frequency_at_the_longest_substeps(texels: float) -> None:
+def test_a_layer_of_few_texels_rings_at_its_frequency_at_the_longest_substeps(
+    texels: float,
+) -> None:
     """All its modes swing nearly as fast as stability allows: they were up to 9 % too high."""
     atlas = texel_atlas(square(16))
     material = Material.layer(1000.0, 0.0, thickness=texels / 16)
@@ -94,17 +107,22 @@ def test_modes_of_one_frequency_are_those_that_uneven_damping_does_not_mix(ball:
     uneven = 1 + (ball.positions[..., 0] / RADIUS) ** 2
     found = modes(ball, Material(speed=1.0, damping=0.1 * uneven), 3)
     # means of x^4 over x^2, and of x^2 y^2 over y^2: 3/5 and 1/5
-    np.testing.assert_allclose(np.sort(found.decay_times), [20 / 1.6, 20 / 1.2, 20 / 1.2], rtol=0.005)
+    np.testing.assert_allclose(
+        np.sort(found.decay_times), [20 / 1.6, 20 / 1.2, 20 / 1.2], rtol=0.005
+    )
 
 
 def test_what_creeps_back_has_no_frequency_and_its_slow_time(ball: Atlas) -> None:
     found = modes(ball, Material(speed=1.0, damping=40.0), 3)
     assert not found.frequencies.any()
-    np.testing.assert_allclose(found.decay_times, 1 / (20 - np.sqrt(400 - 2 / RADIUS**2)), rtol=0.005)
+    np.testing.assert_allclose(
+        found.decay_times, 1 / (20 - np.sqrt(400 - 2 / RADIUS**2)), rtol=0.005
+    )
 
 
 def test_what_does_not_move_has_no_height(ball: Atlas) -> None:
-    right, left = ball.positions[..., 0] > 0.2, ball.positions[..., 0] < -0.2
+    right = ball.positions[..., 0] > 0.2
+    left = ball.positions[..., 0] < -0.2
     found = modes(ball, Material(speed=np.where(left, 0.0, 1.0), fixed=right), 5)
     assert not found.shapes[:, right].any()
     assert (found.frequencies > 0).all()
@@ -112,12 +130,16 @@ def test_what_does_not_move_has_no_height(ball: Atlas) -> None:
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, 10**6, None])
 def test_a_wrong_count_is_told_with_what_is_valid(ball: Atlas, count: object) -> None:
-    with pytest.raises(SolverError, match=r"count of modes is .*valid is a whole number from 1 to 134"):
+    with pytest.raises(
+        SolverError, match=r"count of modes is .*valid is a whole number from 1 to 134"
+    ):
         modes(ball, Material(speed=1.0), count)  # type: ignore[arg-type]
 
 
 def test_deep_fluid_is_refused_where_its_modes_are_not_known(ball: Atlas) -> None:
     water = Material.water()
-    held = Material(water.speed, stiffness=water.stiffness, deep=water.deep, fixed=ball.positions[..., 2] > 0.4)
+    held = Material(
+        water.speed, stiffness=water.stiffness, deep=water.deep, fixed=ball.positions[..., 2] > 0.4
+    )
     with pytest.raises(SolverError, match="deep fluid"):
         modes(ball, held, 3)

@@ -32,8 +32,9 @@ def on_one_side(points: np.ndarray) -> np.ndarray:
     return points[:, 0] < 1e-6
 
 
-# Angular frequencies over sqrt(b) / side^2. Supported: pi^2 (m^2 + n^2). The others to four digits: free and cantilever
-# after Leissa (1973), whose values are upper bounds, and clamped ones after Birger.
+# Angular frequencies over sqrt(b) / side^2. Supported: pi^2 (m^2 + n^2). The others to four digits:
+# free and cantilever after Leissa (1973), whose values are upper bounds, and clamped ones after
+# Birger.
 TABLES = {
     "supported": ("supported", np.pi**2 * np.array([2, 5, 5, 8, 10, 10])),
     "free": ("free", [13.468, 19.596, 24.270, 34.801, 34.801, 61.09]),
@@ -55,7 +56,9 @@ def test_a_square_plate_has_the_frequencies_of_the_tables(name: str, sheet) -> N
     np.testing.assert_allclose(found, expected, rtol=0.01)
 
 
-@pytest.mark.parametrize(("rim", "expected"), [("supported", 4.935), ("clamped", 10.216), ("free", 5.358)])
+@pytest.mark.parametrize(
+    ("rim", "expected"), [("supported", 4.935), ("clamped", 10.216), ("free", 5.358)]
+)
 def test_a_round_plate_has_them_too(rim: str, expected: float) -> None:
     found = 2 * np.pi * modes(texel_atlas(disk(20)), PLATE, 1, rim=rim).frequencies
     assert found[0] == pytest.approx(expected, rel=0.01)
@@ -72,7 +75,8 @@ def bent_sheet(along_x: float, along_y: float) -> Mesh:
     """Square of side 2 with curvatures in its middle, of one sign a dome, of two a saddle."""
 
     def place(a: np.ndarray, b: np.ndarray) -> tuple:
-        x, y = 2 * a - 1, 2 * b - 1
+        x = 2 * a - 1
+        y = 2 * b - 1
         return x, y, (along_x * x**2 + along_y * y**2) / 2
 
     return Mesh.from_arrays(*surfaces.grid(10, place))
@@ -80,7 +84,8 @@ def bent_sheet(along_x: float, along_y: float) -> Mesh:
 
 def catenoid() -> Mesh:
     def place(a: np.ndarray, b: np.ndarray) -> tuple:
-        u, v = 2 * np.pi * a, 2 * b - 1
+        u = 2 * np.pi * a
+        v = 2 * b - 1
         return np.cosh(v) * np.cos(u), np.cosh(v) * np.sin(u), v
 
     return Mesh.from_arrays(*surfaces.grid(16, place, closed=(True, False)))
@@ -88,7 +93,8 @@ def catenoid() -> Mesh:
 
 def helix() -> Mesh:
     def place(a: np.ndarray, b: np.ndarray) -> tuple:
-        u, v = 9 * a, 0.2 + 0.8 * b
+        u = 9 * a
+        v = 0.2 + 0.8 * b
         return v * np.cos(u), v * np.sin(u), 0.3 * u
 
     return Mesh.from_arrays(*surfaces.grid(16, place))
@@ -130,7 +136,9 @@ def rates_of(atlas: Atlas, poisson: float, rim) -> np.ndarray:
     ("name", "rim", "poisson"),
     [("slivers, square", "free", 0.3), ("saddle", on_one_side, -0.5), ("catenoid", "free", 0.49)],
 )
-def test_no_squared_frequency_is_negative_on_slivers_and_saddles(name: str, rim, poisson: float) -> None:
+def test_no_squared_frequency_is_negative_on_slivers_and_saddles(
+    name: str, rim, poisson: float
+) -> None:
     rates = rates_of(coarse(name), poisson, rim)
     assert rates[0] > -1e-13 * rates[-1]
 
@@ -149,7 +157,9 @@ def test_energy_does_not_grow_in_five_thousand_stable_steps(name: str) -> None:
 @pytest.mark.parametrize("poisson", [-0.5, 0.49])
 def test_a_straight_support_does_not_know_poissons_ratio(poisson: float, sheet) -> None:
     expected = TABLES["supported"][1]
-    found = modes(sheet, Material(speed=0.0, bending=1.0, poisson=poisson), 6, rim="supported").frequencies
+    found = modes(
+        sheet, Material(speed=0.0, bending=1.0, poisson=poisson), 6, rim="supported"
+    ).frequencies
     np.testing.assert_allclose(2 * np.pi * found, expected, rtol=0.01)
 
 
@@ -167,7 +177,9 @@ def test_slivers_along_the_rim_keep_the_frequencies() -> None:
 
 
 def test_a_plate_of_too_few_texels_is_warned_of() -> None:
-    with pytest.warns(RippleWarning, match="softer than its material on 100 % of its surface.*finer resolution"):
+    with pytest.warns(
+        RippleWarning, match="softer than its material on 100 % of its surface.*finer resolution"
+    ):
         build_operator(texel_atlas(square(2)), PLATE, "fem", "free")
 
 
@@ -175,7 +187,8 @@ def test_a_plate_of_too_few_texels_is_warned_of() -> None:
 def test_curvatures_summed_up_by_their_neighbours_are_the_force_of_the_matrix(texels) -> None:
     bending = build_operator(texel_atlas(texels), PLATE, "fem", "free").bending
     height = np.random.default_rng(0).normal(size=texels.shape)
-    topology, n = texels.topology, texels.resolution
+    topology = texels.topology
+    n = texels.resolution
     force = np.zeros_like(height)
     for weights, transposed in zip(bending.weights, bending.transposed, strict=True):
         around = topology.with_halo(height)
@@ -193,8 +206,12 @@ def test_curvatures_summed_up_by_their_neighbours_are_the_force_of_the_matrix(te
 
 @pytest.mark.parametrize("rim", ["free", "supported", "clamped", on_one_side])
 @pytest.mark.parametrize("poisson", [-0.5, 0.0, 0.5])
-@pytest.mark.parametrize("texels", [square(10), disk(6), polygon(6, 6)], ids=["square", "disk", "hexagon"])
-def test_no_shape_has_negative_energy_even_where_the_thickness_varies(texels, poisson: float, rim) -> None:
+@pytest.mark.parametrize(
+    "texels", [square(10), disk(6), polygon(6, 6)], ids=["square", "disk", "hexagon"]
+)
+def test_no_shape_has_negative_energy_even_where_the_thickness_varies(
+    texels, poisson: float, rim
+) -> None:
     bending = 1 + 5 * (texels.positions[..., 0] > 0.3)
     material = Material(speed=0.0, bending=bending, poisson=poisson)
     operator = build_operator(texel_atlas(texels), material, "fem", rim)
@@ -234,7 +251,9 @@ def test_a_membrane_is_held_where_the_function_says_so(sheet) -> None:
 
 
 def test_a_plate_that_is_turned_rings_as_before(sheet) -> None:
-    plain, turned = (WaveSolver(sheet, PLATE, backend="cpu", conserve_volume=False) for _ in range(2))
+    plain, turned = (
+        WaveSolver(sheet, PLATE, backend="cpu", conserve_volume=False) for _ in range(2)
+    )
     # a motion with stretch, and back: the operator is made anew twice
     for factor in (1.1, 1.0):
         turned.move(factor * sheet.mesh.V)
@@ -244,7 +263,9 @@ def test_a_plate_that_is_turned_rings_as_before(sheet) -> None:
     assert np.abs(plain.height - turned.height).max() < 1e-3 * np.abs(plain.height).max()
 
 
-@pytest.mark.parametrize("wrong", ["bent", 3, lambda points: "free", lambda points: ["bent"] * len(points)])
+@pytest.mark.parametrize(
+    "wrong", ["bent", 3, lambda points: "free", lambda points: ["bent"] * len(points)]
+)
 def test_what_is_no_rim_is_refused(wrong, sheet) -> None:
     with pytest.raises(SolverError, match=r"valid are .*'free', 'supported'"):
         WaveSolver(sheet, PLATE, backend="cpu", rim=wrong)

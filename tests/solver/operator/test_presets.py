@@ -19,9 +19,13 @@ def deepest(waves: WaveSolver, seconds: float, steps: int) -> float:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_hit_makes_the_dent_that_was_asked_for_and_its_waves_cross_and_die_in_time(size: float) -> None:
+def test_a_hit_makes_the_dent_that_was_asked_for_and_its_waves_cross_and_die_in_time(
+    size: float,
+) -> None:
     atlas = sphere_atlas(size / 2, 48)
-    material = Material.suited(size, 0.3 * size**3.5, radius=0.12 * size, amplitude=0.03, crossing=0.5, decay=1.5)
+    material = Material.suited(
+        size, 0.3 * size**3.5, radius=0.12 * size, amplitude=0.03, crossing=0.5, decay=1.5
+    )
     waves = WaveSolver(atlas, material, backend="cpu")
     waves.add_impulse([0, 0, size / 2], 0.3 * size**3.5, 0.12 * size)
     # stiffness and viscosity take a little off the dent of a free membrane
@@ -39,7 +43,9 @@ def test_a_hit_makes_the_dent_that_was_asked_for_and_its_waves_cross_and_die_in_
 def test_scaled_worlds_have_scaled_waves() -> None:
     shares = []
     for size in SIZES:
-        waves = WaveSolver(sphere_atlas(size / 2, 16), Material.suited(size, 0.3 * size**3.5), backend="cpu")
+        waves = WaveSolver(
+            sphere_atlas(size / 2, 16), Material.suited(size, 0.3 * size**3.5), backend="cpu"
+        )
         waves.add_impulse([0, 0, size / 2], 0.3 * size**3.5, 0.3 * size)
         waves.step(0.3)
         shares.append(waves.height / size)
@@ -48,7 +54,8 @@ def test_scaled_worlds_have_scaled_waves() -> None:
 
 
 def test_a_body_and_its_impulse_are_the_same_hit_unless_it_is_too_heavy_to_rest() -> None:
-    light, as_impulse = Material.suited(1.0, (0.5, 4.0)), Material.suited(1.0, 3.0)
+    light = Material.suited(1.0, (0.5, 4.0))
+    as_impulse = Material.suited(1.0, 3.0)
     assert (light.density, light.stiffness) == (as_impulse.density, as_impulse.stiffness)
     slow = Material.suited(1.0, (50.0, 0.01))
     assert slow.stiffness > 10 * as_impulse.stiffness
@@ -69,7 +76,12 @@ def test_what_is_no_size_and_no_hit_is_refused(size: float, hit: object, message
 
 
 def test_the_stiffness_under_a_load_holds_it_at_the_depth_or_above() -> None:
-    atlas, force, radius, density, speed, depth = sphere_atlas(1.0, 64), 20.0, 0.2, 40.0, 1.0, 0.02
+    atlas = sphere_atlas(1.0, 64)
+    force = 20.0
+    radius = 0.2
+    density = 40.0
+    speed = 1.0
+    depth = 0.02
     stiffness = stiffness_under(force, depth, radius=radius, density=density, speed=speed)
     material = Material(speed=speed, damping=40.0, stiffness=stiffness, density=density)
     waves = WaveSolver(atlas, material, backend="cpu", conserve_volume=False)
@@ -83,10 +95,21 @@ def test_the_stiffness_under_a_load_holds_it_at_the_depth_or_above() -> None:
 
 
 def test_the_density_after_a_hit_keeps_the_dent_within_a_factor_of_two_of_the_depth() -> None:
-    atlas, impulse, pulse, radius, speed, stiffness = sphere_atlas(1.0, 64), 1.0, 0.02, 0.2, 2.0, 500.0
+    atlas = sphere_atlas(1.0, 64)
+    impulse = 1.0
+    pulse = 0.02
+    radius = 0.2
+    speed = 2.0
+    stiffness = 500.0
     depth = 0.01
-    density = density_after(impulse, depth, duration=pulse, radius=radius, speed=speed, stiffness=stiffness)
-    waves = WaveSolver(atlas, Material(speed=speed, stiffness=stiffness, density=density, damping=0.0), backend="cpu")
+    density = density_after(
+        impulse, depth, duration=pulse, radius=radius, speed=speed, stiffness=stiffness
+    )
+    waves = WaveSolver(
+        atlas,
+        Material(speed=speed, stiffness=stiffness, density=density, damping=0.0),
+        backend="cpu",
+    )
     waves.add_force([0, 0, 1], impulse / pulse, radius)
     dent = deepest(waves, pulse, 10)
     waves.pressure = 0.0

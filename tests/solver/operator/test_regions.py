@@ -4,11 +4,20 @@ import numpy as np
 import pytest
 from modes import zonal_harmonic
 
-from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, absorbing_damping, sphere_atlas
+from ripple_sim.solver import (
+    Atlas,
+    Material,
+    SolverError,
+    WaveSolver,
+    absorbing_damping,
+    sphere_atlas,
+)
 from ripple_sim.solver.operator import hold
 
 
-def after_one_period(n: int, material: Material, mode: np.ndarray, eigenvalue: float, backend: str = "cpu") -> float:
+def after_one_period(
+    n: int, material: Material, mode: np.ndarray, eigenvalue: float, backend: str = "cpu"
+) -> float:
     """Relative L2 error on the northern hemisphere."""
     atlas = sphere_atlas(1.0, n)
     waves = WaveSolver(atlas, material, backend=backend)
@@ -19,7 +28,8 @@ def after_one_period(n: int, material: Material, mode: np.ndarray, eigenvalue: f
 
 
 def test_hemisphere_with_a_free_rim_has_the_even_modes() -> None:
-    # c = 0 below the equator: on the other side only modes with no slope at the equator are left, as on a whole sphere
+    # c = 0 below the equator: on the other side only modes with no slope at the equator are left,
+    # as on a whole sphere
     errors = []
     for n in (32, 64):
         x, y, z = np.moveaxis(sphere_atlas(1.0, n).positions, -1, 0)
@@ -36,7 +46,9 @@ def test_hemisphere_with_a_clamped_rim_has_the_odd_modes(backend: str) -> None:
     for n in (32, 64):
         z = sphere_atlas(1.0, n).positions[..., 2]
         # the clamp acts at texel centres: the rim is half a texel below the equator
-        error = after_one_period(n, Material(fixed=z < 0), np.where(z > 0, (5 * z**3 - 3 * z) / 2, 0), 12, backend)
+        error = after_one_period(
+            n, Material(fixed=z < 0), np.where(z > 0, (5 * z**3 - 3 * z) / 2, 0), 12, backend
+        )
         assert error < 2.4 / n
 
 
@@ -45,17 +57,21 @@ def test_pulse_bounces_with_all_its_energy_and_the_right_sign(kind: str) -> None
     atlas = sphere_atlas(1.0, 96)
     angle = np.arccos(np.clip(atlas.positions[..., 2], -1, 1))
     below = angle > 2.0
-    material = Material(speed=np.where(below, 0.0, 1.0)) if kind == "rigid" else Material(fixed=below)
+    material = (
+        Material(speed=np.where(below, 0.0, 1.0)) if kind == "rigid" else Material(fixed=below)
+    )
     waves = WaveSolver(atlas, material, backend="cpu")
     # a ring on its way to the south: height f(angle - t) in the plane wave's limit
     pulse = np.exp(-(((angle - 1.2) / 0.12) ** 2))
-    waves.height, waves.velocity = pulse, 2 * (angle - 1.2) / 0.12**2 * pulse
+    waves.height = pulse
+    waves.velocity = 2 * (angle - 1.2) / 0.12**2 * pulse
     waves.step(0.8)
     energy = waves.energy()
     waves.step(0.8)
     assert waves.energy() == pytest.approx(energy, rel=1e-5)
     assert np.abs(waves.height[angle > 2.05]).max() < 1e-15
-    # back at 1.2, on its way north: the end of a free rope keeps its sign, that of a clamped one turns it
+    # back at 1.2, on its way north: the end of a free rope keeps its sign, that of a clamped one
+    # turns it
     ring = np.abs(angle - 1.2) < 0.05
     peak = waves.height[ring].mean() / pulse[ring].mean()
     assert peak == pytest.approx(1.0 if kind == "rigid" else -1.0, abs=0.1)
@@ -64,7 +80,11 @@ def test_pulse_bounces_with_all_its_energy_and_the_right_sign(kind: str) -> None
 def test_sources_do_not_move_rigid_and_clamped_texels(animal: Atlas, backend: str) -> None:
     calm = animal.positions[..., 2] > 0.05
     fixed = animal.positions[..., 0] > 0.1
-    waves = WaveSolver(animal, Material(speed=np.where(calm, 0.0, 0.5), viscosity=1e-3, fixed=fixed), backend=backend)
+    waves = WaveSolver(
+        animal,
+        Material(speed=np.where(calm, 0.0, 0.5), viscosity=1e-3, fixed=fixed),
+        backend=backend,
+    )
     rng = np.random.default_rng(1)
     for vertex in rng.integers(0, len(animal.mesh.V), 40):
         waves.add_impulse(animal.mesh.V[vertex], 1.0, 0.05)
@@ -81,10 +101,15 @@ def held_cap(n: int, kind: str) -> tuple[WaveSolver, np.ndarray]:
     center = np.array([0.36, -0.48, 0.8])
     angle = np.arccos(np.clip(atlas.positions @ center, -1, 1))
     cap = angle < 1.0
-    materials = {"held": hold(atlas, Material(), cap), "clamped": Material(fixed=cap), "free": Material(1.0 * ~cap)}
+    materials = {
+        "held": hold(atlas, Material(), cap),
+        "clamped": Material(fixed=cap),
+        "free": Material(1.0 * ~cap),
+    }
     waves = WaveSolver(atlas, materials[kind], backend="cpu")
     pulse = np.exp(-(((angle - 1.8) / 0.12) ** 2))
-    waves.height, waves.velocity = pulse, -2 * (angle - 1.8) / 0.12**2 * pulse
+    waves.height = pulse
+    waves.velocity = -2 * (angle - 1.8) / 0.12**2 * pulse
     return waves, angle
 
 
@@ -107,9 +132,11 @@ def test_rim_of_a_held_region_is_smooth() -> None:
     for kind in ("held", "clamped", "free"):
         waves, angle = held_cap(64, kind)
         waves.step(0.7)
-        # what the texels' staircase leaves of a round wave: height about the rim, less its mean at that distance
+        # what the texels' staircase leaves of a round wave: height about the rim, less its mean at
+        # that distance
         rim = np.abs(angle - 1.06) < 0.08
-        distance, height = angle[rim] - 1.0, waves.height[rim]
+        distance = angle[rim] - 1.0
+        height = waves.height[rim]
         mean = np.polyval(np.polyfit(distance, height, 8), distance)
         unevenness[kind] = np.std(height - mean) / np.abs(waves.height).max()
     assert unevenness["held"] < 0.015
@@ -133,7 +160,9 @@ def test_held_region_costs_little_of_the_time_step_and_is_moved_by_nothing(anima
 
 
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
-def test_a_surface_that_is_wholly_held_is_legal_and_does_not_move(backend: str, opengl: None) -> None:
+def test_a_surface_that_is_wholly_held_is_legal_and_does_not_move(
+    backend: str, opengl: None
+) -> None:
     atlas = sphere_atlas(1.0, 8)
     waves = WaveSolver(atlas, Material(fixed=np.ones(atlas.areas.shape, bool)), backend=backend)
     waves.add_impulse([1.0, 0.0, 0.0], 1.0, 0.3)
@@ -146,13 +175,19 @@ def test_absorbing_cap_swallows_a_pulse() -> None:
     atlas = sphere_atlas(1.0, 64)
     angle = np.arccos(np.clip(atlas.positions[..., 2], -1, 1))
     goal = 1e-2
-    # kinetic energy outside the cap when the pulse is back where it began; half of a wave's energy is kinetic
+    # kinetic energy outside the cap when the pulse is back where it began; half of a wave's energy
+    # is kinetic
     energies = {}
     graded = absorbing_damping(atlas, angle > 2.0, speed=1.0, reflection=goal)
-    for kind, damping in (("none", 0.0), ("graded", graded), ("abrupt", np.where(angle > 2.0, 200.0, 0.0))):
+    for kind, damping in (
+        ("none", 0.0),
+        ("graded", graded),
+        ("abrupt", np.where(angle > 2.0, 200.0, 0.0)),
+    ):
         waves = WaveSolver(atlas, Material(damping=damping), backend="cpu")
         pulse = np.exp(-(((angle - 1.2) / 0.12) ** 2))
-        waves.height, waves.velocity = pulse, 2 * (angle - 1.2) / 0.12**2 * pulse
+        waves.height = pulse
+        waves.velocity = 2 * (angle - 1.2) / 0.12**2 * pulse
         start = waves.energy()
         waves.step(2 * (np.pi - 1.2))
         moving = (waves.operator.mass * waves.velocity**2)[angle < 2.0].sum()
@@ -177,4 +212,6 @@ def test_absorbing_cap_swallows_a_pulse() -> None:
 def test_bad_absorbers_are_named(arguments: dict, message: str) -> None:
     atlas = sphere_atlas(1.0, 8)
     with pytest.raises(SolverError, match=message):
-        absorbing_damping(atlas, **({"region": atlas.positions[..., 2] > 0, "speed": 1.0} | arguments))
+        absorbing_damping(
+            atlas, **({"region": atlas.positions[..., 2] > 0, "speed": 1.0} | arguments)
+        )

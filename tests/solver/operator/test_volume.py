@@ -56,7 +56,9 @@ def test_every_source_leaves_the_volume_alone_where_the_density_varies(backend: 
     [{}, {"viscosity": 1e-2}, {"speed": 0.0, "bending": 1e-2}, {"stiffness": 20.0, "damping": 0.3}],
     ids=["tension", "viscosity", "bending", "springs"],
 )
-def test_the_volume_stays_while_waves_run_through_uneven_density(backend: str, coefficients: dict) -> None:
+def test_the_volume_stays_while_waves_run_through_uneven_density(
+    backend: str, coefficients: dict
+) -> None:
     waves = WaveSolver(sphere_atlas(1.0, 16), uneven(**coefficients), backend=backend)
     waves.add_impulse([0, 0.3, 1], 1.0, 0.5)
     for _ in range(5):
@@ -164,7 +166,9 @@ SHAPE = (1, 4, 4)
 
 def operator(damping: float = 0.0, stiffness: float = 0.0, mass: float = 2.0) -> WaveOperator:
     stencil = square(4).stencil(np.ones(SHAPE))
-    return WaveOperator(stencil, np.full(SHAPE, mass), np.full(SHAPE, damping), np.full(SHAPE, stiffness))
+    return WaveOperator(
+        stencil, np.full(SHAPE, mass), np.full(SHAPE, damping), np.full(SHAPE, stiffness)
+    )
 
 
 @pytest.mark.parametrize("rate", [0.01, 0.3, 2.0])
@@ -177,14 +181,17 @@ def test_damping_decays_as_the_exponential_to_third_order(rate: float) -> None:
 
 @pytest.mark.parametrize("half", [1.0, 1.5, 40.0])
 def test_strong_damping_lets_the_velocity_change_its_sign_no_more(half: float) -> None:
-    dt, zeta = 0.1, 20 * half
+    dt = 0.1
+    zeta = 20 * half
     kick = step_coefficients(operator(damping=zeta), dt)
     assert kick.decay == 0
     # what a force sustains against the damping
     assert kick.span == pytest.approx(1 / zeta, rel=1e-6)
     # weaker damping is the centred scheme
     weaker = step_coefficients(operator(damping=19.9), 0.1)
-    assert weaker.decay == np.float32((1 - 0.995) / (1 + 0.995)) and weaker.span == np.float32(0.1 / 1.995)
+    assert weaker.decay == np.float32((1 - 0.995) / (1 + 0.995)) and weaker.span == np.float32(
+        0.1 / 1.995
+    )
 
 
 def field(atlas: Atlas, inside: object, value: float = 1.0) -> np.ndarray:
@@ -194,7 +201,9 @@ def field(atlas: Atlas, inside: object, value: float = 1.0) -> np.ndarray:
     return values
 
 
-SHEET, SPHERE, SHEETS = texel_atlas(square(12)), sphere_atlas(1.0, 8), texel_atlas(two_squares(8))
+SHEET = texel_atlas(square(12))
+SPHERE = sphere_atlas(1.0, 8)
+SHEETS = texel_atlas(two_squares(8))
 PLATE = Material.plate(2e11, 1e-3, 7800.0)
 SPRINGS = Material(stiffness=3.0)
 
@@ -224,7 +233,9 @@ def test_volume_is_kept_by_default_where_a_surface_is_closed_or_nothing_holds_it
     atlas: Atlas, material: Material, rim: object, kept: list[bool]
 ) -> None:
     waves = WaveSolver(atlas, material, rim=rim, backend="cpu")
-    parts = np.zeros(atlas.areas.shape, int) if waves.operator.parts is None else waves.operator.parts
+    parts = (
+        np.zeros(atlas.areas.shape, int) if waves.operator.parts is None else waves.operator.parts
+    )
     assert waves.conserve_volume == any(kept)
     waves.velocity = 0.0
     waves.add_velocity(1.0 + atlas.positions[..., 0])
@@ -239,7 +250,9 @@ def test_volume_is_kept_by_default_where_a_surface_is_closed_or_nothing_holds_it
 
 
 def test_what_conserve_volume_may_be_is_said() -> None:
-    with pytest.raises(SolverError, match="conserve_volume is 'auto'; it must be True, False or None"):
+    with pytest.raises(
+        SolverError, match="conserve_volume is 'auto'; it must be True, False or None"
+    ):
         WaveSolver(SHEET, backend="cpu", conserve_volume="auto")
 
 
@@ -257,7 +270,9 @@ def test_a_change_of_the_choice_reaches_copies_and_states(backend: str) -> None:
 
 def test_a_drum_is_heard_with_the_fundamental_of_its_closed_form(backend: str) -> None:
     """Within 0.2 dB wherever it is hit; with its mean taken out a hit at 0.7 of the radius lost 24 dB."""
-    radius, density, impulse = 0.16, 0.26, 1e-2
+    radius = 0.16
+    density = 0.26
+    impulse = 1e-2
     angles = 2 * np.pi * np.arange(64) / 64
     rings = np.arange(1, 17) / 16
     points = [[0, 0, 0], *((r * np.cos(a), r * np.sin(a), 0) for r in rings for a in angles)]
@@ -267,7 +282,9 @@ def test_a_drum_is_heard_with_the_fundamental_of_its_closed_form(backend: str) -
     zero = jn_zeros(0, 1)[0]
     mode = jv(0, zero * np.linalg.norm(atlas.positions, axis=-1) / radius)
     for place in (0.0, 0.25, 0.45, 0.6, 0.7):
-        waves = WaveSolver(atlas, Material(speed=61.4, density=density), rim="fixed", backend=backend)
+        waves = WaveSolver(
+            atlas, Material(speed=61.4, density=density), rim="fixed", backend=backend
+        )
         waves.add_impulse([place * radius, 0, 0], impulse, 0.05 * radius)
         mass = waves.operator.mass
         amplitude = (mass * mode * waves.velocity).sum() / (mass * mode**2).sum()

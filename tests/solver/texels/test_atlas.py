@@ -25,7 +25,8 @@ def assert_touching(chart, row, column, n: int) -> None:
     on = DIAGONALS[np.arange(26), chart // 2]
     np.testing.assert_array_equal(on, 1 - 2 * (chart % 2))
     offset = np.abs(np.stack([row, column]) - (n - 1) / 2)
-    at_border, in_middle = np.isclose(offset, n / 2, atol=1e-6), np.isclose(offset, 0, atol=1e-6)
+    at_border = np.isclose(offset, n / 2, atol=1e-6)
+    in_middle = np.isclose(offset, 0, atol=1e-6)
     np.testing.assert_array_equal(at_border.sum(axis=0), np.count_nonzero(DIAGONALS, axis=1) - 1)
     assert (at_border | in_middle).all()
 
@@ -34,7 +35,9 @@ def test_cube_edges_and_corners_are_located_on_the_sphere() -> None:
     atlas = sphere_atlas(2.0, 16)
     assert_touching(*atlas.locate(3 * DIAGONALS), 16)
     nearest = atlas.positions.reshape(-1, 3)[atlas.nearest_texel(DIAGONALS)]
-    distance = np.linalg.norm(nearest - 2 * DIAGONALS / np.linalg.norm(DIAGONALS, axis=1, keepdims=True), axis=1)
+    distance = np.linalg.norm(
+        nearest - 2 * DIAGONALS / np.linalg.norm(DIAGONALS, axis=1, keepdims=True), axis=1
+    )
     assert distance.max() < 2 * np.pi / 2 / 16  # a texel's width
 
 
@@ -46,7 +49,9 @@ def test_cube_edges_and_corners_are_located_on_a_mesh_with_vertices_there() -> N
 
 
 @quick
-@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda d: np.linalg.norm(d) > 1e-3))
+@given(
+    st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda d: np.linalg.norm(d) > 1e-3)
+)
 def test_located_points_lie_in_their_chart(direction) -> None:
     mesh = Mesh.from_arrays(BALL.vertices, BALL.faces)
     atlas = atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), 8)
@@ -60,7 +65,9 @@ def test_located_points_lie_in_their_chart(direction) -> None:
 
 def test_locate_returns_the_texel_that_a_point_was_taken_from(animal: Atlas) -> None:
     n = animal.resolution
-    chart, row, column = (x.reshape(6, n, n) for x in animal.locate(animal.positions.reshape(-1, 3)))
+    chart, row, column = (
+        x.reshape(6, n, n) for x in animal.locate(animal.positions.reshape(-1, 3))
+    )
     assert (chart == np.arange(6)[:, None, None]).all()
     np.testing.assert_allclose(row, np.broadcast_to(np.arange(n)[:, None], (6, n, n)), atol=1e-6)
     np.testing.assert_allclose(column, np.broadcast_to(np.arange(n), (6, n, n)), atol=1e-6)
@@ -97,11 +104,14 @@ def written(path: Path, arrays: dict[str, np.ndarray]) -> bytes:
 
 def same(found: dict[str, np.ndarray], expected: dict[str, np.ndarray]) -> bool:
     return found.keys() == expected.keys() and all(
-        found[name].dtype == expected[name].dtype and np.array_equal(found[name], expected[name]) for name in expected
+        found[name].dtype == expected[name].dtype and np.array_equal(found[name], expected[name])
+        for name in expected
     )
 
 
-def test_arrays_come_back_and_numpy_reads_them_too(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+def test_arrays_come_back_and_numpy_reads_them_too(
+    tmp_path: Path, arrays: dict[str, np.ndarray]
+) -> None:
     written(tmp_path / "arrays.npz", arrays)
     expected = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     found = read_arrays(tmp_path / "arrays.npz")
@@ -126,11 +136,16 @@ def test_no_flipped_bit_changes_an_array(tmp_path: Path, arrays: dict[str, np.nd
         except ValueError:
             refused += 1
         else:  # a date or an unused flag of the archive, or a name: the content is sound
-            assert all(any(np.array_equal(array, other) for other in expected.values()) for array in found.values())
+            assert all(
+                any(np.array_equal(array, other) for other in expected.values())
+                for array in found.values()
+            )
     assert refused > 0.2 * len(whole)
 
 
-def test_no_part_of_a_file_is_taken_for_the_whole(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+def test_no_part_of_a_file_is_taken_for_the_whole(
+    tmp_path: Path, arrays: dict[str, np.ndarray]
+) -> None:
     path = tmp_path / "arrays.npz"
     whole = written(path, arrays)
     for length in range(0, len(whole), 7):
@@ -154,7 +169,10 @@ def test_every_chart_has_a_block_of_its_own_on_the_page(page: ChartPage) -> None
     taken = np.zeros((height, width), int)
     for chart in range(page.charts):
         column, row = page.corner(chart)
-        assert taken[row : row + page.resolution + 2, column : column + page.resolution + 2].size == page.block**2
+        assert (
+            taken[row : row + page.resolution + 2, column : column + page.resolution + 2].size
+            == page.block**2
+        )
         taken[row : row + page.block, column : column + page.block] += 1
     assert taken.max() == 1
     # no row of blocks stays empty
@@ -164,11 +182,14 @@ def test_every_chart_has_a_block_of_its_own_on_the_page(page: ChartPage) -> None
 @pytest.mark.parametrize("page", PAGES)
 def test_locating_a_place_gives_back_its_chart_row_and_column(page: ChartPage) -> None:
     rng = np.random.default_rng(0)
-    chart, uv = rng.integers(0, page.charts, 200), rng.uniform(0, 1, (200, 2))
+    chart = rng.integers(0, page.charts, 200)
+    uv = rng.uniform(0, 1, (200, 2))
     uv[:4] = [[0, 0], [1, 0], [1, 1], [0, 1]]  # borders of a chart are still its own
     found, row, column = page.locate(page.places(chart, uv))
     np.testing.assert_array_equal(found, chart)
-    np.testing.assert_allclose(np.stack([column, row], axis=1), page.resolution * uv - 0.5, atol=1e-9)
+    np.testing.assert_allclose(
+        np.stack([column, row], axis=1), page.resolution * uv - 0.5, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -32,7 +32,9 @@ def written(path: Path, arrays: dict[str, np.ndarray]) -> Path:
     return path
 
 
-def test_another_version_is_refused_with_the_advice_to_make_it_again(tmp_path: Path, arrays) -> None:
+def test_another_version_is_refused_with_the_advice_to_make_it_again(
+    tmp_path: Path, arrays
+) -> None:
     for version in (12, FORMAT + 1):
         path = written(tmp_path / "other.atlas", {**arrays, "format": np.array([version])})
         message = r"other\.atlas.* of another version; make it again with `ripple-sim atlas"
@@ -54,11 +56,15 @@ def test_a_file_that_lacks_an_array_is_not_an_atlas(tmp_path: Path, arrays, miss
         read_atlas_file(written(tmp_path / "half.atlas", whole))
 
 
-def test_a_truncated_file_is_named_as_damaged(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+def test_a_truncated_file_is_named_as_damaged(
+    tmp_path: Path, arrays: dict[str, np.ndarray]
+) -> None:
     path = tmp_path / "cut.atlas"
     write_atlas_file(path, arrays)
     path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(AtlasError, match=r"cut\.atlas.* is damaged or not an atlas \(.+\); make it again"):
+    with pytest.raises(
+        AtlasError, match=r"cut\.atlas.* is damaged or not an atlas \(.+\); make it again"
+    ):
         read_atlas_file(path)
 
 
@@ -72,7 +78,9 @@ def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
 def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path: Path, arrays) -> None:
     folder = tmp_path / "folder.atlas"
     folder.mkdir()
-    with pytest.raises(AtlasError, match=r"folder\.atlas' cannot be written: it exists and is not a regular file"):
+    with pytest.raises(
+        AtlasError, match=r"folder\.atlas' cannot be written: it exists and is not a regular file"
+    ):
         write_atlas_file(folder, arrays)
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(AtlasError, match="cannot be written: "):

@@ -11,7 +11,12 @@ from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas, texel_atlas
 from ripple_sim.solver.layouts.cube import CubeChartMap, cube_topology
 from ripple_sim.solver.mesh import ClosestPoints
-from ripple_sim.solver.texels import LinearChartMap, sampling_matrix, texture_coordinates, with_filled_halo
+from ripple_sim.solver.texels import (
+    LinearChartMap,
+    sampling_matrix,
+    texture_coordinates,
+    with_filled_halo,
+)
 
 
 def test_on_a_flat_square_texture_coordinates_are_the_points_themselves() -> None:
@@ -21,7 +26,9 @@ def test_on_a_flat_square_texture_coordinates_are_the_points_themselves() -> Non
     np.testing.assert_allclose(found.uv, points[..., :2], atol=1e-12)
     # the second chart is the square above
     np.testing.assert_array_equal(np.repeat(found.chart, 3), points[..., 2].ravel())
-    np.testing.assert_allclose(found.coordinates[..., 1:], 4 * points[..., [1, 0]] - 0.5, atol=1e-12)
+    np.testing.assert_allclose(
+        found.coordinates[..., 1:], 4 * points[..., [1, 0]] - 0.5, atol=1e-12
+    )
 
 
 def test_what_is_linear_in_a_triangle_is_carried_to_its_parts() -> None:
@@ -42,18 +49,23 @@ def test_what_is_linear_in_a_triangle_is_carried_to_its_parts() -> None:
 def test_a_layer_with_halo_is_read_at_the_place_that_the_documentation_gives(topology) -> None:
     charts, n, _ = topology.shape
     rng = np.random.default_rng(0)
-    chart, uv = rng.integers(0, charts, 200), rng.uniform(0, 1, (200, 2))
+    chart = rng.integers(0, charts, 200)
+    uv = rng.uniform(0, 1, (200, 2))
     # in a corner of three charts, halo and matrix differ but at the corner itself
     uv[:, 0] = uv[:, 0].clip(0.5 / n, 1 - 0.5 / n)
     field = rng.standard_normal(topology.shape)
     around = with_filled_halo(topology, field)
     # as a GPU filters: texel centres at halves
     column, row = ((1 + n * uv) / (n + 2) * (n + 2) - 0.5).T
-    c, r = np.floor(column).astype(int), np.floor(row).astype(int)
-    t, s = column - c, row - r
+    c = np.floor(column).astype(int)
+    r = np.floor(row).astype(int)
+    t = column - c
+    s = row - r
     read = (1 - s) * ((1 - t) * around[chart, r, c] + t * around[chart, r, c + 1])
     read += s * ((1 - t) * around[chart, r + 1, c] + t * around[chart, r + 1, c + 1])
-    np.testing.assert_allclose(read, sampling_matrix(topology, chart, *(n * uv[:, ::-1].T - 0.5)) @ field.ravel())
+    np.testing.assert_allclose(
+        read, sampling_matrix(topology, chart, *(n * uv[:, ::-1].T - 0.5)) @ field.ravel()
+    )
 
 
 # two triangles far apart and skewed, each on a chart of its own
@@ -65,7 +77,8 @@ MAP = LinearChartMap(np.array([2, 0]), CORNERS, 4)
 
 def test_points_keep_their_barycentrics_on_the_chart() -> None:
     rng = np.random.default_rng(0)
-    triangles, weights = rng.integers(0, 2, 100), rng.dirichlet(np.ones(3), 100)
+    triangles = rng.integers(0, 2, 100)
+    weights = rng.dirichlet(np.ones(3), 100)
     points = np.einsum("ij,ijk->ik", weights, V[MESH.F[triangles]])
     chart, row, column = MAP.chart_points(MAP.coordinates(MESH, triangles, points), 4)
     np.testing.assert_array_equal(chart, MAP.charts[triangles])
@@ -90,7 +103,8 @@ def test_a_triangle_without_area_gives_the_middle_of_its_place(corners: list) ->
 
 
 def test_the_border_belongs_to_the_last_texels() -> None:
-    # on the plane of the first triangle, whose corners are at the corners of chart 2; the second is on chart 0
+    # on the plane of the first triangle, whose corners are at the corners of chart 2; the second is
+    # on chart 0
     points = [V[0], V[1], V[2], V[:3].mean(axis=0), 2 * V[2] - V[0]]
     texels = MAP.texels_at(MESH, 4, *ClosestPoints(V, MESH.F)(np.array(points)))
     assert texels.tolist() == [2 * 16, 2 * 16 + 3, 2 * 16 + 15, 2 * 16 + 4 + 2, 2 * 16 + 15]
@@ -104,7 +118,9 @@ def test_the_nearest_texel_is_the_one_whose_centre_is_nearest(texels) -> None:
     near = rng.integers(0, texels.topology.texel_count, 100)
     width = np.sqrt(texels.areas.min())
     offset = np.concatenate([rng.uniform(-0.2, 0.2, (100, 2)) * width, np.zeros((100, 1))], axis=1)
-    np.testing.assert_array_equal(atlas.nearest_texel(texels.positions.reshape(-1, 3)[near] + offset), near)
+    np.testing.assert_array_equal(
+        atlas.nearest_texel(texels.positions.reshape(-1, 3)[near] + offset), near
+    )
 
 
 def limbed_atlas(layout: str) -> Atlas:
@@ -121,9 +137,13 @@ ATLASES: dict[str, Callable[[], Atlas]] = {
 
 @pytest.mark.parametrize("layout", ATLASES)
 def test_places_are_those_of_points_carried_to_the_charts(layout: str) -> None:
-    atlas, rng = ATLASES[layout](), np.random.default_rng(0)
-    n, size = atlas.resolution, np.ptp(atlas.mesh.V, axis=0).max()
-    points = atlas.mesh.V[rng.integers(len(atlas.mesh.V), size=400)] + 0.02 * size * rng.standard_normal((400, 3))
+    atlas = ATLASES[layout]()
+    rng = np.random.default_rng(0)
+    n = atlas.resolution
+    size = np.ptp(atlas.mesh.V, axis=0).max()
+    points = atlas.mesh.V[
+        rng.integers(len(atlas.mesh.V), size=400)
+    ] + 0.02 * size * rng.standard_normal((400, 3))
     closest, texels = atlas.nearest_places(points)
     np.testing.assert_allclose(closest, atlas.project(points)[0], atol=1e-12)
     np.testing.assert_array_equal(atlas.closest_places(points), closest)

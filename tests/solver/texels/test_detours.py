@@ -13,9 +13,17 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import eigsh
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_atlas
-from ripple_sim.solver.texels import LINK_ENDS, SurfaceRide, TexelCells, link_exists, quad, stiffness_matrix
+from ripple_sim.solver.texels import (
+    LINK_ENDS,
+    SurfaceRide,
+    TexelCells,
+    link_exists,
+    quad,
+    stiffness_matrix,
+)
 
-ENDS = np.array([(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)])  # of a quad's links: sw, se, nw, ne
+# of a quad's links: sw, se, nw, ne
+ENDS = np.array([(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)])
 
 
 def paper(rng: np.random.Generator) -> tuple[Mesh, np.ndarray]:
@@ -28,9 +36,13 @@ def paper(rng: np.random.Generator) -> tuple[Mesh, np.ndarray]:
     y = np.linspace(0, 1, 8)
     flat = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
     flat[1:-1, 1:-1, 1] += rng.uniform(-0.05, 0.05, (len(cuts), 6))  # along the folds
-    bent = np.concatenate([np.broadcast_to(profile[:, None], (*flat.shape[:2], 2)), flat[..., 1:]], axis=-1)
+    bent = np.concatenate(
+        [np.broadcast_to(profile[:, None], (*flat.shape[:2], 2)), flat[..., 1:]], axis=-1
+    )
     node = np.arange(flat[..., 0].size).reshape(flat.shape[:2])
-    a, b, c, d = (each.ravel() for each in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]))
+    a, b, c, d = (
+        each.ravel() for each in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])
+    )
     F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     return Mesh.from_arrays(bent.reshape(-1, 3) @ turn, F), flat.reshape(-1, 2)
@@ -38,7 +50,8 @@ def paper(rng: np.random.Generator) -> tuple[Mesh, np.ndarray]:
 
 def lengths(atlas: Atlas, places: np.ndarray) -> np.ndarray:
     """Of all links between texels at places [C, n, n, d], straight, [4, C, n + 1, n + 1]; 0 where there is none."""
-    around, found = atlas.texels.topology.with_halo(places), []
+    around = atlas.texels.topology.with_halo(places)
+    found = []
     for link, (a, b) in enumerate(LINK_ENDS):
         exists = link_exists(atlas.texels.topology, link)
         found.append(np.where(exists, np.linalg.norm(around[a] - around[b], axis=-1), 0))
@@ -50,7 +63,8 @@ def test_ways_over_folded_paper_are_as_long_as_on_flat_paper(resolution: int) ->
     mesh, flat = paper(np.random.default_rng(0))
     atlas = build_atlas(mesh, resolution, cache=False, layout="patches")
     places = np.einsum("...k,...kj->...j", atlas.barycentrics, flat[mesh.F[atlas.triangles]])
-    straight, ways = lengths(atlas, atlas.positions), lengths(atlas, places)
+    straight = lengths(atlas, atlas.positions)
+    ways = lengths(atlas, places)
     detours = atlas.texels.detours[:, :, :-1, :-1]
     np.testing.assert_allclose(straight * np.sqrt(1 + detours), ways, rtol=3e-4)
     assert (straight < 0.9 * ways).any()
@@ -63,8 +77,11 @@ def test_a_bent_quad_weighs_as_much_as_the_flat_one() -> None:
     bent = flat.copy()
     bent[..., 0] = np.sin(flat[..., 0])  # shorter, and out of the plane
     bent[..., 2] = 1 - np.cos(flat[..., 0])
-    squares = [((each[:, ENDS[:, 1]] - each[:, ENDS[:, 0]]) ** 2).sum(axis=-1).T for each in (flat, bent)]
-    straight, detours = np.zeros((6, 100)), squares[0] / squares[1] - 1
+    squares = [
+        ((each[:, ENDS[:, 1]] - each[:, ENDS[:, 0]]) ** 2).sum(axis=-1).T for each in (flat, bent)
+    ]
+    straight = np.zeros((6, 100))
+    detours = squares[0] / squares[1] - 1
     exact, chords, found = (
         np.array(quad(*(each[:, 1:] - each[:, :1]).transpose(1, 2, 0), way)[:6])
         for each, way in ((flat, straight), (bent, straight), (bent, detours))
@@ -96,7 +113,13 @@ def tetrahedron_errors(atlas: Atlas) -> np.ndarray:
     m, n = np.meshgrid(np.arange(-6, 7), np.arange(-6, 7))
     exact = 4 * np.pi**2 / 3 * np.sort((m**2 + m * n + n**2).ravel())[1::2][:19]
     stiffness = stiffness_matrix(atlas.texels.stencil(np.ones(atlas.areas.shape)))
-    found = eigsh(stiffness.tocsc(), 20, diags_array(atlas.areas.ravel()).tocsc(), sigma=-1, return_eigenvectors=False)
+    found = eigsh(
+        stiffness.tocsc(),
+        20,
+        diags_array(atlas.areas.ravel()).tocsc(),
+        sigma=-1,
+        return_eigenvectors=False,
+    )
     return np.abs(np.sort(found)[1:] / exact - 1)
 
 
@@ -123,10 +146,13 @@ def test_the_stiffness_stays_symmetric_and_holds_no_constant(layout: str) -> Non
 
 def test_charts_agree_on_the_length_of_what_they_share_to_the_last_bit() -> None:
     atlas = build_atlas(tetrahedron(), 6, cache=False, layout="patches")
-    topology, known = atlas.texels.topology, {}
+    topology = atlas.texels.topology
+    known = {}
     there = np.where(topology.rim, -1, topology.halo)
     for link, (a, b) in enumerate(LINK_ENDS):
-        first, second, detours = there[a], there[b], atlas.texels.detours[link][:, :-1, :-1]
+        first = there[a]
+        second = there[b]
+        detours = atlas.texels.detours[link][:, :-1, :-1]
         for i, j, detour in zip(first.ravel(), second.ravel(), detours.ravel(), strict=True):
             if min(i, j) >= 0:
                 assert known.setdefault((min(i, j), max(i, j)), detour) == detour
@@ -137,7 +163,8 @@ def test_a_moved_surface_keeps_its_detours_as_shares(tmp_path) -> None:
     atlas.save(tmp_path / "kept.atlas")
     kept = load_atlas(tmp_path / "kept.atlas")
     np.testing.assert_array_equal(kept.texels.detours, atlas.texels.detours)
-    ones, turn = np.ones(atlas.areas.shape), np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
+    ones = np.ones(atlas.areas.shape)
+    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
     around = SurfaceRide(kept).around(2 * kept.mesh.V @ turn + 1)
     cells: TexelCells = kept.texels.cells
     moved = cells.moved(around, cells.coefficient(ones, ones, 0.0))[0].weights

@@ -12,7 +12,8 @@ from ripple_sim.solver import Atlas, Mesh, SolverError, build_atlas, texture_map
 @pytest.fixture(scope="module")
 def globe(ball_mesh: Mesh) -> Atlas:
     """A sphere with longitude and latitude as texture coordinates, seam and poles included."""
-    V, F = ball_mesh.V, ball_mesh.F
+    V = ball_mesh.V
+    F = ball_mesh.F
     corners = V[F]
     u = np.arctan2(corners[..., 1], corners[..., 0]) / (2 * np.pi)
     # triangles across the seam: keep their corners together
@@ -23,18 +24,27 @@ def globe(ball_mesh: Mesh) -> Atlas:
 
 def test_vertex_map_of_positions_gives_the_texel_positions(animal: Atlas) -> None:
     np.testing.assert_allclose(vertex_map(animal, animal.mesh.V), animal.positions, atol=1e-12)
-    np.testing.assert_allclose(vertex_map(animal, animal.mesh.V[:, 1]), animal.positions[..., 1], atol=1e-12)
+    np.testing.assert_allclose(
+        vertex_map(animal, animal.mesh.V[:, 1]), animal.positions[..., 1], atol=1e-12
+    )
 
 
 def test_an_image_lands_where_its_coordinates_say(globe: Atlas, tmp_path: Path) -> None:
     # a smooth function of latitude and longitude, 16 bits deep, upper row first
-    width, height = 256, 128
+    width = 256
+    height = 128
     longitude = (np.arange(width) + 0.5) / width * 2 * np.pi
     latitude = (0.5 - (np.arange(height) + 0.5) / height) * np.pi
-    values = 0.5 + 0.3 * np.sin(latitude)[:, None] + 0.2 * np.cos(latitude)[:, None] ** 2 * np.cos(2 * longitude)
+    values = (
+        0.5
+        + 0.3 * np.sin(latitude)[:, None]
+        + 0.2 * np.cos(latitude)[:, None] ** 2 * np.cos(2 * longitude)
+    )
     path = tmp_path / "map.png"
     Image.fromarray(np.round(values * 65535).astype(np.uint16)).save(path)
-    x, y, z = np.moveaxis(globe.positions / np.linalg.norm(globe.positions, axis=-1, keepdims=True), -1, 0)
+    x, y, z = np.moveaxis(
+        globe.positions / np.linalg.norm(globe.positions, axis=-1, keepdims=True), -1, 0
+    )
     expected = 0.5 + 0.3 * z + 0.2 * (x**2 - y**2)
     # coordinates are linear in each triangle, which is wrong next to the poles
     inside = np.abs(z) < 0.95
@@ -46,7 +56,13 @@ def test_an_image_lands_where_its_coordinates_say(globe: Atlas, tmp_path: Path) 
 def test_channels_are_told_apart(globe: Atlas, tmp_path: Path) -> None:
     path = tmp_path / "color.png"
     Image.new("RGBA", (4, 4), (51, 102, 204, 255)).save(path)
-    for channel, value in {"red": 0.2, "green": 0.4, "blue": 0.8, "alpha": 1.0, "luminance": 1.4 / 3}.items():
+    for channel, value in {
+        "red": 0.2,
+        "green": 0.4,
+        "blue": 0.8,
+        "alpha": 1.0,
+        "luminance": 1.4 / 3,
+    }.items():
         np.testing.assert_allclose(texture_map(globe, path, channel=channel), value, atol=1e-12)
 
 

@@ -14,8 +14,12 @@ def test_both_copies_of_a_link_across_a_side_are_the_same_to_the_last_bit(bumpy:
     assert (np.diff(crossing.begins) == 2).all()
     first, second = stencil.weights.ravel()[crossing.copies].reshape(-1, 2).T
     np.testing.assert_array_equal(first, second)
-    # nine-point stencil everywhere but at the 24 texels round the cube's corners, which have one diagonal less
-    assert np.bincount(np.diff(stiffness_matrix(stencil).indptr))[8:].tolist() == [24, 6 * n * n - 24]
+    # nine-point stencil everywhere but at the 24 texels round the cube's corners, which have one
+    # diagonal less
+    assert np.bincount(np.diff(stiffness_matrix(stencil).indptr))[8:].tolist() == [
+        24,
+        6 * n * n - 24,
+    ]
 
 
 def test_stiffness_is_positive_but_for_the_constant(bumpy: TexelMesh) -> None:

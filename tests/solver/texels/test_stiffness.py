@@ -13,15 +13,20 @@ STRAIGHT = (0.0,) * 6
 
 
 @pytest.mark.parametrize(("long", "angle"), [(1.0, 30.0), (2.0, 35.0), (3.0, 20.0), (1.3, 150.0)])
-def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(long: float, angle: float) -> None:
+def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(
+    long: float, angle: float
+) -> None:
     east = np.array([long, 0.0, 0.0])
     north = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
-    south, north_side, west, east_side, rising, falling, area = quad(east, north, east + north, STRAIGHT)
+    south, north_side, west, east_side, rising, falling, area = quad(
+        east, north, east + north, STRAIGHT
+    )
     direction = np.linspace(0, np.pi, 180, endpoint=False)
     errors = []
     for k in (0.2, 0.1):
         wave = k * np.stack([np.cos(direction), np.sin(direction), 0 * direction], axis=1)
-        theta, phi = wave @ east, wave @ north
+        theta = wave @ east
+        phi = wave @ north
         # every side belongs to two quads
         squared = (
             (south + north_side) * (2 - 2 * np.cos(theta))
@@ -53,7 +58,9 @@ def test_a_quad_of_any_convex_shape_is_next_to_exact_for_linear_functions() -> N
         assert u @ matrix @ u == pytest.approx(area * slope @ slope, rel=2e-3)
         # three motions have energy, a constant has none, and none has less than none
         values = np.linalg.eigvalsh(matrix)
-        assert values[0] == pytest.approx(0, abs=1e-12 * values[-1]) and values[1] > 1e-3 * values[-1]
+        assert (
+            values[0] == pytest.approx(0, abs=1e-12 * values[-1]) and values[1] > 1e-3 * values[-1]
+        )
 
 
 @pytest.mark.parametrize("corners", [3, 4, 5, 8])
@@ -100,8 +107,10 @@ def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
 
 def hourglass_stiffness(diagonals: np.ndarray, area: float) -> float:
     """What waves in time ask for, but no more than a share of what the time step allows, or a square's."""
-    first, second = (diagonals[0] - diagonals[1]) / 2, (diagonals[0] + diagonals[1]) / 2
-    long, both = max(first @ first, second @ second), first @ first + second @ second
+    first = (diagonals[0] - diagonals[1]) / 2
+    second = (diagonals[0] + diagonals[1]) / 2
+    long = max(first @ first, second @ second)
+    both = first @ first + second @ second
     in_time = both * area / 2 / (area**2 + 3 * (first @ second) ** 2)
     free = (long**2 - (first @ second) ** 2) / (4 * long * area)
     return min(in_time, max(0.75 * free, 0.4 * 2 * area / both))
@@ -109,14 +118,21 @@ def hourglass_stiffness(diagonals: np.ndarray, area: float) -> float:
 
 def cell_by_cell(texels: TexelMesh, k: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness matrix and areas of a mesh without rims: each cell once, by the texels at its corners."""
-    topology, around = texels.topology, texels.halo_positions
-    k, s, count = k.ravel(), s.ravel(), topology.texel_count
-    matrix, areas, seen = np.zeros((count, count)), np.zeros(count), set()
+    topology = texels.topology
+    around = texels.halo_positions
+    k = k.ravel()
+    s = s.ravel()
+    count = topology.texel_count
+    matrix = np.zeros((count, count))
+    areas = np.zeros(count)
+    seen = set()
     charts, n, _ = topology.shape
     for chart, r, c in np.ndindex(charts, n + 1, n + 1):
         places = [(r, c), (r, c + 1), (r + 1, c + 1), (r + 1, c)]
         there = [(int(topology.halo[chart, *place]), around[chart, *place]) for place in places]
-        indices, points = zip(*[(index, point) for index, point in there if index >= 0], strict=True)
+        indices, points = zip(
+            *[(index, point) for index, point in there if index >= 0], strict=True
+        )
         if frozenset(indices) in seen:
             continue
         seen.add(frozenset(indices))
@@ -131,12 +147,17 @@ def test_coefficients_and_softening_of_every_cell_count_once(bumpy: TexelMesh) -
     rng = np.random.default_rng(0)
     # rows and columns of uneven width, on a slope: no two cells are alike
     flat = flat_torus(5)
-    bend = flat.beyond + 0.03 * np.sin(2 * np.pi * flat.beyond @ np.array([[1, 0, 2], [1, 1, 0], [0, 0, 0]]))
+    bend = flat.beyond + 0.03 * np.sin(
+        2 * np.pi * flat.beyond @ np.array([[1, 0, 2], [1, 1, 0], [0, 0, 0]])
+    )
     for texels in (bumpy, TexelMesh.of(flat.topology, bend[:, 1:-1, 1:-1], beyond=bend)):
-        k, s = rng.uniform(0.2, 4, texels.shape), rng.uniform(0.1, 1, texels.shape)
+        k = rng.uniform(0.2, 4, texels.shape)
+        s = rng.uniform(0.1, 1, texels.shape)
         matrix, areas = cell_by_cell(texels, k, s)
         field = rng.standard_normal(texels.shape)
-        np.testing.assert_allclose(-texels.stencil(k, s)(field).ravel(), matrix @ field.ravel(), atol=1e-11)
+        np.testing.assert_allclose(
+            -texels.stencil(k, s)(field).ravel(), matrix @ field.ravel(), atol=1e-11
+        )
         np.testing.assert_allclose(texels.cells.areas.ravel(), areas, rtol=1e-12)
 
 
@@ -147,7 +168,9 @@ def test_strips_at_free_edges_make_the_modes_of_a_string_with_free_ends(k: int) 
     mode = np.broadcast_to(np.cos(np.pi * k * (np.arange(n) + 0.5) / n), (1, n, n))
     stencil = texels.stencil(np.ones(texels.shape))
     for wave in (mode, mode.transpose(0, 2, 1)):
-        np.testing.assert_allclose(-stencil(wave), (2 - 2 * np.cos(np.pi * k / n)) * wave, atol=1e-12)
+        np.testing.assert_allclose(
+            -stencil(wave), (2 - 2 * np.cos(np.pi * k / n)) * wave, atol=1e-12
+        )
     np.testing.assert_allclose(texels.areas, 1 / n**2)
 
 
@@ -158,7 +181,8 @@ def test_charts_turned_against_each_other_and_a_rim_make_the_same_surface() -> N
     field = np.random.default_rng(1).standard_normal((n, 2 * n))
     expected = None
     for turn in range(4):
-        # the right chart begins at another corner; the side that faces the left one is its side 3 - turn
+        # the right chart begins at another corner; the side that faces the left one is its side 3 -
+        # turn
         side = (3 - turn) % 4
         glued = [[RIM, (1, side), RIM, RIM], [(0, 1) if i == side else RIM for i in range(4)]]
         texels = flat_charts([left, np.roll(right, -turn, axis=0)], glued, n)
@@ -175,7 +199,8 @@ def test_media_in_series_carry_the_same_flux() -> None:
     n = 6
     columns = np.array([1.0, 5.0, 0.2, 3.0, 3.0, 0.5])
     texels = square(n)
-    # what a layered medium holds in balance: its slope times the mean of the layers' resistances is the flux
+    # what a layered medium holds in balance: its slope times the mean of the layers' resistances is
+    # the flux
     steps = (1 / columns[:-1] + 1 / columns[1:]) / 2
     height = np.broadcast_to(np.concatenate([[0], np.cumsum(steps)]), (1, n, n))
     force = texels.stencil(np.broadcast_to(columns, (1, n, n)).copy())(height)
@@ -211,7 +236,10 @@ def test_texels_in_one_point_have_neither_area_nor_weight() -> None:
 
 
 def test_sphere_area_converges_at_second_order() -> None:
-    error = [4 * np.pi - TexelMesh.of(cube_topology(n), texel_directions(n)).areas.sum() for n in (8, 16, 32, 64)]
+    error = [
+        4 * np.pi - TexelMesh.of(cube_topology(n), texel_directions(n)).areas.sum()
+        for n in (8, 16, 32, 64)
+    ]
     assert (orders(error) > 1.95).all()
 
 
@@ -238,7 +266,9 @@ def test_weights_and_areas_are_those_of_the_texels_where_they_are(name, fixed):
     beside = np.moveaxis(around, 0, -1)
     there = TexelCells(texels.topology, beside)
     exact = there.at_rest(speeds, soft)
-    np.testing.assert_allclose(stencil.weights, exact.weights, atol=3e-6 * np.abs(exact.weights).max())
+    np.testing.assert_allclose(
+        stencil.weights, exact.weights, atol=3e-6 * np.abs(exact.weights).max()
+    )
     np.testing.assert_allclose(stencil.irregular.weights, exact.irregular.weights, atol=1e-6)
     np.testing.assert_allclose(stencil.irregular.others, exact.irregular.others)
     np.testing.assert_allclose(areas, there.areas, rtol=3e-6)
@@ -246,9 +276,12 @@ def test_weights_and_areas_are_those_of_the_texels_where_they_are(name, fixed):
 
 def test_crushed_cells_have_finite_weights():
     atlas = SURFACES["disk"]()
-    cells, ones = atlas.texels.cells, np.ones(atlas.areas.shape)
+    cells = atlas.texels.cells
+    ones = np.ones(atlas.areas.shape)
     for V in (0 * atlas.mesh.V, atlas.mesh.V * [1, 0, 1]):
-        stencil, areas = cells.moved(SurfaceRide(atlas).around(V), cells.coefficient(ones, ones, -1.0))
+        stencil, areas = cells.moved(
+            SurfaceRide(atlas).around(V), cells.coefficient(ones, ones, -1.0)
+        )
         assert np.isfinite(stencil.weights).all()
         assert np.isfinite(areas).all()
 

@@ -19,9 +19,13 @@ def test_plane_waves_on_a_flat_torus_converge_at_second_order() -> None:
         texels = flat_torus(n)
         assert texels.areas.sum() == pytest.approx(1)
         x, y, _ = np.moveaxis(texels.positions, -1, 0)
-        phase, frequency = 2 * np.pi * (2 * x + y), 2 * np.pi * np.sqrt(5)
-        waves = WaveSolver(texel_atlas(texels), Material(speed=1.0), backend="cpu", conserve_volume=False)
-        waves.height, waves.velocity = np.cos(phase), frequency * np.sin(phase)
+        phase = 2 * np.pi * (2 * x + y)
+        frequency = 2 * np.pi * np.sqrt(5)
+        waves = WaveSolver(
+            texel_atlas(texels), Material(speed=1.0), backend="cpu", conserve_volume=False
+        )
+        waves.height = np.cos(phase)
+        waves.velocity = frequency * np.sin(phase)
         waves.step(0.6)
         # the wave has travelled, not stood
         expected = np.cos(phase - 0.6 * frequency)
@@ -53,13 +57,17 @@ def test_new_positions_keep_the_topology() -> None:
     # in two dimensions the area integral of the gradient's square does not know the scale
     assert abs(twice.stiffness() - texels.stiffness()).max() < 1e-12
     ball = sphere_atlas(1.0, 8).texels
-    np.testing.assert_allclose(ball.with_positions(3 * ball.positions, normals=ball.normals).areas, 9 * ball.areas)
+    np.testing.assert_allclose(
+        ball.with_positions(3 * ball.positions, normals=ball.normals).areas, 9 * ball.areas
+    )
 
 
 def test_momentum_of_an_impulse_on_a_rim_and_an_irregular_vertex() -> None:
     texels = polygon(5, 12)
     for point in ([0.0, 0, 0], texels.positions[2, 4, -1]):
-        waves = WaveSolver(texel_atlas(texels), Material(density=3.0), backend="cpu", conserve_volume=False)
+        waves = WaveSolver(
+            texel_atlas(texels), Material(density=3.0), backend="cpu", conserve_volume=False
+        )
         waves.add_impulse(point, 0.7, 0.2)
         waves.step(0.3)
         assert waves.momentum() == pytest.approx(-0.7, rel=1e-5)
@@ -69,7 +77,9 @@ def test_a_rectangle_is_covered_by_texels_as_long_and_as_wide_as_its_sides_say()
     texels = flat_charts([[[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]]], [[RIM] * 4], 5)
     found = texel_quality(texels, texel_atlas(texels).mesh)
     timestep = found.pop("timestep")
-    assert found == pytest.approx({"edge_min": 1 / 5, "edge_max": 3 / 5, "folded": 0, "coverage": 1, "spanned": 1})
+    assert found == pytest.approx(
+        {"edge_min": 1 / 5, "edge_max": 3 / 5, "folded": 0, "coverage": 1, "spanned": 1}
+    )
     # the shorter sides set it
     assert 1 / np.sqrt(3) < timestep < 1
 
@@ -90,7 +100,9 @@ def test_the_time_step_is_that_of_waves_over_an_even_grids() -> None:
     steps = [WaveSolver(atlas, backend="cpu").stable_timestep for atlas in (even, uneven)]
     spacings = [np.sqrt(atlas.mesh.area / atlas.areas.size) for atlas in (even, uneven)]
     expected = steps[1] / spacings[1] / (steps[0] / spacings[0])
-    assert uneven.quality()["timestep"] == pytest.approx(expected * even.quality()["timestep"], rel=1e-6)
+    assert uneven.quality()["timestep"] == pytest.approx(
+        expected * even.quality()["timestep"], rel=1e-6
+    )
     assert 0.5 < uneven.quality()["timestep"] < 0.8
 
 
@@ -105,7 +117,8 @@ def test_waves_on_a_torus_fade_as_cos_to_the_eighth_of_half_their_phase(k: int, 
 
 
 @pytest.mark.parametrize(
-    "topology", [cube_topology(4), square(4).topology, polygon(3, 4).topology, polygon(5, 4).topology]
+    "topology",
+    [cube_topology(4), square(4).topology, polygon(3, 4).topology, polygon(5, 4).topology],
 )
 def test_constants_stay_and_nothing_leaves_its_range(topology) -> None:
     np.testing.assert_allclose(smoothed(topology, np.full(topology.shape, 7.0)), 7)

@@ -7,7 +7,16 @@ from scipy.spatial import cKDTree
 
 from ripple_sim import RippleWarning
 from ripple_sim.scenes.shapes import polygonise, sphere
-from ripple_sim.solver import Atlas, AtlasError, Mesh, MeshError, Volume, build_atlas, sphere_atlas, thickness_map
+from ripple_sim.solver import (
+    Atlas,
+    AtlasError,
+    Mesh,
+    MeshError,
+    Volume,
+    build_atlas,
+    sphere_atlas,
+    thickness_map,
+)
 from ripple_sim.solver.texels import LEAST, half_thickness, medial_radius
 
 
@@ -27,7 +36,8 @@ def test_of_a_slab_it_is_half_its_thickness_up_to_the_edges() -> None:
     np.testing.assert_allclose(half_thickness(atlas)[flat], 0.1, atol=0.05)
 
 
-RADIUS, BOUNDS = 0.6, ((-0.8, -0.8, -0.8), (0.8, 0.8, 0.8))
+RADIUS = 0.6
+BOUNDS = ((-0.8, -0.8, -0.8), (0.8, 0.8, 0.8))
 
 
 def ball(centre: tuple[float, float, float], radius: float = RADIUS) -> Mesh:
@@ -51,12 +61,18 @@ def test_thickness_over_a_sphere_is_exact(centre: tuple[float, float, float]) ->
 
 
 def test_voxels_with_noise_give_the_same_within_a_voxel() -> None:
-    atlas, centre, voxel = sphere_atlas(1.0, 32), (0.1, -0.05, 0.15), 0.05
+    atlas = sphere_atlas(1.0, 32)
+    centre = (0.1, -0.05, 0.15)
+    voxel = 0.05
     nodes = np.arange(-0.8, 0.8 + voxel / 2, voxel)
     grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1)
     depth = RADIUS - np.linalg.norm(grid - centre, axis=-1)
     # bone has 1000 and the rest 40, with the blur of a scanner and its noise
-    values = 40 + 960 / (1 + np.exp(-4 * depth / voxel)) + np.random.default_rng(0).normal(0, 20, depth.shape)
+    values = (
+        40
+        + 960 / (1 + np.exp(-4 * depth / voxel))
+        + np.random.default_rng(0).normal(0, 20, depth.shape)
+    )
     volume = Volume(values, threshold=520.0, spacing=voxel, origin=(-0.8, -0.8, -0.8))
     assert np.abs(thickness_map(atlas, volume) - thickness_map(atlas, ball(centre))).max() < voxel
 
@@ -68,7 +84,8 @@ def test_of_several_bodies_the_nearest_counts() -> None:
 
 
 def test_rays_that_miss_get_the_greatest_thickness_and_a_warning() -> None:
-    atlas, centre = sphere_atlas(1.0, 48), (0.0, 0.0, 0.35)
+    atlas = sphere_atlas(1.0, 48)
+    centre = (0.0, 0.0, 0.35)
     small = ball(centre, 0.2)
     with pytest.warns(RippleWarning, match="have nothing below them") as told:
         thickness = thickness_map(atlas, small)
@@ -82,7 +99,9 @@ def test_rays_that_miss_get_the_greatest_thickness_and_a_warning() -> None:
 
 def test_what_comes_out_of_the_surface_leaves_no_layer() -> None:
     atlas = sphere_atlas(1.0, 32)
-    large = Mesh.from_arrays(*polygonise(sphere((0.0, 0.0, 0.6), 0.6), ((-0.8, -0.8, -0.2), (0.8, 0.8, 1.4)), 0.05))
+    large = Mesh.from_arrays(
+        *polygonise(sphere((0.0, 0.0, 0.6), 0.6), ((-0.8, -0.8, -0.2), (0.8, 0.8, 1.4)), 0.05)
+    )
     with pytest.warns(RippleWarning, match="comes out of the surface") as told:
         thickness = thickness_map(atlas, large)
     assert told[0].filename == __file__
@@ -112,7 +131,8 @@ def test_the_medial_radius_of_a_tube_is_the_tubes_radius_away_from_its_ends() ->
 
 def test_points_moved_by_less_stay_nearest_to_where_they_came_from(animal: Atlas) -> None:
     size = np.ptp(animal.mesh.V, axis=0).max()
-    points, normals = animal.positions.reshape(-1, 3), animal.normals.reshape(-1, 3)
+    points = animal.positions.reshape(-1, 3)
+    normals = animal.normals.reshape(-1, 3)
     radius = medial_radius(animal).reshape(-1)
     assert radius.min() >= LEAST * size * (1 - 1e-12)
     tree = cKDTree(points)

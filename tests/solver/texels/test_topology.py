@@ -14,7 +14,9 @@ TOPOLOGIES = {
     "square": lambda: square(4).topology,
     "pentagon": lambda: polygon(5, 4).topology,
     # front and back of a pillow: they share all four sides
-    "pillow": lambda: glue(np.array([[(1, 0), (1, 3), (1, 2), (1, 1)], [(0, 0), (0, 3), (0, 2), (0, 1)]]), 4),
+    "pillow": lambda: glue(
+        np.array([[(1, 0), (1, 3), (1, 2), (1, 1)], [(0, 0), (0, 3), (0, 2), (0, 1)]]), 4
+    ),
 }
 
 
@@ -38,7 +40,9 @@ def test_every_step_over_a_border_leads_back(topology: TexelTopology) -> None:
     for chart, r, c in np.ndindex(*topology.shape):
         for dr, dc in ((0, 1), (1, 0), (0, -1), (-1, 0)):
             if not topology.rim[chart, r + 1 + dr, c + 1 + dc]:
-                beside[(chart * n + r) * n + c].add(int(topology.halo[chart, r + 1 + dr, c + 1 + dc]))
+                beside[(chart * n + r) * n + c].add(
+                    int(topology.halo[chart, r + 1 + dr, c + 1 + dc])
+                )
     assert all(texel in beside[other] for texel, others in beside.items() for other in others)
 
 
@@ -63,7 +67,8 @@ def test_addresses_copy_the_same_halo_as_the_table(topology: TexelTopology) -> N
 
 
 UNIT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-ROWS, COLUMNS = [0, 0, -1, -1], [0, -1, -1, 0]
+ROWS = [0, 0, -1, -1]
+COLUMNS = [0, -1, -1, 0]
 
 
 def random_gluing(charts: int, rims: int, seed: int) -> np.ndarray:
@@ -72,7 +77,8 @@ def random_gluing(charts: int, rims: int, seed: int) -> np.ndarray:
     sides = rng.permutation(4 * charts)
     glued = np.full((4 * charts, 2), -1)
     for a, b in sides[rims:].reshape(-1, 2):
-        glued[a], glued[b] = divmod(b, 4), divmod(a, 4)
+        glued[a] = divmod(b, 4)
+        glued[b] = divmod(a, 4)
     return glued.reshape(charts, 4, 2)
 
 
@@ -89,7 +95,10 @@ def points_by_merging(glued: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             other, back = glued[chart, side]
             if other < 0:
                 continue
-            for a, b in (((chart, side), (other, (back + 1) % 4)), ((chart, (side + 1) % 4), (other, back))):
+            for a, b in (
+                ((chart, side), (other, (back + 1) % 4)),
+                ((chart, (side + 1) % 4), (other, back)),
+            ):
                 point[a] = point[b] = min(point[a], point[b])
     for chart, side in np.argwhere(glued[..., 0] < 0):
         ends = point[chart, side], point[chart, (side + 1) % 4]
@@ -103,7 +112,8 @@ def test_corners_of_any_gluing_are_those_that_merge(charts: int, rims: int, seed
     glued = random_gluing(charts, rims, seed)
     topology = glue(glued, 3)
     point, at_rim = points_by_merging(glued)
-    pairs = np.unique([topology.corners.ravel(), point.ravel()], axis=1)  # corners are numbered in another order
+    # corners are numbered in another order
+    pairs = np.unique([topology.corners.ravel(), point.ravel()], axis=1)
     assert pairs.shape[1] == len(np.unique(topology.corners)) == len(np.unique(point))
     assert topology.corners.min() == 0 and topology.corners.max() == len(np.unique(point)) - 1
     meeting = (point.ravel() == point.ravel()[:, None]).sum(axis=1).reshape(charts, 4)
@@ -112,7 +122,8 @@ def test_corners_of_any_gluing_are_those_that_merge(charts: int, rims: int, seed
     limit = np.where(at_rim, 2, 4)
     assert len(topology.polygons) == len(np.unique(point[meeting > limit]))
     if rims == 0:
-        # Euler: C faces, 2 C edges; each part has at most the characteristic of a sphere, and that of a handle less 2
+        # Euler: C faces, 2 C edges; each part has at most the characteristic of a sphere, and that
+        # of a handle less 2
         assert (topology.corners.max() + 1 - charts) % 2 == 0
 
 
@@ -125,13 +136,19 @@ def test_the_cube_has_eight_corners_of_three_charts() -> None:
 
 
 @pytest.mark.parametrize(("name", "mode", "valence"), [("torus", "wrap", 4), ("square", "edge", 0)])
-def test_a_torus_goes_round_and_a_rim_repeats_the_last_texels(name: str, mode: str, valence: int) -> None:
+def test_a_torus_goes_round_and_a_rim_repeats_the_last_texels(
+    name: str, mode: str, valence: int
+) -> None:
     topology = TOPOLOGIES[name]()
-    np.testing.assert_array_equal(topology.halo[0], np.pad(np.arange(16).reshape(4, 4), 1, mode=mode))
+    np.testing.assert_array_equal(
+        topology.halo[0], np.pad(np.arange(16).reshape(4, 4), 1, mode=mode)
+    )
     np.testing.assert_array_equal(topology.rim[0, 0], 6 * [mode == "edge"])
     assert (topology.valence == valence).all()
     field = noise(1, 4, 4)
-    np.testing.assert_array_equal(with_filled_halo(topology, field)[0], np.pad(field[0], 1, mode=mode))
+    np.testing.assert_array_equal(
+        with_filled_halo(topology, field)[0], np.pad(field[0], 1, mode=mode)
+    )
 
 
 def l_shape(n: int, turns: tuple[int, int, int]) -> TexelMesh:
@@ -140,19 +157,28 @@ def l_shape(n: int, turns: tuple[int, int, int]) -> TexelMesh:
     The surface ends at its last texels.
     """
     squares = UNIT + np.array([[[0, 0, 0]], [[1, 0, 0]], [[0, 1, 0]]])
-    corners = np.stack([np.roll(square, -turn, axis=0) for square, turn in zip(squares, turns, strict=True)])
+    corners = np.stack(
+        [np.roll(square, -turn, axis=0) for square, turn in zip(squares, turns, strict=True)]
+    )
     glued = np.full((3, 4, 2), -1)
     for (a, side), (b, back) in (((0, 1), (1, 3)), ((0, 2), (2, 0))):
-        mine, other = (side - turns[a]) % 4, (back - turns[b]) % 4
-        glued[a, mine], glued[b, other] = (b, other), (a, mine)
+        mine = (side - turns[a]) % 4
+        other = (back - turns[b]) % 4
+        glued[a, mine] = (b, other)
+        glued[b, other] = (a, mine)
     u = (np.arange(n) + 0.5) / n
-    s, t = u[None, None, :, None], u[None, :, None, None]
+    s = u[None, None, :, None]
+    t = u[None, :, None, None]
     a, b, c, d = (corners[:, k, None, None] for k in range(4))
-    return TexelMesh.of(glue(glued, n), (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d)
+    return TexelMesh.of(
+        glue(glued, n), (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d
+    )
 
 
 @pytest.mark.parametrize("turns", [(0, 0, 0), (1, 2, 3), (3, 0, 2)])
-def test_three_charts_at_a_rim_make_a_triangle_wherever_the_charts_begin(turns: tuple[int, int, int]) -> None:
+def test_three_charts_at_a_rim_make_a_triangle_wherever_the_charts_begin(
+    turns: tuple[int, int, int],
+) -> None:
     n = 4
     texels = l_shape(n, turns)
     [cell] = texels.topology.polygons
@@ -165,9 +191,12 @@ def test_three_charts_at_a_rim_make_a_triangle_wherever_the_charts_begin(turns: 
 
 
 def test_charts_side_by_side_are_one_chart() -> None:
-    whole, parts = square(12), polygon(4, 6)
+    whole = square(12)
+    parts = polygon(4, 6)
     # the same square, turned by an eighth and 2 ** 0.5 as wide
-    np.testing.assert_allclose(eigenvalues(parts, 12), eigenvalues(whole, 12) / 2, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        eigenvalues(parts, 12), eigenvalues(whole, 12) / 2, rtol=1e-9, atol=1e-9
+    )
 
 
 def test_what_does_not_fit_is_refused() -> None:
@@ -185,12 +214,17 @@ def noise(*shape: int) -> np.ndarray:
     return np.random.default_rng(0).standard_normal(shape).astype(np.float32)
 
 
-@pytest.mark.parametrize("topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology])
+@pytest.mark.parametrize(
+    "topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology]
+)
 def test_charts_that_meet_in_a_corner_agree_on_its_value(topology) -> None:
     around = with_filled_halo(topology, noise(*topology.shape)).astype(np.float64)
-    inner, last = topology.valence > 0, around.shape[1] - 2
+    inner = topology.valence > 0
+    last = around.shape[1] - 2
     places = (0, 0), (0, last), (last, last), (last, 0)
-    values = np.stack([around[:, r : r + 2, c : c + 2].mean(axis=(1, 2)) for r, c in places], axis=1)
+    values = np.stack(
+        [around[:, r : r + 2, c : c + 2].mean(axis=(1, 2)) for r, c in places], axis=1
+    )
     for point in np.unique(topology.corners[inner]):
         here = values[topology.corners == point]
         assert len(here) >= 3
@@ -199,16 +233,22 @@ def test_charts_that_meet_in_a_corner_agree_on_its_value(topology) -> None:
 
 def test_constants_stay_constant_even_in_corners_of_five_charts() -> None:
     for topology in (polygon(5, 4).topology, cube_topology(4)):
-        np.testing.assert_allclose(with_filled_halo(topology, np.full(topology.shape, 2.5, np.float32)), 2.5)
+        np.testing.assert_allclose(
+            with_filled_halo(topology, np.full(topology.shape, 2.5, np.float32)), 2.5
+        )
 
 
 def at_side(side: int, along: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Row and column of places on a side of a chart, 0 to 1 from its first corner to its second."""
-    low, high, there = np.full_like(along, -0.5), np.full_like(along, n - 0.5), n * along - 0.5
+    low = np.full_like(along, -0.5)
+    high = np.full_like(along, n - 0.5)
+    there = n * along - 0.5
     return ((low, there), (there, high), (high, there[::-1]), (there[::-1], low))[side]
 
 
-@pytest.mark.parametrize("topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology])
+@pytest.mark.parametrize(
+    "topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology]
+)
 def test_both_charts_agree_along_a_glued_side_up_to_its_corners(topology) -> None:
     n = topology.shape[1]
     field = np.random.default_rng(0).standard_normal(topology.texel_count)
@@ -220,7 +260,9 @@ def test_both_charts_agree_along_a_glued_side_up_to_its_corners(topology) -> Non
         np.testing.assert_allclose(here, there[::-1], atol=1e-12)
 
 
-@pytest.mark.parametrize("topology", [cube_topology(4), flat_torus(4).topology, polygon(5, 4).topology])
+@pytest.mark.parametrize(
+    "topology", [cube_topology(4), flat_torus(4).topology, polygon(5, 4).topology]
+)
 def test_weights_are_a_mean_of_at_most_four_texels(topology) -> None:
     rng = np.random.default_rng(1)
     chart = rng.integers(0, topology.shape[0], 500)

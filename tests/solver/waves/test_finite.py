@@ -22,13 +22,25 @@ from ripple_sim.solver import Material, RippleError, SolverError, WaveSolver, sp
         (lambda w: setattr(w, "height", np.full((6, 8, 8), np.nan)), "NaN"),
         (lambda w: w.add_force([0, 0, 1], np.nan, 0.1), "force is nan N"),
         (lambda w: w.add_pressure(np.inf), "pressure holds 384 values that are NaN or infinite"),
-        (lambda w: w.add_height(np.zeros((6, 4, 4))), r"height has shape \(6, 4, 4\); valid is \(6, 8, 8\)"),
-        (lambda w: w.add_impulse([[0, 0, 1], [0, 1, 0]], 1.0, 0.1), "a source has 2 points; valid is one"),
+        (
+            lambda w: w.add_height(np.zeros((6, 4, 4))),
+            r"height has shape \(6, 4, 4\); valid is \(6, 8, 8\)",
+        ),
+        (
+            lambda w: w.add_impulse([[0, 0, 1], [0, 1, 0]], 1.0, 0.1),
+            "a source has 2 points; valid is one",
+        ),
         (lambda w: w.add_impulse([0, 0, 1], "hard", 0.1), "impulse is 'hard' N s"),
         (lambda w: w.step("long"), "time step is 'long' s"),
-        (lambda w: w.step(0.1, substeps=[]), r"substeps is \[\]; valid is a whole number, 1 or greater, up to 1000000"),
+        (
+            lambda w: w.step(0.1, substeps=[]),
+            r"substeps is \[\]; valid is a whole number, 1 or greater, up to 1000000",
+        ),
         (lambda w: w.step(0.1, substeps=10**400), r"substeps is 1000.*valid is a whole number"),
-        (lambda w: w.add_pressure([1.0, 2.0]), r"pressure has shape \(2,\); valid is \(6, 8, 8\), or one number"),
+        (
+            lambda w: w.add_pressure([1.0, 2.0]),
+            r"pressure has shape \(2,\); valid is \(6, 8, 8\), or one number",
+        ),
     ],
 )
 def test_bad_values_are_named(call, message: str) -> None:
@@ -44,7 +56,10 @@ def test_what_is_not_finite_is_reported_with_place_and_time(backend: str) -> Non
     height[2, 5, 9] = np.nan
     waves._backend.set_height(height)
     place = atlas.positions[2, 5, 9]
-    expected = rf"chart 2, row 5, column 9, \({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}\) m .* time 0\.6 s"
+    expected = (
+        rf"chart 2, row 5, column 9, \({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}\) m "
+        rf".* time 0\.6 s"
+    )
     with pytest.raises(SolverError, match=expected):
         waves.step(0.1)
         _ = waves.height
@@ -69,7 +84,9 @@ def test_the_error_names_the_source_and_comes_without_a_look_of_the_users(source
     waves.step(0.1)
     with warnings.catch_warnings(action="error"):
         SOURCES[source](waves)
-        with pytest.raises(SolverError, match=re.escape(f"the largest source is the {source} at time 0.1 s")):
+        with pytest.raises(
+            SolverError, match=re.escape(f"the largest source is the {source} at time 0.1 s")
+        ):
             for _ in range(32):
                 waves.step(waves.stable_timestep)
 
@@ -86,7 +103,9 @@ READ = {
 
 
 @pytest.mark.parametrize("name", READ)
-def test_nothing_that_is_not_finite_leaves_the_solver_without_an_error(name: str, backend: str) -> None:
+def test_nothing_that_is_not_finite_leaves_the_solver_without_an_error(
+    name: str, backend: str
+) -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
     waves._backend.set_height(np.full((6, 8, 8), np.nan, np.float32))
     waves._backend.set_velocity(np.full((6, 8, 8), np.nan, np.float32))
@@ -96,7 +115,10 @@ def test_nothing_that_is_not_finite_leaves_the_solver_without_an_error(name: str
 
 def test_an_impulse_beyond_float32_is_refused_and_changes_nothing() -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
-    with pytest.raises(SolverError, match=r"impulse is 1e\+300 N s, which would move the surface at .* beyond float32"):
+    with pytest.raises(
+        SolverError,
+        match=r"impulse is 1e\+300 N s, which would move the surface at .* beyond float32",
+    ):
         waves.add_impulse([0, 0, 1], 1e300, 0.5)
     waves.step(0.1)
     assert not waves.height.any()
@@ -104,7 +126,9 @@ def test_an_impulse_beyond_float32_is_refused_and_changes_nothing() -> None:
 
 def test_a_step_whose_coefficients_are_beyond_float32_is_refused() -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), Material(speed=1e-40), backend="cpu")
-    with pytest.raises(SolverError, match=r"a substep of 1e\+39 s on texels of .* kg and more is beyond float32"):
+    with pytest.raises(
+        SolverError, match=r"a substep of 1e\+39 s on texels of .* kg and more is beyond float32"
+    ):
         waves.step(1e39)
 
 
@@ -113,6 +137,8 @@ def test_a_velocity_that_is_not_finite_before_the_height_is_no_secret(backend: s
     velocity = np.zeros((6, 8, 8), np.float32)
     velocity[1, 2, 3] = np.inf
     waves._backend.set_velocity(velocity)
-    with pytest.raises(SolverError, match="velocity is no longer finite at chart 1, row 2, column 3"):
+    with pytest.raises(
+        SolverError, match="velocity is no longer finite at chart 1, row 2, column 3"
+    ):
         _ = waves.velocity
     assert not waves.height.any()

@@ -30,25 +30,38 @@ def test_gradient_converges_at_second_order_also_at_the_cubes_edges() -> None:
 
 def interpolated(height_map: np.ndarray, r: float, c: float) -> np.ndarray:
     """Bilinear heights of all charts at a place of theirs [texels], which begins at 0 at the charts' border."""
-    i, j = int(r + 0.5), int(c + 0.5)
-    s, t = r + 0.5 - i, c + 0.5 - j
+    i = int(r + 0.5)
+    j = int(c + 0.5)
+    s = r + 0.5 - i
+    t = c + 0.5 - j
     h = height_map[..., 3]
     above, below = ((1 - t) * h[:, row, j] + t * h[:, row, j + 1] for row in (i, i + 1))
     return (1 - s) * above + s * below
 
 
-@pytest.mark.parametrize("shape", [square, disk, partial(polygon, 6)], ids=["square", "disk", "hexagon"])
+@pytest.mark.parametrize(
+    "shape", [square, disk, partial(polygon, 6)], ids=["square", "disk", "hexagon"]
+)
 def test_heights_that_are_drawn_come_to_zero_at_a_fixed_rim(shape) -> None:
     n = 8
     texels = shape(n).with_fixed_rim()
-    height_map = HeightMap(texels)(np.random.default_rng(1).standard_normal(texels.positions.shape[:3]))
+    height_map = HeightMap(texels)(
+        np.random.default_rng(1).standard_normal(texels.positions.shape[:3])
+    )
     rim = texels.topology.rim
     assert np.isfinite(height_map).all()
     assert rim.any()
     for along in np.linspace(0, n, 4 * n + 1):
-        for side, place in enumerate(((0.0, along), (along, float(n)), (float(n), along), (along, 0.0))):
+        for side, place in enumerate(
+            ((0.0, along), (along, float(n)), (float(n), along), (along, 0.0))
+        ):
             at_rim = texels.topology.glued[:, side, 0] < 0
-            assert np.abs(interpolated(height_map, *np.minimum(place, n - 1e-9))[at_rim]).max(initial=0.0) < 1e-6
+            assert (
+                np.abs(interpolated(height_map, *np.minimum(place, n - 1e-9))[at_rim]).max(
+                    initial=0.0
+                )
+                < 1e-6
+            )
 
 
 def test_gradient_beside_a_fixed_rim_converges() -> None:
@@ -57,7 +70,9 @@ def test_gradient_beside_a_fixed_rim_converges() -> None:
         texels = square(n).with_fixed_rim()
         x, y, _ = np.pi * np.moveaxis(texels.positions, -1, 0)
         h = np.sin(x) * np.sin(2 * y)
-        exact = np.pi * np.stack([np.cos(x) * np.sin(2 * y), 2 * np.sin(x) * np.cos(2 * y)], axis=-1)
+        exact = np.pi * np.stack(
+            [np.cos(x) * np.sin(2 * y), 2 * np.sin(x) * np.cos(2 * y)], axis=-1
+        )
         found = HeightMap(texels)(h.astype(np.float32))[:, 1:-1, 1:-1, :2]
         errors.append(np.abs(found - exact).max())
     assert (orders(errors) > 1.8).all()
@@ -100,13 +115,17 @@ def test_the_page_is_the_hosts_height_map(hardware, shape) -> None:
         "fixed disk": lambda n: disk(n).with_fixed_rim(),
         "fixed hexagon": lambda n: polygon(6, n).with_fixed_rim(),
     }[shape](N)
-    heights = np.random.default_rng(3).standard_normal(texels.positions.shape[:3]).astype(np.float32)
+    heights = (
+        np.random.default_rng(3).standard_normal(texels.positions.shape[:3]).astype(np.float32)
+    )
     height_map = HeightMap(texels)
     page, highest = page_of(hardware, height_map, heights)
     host = height_map(heights)
     np.testing.assert_array_equal(page[:, 1:-1, 1:-1, 3], heights)
     np.testing.assert_allclose(page, host, rtol=0, atol=1e-5 * np.abs(host[..., :3]).max())
-    np.testing.assert_allclose(page[..., 3], host[..., 3], rtol=0, atol=1e-6 * np.abs(heights).max())
+    np.testing.assert_allclose(
+        page[..., 3], host[..., 3], rtol=0, atol=1e-6 * np.abs(heights).max()
+    )
     assert highest == np.abs(heights).max()
     np.testing.assert_array_equal(np.asarray(height_map(on_device(hardware, heights))), host)
 
@@ -127,16 +146,20 @@ def test_a_snapshot_is_the_height_and_stays_while_the_waves_go_on(hardware) -> N
     waves = WaveSolver(sphere_atlas(0.1, N), material, backend="gl")
     waves.add_impulse((0.1, 0, 0), 1e-3, 0.05)
     waves.step(1e-3)
-    before, height = waves.snapshot(), waves.height
+    before = waves.snapshot()
+    height = waves.height
     waves.step(1e-2)
-    after, later = waves.snapshot(), waves.height
+    after = waves.snapshot()
+    later = waves.height
     assert isinstance(before, DeviceField)
     assert waves.dent.any()
     np.testing.assert_array_equal(np.asarray(before), height)
     np.testing.assert_array_equal(np.asarray(after), later)
     assert (before.peak, after.peak) == (np.abs(height).max(), np.abs(later).max())
     between = height + np.float32(0.3) * (later - height)
-    np.testing.assert_allclose(np.asarray(before.blend(after, 0.3)), between, rtol=0, atol=1e-7 * np.abs(between).max())
+    np.testing.assert_allclose(
+        np.asarray(before.blend(after, 0.3)), between, rtol=0, atol=1e-7 * np.abs(between).max()
+    )
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -182,7 +205,10 @@ def test_no_height_is_too_large(height: float) -> None:
 
 def test_the_limit_is_the_same_at_every_scale() -> None:
     field = np.random.default_rng(1).standard_normal(SHAPE)
-    shares = [DisplacementLimit(sphere_atlas(r, 12))((r * field).astype(np.float32)) / r for r in (1e-3, 1.0, 1e3)]
+    shares = [
+        DisplacementLimit(sphere_atlas(r, 12))((r * field).astype(np.float32)) / r
+        for r in (1e-3, 1.0, 1e3)
+    ]
     np.testing.assert_allclose(shares[0], shares[1], rtol=1e-4)
     np.testing.assert_allclose(shares[2], shares[1], rtol=1e-4)
 
@@ -191,5 +217,7 @@ def test_a_height_map_for_drawing_has_the_gradient_of_the_limited_heights() -> N
     height = (3.0 * ATLAS.positions[..., 2]).astype(np.float32)
     limited = DisplacementLimit(ATLAS)(height)
     np.testing.assert_array_equal(HeightMap.drawn(ATLAS)(height), HeightMap(ATLAS.texels)(limited))
-    np.testing.assert_array_equal(HeightMap.drawn(ATLAS, limit=False)(height), HeightMap(ATLAS.texels)(height))
+    np.testing.assert_array_equal(
+        HeightMap.drawn(ATLAS, limit=False)(height), HeightMap(ATLAS.texels)(height)
+    )
     assert np.abs(limited).max() < np.abs(height).max() / 4

@@ -21,7 +21,9 @@ def descriptors() -> int:
 
 
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
-def test_making_and_dropping_solvers_takes_no_more_and_more_memory(backend: str, opengl: None) -> None:
+def test_making_and_dropping_solvers_takes_no_more_and_more_memory(
+    backend: str, opengl: None
+) -> None:
     atlas = sphere_atlas(resolution=16)
     plate = Material(speed=1.0, viscosity=1e-3, bending=1e-4)  # which has three stencils
 
@@ -35,8 +37,10 @@ def test_making_and_dropping_solvers_takes_no_more_and_more_memory(backend: str,
         gc.collect()
 
     use(20)
-    memory, files = resident(), descriptors()
+    memory = resident()
+    files = descriptors()
     use(60)
     assert descriptors() == files
-    # one solver has fields of 6 x 16 x 16 float32 and three stencils: sixty that stay would be 6 MB and more
+    # one solver has fields of 6 x 16 x 16 float32 and three stencils: sixty that stay would be 6 MB
+    # and more
     assert resident() - memory < 4e6

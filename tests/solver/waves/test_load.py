@@ -5,13 +5,24 @@ import pytest
 import trimesh
 from arrival import distance_from_point
 
-from ripple_sim.solver import Atlas, Load, Material, Mesh, SolverError, WaveSolver, build_atlas, sphere_atlas
+from ripple_sim.solver import (
+    Atlas,
+    Load,
+    Material,
+    Mesh,
+    SolverError,
+    WaveSolver,
+    build_atlas,
+    sphere_atlas,
+)
 from ripple_sim.solver.waves import footprint_at
 from ripple_sim.solver.waves.footprint import footprint
 
 
 def test_load_acts_over_its_step_alone_beside_what_is_held(backend: str) -> None:
-    waves = WaveSolver(sphere_atlas(1.0, 16), Material(density=2.0), backend=backend, conserve_volume=False)
+    waves = WaveSolver(
+        sphere_atlas(1.0, 16), Material(density=2.0), backend=backend, conserve_volume=False
+    )
     waves.add_force([0, 0, 1], 3.0, 0.3)
     waves.step(0.1, load=Load(np.array([5, 9, 5]), np.array([1.0, 0.5, 2.0])))
     assert waves.momentum() == pytest.approx(-0.65, rel=1e-5)
@@ -21,7 +32,8 @@ def test_load_acts_over_its_step_alone_beside_what_is_held(backend: str) -> None
 
 
 def test_load_is_the_same_as_a_held_force_that_is_ended(backend: str) -> None:
-    atlas, results = sphere_atlas(1.0, 16), []
+    atlas = sphere_atlas(1.0, 16)
+    results = []
     where = footprint(atlas, [1, 0, 0], 0.4)
     shares = where.weights * atlas.areas.reshape(-1)[where.texels]
     for held in (True, False):
@@ -40,7 +52,10 @@ def test_load_is_the_same_as_a_held_force_that_is_ended(backend: str) -> None:
 @pytest.mark.parametrize(
     ("load", "message"),
     [
-        (Load(np.array([3, 384]), np.ones(2)), "texels go from 3 to 384; valid are indices from 0 to 383"),
+        (
+            Load(np.array([3, 384]), np.ones(2)),
+            "texels go from 3 to 384; valid are indices from 0 to 383",
+        ),
         (Load(np.array([-1]), np.ones(1)), "texels go from -1"),
         (Load(np.array([1]), np.array([np.nan])), "add up to nan N"),
     ],
@@ -52,8 +67,12 @@ def test_loads_that_cannot_be_are_refused(load: Load, message: str) -> None:
 
 
 @pytest.mark.parametrize("conserve", [True, False])
-def test_held_force_changes_momentum_by_force_times_time(animal: Atlas, backend: str, conserve: bool) -> None:
-    waves = WaveSolver(animal, Material(speed=0.3, density=2.0), backend=backend, conserve_volume=conserve)
+def test_held_force_changes_momentum_by_force_times_time(
+    animal: Atlas, backend: str, conserve: bool
+) -> None:
+    waves = WaveSolver(
+        animal, Material(speed=0.3, density=2.0), backend=backend, conserve_volume=conserve
+    )
     waves.add_force(animal.mesh.V[100], 3.0, 0.06)
     waves.add_force(animal.mesh.V[105], 1.0, 0.06)
     waves.step(0.11)
@@ -79,7 +98,8 @@ def test_static_deflection_under_pressure_is_pressure_over_spring(backend: str) 
 
 
 def test_force_held_over_a_step_equals_many_small_impulses(animal: Atlas) -> None:
-    point, results = animal.mesh.V[700], []
+    point = animal.mesh.V[700]
+    results = []
     for pieces in (0, 400):
         waves = WaveSolver(animal, Material(speed=0.4), backend="cpu")
         if pieces:
@@ -95,7 +115,9 @@ def test_force_held_over_a_step_equals_many_small_impulses(animal: Atlas) -> Non
 
 def test_weights_integrate_to_one(animal: Atlas) -> None:
     rng = np.random.default_rng(2)
-    for vertex, radius in zip(rng.integers(0, len(animal.mesh.V), 20), rng.uniform(0, 0.2, 20), strict=True):
+    for vertex, radius in zip(
+        rng.integers(0, len(animal.mesh.V), 20), rng.uniform(0, 0.2, 20), strict=True
+    ):
         where = footprint(animal, animal.mesh.V[vertex], radius)
         total = (where.weights * animal.areas.reshape(-1)[where.texels]).sum()
         assert total == pytest.approx(1, rel=1e-12)
@@ -115,17 +137,22 @@ def test_centroid_of_the_footprint_is_the_source() -> None:
         assert np.linalg.norm(centroid - point) < 0.1 * texel
 
 
-def test_footprint_measures_straight_where_it_is_flat_and_along_the_surface_where_it_is_not(animal: Atlas) -> None:
+def test_footprint_measures_straight_where_it_is_flat_and_along_the_surface_where_it_is_not(
+    animal: Atlas,
+) -> None:
     """Both ways through the code against distances by fast marching."""
     rng = np.random.default_rng(1)
-    positions, flat = animal.positions.reshape(-1, 3), 0
+    positions = animal.positions.reshape(-1, 3)
+    flat = 0
     for vertex in rng.integers(0, len(animal.mesh.V), 40):
         (point,), (center,) = animal.nearest(animal.mesh.V[vertex])
         where = footprint_at(animal, point, int(center), 0.08)
         texels, along = distance_from_point(animal.texels, int(center), point, 3 * where.radius)
         distance = dict(zip(texels.tolist(), along, strict=True))
         height = (where.weights / where.weights.max()) ** (1 / 3)
-        used = where.radius * np.sqrt(1 - np.minimum(1, height * (1 - (min(distance.values()) / where.radius) ** 2)))
+        used = where.radius * np.sqrt(
+            1 - np.minimum(1, height * (1 - (min(distance.values()) / where.radius) ** 2))
+        )
         straight = np.linalg.norm(positions[where.texels] - point, axis=1)
         true = np.array([distance[texel] for texel in where.texels.tolist()])
         assert (used > 0.97 * straight - 0.05 * where.radius).all()

@@ -15,14 +15,17 @@ POINTS = np.array([[0.3, -0.2, 0.9], [0.577, 0.577, 0.577], [-0.9, 0.1, -0.4]])
 
 def levels(signals: np.ndarray, rate: float, edges: np.ndarray) -> np.ndarray:
     """Level of signals [k, points], the mean of all, in bands between frequencies [dB]."""
-    power = (np.abs(np.fft.rfft(signals * np.hanning(len(signals))[:, None], axis=0)) ** 2).mean(axis=1)
+    power = (np.abs(np.fft.rfft(signals * np.hanning(len(signals))[:, None], axis=0)) ** 2).mean(
+        axis=1
+    )
     frequency = np.fft.rfftfreq(len(signals), 1 / rate)
     bands = [(low <= frequency) & (frequency < high) for low, high in itertools.pairwise(edges)]
     return 10 * np.log10([power[band].sum() for band in bands])
 
 
 def test_modes_of_a_sphere_within_a_decibel_up_to_five_texels_a_wave() -> None:
-    atlas, damping = sphere_atlas(1.0, 24), 0.2
+    atlas = sphere_atlas(1.0, 24)
+    damping = 0.2
     waves = WaveSolver(atlas, Material(speed=1.0, damping=damping), backend="cpu")
     degrees = np.array([2, 5, 9, 13, 17])
     rates = np.sqrt(degrees * (degrees + 1) - damping**2 / 4)
@@ -33,21 +36,31 @@ def test_modes_of_a_sphere_within_a_decibel_up_to_five_texels_a_wave() -> None:
     sensor.begin(0.0, sensor.probes.of(waves.height, waves.velocity))
     waves.step(40.0)
     times, samples = sensor.read()
-    shapes = [eval_legendre(degree, sensor.points[:, 2] / np.linalg.norm(sensor.points, axis=1)) for degree in degrees]
-    w, t = rates, times[:, None]
-    swings = -np.exp(-damping * t / 2) * (damping * np.cos(w * t) + (w - damping**2 / 4 / w) * np.sin(w * t))
+    shapes = [
+        eval_legendre(degree, sensor.points[:, 2] / np.linalg.norm(sensor.points, axis=1))
+        for degree in degrees
+    ]
+    w = rates
+    t = times[:, None]
+    swings = -np.exp(-damping * t / 2) * (
+        damping * np.cos(w * t) + (w - damping**2 / 4 / w) * np.sin(w * t)
+    )
     exact = swings @ np.stack(shapes)
     edges = np.append(0.5 * rates[0], (rates[1:] + rates[:-1]) / 2) / (2 * np.pi)
     edges = np.append(edges, sensor.bandwidth)
-    assert rates[-1] / (2 * np.pi) < sensor.bandwidth < 20 / (2 * np.pi)  # wide texels are a third wider than the mean
+    # wide texels are a third wider than the mean
+    assert rates[-1] / (2 * np.pi) < sensor.bandwidth < 20 / (2 * np.pi)
     error = levels(samples[30:], 60, edges) - levels(exact[30:], 60, edges)
     assert np.abs(error).max() < 1.0
 
 
-@pytest.mark.parametrize(("speed", "bending"), [(3.0, 0.0), (0.0, 3.6e-3)], ids=["membrane", "plate"])
+@pytest.mark.parametrize(
+    ("speed", "bending"), [(3.0, 0.0), (0.0, 3.6e-3)], ids=["membrane", "plate"]
+)
 def test_a_struck_sheet_against_modal_superposition(speed: float, bending: float) -> None:
     """Held at the rim, a plate without a moment there, it has sines for modes."""
-    n, damping = 40, 0.5
+    n = 40
+    damping = 0.5
     atlas = texel_atlas(square(n))
     material = Material(speed=speed, bending=bending, damping=damping)
     waves = WaveSolver(atlas, material, rim="fixed", conserve_volume=False, backend="cpu")
@@ -66,7 +79,11 @@ def test_a_struck_sheet_against_modal_superposition(speed: float, bending: float
     rates = np.sqrt(speed**2 * square_of + bending * square_of**2 - damping**2 / 4)
     exact = np.zeros(len(times))
     for weight, w in zip(weights.ravel(), rates.ravel(), strict=True):
-        exact += weight * np.exp(-damping * times / 2) * (np.cos(w * times) - damping / 2 / w * np.sin(w * times))
+        exact += (
+            weight
+            * np.exp(-damping * times / 2)
+            * (np.cos(w * times) - damping / 2 / w * np.sin(w * times))
+        )
     hertz = np.unique(rates[rates < 2 * np.pi * sensor.bandwidth].round(6)) / (2 * np.pi)
     widest = np.sort(np.argsort(hertz[1:] / hertz[:-1])[-5:])  # bands end where no mode is
     edges = np.array([hertz[0] / 2, *np.sqrt(hertz[widest] * hertz[widest + 1]), sensor.bandwidth])
@@ -79,9 +96,11 @@ def test_a_struck_sheet_against_modal_superposition(speed: float, bending: float
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
 def test_strain_is_within_a_decibel_up_to_the_bandwidth_as_heights_are(share: float) -> None:
-    atlas, thickness = sphere_atlas(1.0, 24), 1e-2
+    atlas = sphere_atlas(1.0, 24)
+    thickness = 1e-2
     rng = np.random.default_rng(0)
-    points, axis = rng.normal(size=(150, 3)), np.array([0.304, 0.507, 0.806])
+    points = rng.normal(size=(150, 3))
+    axis = np.array([0.304, 0.507, 0.806])
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     waves = WaveSolver(atlas, Material(speed=1.0), backend="cpu")
     sensor = waves.sensor(points, "strain", 60.0, thickness=thickness)
@@ -91,7 +110,9 @@ def test_strain_is_within_a_decibel_up_to_the_bandwidth_as_heights_are(share: fl
     sensor.begin(0.0, sensor.probes.of(waves.height, waves.velocity))
     waves.step(12.0)
     times, samples = (each[20:] for each in sensor.read())
-    exact = np.outer(np.sin(omega * times), thickness / 4 * omega * eval_legendre(degree, points @ axis))
+    exact = np.outer(
+        np.sin(omega * times), thickness / 4 * omega * eval_legendre(degree, points @ axis)
+    )
     assert abs(10 * np.log10((samples.astype(float) ** 2).sum() / (exact**2).sum())) < 1.0
 
 
@@ -117,7 +138,10 @@ def test_both_backends_give_the_same_samples(opengl: None, material: Material) -
     runs = []
     for backend in ("cpu", "gl"):
         waves = WaveSolver(sphere_atlas(1.0, 16), material, backend=backend)
-        sensors = [waves.sensor(POINTS, kind, 100.0, thickness=0.02 if kind == "strain" else None) for kind in KINDS]
+        sensors = [
+            waves.sensor(POINTS, kind, 100.0, thickness=0.02 if kind == "strain" else None)
+            for kind in KINDS
+        ]
         waves.step(0.1)
         waves.add_impulse([0.4, 0.0, 0.9], 0.01, 0.3)
         waves.add_pressure(0.01)
@@ -133,7 +157,8 @@ def test_samples_do_not_depend_on_when_they_are_read_and_have_exact_times() -> N
     def run(*, often: bool) -> tuple[np.ndarray, np.ndarray]:
         waves = WaveSolver(sphere_atlas(1.0, 16), backend="cpu")
         waves.step(0.3)
-        sensor, blocks = waves.sensor(POINTS, "height", 50.0), []
+        sensor = waves.sensor(POINTS, "height", 50.0)
+        blocks = []
         waves.add_impulse([0, 0, 1], 1.0, 0.3)
         for step in range(30):
             waves.step(0.1 if step % 3 else 0.07)  # substeps of several lengths
@@ -142,13 +167,16 @@ def test_samples_do_not_depend_on_when_they_are_read_and_have_exact_times() -> N
         assert times[-1] > waves.time - sensor.latency - 1 / 50
         return times, values
 
-    (times, values), (_, together) = run(often=True), run(often=False)
+    (times, values) = run(often=True)
+    (_, together) = run(often=False)
     np.testing.assert_array_equal(values, together)
     np.testing.assert_allclose(times, 0.3 + np.arange(len(times)) / 50, rtol=1e-15)
 
 
 def test_a_constant_stays_what_it_is_and_a_reset_begins_anew() -> None:
-    waves = WaveSolver(sphere_atlas(1.0, 16), Material(speed=1.0), backend="cpu", conserve_volume=False)
+    waves = WaveSolver(
+        sphere_atlas(1.0, 16), Material(speed=1.0), backend="cpu", conserve_volume=False
+    )
     waves.height = 0.25
     sensor = waves.sensor(POINTS, "height", 30.0)
     waves.step(2.0)
@@ -164,8 +192,11 @@ def test_a_constant_stays_what_it_is_and_a_reset_begins_anew() -> None:
 
 
 def test_the_filter_passes_a_third_of_the_rate_and_nothing_above_a_half() -> None:
-    times, at = np.arange(4000) / 1000, 0.5 + np.arange(200) / 100
-    values = np.stack([np.cos(2 * np.pi * hertz * times + 0.3) for hertz in (3, 20, 34, 50, 70, 230)], axis=1)
+    times = np.arange(4000) / 1000
+    at = 0.5 + np.arange(200) / 100
+    values = np.stack(
+        [np.cos(2 * np.pi * hertz * times + 0.3) for hertz in (3, 20, 34, 50, 70, 230)], axis=1
+    )
     kept = filtered(times, np.full(len(times), 1e-3), values, at, 100.0)
     exact = np.stack([np.cos(2 * np.pi * hertz * at + 0.3) for hertz in (3, 20, 34)], axis=1)
     assert np.abs(kept[:, :3] - exact).max() < 2e-4  # 80 dB
@@ -175,9 +206,15 @@ def test_the_filter_passes_a_third_of_the_rate_and_nothing_above_a_half() -> Non
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"kind": "pressure"}, "sensor kind is 'pressure'; valid are 'acceleration', 'velocity', 'height', 'strain'"),
+        (
+            {"kind": "pressure"},
+            "sensor kind is 'pressure'; valid are 'acceleration', 'velocity', 'height', 'strain'",
+        ),
         ({"rate": 0}, "sensor rate is 0; valid is a finite number greater than 0"),
-        ({"kind": "strain"}, "sensor thickness is None m; valid is a finite number greater than 0 for kind 'strain'"),
+        (
+            {"kind": "strain"},
+            "sensor thickness is None m; valid is a finite number greater than 0 for kind 'strain'",
+        ),
         ({"at": "tip"}, "sensor at 'tip': this surface knows no names; valid are points"),
     ],
 )

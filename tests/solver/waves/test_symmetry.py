@@ -20,8 +20,12 @@ def ripple(atlas: Atlas, point: np.ndarray, backend: str, seconds: float = 0.9) 
 
 
 # two chart centres and two corners of the cube; the others as the rotated impulse
-@pytest.mark.parametrize(("point", "count"), [([1, 0, 0], 8), ([0, -1, 0], 8), ([1, 1, 1], 6), ([-1, 1, -1], 6)])
-def test_impulse_keeps_the_symmetries_of_its_place_on_the_cube(point: list[int], count: int, backend: str) -> None:
+@pytest.mark.parametrize(
+    ("point", "count"), [([1, 0, 0], 8), ([0, -1, 0], 8), ([1, 1, 1], 6), ([-1, 1, -1], 6)]
+)
+def test_impulse_keeps_the_symmetries_of_its_place_on_the_cube(
+    point: list[int], count: int, backend: str
+) -> None:
     place = point / np.linalg.norm(point)
     h = ripple(sphere_atlas(1.0, 32), place, backend)
     symmetries = ALL_48[np.abs(ALL_48 @ place - place).max(axis=1) < 1e-12]
@@ -56,7 +60,9 @@ def test_rotated_impulse_on_a_fine_mesh_of_a_sphere(ball_mesh: Mesh) -> None:
 
 def sample(atlas: Atlas, field: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Bilinear samples of a field at surface points."""
-    return sampling_matrix(atlas.texels.topology, *atlas.locate(points)) @ field.ravel().astype(float)
+    return sampling_matrix(atlas.texels.topology, *atlas.locate(points)) @ field.ravel().astype(
+        float
+    )
 
 
 @pytest.mark.parametrize("point", [[0, 0, 1], [1, 1, 1], [0.3, 0.9, -0.4]])
@@ -71,7 +77,8 @@ def test_first_crest_arrives_at_the_same_time_in_all_directions(point: list[floa
     probes = np.cos(distance) * p + np.sin(distance) * around
     waves = WaveSolver(atlas, backend="cpu")
     waves.add_impulse(p, 1.0, 0.3)
-    times, signal = [], []
+    times = []
+    signal = []
     for _ in range(130):
         waves.step(0.01)
         times.append(waves.time)

@@ -41,7 +41,8 @@ def test_superposition(animal: Atlas, backend: str) -> None:
         waves.step(0.3)
         return waves.height
 
-    a, b = (animal.mesh.V[100], 1.0), (animal.mesh.V[2000], -0.7)
+    a = (animal.mesh.V[100], 1.0)
+    b = (animal.mesh.V[2000], -0.7)
     both = run(a, b)
     np.testing.assert_allclose(run(a) + run(b), both, atol=1e-5 * np.abs(both).max())
 
@@ -124,10 +125,15 @@ def bits(waves: WaveSolver) -> tuple[bytes, ...]:
     return waves.height.tobytes(), waves.velocity.tobytes(), waves.dent.tobytes()
 
 
-@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda waves: pickle.loads(pickle.dumps(waves))])
-def test_a_copy_goes_on_as_the_original_bit_for_bit(backend: str, copied: Callable[[WaveSolver], WaveSolver]) -> None:
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda waves: pickle.loads(pickle.dumps(waves))]
+)
+def test_a_copy_goes_on_as_the_original_bit_for_bit(
+    backend: str, copied: Callable[[WaveSolver], WaveSolver]
+) -> None:
     waves = hit(backend)
-    twin, untouched = copied(waves), copied(waves)
+    twin = copied(waves)
+    untouched = copied(waves)
     assert np.abs(waves.dent).max() > 1e-3
     before = bits(untouched)
     for each in (waves, twin):
@@ -135,7 +141,11 @@ def test_a_copy_goes_on_as_the_original_bit_for_bit(backend: str, copied: Callab
         each.add_impulse([0, 1, 1], 0.2, 0.3)
         each.step(0.1)
     assert bits(twin) == bits(waves)
-    assert (twin.time, twin.substeps_taken, twin.energy()) == (waves.time, waves.substeps_taken, waves.energy())
+    assert (twin.time, twin.substeps_taken, twin.energy()) == (
+        waves.time,
+        waves.substeps_taken,
+        waves.energy(),
+    )
     assert bits(untouched) == before
 
 
@@ -154,7 +164,9 @@ def test_a_dent_stays_to_the_last_bit_in_a_surface_that_does_not_yield(backend: 
 def test_what_is_clamped_or_rigid_takes_over_its_dent_alone(backend: str) -> None:
     waves = hit(backend)
     z = waves.atlas.positions[..., 2]
-    other = WaveSolver(waves.atlas, Material(speed=np.where(z < 0, 0.0, 1.0), fixed=z > 0.5), backend=backend)
+    other = WaveSolver(
+        waves.atlas, Material(speed=np.where(z < 0, 0.0, 1.0), fixed=z > 0.5), backend=backend
+    )
     other.state = waves.state
     rigid = ~other.operator.movable
     assert not other.velocity[rigid].any()
@@ -216,8 +228,12 @@ def test_energy_never_rises_with_damping_and_viscosity(animal: Atlas) -> None:
 PLAIN = Material(speed=1.0, density=3.0)
 
 
-@pytest.mark.parametrize("material", [PLAIN, dataclasses.replace(PLAIN, yield_height=2e-3)], ids=["elastic", "dents"])
-def test_crests_are_the_greatest_height_of_all_steps(animal: Atlas, backend: str, material: Material) -> None:
+@pytest.mark.parametrize(
+    "material", [PLAIN, dataclasses.replace(PLAIN, yield_height=2e-3)], ids=["elastic", "dents"]
+)
+def test_crests_are_the_greatest_height_of_all_steps(
+    animal: Atlas, backend: str, material: Material
+) -> None:
     waves = WaveSolver(animal, material, backend=backend)
     assert not waves.crests().any()
     for seed in (0, 1):

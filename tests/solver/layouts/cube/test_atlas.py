@@ -26,7 +26,9 @@ def test_texels_lie_where_their_rays_meet_the_mesh() -> None:
     atlas = atlas_from_sphere_map(BALL, BALL.V, 8)
     np.testing.assert_allclose(np.cross(atlas.positions, texel_directions(8)), 0, atol=1e-12)
     corners = BALL.V[BALL.F[atlas.triangles]]
-    np.testing.assert_allclose(np.einsum("...i,...ij->...j", atlas.barycentrics, corners), atlas.positions, atol=1e-12)
+    np.testing.assert_allclose(
+        np.einsum("...i,...ij->...j", atlas.barycentrics, corners), atlas.positions, atol=1e-12
+    )
     np.testing.assert_allclose(np.linalg.norm(atlas.normals, axis=-1), 1)
     # on a sphere normals are directions
     assert np.einsum("...i,...i->...", atlas.normals, texel_directions(8)).min() > 0.999
@@ -39,7 +41,9 @@ def test_an_octahedron_has_all_symmetries_of_the_cube(n: int) -> None:
     atlas = atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), n)
     for rotation in cube_rotations():
         np.testing.assert_allclose(permute_texels(atlas.areas, rotation), atlas.areas, rtol=1e-9)
-        np.testing.assert_allclose(permute_texels(atlas.positions, rotation), atlas.positions @ rotation, atol=1e-9)
+        np.testing.assert_allclose(
+            permute_texels(atlas.positions, rotation), atlas.positions @ rotation, atol=1e-9
+        )
 
 
 def test_a_mesh_moved_turned_and_enlarged_takes_its_texels_along() -> None:
@@ -102,7 +106,8 @@ def test_rays_agree_with_every_ray_against_every_triangle(animal: Atlas) -> None
     assert differ.mean() < 0.05
     assert np.abs(weights[differ].min(axis=1)).max(initial=0) < 1e-9
     np.testing.assert_allclose(barycentrics[~differ], weights[~differ], atol=1e-9)
-    points, others = surface_points(animal, triangles, barycentrics), surface_points(animal, expected, weights)
+    points = surface_points(animal, triangles, barycentrics)
+    others = surface_points(animal, expected, weights)
     np.testing.assert_allclose(points, others, atol=1e-9)
     assert (barycentrics >= 0).all()
     np.testing.assert_allclose(barycentrics.sum(axis=1), 1)
@@ -118,14 +123,18 @@ def test_rays_that_walk_on_from_their_neighbours_hit_the_same(animal: Atlas) -> 
         np.testing.assert_array_equal(walked[inside], triangles[inside])
         np.testing.assert_array_equal(weights[inside], barycentrics[inside])
         assert inside.mean() > 0.9
-        points, others = surface_points(animal, walked, weights), surface_points(animal, triangles, barycentrics)
+        points = surface_points(animal, walked, weights)
+        others = surface_points(animal, triangles, barycentrics)
         np.testing.assert_allclose(points, others, atol=1e-12)
 
 
-@pytest.mark.parametrize("what", ["cube edges and corners", "edges and vertices of the mesh", "anywhere"])
+@pytest.mark.parametrize(
+    "what", ["cube edges and corners", "edges and vertices of the mesh", "anywhere"]
+)
 def test_rays_in_degenerate_directions_agree_too(what: str) -> None:
     coarse = trimesh.creation.icosphere(subdivisions=2)
-    V, F = np.array(coarse.vertices), np.array(coarse.faces)
+    V = np.array(coarse.vertices)
+    F = np.array(coarse.faces)
     if what == "cube edges and corners":
         directions = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
     elif what == "edges and vertices of the mesh":
@@ -134,7 +143,10 @@ def test_rays_in_degenerate_directions_agree_too(what: str) -> None:
         directions = np.random.default_rng(0).standard_normal((200, 3))
     found, weights = cast_rays(V, Mesh(V, F), directions)
     expected, expected_weights = cast_rays_exhaustively(V, F, directions)
-    hit, other = (np.einsum("ij,ijk->ik", w, V[F[t]]) for t, w in ((found, weights), (expected, expected_weights)))
+    hit, other = (
+        np.einsum("ij,ijk->ik", w, V[F[t]])
+        for t, w in ((found, weights), (expected, expected_weights))
+    )
     np.testing.assert_allclose(hit, other, atol=1e-9)
     np.testing.assert_allclose(np.cross(hit, directions), 0, atol=1e-9)
     assert (np.einsum("ij,ij->i", hit, directions) > 0).all()

@@ -60,7 +60,8 @@ def test_areas_are_those_of_the_texel_mesh_where_it_follows_the_surface(ball_mes
     corners = np.zeros(share.shape, bool)
     corners[:, [0, 0, -1, -1], [0, -1, -1, 0]] = True
     np.testing.assert_allclose(share[~corners], 1, atol=0.01)
-    # of a hexagon that three squares make, their centres' triangle and quads leave a seventh of each
+    # of a hexagon that three squares make, their centres' triangle and quads leave a seventh of
+    # each
     np.testing.assert_allclose(share[corners], 8 / 7, atol=0.01)
     assert atlas.areas.sum() == pytest.approx(ball_mesh.area, rel=1e-9)
 
@@ -78,7 +79,9 @@ def ball(subdivisions: int, resolution: int) -> Atlas:
     solid = trimesh.creation.icosphere(subdivisions=subdivisions)
     turned = solid.vertices @ trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])[:3, :3].T
     mesh = Mesh.from_arrays(turned, solid.faces)
-    return atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), resolution)
+    return atlas_from_sphere_map(
+        mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), resolution
+    )
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -88,7 +91,11 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 def direction_at(chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
     """The direction that a place in a chart stands for, by the definition of the equiangular cube map."""
     a, b = np.tan(np.pi / 4 * (2 * uv - 1)).T
-    return unit(cube.CHART_NORMALS[chart] + a[:, None] * cube.CHART_U[chart] + b[:, None] * cube.CHART_V[chart])
+    return unit(
+        cube.CHART_NORMALS[chart]
+        + a[:, None] * cube.CHART_U[chart]
+        + b[:, None] * cube.CHART_V[chart]
+    )
 
 
 def test_pieces_make_up_every_triangle_in_its_winding() -> None:
@@ -96,13 +103,19 @@ def test_pieces_make_up_every_triangle_in_its_winding() -> None:
     coordinates = atlas.texture_coordinates()
     share = np.linalg.det(coordinates.barycentrics)
     assert (share > 0).all()
-    assert (np.linalg.det(coordinates.uv[:, 1:] - coordinates.uv[:, :1]) > 0).all()  # on the charts too
+    # on the charts too
+    assert (np.linalg.det(coordinates.uv[:, 1:] - coordinates.uv[:, :1]) > 0).all()
     np.testing.assert_allclose(np.bincount(coordinates.triangle, share), 1, atol=1e-10)
     assert (coordinates.barycentrics >= 0).all()
     np.testing.assert_allclose(coordinates.barycentrics.sum(axis=2), 1)
     assert (np.diff(coordinates.triangle) >= 0).all()
     corners = coordinates.carry(atlas.mesh.V[atlas.mesh.F])
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    area = (
+        np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        ).sum()
+        / 2
+    )
     assert area == pytest.approx(atlas.mesh.area)
 
 
@@ -110,13 +123,19 @@ def test_every_corner_of_the_mesh_has_exact_coordinates(animal: Atlas) -> None:
     coordinates = animal.texture_coordinates()
     at_corner = coordinates.barycentrics.max(axis=2) == 1
     corner = coordinates.barycentrics.argmax(axis=2)
-    found = {(t, k) for t, ks, here in zip(coordinates.triangle, corner, at_corner, strict=True) for k in ks[here]}
+    found = {
+        (t, k)
+        for t, ks, here in zip(coordinates.triangle, corner, at_corner, strict=True)
+        for k in ks[here]
+    }
     assert len(found) == animal.mesh.F.size
     assert coordinates.uv.min() >= 0
     assert coordinates.uv.max() <= 1
     directions = unit(coordinates.carry(animal.sphere[animal.mesh.F]))
     for k in range(3):
-        np.testing.assert_allclose(direction_at(coordinates.chart, coordinates.uv[:, k]), directions[:, k], atol=1e-11)
+        np.testing.assert_allclose(
+            direction_at(coordinates.chart, coordinates.uv[:, k]), directions[:, k], atol=1e-11
+        )
 
 
 def test_triangles_are_cut_exactly_where_they_cross_a_cube_edge(animal: Atlas) -> None:
@@ -139,7 +158,9 @@ def test_interpolated_coordinates_converge_at_second_order() -> None:
         # one random point inside each piece: its interpolated coordinates, and true direction
         weights = np.random.default_rng(0).dirichlet(np.ones(3), size=len(coordinates.chart))
         uv = np.einsum("pi,pij->pj", weights, coordinates.uv)
-        directions = unit(np.einsum("pi,pij->pj", weights, coordinates.carry(atlas.sphere[atlas.mesh.F])))
+        directions = unit(
+            np.einsum("pi,pij->pj", weights, coordinates.carry(atlas.sphere[atlas.mesh.F]))
+        )
         distance = np.linalg.norm(direction_at(coordinates.chart, uv) - directions, axis=1)
         assert distance.max() < 0.01
         errors.append(np.sqrt((distance**2).mean()))
@@ -149,7 +170,11 @@ def test_interpolated_coordinates_converge_at_second_order() -> None:
 
 def test_triangles_as_large_as_a_quarter_of_the_sphere_are_cut() -> None:
     V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    atlas = build_atlas(Mesh.from_arrays(V, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), 8, cache=False)
+    atlas = build_atlas(
+        Mesh.from_arrays(V, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), 8, cache=False
+    )
     coordinates = atlas.texture_coordinates()
     assert set(coordinates.chart) == set(range(6))
-    np.testing.assert_allclose(np.bincount(coordinates.triangle, np.linalg.det(coordinates.barycentrics)), 1)
+    np.testing.assert_allclose(
+        np.bincount(coordinates.triangle, np.linalg.det(coordinates.barycentrics)), 1
+    )

@@ -10,8 +10,24 @@ from hand_made import eigenvalues, square_eigenvalues
 from known_meshes import known_mesh
 from surfaces import disk, grid, joined, moved, sphere, square, torus
 
-from ripple_sim.solver import Atlas, AtlasError, Material, Mesh, TexelMesh, WaveSolver, build_atlas, glue, load_mesh
-from ripple_sim.solver.layouts.patches import atlas_from_patch_map, centres, layout, patch_map, quads
+from ripple_sim.solver import (
+    Atlas,
+    AtlasError,
+    Material,
+    Mesh,
+    TexelMesh,
+    WaveSolver,
+    build_atlas,
+    glue,
+    load_mesh,
+)
+from ripple_sim.solver.layouts.patches import (
+    atlas_from_patch_map,
+    centres,
+    layout,
+    patch_map,
+    quads,
+)
 from ripple_sim.solver.layouts.patches.quads import Quads
 from ripple_sim.solver.layouts.patches.surface import TriangleSurface
 from ripple_sim.solver.texels import folded_texels
@@ -48,7 +64,9 @@ def test_texels_lie_in_their_triangles(atlas: Atlas) -> None:
 
 def test_no_triangle_is_folded_and_every_texel_is_found_where_it_lies(atlas: Atlas) -> None:
     assert atlas.quality()["flipped"] == 0
-    np.testing.assert_array_equal(atlas.nearest_texel(atlas.positions.reshape(-1, 3)), np.arange(atlas.areas.size))
+    np.testing.assert_array_equal(
+        atlas.nearest_texel(atlas.positions.reshape(-1, 3)), np.arange(atlas.areas.size)
+    )
     chart, row, column = atlas.locate(atlas.positions.reshape(-1, 3))
     place = np.stack([chart, row, column]).reshape(3, *atlas.areas.shape)
     np.testing.assert_allclose(place, np.indices(atlas.areas.shape), atol=1e-5)
@@ -70,7 +88,9 @@ def test_what_lies_beyond_a_rim_lies_on_it(atlas: Atlas) -> None:
         assert atlas.mesh.closed
         return
     points = atlas.texels.beyond[topology.rim]
-    ends = atlas.mesh.V[np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in atlas.mesh.rims])]
+    ends = atlas.mesh.V[
+        np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in atlas.mesh.rims])
+    ]
     along = ends[:, 1] - ends[:, 0]
     share = np.einsum("pek,ek->pe", points[:, None] - ends[:, 0], along) / (along**2).sum(axis=1)
     nearest = ends[:, 0] + np.clip(share, 0, 1)[..., None] * along
@@ -88,7 +108,9 @@ def test_a_wave_keeps_its_energy(atlas: Atlas) -> None:
 def test_texture_coordinates_cover_every_triangle_once(atlas: Atlas) -> None:
     pieces = atlas.texture_coordinates()
     share = np.abs(np.linalg.det(pieces.barycentrics))
-    np.testing.assert_allclose(np.bincount(pieces.triangle, share, len(atlas.mesh.F)), 1.0, atol=1e-6)
+    np.testing.assert_allclose(
+        np.bincount(pieces.triangle, share, len(atlas.mesh.F)), 1.0, atol=1e-6
+    )
     u, v = np.moveaxis(pieces.uv[:, 1:] - pieces.uv[:, :1], 1, 0)
     flat = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
     np.testing.assert_allclose(np.bincount(pieces.chart, flat, len(atlas.areas)), 1.0, atol=1e-6)
@@ -124,7 +146,9 @@ def thick_graph(genus: int) -> Mesh:
     rng = np.random.default_rng(genus)
     filled = np.zeros((5, 5, 5), bool)
     for ends in graph(genus, rng, size=2):
-        filled[tuple(2 * ends.astype(int).T + 1)] = filled[tuple(ends.sum(axis=0).astype(int) + 1)] = True
+        filled[tuple(2 * ends.astype(int).T + 1)] = filled[
+            tuple(ends.sum(axis=0).astype(int) + 1)
+        ] = True
     bars = Mesh.from_arrays(*voxels(filled))
     return Mesh.from_arrays(bars.V + rng.uniform(-0.2, 0.2, bars.V.shape), bars.F)
 
@@ -173,7 +197,9 @@ def test_a_surface_too_long_for_its_width_is_refused_at_once(stretch: float) -> 
         build_atlas(long, 16, cache=False, layout="patches")
 
 
-def test_a_surface_a_little_too_long_for_so_many_cells_has_fewer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_surface_a_little_too_long_for_so_many_cells_has_fewer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(quads, "_FARTHEST", 20**2)
     assert_atlas_carries_waves(build_atlas(ANY_MESH["strip"](), 16, cache=False, layout="patches"))
 
@@ -189,14 +215,17 @@ def test_many_parts_none_of_which_has_a_share_to_speak_of(monkeypatch: pytest.Mo
 
 def spout() -> Mesh:
     """An open tube, half as wide at its end."""
-    around, along = 8, 4
+    around = 8
+    along = 4
     row, column = np.divmod(np.arange(around * (along + 1)), around)
-    radius, angle = 0.04 * (1 - row / (2 * along)), 2 * np.pi / around * column
+    radius = 0.04 * (1 - row / (2 * along))
+    angle = 2 * np.pi / around * column
     V = np.stack([0.1 * row, radius * np.cos(angle), radius * np.sin(angle)], axis=1)
     a = np.arange(around * along)
     b = a - a % around + (a + 1) % around
     return Mesh.from_arrays(
-        V, np.concatenate([np.stack([a, b, b + around], 1), np.stack([a, b + around, a + around], 1)])
+        V,
+        np.concatenate([np.stack([a, b, b + around], 1), np.stack([a, b + around, a + around], 1)]),
     )
 
 
@@ -261,9 +290,15 @@ def texel_meshes(mesh: Mesh, project: Callable[[np.ndarray], np.ndarray]) -> lis
     patches = patch_map(mesh.V, mesh.F, 24)
     meshes = []
     for n in (8, 16):
-        texels = atlas_from_patch_map(mesh, patches, round(n * np.sqrt(len(patches.seamless.glued) / 6))).texels
+        texels = atlas_from_patch_map(
+            mesh, patches, round(n * np.sqrt(len(patches.seamless.glued) / 6))
+        ).texels
         beyond = None if texels.beyond is None else project(texels.beyond)
-        meshes.append(TexelMesh.of(texels.topology, project(texels.positions), normals=texels.normals, beyond=beyond))
+        meshes.append(
+            TexelMesh.of(
+                texels.topology, project(texels.positions), normals=texels.normals, beyond=beyond
+            )
+        )
     return meshes
 
 
@@ -272,11 +307,17 @@ def texel_meshes(mesh: Mesh, project: Callable[[np.ndarray], np.ndarray]) -> lis
     [
         (lambda: sphere(2), on_sphere, {"free": degrees(lambda d: 2 * d + 1)}),
         (hemisphere, on_sphere, {"free": degrees(lambda d: d + 1), "fixed": degrees(lambda d: d)}),
-        (lambda: square(4), np.asarray, {rim: square_eigenvalues(rim) for rim in ("free", "fixed")}),
+        (
+            lambda: square(4),
+            np.asarray,
+            {rim: square_eigenvalues(rim) for rim in ("free", "fixed")},
+        ),
     ],
     ids=["sphere", "hemisphere", "square"],
 )
-def test_eigenvalues_are_of_second_order(mesh: Callable, project: Callable, exact: dict[str, np.ndarray]) -> None:
+def test_eigenvalues_are_of_second_order(
+    mesh: Callable, project: Callable, exact: dict[str, np.ndarray]
+) -> None:
     meshes = texel_meshes(mesh(), project)
     for rim, values in exact.items():
         moving = values[:MODES] > 0

@@ -22,7 +22,8 @@ def test_sizes_keep_to_their_bounds() -> None:
 
 
 def test_texels_on_limbs_are_neither_folded_nor_wide() -> None:
-    ball, tips = sphere(4), TETRAHEDRON[0] / np.sqrt(3)
+    ball = sphere(4)
+    tips = TETRAHEDRON[0] / np.sqrt(3)
     radius = 1 + 3.0 * np.exp(40.0 * (ball.V @ tips.T - 1)).sum(axis=1)
     atlas = patches.patch_atlas(Mesh.from_arrays(ball.V * radius[:, None], ball.F), 64)
     quality = atlas.quality()
@@ -40,7 +41,9 @@ def cells_of(name: str, cells: int) -> patches.BorderedCells:
     surface = TriangleSurface.of(mesh.V, mesh.F)
     metric = Metric.of(surface)
     reach = 0.75 * np.sqrt(surface.areas.sum() / cells) if cells > 1 else np.inf
-    return patches.disk_cells(metric, patches.centred_cells(metric, patches.spread_seeds(metric, reach)))
+    return patches.disk_cells(
+        metric, patches.centred_cells(metric, patches.spread_seeds(metric, reach))
+    )
 
 
 def quads_of(name: str, cells: int) -> Quads:
@@ -145,12 +148,15 @@ def test_the_slope_of_newtons_system_is_that_of_the_energy(quads: Quads) -> None
     patches.assemble(seamless, reference, edges.of, ends, system)
     way = np.random.default_rng(0).normal(size=(len(seamless.z), 2))
     way[seamless.freedom == FIXED] = 0
-    start, step = seamless.z.copy(), 1e-9
+    start = seamless.z.copy()
+    step = 1e-9
     energies = []
     for t in (step, -step):
         seamless.z[:] = start + t * way @ (1, 1j)
         energies.append(patches.total_energy(seamless, reference))
-    assert (system.gradient * way).sum() == pytest.approx((energies[0] - energies[1]) / (2 * step), rel=1e-4)
+    assert (system.gradient * way).sum() == pytest.approx(
+        (energies[0] - energies[1]) / (2 * step), rel=1e-4
+    )
 
 
 def test_moved_tips_lower_the_energy_and_leave_the_map_one_to_one(quads: Quads) -> None:
@@ -164,7 +170,8 @@ def test_moved_tips_lower_the_energy_and_leave_the_map_one_to_one(quads: Quads) 
     places = assert_one_to_one(seamless)
     total = np.zeros(len(seamless.z))
     for k in range(3):
-        u, v = places[:, (k + 1) % 3] - places[:, k], places[:, (k + 2) % 3] - places[:, k]
+        u = places[:, (k + 1) % 3] - places[:, k]
+        v = places[:, (k + 2) % 3] - places[:, k]
         angle = np.angle(v / u)
         total += np.bincount(seamless.F[:, k], angle, len(total))
     np.testing.assert_allclose(total[seamless.freedom == FREE] / (2 * np.pi), 1.0, atol=1e-9)
@@ -174,7 +181,11 @@ def hull(points: int) -> tuple[tuple[np.ndarray, ...], int, np.ndarray]:
     """Triangles of the convex hull of random points, their sides, and how many meet in each point."""
     V = np.random.default_rng(points).normal(size=(points, 3))
     F = ConvexHull(V / np.linalg.norm(V, axis=1, keepdims=True)).simplices.astype(np.int64)
-    pairs = [(i, j) for i, j in itertools.combinations(range(len(F)), 2) if len(set(F[i]) & set(F[j])) == 2]
+    pairs = [
+        (i, j)
+        for i, j in itertools.combinations(range(len(F)), 2)
+        if len(set(F[i]) & set(F[j])) == 2
+    ]
     ends = [sorted(set(F[i]) & set(F[j])) for i, j in pairs]
     return (np.array(pairs), np.array(ends), np.zeros(len(pairs))), len(F), np.bincount(F.ravel())
 
@@ -198,7 +209,10 @@ def test_the_best_of_all_pairings_is_found(points: int) -> None:
     chosen = patches.chosen_joints(*joints, count, corners, np.full(points, 4.0))
     assert chosen is not None
     assert (np.bincount(joints[0][chosen].ravel()) == 1).all()
-    ways = [off(joints[1], corners, np.array(each)) for each in pairings(joints[0], frozenset(range(count)))]
+    ways = [
+        off(joints[1], corners, np.array(each))
+        for each in pairings(joints[0], frozenset(range(count)))
+    ]
     cost = [(each + 2 * np.maximum(each - 1, 0)).sum() for each in ways if each.max() < 2]
     found = off(joints[1], corners, chosen)
     assert (found + 2 * np.maximum(found - 1, 0)).sum() == min(cost)
@@ -206,7 +220,11 @@ def test_the_best_of_all_pairings_is_found(points: int) -> None:
 
 def test_where_their_number_is_odd_one_triangle_stays_alone() -> None:
     # three in a row, round points that have enough of others
-    joints = (np.array([[0, 1], [1, 2], [0, -1], [2, -1]]), np.array([[0, 1], [1, 2], [3, 4], [5, 6]]), np.zeros(4))
+    joints = (
+        np.array([[0, 1], [1, 2], [0, -1], [2, -1]]),
+        np.array([[0, 1], [1, 2], [3, 4], [5, 6]]),
+        np.zeros(4),
+    )
     chosen = patches.chosen_joints(*joints, 3, np.full(7, 5), np.full(7, 4.0))
     assert chosen is not None
     alone = joints[0][chosen, 1] < 0

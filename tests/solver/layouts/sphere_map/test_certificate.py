@@ -8,7 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from ripple_sim.solver import Mesh, WaveSolver, build_atlas
 from ripple_sim.solver.layouts import atlas_from_sphere_map
-from ripple_sim.solver.layouts.sphere_map import certificate, certify, progressive_sphere_map, stretch
+from ripple_sim.solver.layouts.sphere_map import (
+    certificate,
+    certify,
+    progressive_sphere_map,
+    stretch,
+)
 
 
 def test_certificate_catches_a_planted_fold():
@@ -53,10 +58,13 @@ def test_stretch_is_one_for_the_identity_and_doubles_with_lengths():
 def test_turning_the_cube_lengthens_the_time_step():
     V, F = thin_limb(3, 0.3)
     V = V / np.sqrt(trimesh.Trimesh(V, F, process=False).area / (4 * np.pi))
-    mesh, S = Mesh.from_arrays(V, F), progressive_sphere_map(V, F)
+    mesh = Mesh.from_arrays(V, F)
+    S = progressive_sphere_map(V, F)
 
     def step(sphere_map):
-        return WaveSolver(atlas_from_sphere_map(mesh, sphere_map, 32), backend="cpu").stable_timestep
+        return WaveSolver(
+            atlas_from_sphere_map(mesh, sphere_map, 32), backend="cpu"
+        ).stable_timestep
 
     others = [step(S @ rotation.T) for rotation in Rotation.random(12, random_state=1).as_matrix()]
     assert step(S) > np.median(others)

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from genus_zero import SHAPES, crumpled, icosphere
 
-from ripple_sim.solver.layouts.sphere_map import corner_table, decimate, undo_collapse, vertex_quadrics
+from ripple_sim.solver.layouts.sphere_map import (
+    corner_table,
+    decimate,
+    undo_collapse,
+    vertex_quadrics,
+)
 
 
 def decimated(V, F):
@@ -52,7 +57,9 @@ def test_a_mesh_that_is_one_point_still_collapses(place):
 
 
 def quadrics_of(V, F):
-    return vertex_quadrics(np.ascontiguousarray(F, dtype=np.int32).ravel(), np.asarray(V, dtype=float))
+    return vertex_quadrics(
+        np.ascontiguousarray(F, dtype=np.int32).ravel(), np.asarray(V, dtype=float)
+    )
 
 
 def test_quadric_error_is_the_sum_of_squared_distances_weighted_by_area():
@@ -67,7 +74,12 @@ def test_quadric_error_is_the_sum_of_squared_distances_weighted_by_area():
             twice_area = np.linalg.norm(normal)
             total += twice_area / 2 * (normal / twice_area @ (p - a)) ** 2
         q = quadrics[v]  # a form of (x, y, z, 1)
-        rows = [q[0], q[1], q[2], q[6]], [q[1], q[3], q[4], q[7]], [q[2], q[4], q[5], q[8]], [*q[6:9], q[9]]
+        rows = (
+            [q[0], q[1], q[2], q[6]],
+            [q[1], q[3], q[4], q[7]],
+            [q[2], q[4], q[5], q[8]],
+            [*q[6:9], q[9]],
+        )
         assert np.append(p, 1) @ np.array(rows) @ np.append(p, 1) == pytest.approx(total, rel=1e-10)
 
 

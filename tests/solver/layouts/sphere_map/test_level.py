@@ -47,9 +47,11 @@ def test_area_is_carried_on_through_a_chain_of_collapses_and_none_is_lost():
     carry(np.array([0, 1, 2]), np.array([1, 2, 3]), carried)
     assert carried[3] == 15
     V, F = crumpled()
-    source, table = source_of(V, F), corner_table(F, len(V))
+    source = source_of(V, F)
+    table = corner_table(F, len(V))
     log = decimate(table, source.V)
-    removed, kept = table.tail[log], table.tail[table.twin[log]]
+    removed = table.tail[log]
+    kept = table.tail[table.twin[log]]
     carry(removed, kept, source.carried)
     last = np.setdiff1d(np.arange(len(V)), removed)
     assert source.carried[last].sum() == pytest.approx(4 * np.pi)
@@ -59,7 +61,8 @@ def test_area_is_carried_on_through_a_chain_of_collapses_and_none_is_lost():
 def test_full_trust_in_a_whole_mesh_gives_its_own_triangles():
     V, F = stretched([1, 2, 3], subdivisions=2)
     source = source_of(V, F)
-    expected, reference = whole_level(source.V, F)[1], references(source, F)
+    expected = whole_level(source.V, F)[1]
+    reference = references(source, F)
     np.testing.assert_allclose(source.load, 1, rtol=1e-12)
     np.testing.assert_allclose(reference.area, expected.area, rtol=1e-12)
     np.testing.assert_allclose(reference.cotangent, expected.cotangent, rtol=1e-9, atol=1e-9)
@@ -84,7 +87,8 @@ def test_references_of_any_trust_are_triangles_whose_areas_make_up_the_sphere(tr
 
 
 def one_triangle(corners, **options):
-    V, F = np.array(corners, dtype=float), np.array([[0, 1, 2]])
+    V = np.array(corners, dtype=float)
+    F = np.array([[0, 1, 2]])
     settings = {"trust": 1.0, "sliver": 0.5} | options
     reference = Reference(np.zeros(1), np.zeros(3), SPHERE)
     source = RealSurface(V, np.ones(3), np.ones(3), settings["trust"], settings["sliver"], 1.0)
@@ -96,13 +100,17 @@ def test_only_slivers_are_pulled_towards_equilateral():
     good = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     np.testing.assert_allclose(angle_cotangents(one_triangle(good)), [[0, 1, 1]], atol=1e-12)
     thin = [[0, 0, 0], [1, 0, 0], [0.5, 0.01, 0]]
-    steepest = [np.abs(angle_cotangents(one_triangle(thin, sliver=sliver))).max() for sliver in (1e-6, 0.15, 0.5)]
+    steepest = [
+        np.abs(angle_cotangents(one_triangle(thin, sliver=sliver))).max()
+        for sliver in (1e-6, 0.15, 0.5)
+    ]
     assert steepest[0] == pytest.approx(50, rel=1e-6)
     assert steepest[0] > 5 * steepest[1] > 5 * steepest[2] > 5 * EQUILATERAL
 
 
 @pytest.mark.parametrize(
-    "corners", [[[1, 1, 1]] * 3, [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 0, 0], [0, 0, 0], [1, 0, 0]]]
+    "corners",
+    [[[1, 1, 1]] * 3, [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 0, 0], [0, 0, 0], [1, 0, 0]]],
 )
 def test_a_triangle_without_area_gets_the_smallest_share_and_finite_cotangents(corners):
     reference = one_triangle(corners)

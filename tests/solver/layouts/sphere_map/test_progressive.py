@@ -35,7 +35,9 @@ def test_map_is_certified(shape):
 
 def test_no_map_without_a_certificate(monkeypatch):
     V, F = icosphere(1)
-    monkeypatch.setattr(progressive, "_map_by_levels", lambda V, F, trust: np.ones_like(V) / np.sqrt(3))
+    monkeypatch.setattr(
+        progressive, "_map_by_levels", lambda V, F, trust: np.ones_like(V) / np.sqrt(3)
+    )
     with pytest.raises(SphereMapError, match=f"{len(F)} of {len(F)} triangles"):
         progressive_sphere_map(V, F)
 
@@ -74,7 +76,9 @@ def test_limbs_get_their_share_of_the_sphere():
     assert np.all(quantiles < [1.5, 2.2, 2.3])
 
 
-@pytest.mark.parametrize(("name", "bound"), [("spot.obj", 1.9), ("bunny.off", 2.0), ("elephant.obj", 2.0)])
+@pytest.mark.parametrize(
+    ("name", "bound"), [("spot.obj", 1.9), ("bunny.off", 2.0), ("elephant.obj", 2.0)]
+)
 def test_known_mesh(name, bound):
     mesh = trimesh.load(known_mesh(f"good/{name}"), process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
@@ -85,12 +89,15 @@ def test_known_mesh(name, bound):
 
 
 SEEDS = st.integers(0, 2**32 - 1)
-EXAMPLES = settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+EXAMPLES = settings(
+    max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 
 
 def smooth_radius(V, rng, roughness, waves=5):
     """A positive radius in every direction, smooth over about a third of the sphere."""
-    directions, phases = rng.standard_normal((waves, 3)) * 2, rng.uniform(0, 2 * np.pi, waves)
+    directions = rng.standard_normal((waves, 3)) * 2
+    phases = rng.uniform(0, 2 * np.pi, waves)
     return np.exp(roughness * np.mean(np.sin(V @ directions.T + phases), axis=1))
 
 
@@ -115,7 +122,9 @@ def assert_certified(V, F):
 @EXAMPLES
 @given(seed=SEEDS, points=st.integers(4, 400), factors=st.tuples(*[st.floats(0.05, 1)] * 3))
 def test_convex_hulls_of_random_points(seed, points, factors):
-    hull = trimesh.convex.convex_hull(np.random.default_rng(seed).standard_normal((points, 3)) * factors)
+    hull = trimesh.convex.convex_hull(
+        np.random.default_rng(seed).standard_normal((points, 3)) * factors
+    )
     assert_certified(*solid(hull))
 
 
@@ -154,7 +163,8 @@ def test_very_uneven_triangles(seed, power):
     V, F = icosphere(4)
     pole = np.random.default_rng(seed).standard_normal(3)
     pole /= np.linalg.norm(pole)
-    V = V + np.tanh(power / 2) * 0.98 * pole  # a Moebius map of the sphere crowds the vertices round one pole
+    # a Moebius map of the sphere crowds the vertices round one pole
+    V = V + np.tanh(power / 2) * 0.98 * pole
     inside = np.sum(V * V, axis=1, keepdims=True)
     V = V / np.sqrt(inside)
     S = assert_certified(V, F)
@@ -189,7 +199,9 @@ def renumbered(V, F):
     order = rng.permutation(len(V))
     number = np.empty(len(V), dtype=int)
     number[order] = np.arange(len(V))
-    F = np.array([np.roll(f, k) for f, k in zip(number[F], rng.integers(0, 3, len(F)), strict=True)])
+    F = np.array(
+        [np.roll(f, k) for f, k in zip(number[F], rng.integers(0, 3, len(F)), strict=True)]
+    )
     return V[order], rng.permutation(F)
 
 
