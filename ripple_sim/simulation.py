@@ -19,8 +19,8 @@ from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import RippleEntry, apply_maps, uniform_material
 from ripple_sim.scene.target_maps import rim_of
+from ripple_sim.solver.compile_clock import work_clock
 from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
-from ripple_sim.solver.kernel import work_clock
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000

@@ -31,6 +31,8 @@ SUBTITLE = (
 COMMON = (
     "ripple_sim.solver.errors",
     "ripple_sim.solver.kernel",
+    "ripple_sim.solver.kernel_cache",
+    "ripple_sim.solver.compile_clock",
     "ripple_sim.solver.files",
     "ripple_sim.solver.memory",
     "ripple_sim.errors",

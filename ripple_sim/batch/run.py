@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from ripple_sim.errors import BatchError
+from ripple_sim.solver.compile_clock import compile_times
 from ripple_sim.solver.files import OF_THE_DISK
-from ripple_sim.solver.kernel import compile_times
 
 from .executors import DaskExecutor, LocalExecutor, first_alone, usual_workers
 from .finished import pack

@@ -125,7 +125,7 @@ class _Rate(ProgressColumn):
     """The rate; or what is being compiled, and for how many seconds so far."""
 
     def render(self, task: Task) -> Text:
-        from ripple_sim.solver.kernel import compile_times, compiling
+        from ripple_sim.solver.compile_clock import compile_times, compiling
 
         if (module := compiling()) is None:
             return Text(

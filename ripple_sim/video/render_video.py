@@ -47,9 +47,9 @@ from ripple_sim.render import Surface
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.compile_clock import compile_times, work_clock
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance, user_line, work_for
 from ripple_sim.solver.gl import GLContext, shared_context
-from ripple_sim.solver.kernel import compile_times, work_clock
 from ripple_sim.sound import Microphone, gain
 
 from .options import VideoOptions

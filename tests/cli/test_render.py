@@ -16,7 +16,7 @@ import pytest
 from scene_files import write_scene
 
 from ripple_sim.cli import frame_progress, main as cli, reports
-from ripple_sim.solver import kernel
+from ripple_sim.solver import compile_clock
 from ripple_sim.solver.layouts.cube.convention import check_memory
 from ripple_sim.solver.operator import PRESETS
 
@@ -70,9 +70,9 @@ def test_a_terminal_shows_title_and_frames_done(monkeypatch: pytest.MonkeyPatch,
 def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     told = terminal(monkeypatch)
     kernels = "ripple_sim.solver.backends.kernels"
-    monkeypatch.setattr("ripple_sim.solver.kernel.compiling", lambda: kernels)
+    monkeypatch.setattr("ripple_sim.solver.compile_clock.compiling", lambda: kernels)
     times = {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0}
-    monkeypatch.setattr("ripple_sim.solver.kernel.compile_times", lambda: times)
+    monkeypatch.setattr("ripple_sim.solver.compile_clock.compile_times", lambda: times)
     with frame_progress("renderer", 120):
         pass
     assert all(
@@ -81,8 +81,8 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
 
 
 def test_what_takes_long_is_logged_and_printed_as_a_line(monkeypatch, capsys, caplog) -> None:
-    monkeypatch.setattr(kernel._watch, "seconds", {"ripple_sim.solver": 2.1})
-    monkeypatch.setattr(kernel._watch, "told", False)
+    monkeypatch.setattr(compile_clock._listener, "seconds", {"ripple_sim.solver": 2.1})
+    monkeypatch.setattr(compile_clock._listener, "warned", False)
 
     def run(self: object) -> None:
         check_memory(1000)

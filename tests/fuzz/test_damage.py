@@ -69,7 +69,7 @@ CACHES = [kernel(function)._cache for function in (lambda x: x + 1, changed, dam
 def test_damaged_kernels_are_not_loaded(damages: list) -> None:
     """What is not loaded is compiled: tests/solver/test_kernel.py."""
     with home_of_others() as home, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ripple_sim.solver.kernel.kernel_folder", lambda: home / "kernels")
+        patch.setattr("ripple_sim.solver.kernel_cache.kernel_folder", lambda: home / "kernels")
         for number, cache in enumerate(CACHES):
             cache.save("key", bytes([number]) * 99)
         damage(home / "kernels", damages)

@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 from programs import ended
 
-from ripple_sim.solver.kernel import compile_times, compiling, fingerprint, kernel, work_clock
+from ripple_sim.solver.compile_clock import compile_times, compiling, work_clock
+from ripple_sim.solver.kernel import kernel
+from ripple_sim.solver.kernel_cache import fingerprint
 
 
 @kernel
@@ -113,7 +115,9 @@ def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     monkeypatch.syspath_prepend(tmp_path)
     # a change within the second would go unnoticed
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    monkeypatch.setattr("ripple_sim.solver.kernel.kernel_folder", lambda: tmp_path / "kernels")
+    monkeypatch.setattr(
+        "ripple_sim.solver.kernel_cache.kernel_folder", lambda: tmp_path / "kernels"
+    )
 
     def imported() -> ModuleType:
         sys.modules.pop("library_of_kernels", None)
