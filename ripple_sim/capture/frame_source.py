@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.soft import first_skin
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
-from ripple_sim.render.camera import Pose
-from ripple_sim.render.resources import MovedHeightMap
+from ripple_sim.render.height_map_textures import MovedHeightMap
+from ripple_sim.render.pose import Pose
+from ripple_sim.render.surface_image import SurfaceImage
 from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
 from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.render.targets import SurfaceImage
 from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Impulse, Ripples
-from ripple_sim.render.camera import Pose
-from ripple_sim.render.resources import AnyHeightMap, MovedHeightMap
+from ripple_sim.render.height_map_textures import AnyHeightMap, MovedHeightMap
+from ripple_sim.render.pose import Pose
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap

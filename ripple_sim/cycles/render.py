@@ -31,7 +31,7 @@ from ripple_sim.export.options import ExportOptions
 from ripple_sim.export.place import ending_of
 from ripple_sim.export.source import Source
 from ripple_sim.export.visuals import mean_color
-from ripple_sim.render.passes.shadows import find_floor
+from ripple_sim.render.passes.floor import find_floor
 from ripple_sim.render.tone_mapping import tone_mapped
 from ripple_sim.render.visuals.lights import (
     BESIDE_LIGHTS,

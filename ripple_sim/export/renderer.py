@@ -18,9 +18,8 @@ from ripple_sim.coupling.own_model import check_targets, own_data, own_model, po
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RenderError, SceneError
 from ripple_sim.render import AnyHeightMap, Camera, FixedCamera, Renderer
-from ripple_sim.render.camera import (
-    Viewpoint,
-    find_viewpoint,
+from ripple_sim.render.camera import Viewpoint, find_viewpoint
+from ripple_sim.render.mujoco_cameras import (
     mujoco_camera,
     pose_of_scene,
     set_scene_camera,

@@ -13,7 +13,7 @@ import mujoco
 from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.encode.part import Settings
-from ripple_sim.render.camera import Pose
+from ripple_sim.render.pose import Pose
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.solver.waves.sensor import Sensor
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.energy import Energy
-from ripple_sim.render.camera import Pose
+from ripple_sim.render.pose import Pose
 from ripple_sim.scene.overlays import HEATMAPS, Request
 
 from .marks import FAINT, HEAD_WIDTH, INK, RIM, Color, Mark, Sprite, draw_arrow, overlap, text_width

@@ -15,13 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
-from ripple_sim.render.passes.shadows import (
-    Floor,
-    FloorOcclusion,
-    ShadowMaps,
-    TransmissionMaps,
-    find_floor,
-)
+from ripple_sim.render.passes.floor import Floor, find_floor
+from ripple_sim.render.passes.floor_occlusion import FloorOcclusion
+from ripple_sim.render.passes.shadows import ShadowMaps, TransmissionMaps
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.visuals.lights import SceneLight, in_studio
 from ripple_sim.render.visuals.objects import Assets
@@ -30,11 +26,16 @@ from ripple_sim.solver.errors import RippleError, warn_caller
 from ripple_sim.solver.gl import GLContext
 from ripple_sim.solver.memory import require_memory
 
-from .camera import Pose, Viewpoint, boxes_of, enclosing, within
+from .bounds import boxes_of, enclosing, within
+from .camera import Viewpoint
 from .drawn_scene import DrawnScene
-from .resources import AnyHeightMap, FrameUniforms, Resources
+from .frame_uniforms import FrameUniforms
+from .height_map_textures import AnyHeightMap
+from .pose import Pose
+from .readback import FrameFormat, Readback
+from .resources import Resources
 from .shown_scene import ShownScene
-from .targets import FrameFormat, Readback, SurfaceBuffers, SurfaceImage
+from .surface_image import SurfaceBuffers, SurfaceImage
 
 _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow

@@ -16,7 +16,7 @@ from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.export.moving_mesh import Displaced
 from ripple_sim.overlay.notes import round_up
-from ripple_sim.render.passes.shadows import find_floor
+from ripple_sim.render.passes.floor import find_floor
 from ripple_sim.render.surfaces.surface import target_color
 from ripple_sim.render.visuals.shapes import shape_of, sizes
 from ripple_sim.render.visuals.visual import geom_visual, visible_geoms

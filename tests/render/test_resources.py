@@ -20,7 +20,9 @@ from ripple_sim.render import (
     srgb_texture,
     srgb_to_linear,
 )
-from ripple_sim.render.targets import FramePass, GBuffer, Readback
+from ripple_sim.render.frame_pass import FramePass
+from ripple_sim.render.g_buffer import GBuffer
+from ripple_sim.render.readback import Readback
 
 
 def test_renderers_leave_nothing_behind(gl):

@@ -5,10 +5,6 @@ from .deferred import (
     TransparentLayers as TransparentLayers,
     touched_tiles as touched_tiles,
 )
-from .shadows import (
-    Floor as Floor,
-    FloorOcclusion as FloorOcclusion,
-    ShadowMaps as ShadowMaps,
-    TransmissionMaps as TransmissionMaps,
-    find_floor as find_floor,
-)
+from .floor import Floor as Floor, find_floor as find_floor
+from .floor_occlusion import FloorOcclusion as FloorOcclusion
+from .shadows import ShadowMaps as ShadowMaps, TransmissionMaps as TransmissionMaps

@@ -15,13 +15,18 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import Pose, boxes_of, scissor_of
+from ripple_sim.render.bounds import boxes_of, scissor_of
 from ripple_sim.render.contract import LEVELS, Unit
-from ripple_sim.render.resources import SRGB8_ALPHA8, FrameUniforms, Resources
-from ripple_sim.render.targets import FrameFormat, FramePass, GBuffer
+from ripple_sim.render.frame_pass import FramePass
+from ripple_sim.render.frame_uniforms import FrameUniforms
+from ripple_sim.render.g_buffer import GBuffer
+from ripple_sim.render.pose import Pose
+from ripple_sim.render.readback import FrameFormat
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.srgb_textures import SRGB8_ALPHA8
 from ripple_sim.solver.errors import RippleError
 
-from .shadows import Floor
+from .floor import Floor
 
 _PIXELS = 4  # along an edge of a block, which a texel of the coarse background stands for
 _BLOCKS = 8  # along an edge of a tile

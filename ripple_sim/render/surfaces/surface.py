@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.contract import MappingKind, Unit
-from ripple_sim.render.resources import Resources, write_page
+from ripple_sim.render.height_map_textures import write_page
+from ripple_sim.render.resources import Resources
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
 from ripple_sim.render.visuals.visual import (

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import balls_about
+from ripple_sim.render.bounds import balls_about
 from ripple_sim.render.visuals.corners import (
     bake,
     corner_normals,

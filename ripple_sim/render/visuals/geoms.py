@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import Pose
 from ripple_sim.render.contract import CasterMap
+from ripple_sim.render.pose import Pose
 from ripple_sim.render.resources import Resources
 
 from .objects import Assets, Occluders

@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.render.camera import Pose
 from ripple_sim.render.contract import MAX_LIGHTS, MAX_SHADOWS, Unit
-from ripple_sim.render.resources import FrameUniforms
+from ripple_sim.render.frame_uniforms import FrameUniforms
+from ripple_sim.render.pose import Pose
 from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
 

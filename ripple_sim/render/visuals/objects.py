@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.contract import MAX_OCCLUDERS, OBJECT, OBJECT_COLUMNS, Binding, Unit
-from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture, write_srgb
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.srgb_textures import srgb_cube, srgb_texture, write_srgb
 from ripple_sim.render.tone_mapping import srgb_to_linear
 
 from .scene_entries import outgrown_assets

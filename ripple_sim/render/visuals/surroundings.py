@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import Pose
-from ripple_sim.render.resources import FrameUniforms
+from ripple_sim.render.frame_uniforms import FrameUniforms
+from ripple_sim.render.pose import Pose
 from ripple_sim.render.tone_mapping import srgb_to_linear
 
 _FLAG = mujoco.mjtRndFlag

@@ -11,7 +11,7 @@ from scipy.ndimage import binary_erosion
 
 from ripple_sim.render import Camera
 from ripple_sim.render.passes import deferred
-from ripple_sim.render.passes.shadows import Floor, find_floor
+from ripple_sim.render.passes.floor import Floor, find_floor
 from ripple_sim.render.visuals import Assets
 
 CHECKER = """<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="{0}" height="{0}"/>

@@ -5,7 +5,7 @@ import pytest
 from mujoco_models import posed
 from shader_functions import evaluated
 
-from ripple_sim.render.camera import Pose
+from ripple_sim.render.pose import Pose
 from ripple_sim.render.visuals import (
     LOOKS,
     Assets,
