@@ -26,8 +26,8 @@ try:
     from ripple_sim.export.environment_renders import DRAWN_MODES, RenderedInPlace, frames_of
 except ImportError as error:
     raise ImportError(
-        "ripple_sim.gymnasium needs Gymnasium, which is not installed; install it with: "
-        "pip install 'ripple-sim[gymnasium]'"
+        "ripple_sim.gymnasium needs Gymnasium, which is not installed; install it with: pip "
+        "install 'ripple-sim[gymnasium]'"
     ) from error
 
 _SIZE = 480  # of frames where an environment does not say [pixels]
@@ -42,8 +42,7 @@ def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
     if not (hasattr(holder, "model") and hasattr(holder, "data")):
         raise SceneError(
             f"the environment {env} has no `model` and `data`; valid are MuJoCo environments, such "
-            f"as those derived "
-            "from gymnasium.envs.mujoco.MujocoEnv"
+            "as those derived from gymnasium.envs.mujoco.MujocoEnv"
         )
     model = own_model(holder.model)
     return model, own_data(model, holder.data)
@@ -170,8 +169,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             if name in spaces or round(count) < 1 or abs(count - round(count)) > 1e-6 * count:
                 raise SceneError(
                     f"sensor {name!r} has {count:g} samples in a control step of {control:g} s; "
-                    f"valid are whole "
-                    f"numbers, and names other than {', '.join(map(repr, spaces))}"
+                    f"valid are whole numbers, and names other than {', '.join(map(repr, spaces))}"
                 )
             shape = round(count), len(sensor.points)
             self._counts[name] = shape[0]
@@ -236,8 +234,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         if problem is not None:
             warn_caller(
                 f"the environment's own render {problem}; the model is drawn with MuJoCo's free "
-                f"camera in its place, "
-                "without what that render adds"
+                "camera in its place, without what that render adds"
             )
         return self._drawn_from_outside(self._in_place)
 

@@ -99,8 +99,7 @@ class Simulation:
         if not steps < _MOST_STEPS_PER_FRAME:
             raise SceneError(
                 f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are "
-                f"at most "
-                f"{_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
+                f"at most {_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
             )
         self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
         self.model.opt.timestep = 1 / (fps * self.steps_per_frame)
@@ -215,8 +214,8 @@ class Simulation:
         stepped = work_clock()
         if (broken := divergence(self.data)) is not None:
             raise SimulationError(
-                f"the physics became unstable at {self.data.time:.4g} s ({broken}); "
-                "use a shorter time step in the MJCF's <option>, or softer contacts"
+                f"the physics became unstable at {self.data.time:.4g} s ({broken}); use a shorter "
+                "time step in the MJCF's <option>, or softer contacts"
             )
         self.ripples.step(self.data)
         self.impulses += self.ripples.last_impulses

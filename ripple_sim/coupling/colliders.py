@@ -182,8 +182,7 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
     if not mesh.closed:
         raise SceneError(
             f"the {mesh.name} is open and encloses no volume that has convex parts; valid routes "
-            f"for it are 'flex' "
-            "and 'hull'"
+            "for it are 'flex' and 'hull'"
         )
     try:
         version = importlib.metadata.version("coacd")
@@ -224,8 +223,7 @@ def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
     if spec.compiler.discardvisual:
         raise SceneError(
             f"geom {geom.name!r} cannot have others collide for it: with discardvisual the "
-            f"compiler would discard it; "
-            "set spec.compiler.discardvisual = False"
+            "compiler would discard it; set spec.compiler.discardvisual = False"
         )
     model = _compiled(spec, geom)
     index = model.geom(geom.name).id
@@ -246,8 +244,7 @@ def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
     except ValueError as error:
         raise SceneError(
             f"the colliders of geom {geom.name!r} are made from its compiled mesh, but the "
-            f"specification does not "
-            f"compile: {error}"
+            f"specification does not compile: {error}"
         ) from error
 
 

@@ -38,8 +38,8 @@ def named_collision_geoms(
         if is_soft(model, target):
             raise SceneError(
                 f"contacts names {name!r}, a flex or a skin, for which no geoms can be chosen: a "
-                f"flex takes the "
-                "contacts of its own vertices, a skin those of the bodies of its bones"
+                "flex takes the contacts of its own vertices, a skin those of the bodies of its "
+                "bones"
             )
         if target not in rippling:
             raise SceneError(
@@ -56,14 +56,12 @@ def named_collision_geoms(
                 theirs, own = (model.body(model.geom_bodyid[each]).name for each in (geom, target))
                 raise SceneError(
                     f"contacts of geom {name!r} names geom {other!r} on body {theirs!r}, which "
-                    f"moves by itself; valid "
-                    f"are geoms of body {own!r} and of those welded to it"
+                    f"moves by itself; valid are geoms of body {own!r} and of those welded to it"
                 )
             if geom != target and geom in rippling:
                 raise SceneError(
                     f"contacts of geom {name!r} names geom {other!r}, which ripples itself and "
-                    f"keeps its contacts; "
-                    "take it out of one of the two"
+                    "keeps its contacts; take it out of one of the two"
                 )
     return found
 

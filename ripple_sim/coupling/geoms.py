@@ -73,8 +73,8 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
     )
     raise SceneError(
         f"the model has no geom {key!r}; its geoms are "
-        f"{', '.join(map(repr, names[:_LISTED])) or 'none'}{more}{soft}: "
-        'give a name, "body/index", or an id'
+        f"{', '.join(map(repr, names[:_LISTED])) or 'none'}{more}{soft}: give a name, "
+        '"body/index", or an id'
     )
 
 

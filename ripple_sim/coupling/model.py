@@ -427,8 +427,7 @@ class FlexContacts:
             share = self._amounts[target, 1] / self._amounts[target, 0]
             warn_caller(
                 f"the impulses on geom {name!r} are wrong by about {share:.1%}: MuJoCo pushes "
-                f"sideways what touches "
-                "its flex, where a geom has sunk in or edges and corners meet; use a shorter time "
-                "step, no override of "
-                f'contact margins, or make_collidable(spec, {name!r}, "sdf")'
+                "sideways what touches its flex, where a geom has sunk in or edges and corners "
+                "meet; use a shorter time step, no override of contact margins, or "
+                f'make_collidable(spec, {name!r}, "sdf")'
             )

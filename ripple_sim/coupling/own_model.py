@@ -55,8 +55,7 @@ def own_model(model: Any) -> mujoco.MjModel:
     if not 0 < found.opt.timestep <= _LONGEST_STEP:
         raise SceneError(
             f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 "
-            f"and up to "
-            f"{_LONGEST_STEP:g}, such as 0.002 (<option timestep=...>)"
+            f"and up to {_LONGEST_STEP:g}, such as 0.002 (<option timestep=...>)"
         )
     for name in (
         "opt.gravity",
@@ -103,9 +102,8 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
     if differing:
         raise SceneError(
             f"data belongs to another model ({_sizes(other)}) than that of the ripples "
-            f"({_sizes(model)}), of another "
-            f"{differing}: give step the data of the latter, mujoco.MjData(model), or make new "
-            f"Ripples for the former"
+            f"({_sizes(model)}), of another {differing}: give step the data of the latter, "
+            "mujoco.MjData(model), or make new Ripples for the former"
         )
     if not drawn:
         _copies.setdefault(model, WeakSet()).add(other)
@@ -127,8 +125,8 @@ def check_targets(model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping
     if differing:
         raise SceneError(
             f"the ripples belong to another model ({_sizes(other)}) than the one to be drawn "
-            f"({_sizes(model)}), of "
-            f"another {differing}: draw ripples.model, or make new Ripples for the latter"
+            f"({_sizes(model)}), of another {differing}: draw ripples.model, or make new Ripples "
+            "for the latter"
         )
 
 

@@ -173,17 +173,15 @@ class Ripples:
         if two_way and coupled.soft:
             raise SceneError(
                 "flexes and skins cannot push back: their waves have the masses that their nodes "
-                "and bones have "
-                "already; take two_way=False, or geoms as targets alone"
+                "and bones have already; take two_way=False, or geoms as targets alone"
             )
         if two_way:
             require_suited_options(self.model)
         if self._waves and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
             warn_caller(
                 "the integrator RK4 averages four contact forces in each step, of which MuJoCo "
-                "keeps only the last: "
-                'impulses are off by some per cent; use integrator="implicitfast", or a short time '
-                "step"
+                "keeps only the last: impulses are off by some per cent; use "
+                'integrator="implicitfast", or a short time step'
             )
         for name, target in targets.items():
             if not target.limit:
@@ -267,8 +265,7 @@ class Ripples:
         if off > _FAR * size:
             warn_caller(
                 f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its "
-                f"size); the nearest point "
-                f"is poked. Points are in the frame of the geom's body [m]"
+                "size); the nearest point is poked. Points are in the frame of the geom's body [m]"
             )
         return where
 
@@ -497,8 +494,7 @@ class Ripples:
             self._warn_once(
                 f"shapes {names}",
                 f"the surface of {names} was changed in the model: it gets a new atlas, and its "
-                f"waves begin flat; set "
-                "surfaces before Ripples is made where that takes too long",
+                "waves begin flat; set surfaces before Ripples is made where that takes too long",
             )
 
     def _couple(self, before: AmplitudeCheck | None) -> CoupledModel:

@@ -68,8 +68,7 @@ class RipplingSurface:
             if so:
                 raise SceneError(
                     f"the surface of {name!r} was changed in the model, and {what}, which belongs "
-                    f"to the old one: make "
-                    "new Ripples for the model as it is now"
+                    "to the old one: make new Ripples for the model as it is now"
                 )
         atlas = target_atlas(model, self.geom, old.rest.resolution, self.layout)
         new = WaveSolver(atlas, self.material, **self.options)
@@ -117,7 +116,7 @@ def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
         names = " and ".join(repr(model.body(body).name) for body in bodies)
         raise SceneError(
             f"site {name!r} and the geom it measures are on bodies {names}, which move; put it on "
-            f"the geom's"
+            "the geom's"
         )
     mujoco.mj_kinematics(model, data)
     position, rotation = target_pose(data, geom)

@@ -100,8 +100,7 @@ class SoftSurface:
             if model.flex_dim[flex] == 1:
                 raise SceneError(
                     f"flex {soft_name(model, target)!r} is a cable, which cannot ripple; valid are "
-                    f"surfaces and solids "
-                    "(dim 2 and 3)"
+                    "surfaces and solids (dim 2 and 3)"
                 )
             # the triangles themselves, or those of the outside of tetrahedra
             F = model.flex_elem

@@ -30,8 +30,8 @@ _ROUND_OFF = 1e-6  # of times, in time steps
 
 IN_TURN_WARNING = (
     "`Ripples.step` was given two MjData in turn, as of two simulations: its waves belong to one, "
-    "and begin anew each "
-    "time the other one comes; make one Ripples for each MjData, Ripples(model, materials)"
+    "and begin anew each time the other one comes; make one Ripples for each MjData, "
+    "Ripples(model, materials)"
 )
 _NO_CONTACTS = {
     "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
@@ -61,17 +61,15 @@ _EVERY = 20
 _MOVES = 1e-8
 UNSOLVED_WARNING = (
     "`Ripples.step` was called between `mj_step1` and `mj_step2`, before MuJoCo had solved for the "
-    "contact forces: "
-    "they are solved for with the controls as they are, and may differ from those of the coming "
-    "`mj_step2`; call "
-    "`step` between `mj_step2` and `mj_step1`, or take steps within `with ripples.following(data):`"
+    "contact forces: they are solved for with the controls as they are, and may differ from those "
+    "of the coming `mj_step2`; call `step` between `mj_step2` and `mj_step1`, or take steps within "
+    "`with ripples.following(data):`"
 )
 LOST_WARNING = (
     "the contact forces of the latest physics step were gone when `Ripples.step` was called: "
-    "`mj_collision`, called "
-    "after `mj_step`, throws them away; those of the coming step are taken in their place, so that "
-    "hits begin too "
-    "late; call `step` right after `mj_step`, or take steps with `ripples.mj_step(data)`"
+    "`mj_collision`, called after `mj_step`, throws them away; those of the coming step are taken "
+    "in their place, so that hits begin too late; call `step` right after `mj_step`, or take steps "
+    "with `ripples.mj_step(data)`"
 )
 
 
@@ -193,8 +191,8 @@ def disabled_warning(model: mujoco.MjModel) -> str | None:
     constants = " | ".join(f"mujoco.mjtDisableBit.{_NO_CONTACTS[name].name}" for name in disabled)
     return (
         f"nothing will ripple by contacts: the model has <flag {flags}/>, with which MuJoCo finds "
-        f"no contact forces; "
-        f"remove it from the MJCF's <option>, or call model.opt.disableflags &= ~int({constants})"
+        "no contact forces; remove it from the MJCF's <option>, or call model.opt.disableflags &= "
+        f"~int({constants})"
     )
 
 
@@ -204,11 +202,9 @@ def missed_warning(missed: int) -> str | None:
         return None
     return (
         f"{missed + 1} physics steps were taken between two calls of `Ripples.step`, of which only "
-        f"the latest gives "
-        f"its impulses: MuJoCo no longer has the contact forces of the other {missed}; call "
-        f"`ripples.mj_step(data, nstep={missed + 1})` in place of `mujoco.mj_step`, or, around "
-        f"code that steps by "
-        "itself, `with ripples.following(data):`"
+        "the latest gives its impulses: MuJoCo no longer has the contact forces of the other "
+        f"{missed}; call `ripples.mj_step(data, nstep={missed + 1})` in place of `mujoco.mj_step`, "
+        "or, around code that steps by itself, `with ripples.following(data):`"
     )
 
 

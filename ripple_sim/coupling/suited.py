@@ -418,9 +418,8 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
     """
     geom = find_target(model, name)
     needs = (
-        f'the preset "suited" of {name!r} needs a size [m] and a hit [kg, m/s], as size = '
-        f"1.0, "
-        f"hit = [0.5, 4.4]"
+        f'the preset "suited" of {name!r} needs a size [m] and a hit [kg, m/s], as size = 1.0, hit '
+        "= [0.5, 4.4]"
     )
     if is_soft(model, geom):
         raise SceneError(f"{needs}: what may hit a flex or a skin is not known")
@@ -537,8 +536,6 @@ def _warn_of_unseen(coupled: CoupledModel, name: str, geom: int, extent: Extent)
     if heavy > _HEAVY * light:
         warn_caller(
             f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
-            f"{light:.2g} "
-            f"kg will not be seen; Material.suited(size={extent.size:.2g}, hit=({light:.2g}, m/s)) "
-            f"is suited "
-            "to them"
+            f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, "
+            f"hit=({light:.2g}, m/s)) is suited to them"
         )

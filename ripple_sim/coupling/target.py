@@ -92,7 +92,7 @@ def named_targets(
     if not isinstance(given, Mapping):
         raise SceneError(
             f"materials is {type(given).__name__}; valid is a mapping of geom names to Material or "
-            f"Target"
+            "Target"
         )
     for key, value in given.items():
         find_target(model, key)
@@ -129,8 +129,8 @@ def _value_for_each(
     if missing and field not in _MAY_BE_MISSING:
         raise SceneError(
             f"{field} has no entry for geom {missing[0]!r}; it has "
-            f"{', '.join(map(repr, values)) or 'none'}: "
-            f"give every rippling geom one, or one {field} for all"
+            f"{', '.join(map(repr, values)) or 'none'}: give every rippling geom one, or one "
+            f"{field} for all"
         )
     return values
 

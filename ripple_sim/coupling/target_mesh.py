@@ -121,9 +121,8 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
         except AtlasError as error:
             raise AtlasError(
                 f"{name}, in {counted(mesh.component_count, 'part')}, gets no charts: {error}; let "
-                f"the geom that "
-                "collides for it ripple, or give it a mesh that is wrapped: load_mesh(file, "
-                "wrap=True)"
+                "the geom that collides for it ripple, or give it a mesh that is wrapped: "
+                "load_mesh(file, wrap=True)"
             ) from error
 
     return _atlases.get(key, build)

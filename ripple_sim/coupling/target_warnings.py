@@ -134,10 +134,8 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
             names = ", ".join(repr(coupled.names[each]) for each in colliders)
             yield (
                 f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its "
-                f"size) off the surface "
-                f"that ripples: contacts load it where it is nearest to them; name other geoms in "
-                f"Target(contacts=...) "
-                f"or call make_collidable(spec, {name!r})"
+                "size) off the surface that ripples: contacts load it where it is nearest to them; "
+                f"name other geoms in Target(contacts=...) or call make_collidable(spec, {name!r})"
             )
     elif coupled.has_flex[geom]:
         yield from _flex_warning(coupled, geom)
@@ -148,9 +146,8 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
         if gap > GAP_TOLERANCE * size:
             yield (
                 f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} "
-                f"of its size) off the "
-                f'surface that ripples; give it type="sdf" in the MJCF, or call '
-                f"make_collidable(spec, {name!r})"
+                'of its size) off the surface that ripples; give it type="sdf" in the MJCF, or '
+                f"call make_collidable(spec, {name!r})"
             )
     elif model.geom_type[geom] == _GEOM.mjGEOM_SDF:
         hills = np.flatnonzero(coupled.can_collide(geom) & (model.geom_type == _GEOM.mjGEOM_HFIELD))
@@ -158,9 +155,8 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
             names = ", ".join(repr(coupled.names[other]) for other in hills)
             yield (
                 f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): "
-                f"call "
-                f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so '
-                f"that they do not meet"
+                f'call make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity '
+                "so that they do not meet"
             )
     # not in MuJoCo's older versions
     passive = getattr(model, "flex_passive", np.zeros(model.nflex))
@@ -181,9 +177,8 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
     if not colliders:
         return (
             f"nothing can touch geom {name!r}: it does not collide (contype and conaffinity are "
-            f"0), nor does another "
-            f"geom of its body; name the geoms that collide for it, Target(contacts=[...]), or "
-            f"give it a contype"
+            "0), nor does another geom of its body; name the geoms that collide for it, "
+            "Target(contacts=[...]), or give it a contype"
         )
     masks = ", ".join(
         (
@@ -194,7 +189,7 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
     )
     return (
         f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not "
-        f"welded to its own"
+        "welded to its own"
     )
 
 
@@ -233,8 +228,7 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
             apart,
             (
                 "MuJoCo finds no contacts of a flex with bodies that are joined to its own or "
-                "excluded "
-                "({})"
+                "excluded ({})"
             ),
         ),
     )
@@ -246,8 +240,8 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
     if found:
         yield (
             f"geom {name!r} collides through a flex: {'; '.join(found)}; call "
-            f'make_collidable(spec, {name!r}, "sdf"), '
-            "or choose contype and conaffinity so that they do not meet"
+            f'make_collidable(spec, {name!r}, "sdf"), or choose contype and conaffinity so that '
+            "they do not meet"
         )
 
 
@@ -339,8 +333,7 @@ class AmplitudeCheck:
         warn_caller(
             (
                 f"the waves on geom {self._coupled.names[geom]!r} are {watch.what}; pictures show "
-                f"them "
-                f"limited. "
+                "them limited. "
             )
             + self._advice(geom, watch.waves, _MARGIN * watch.needed)
         )

@@ -250,7 +250,7 @@ def _check(entry: RandomEntry) -> None:
         if not 0 < low <= high < np.inf:
             raise SceneError(
                 f"[random] {name} is [{low!r}, {high!r}]; valid are two positive factors, the "
-                f"lower one first"
+                "lower one first"
             )
     if not 0 <= entry.position < np.inf:
         raise SceneError(f"[random] position is {entry.position!r} m; valid is 0 or greater")

@@ -313,6 +313,5 @@ def is_scene(target: str | Path) -> bool:
         return False
     raise SceneError(
         f"there is no scene or mesh {str(target)!r}; shipped scenes are "
-        f"{', '.join(shipped_scenes())}, or give the "
-        "path of a scene file (TOML) or of a mesh"
+        f"{', '.join(shipped_scenes())}, or give the path of a scene file (TOML) or of a mesh"
     )

@@ -93,7 +93,7 @@ def free_joint(
     if entry.orientation is not None and not np.linalg.norm(entry.orientation) > 0:
         raise SceneError(
             f"[[{verb}]] of body {entry.body!r} has orientation {entry.orientation}; valid is w x "
-            f"y z, not 0"
+            "y z, not 0"
         )
     return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
 
@@ -182,8 +182,7 @@ class Script:
             if target_name(model, find_any(model, surface.geom)) not in targets:
                 raise SceneError(
                     f"[[{verb}]] names the geom {surface.geom!r}, which does not ripple; the "
-                    f"rippling geoms are "
-                    f"{', '.join(map(repr, targets))}"
+                    f"rippling geoms are {', '.join(map(repr, targets))}"
                 )
             if isinstance(surface, PokeEntry) and not (
                 np.isfinite([surface.impulse, *surface.point]).all()
@@ -191,9 +190,8 @@ class Script:
             ):
                 raise SceneError(
                     f"[[poke]] of {surface.geom!r} has point {surface.point} m, impulse "
-                    f"{surface.impulse!r} N s, "
-                    f"radius {surface.radius!r} m; valid are finite numbers, the radius 0 or "
-                    f"greater"
+                    f"{surface.impulse!r} N s, radius {surface.radius!r} m; valid are finite "
+                    "numbers, the radius 0 or greater"
                 )
         controls = sorted(events.control, key=lambda entry: entry.time)
         self._actuators = {entry.actuator: _actuator(model, entry) for entry in controls}

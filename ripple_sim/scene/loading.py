@@ -102,8 +102,8 @@ def check_scene(scene: Scene) -> None:
         ]:
             warn_caller(
                 f"a [[{each.name}]] at {late[0]:g} s is not before the scene's end, "
-                f"{scene.duration:g} s; give the "
-                "scene a longer duration, or the event an earlier time"
+                f"{scene.duration:g} s; give the scene a longer duration, or the event an earlier "
+                "time"
             )
     check_camera(scene.model, scene.camera)
 
@@ -144,7 +144,7 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
         raise SceneError(
             f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 "
-            f"(sRGB)"
+            "(sRGB)"
         )
     entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)
     for body in entry.inside:
@@ -155,8 +155,7 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     if not 0 <= least <= greatest:
         raise SceneError(
             f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are "
-            f"two numbers from 0 on, "
-            "the least first"
+            "two numbers from 0 on, the least first"
         )
     for coefficient, each in entry.material.maps().items():
         _check_image(
@@ -172,7 +171,7 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
         if not 0 < disc.radius < float("inf"):
             raise SceneError(
                 f"a [[ripple.still]] disc of geom {entry.geom!r} has radius {disc.radius!r} m; "
-                f"valid is above 0"
+                "valid is above 0"
             )
 
 
@@ -202,8 +201,8 @@ def check_files(path: Path) -> None:
                 line, column = error.position
                 raise SceneError(
                     f"the model {str(xml)!r} refers to an unknown character, at line {line}, "
-                    f"column {column}: "
-                    "MuJoCo would cut the text there; valid are names without a NUL"
+                    f"column {column}: MuJoCo would cut the text there; valid are names without a "
+                    "NUL"
                 ) from error
             continue  # MuJoCo says what is wrong
         except (OSError, ValueError, LookupError, RecursionError):
@@ -240,9 +239,8 @@ def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
     if (seconds := _THEIR_SECONDS * (bodies / _BODIES) ** _GROWTH) > _LONG:
         warn_caller(
             f"flexcomp {flex.get('name', '')!r} has {bodies} points, each a body of its own, which "
-            f"MuJoCo takes about "
-            f'{seconds:.0f} s to set up; dof="trilinear", or a count of at most 20 20 20, takes '
-            f"seconds"
+            f'MuJoCo takes about {seconds:.0f} s to set up; dof="trilinear", or a count of at most '
+            "20 20 20, takes seconds"
         )
 
 
@@ -254,7 +252,7 @@ def _exists(path: Path) -> bool:
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise SceneError(
             f"the model names {str(path)!r}, which is not a regular file; a FIFO or a device "
-            f"cannot be read"
+            "cannot be read"
         )
     return stat.S_ISREG(mode)
 
@@ -300,8 +298,7 @@ def load_scene(
         if random is None:
             raise SceneError(
                 f"scene file {str(path)!r} has no [random], so nothing follows the seed {seed}; "
-                f"leave the seed out, or "
-                "write what is to vary under [random]"
+                "leave the seed out, or write what is to vary under [random]"
             )
         random = msgspec.structs.replace(random, seed=seed)
     model, shifts = load_model(path.parent / content.model, random, edit)
@@ -381,14 +378,13 @@ def load_model(
         if edit is None and given not in (0, model.nq):
             raise SceneError(
                 f"keyframe {name or number!r} of {str(path)!r} has {given} positions (qpos); valid "
-                f"are {model.nq}, "
-                "as the model has"
+                f"are {model.nq}, as the model has"
             )
     for key, numbers in enumerate(np.hstack([model.key_qpos, model.key_qvel])):
         if not np.isfinite(numbers).all():
             raise SceneError(
                 f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid "
-                f"are finite numbers"
+                "are finite numbers"
             )
     for each in told:
         warn_caller(str(each.message), each.category)

@@ -82,7 +82,7 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
         if thickness is not None:
             if _law(self.name) not in ("layer", "jelly"):
                 raise SceneError(
-                    f"[[ripple.inside]] needs a material with a layer, not the preset "
+                    "[[ripple.inside]] needs a material with a layer, not the preset "
                     f"{self.name!r}; {_LAYER}"
                 )
             given["thickness"] = thickness

@@ -53,7 +53,7 @@ def parse_request(words: Iterable[str]) -> Request:
         if given and name not in HEATMAPS:
             raise SceneError(
                 f"overlay {word.strip()!r}: {name} has no range; only {' and '.join(HEATMAPS)} "
-                f"have one"
+                "have one"
             )
         chosen[name] = None
         if given:

@@ -46,8 +46,7 @@ def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
     if len(found) > 1:
         warn_caller(
             f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: "
-            f"none is used; join "
-            "them into one image, or choose one with --texture"
+            "none is used; join them into one image, or choose one with --texture"
         )
     return load_image(found[0]) if len(found) == 1 else None
 
@@ -194,8 +193,7 @@ def paint_target(
         if corner_uv is None:
             raise SceneError(
                 f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no "
-                f"texture coordinates: "
-                "choose a mesh that has them (a wrap has none)"
+                "texture coordinates: choose a mesh that has them (a wrap has none)"
             )
         pixels = load_image(texture)
     elif corner_uv is not None:

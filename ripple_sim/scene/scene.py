@@ -96,7 +96,6 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
     if given.get("exposures", 1) > 1 and not (camera.shutter or camera.aperture):
         raise SceneError(
             f"all {camera.exposures} exposures would be the same: give the camera a shutter angle, "
-            f"such as 180 degrees,"
-            " an aperture, such as 0.05 m, or both"
+            "such as 180 degrees, an aperture, such as 0.05 m, or both"
         )
     return dataclasses.replace(scene, camera=camera)

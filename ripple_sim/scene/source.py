@@ -14,8 +14,8 @@ from ripple_sim.solver.errors import shown
 
 # By ending: what a file is that is taken for a scene file, and what to do with it.
 _A_MESH = (
-    "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may "
-    "name a model with it"
+    "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may name a "
+    "model with it"
 )
 
 
@@ -58,7 +58,7 @@ def scene_path(name_or_path: str | Path) -> Path:
             )
     raise SceneError(
         f"there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, or give the "
-        f"path of a TOML file"
+        "path of a TOML file"
     )
 
 

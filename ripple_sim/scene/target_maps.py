@@ -136,7 +136,7 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
         if len(given) != 1:
             raise SceneError(
                 f"[ripple.height] has {' and '.join(given) or 'no shape'}; valid is one of "
-                f"expression, map, field"
+                "expression, map, field"
             )
         for key in ("map", "field"):
             path = getattr(self, key)
@@ -203,7 +203,7 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
         if not len(points):
             raise SceneError(
                 f"rim of geom {geom!r} names regions, and it has no rim: it is closed; leave rim "
-                f"out"
+                "out"
             )
         places = to_body(model, find_target(model, geom), points).T
         found = np.full(len(points), "free", dtype="<U9")
@@ -215,8 +215,7 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
                 )
                 raise SceneError(
                     f"rim {name!r} of geom {geom!r} is where {where!r}, which holds nowhere on its "
-                    f"rims; they lie from "
-                    f"{low} to {high} m in the frame of its body"
+                    f"rims; they lie from {low} to {high} m in the frame of its body"
                 )
             found[there] = name
         return found
@@ -264,7 +263,7 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
             if value is not None and not value > 0:
                 raise SceneError(
                     f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater "
-                    f"than 0"
+                    "than 0"
                 )
 
     def body(self) -> Mesh | Volume:
@@ -320,8 +319,7 @@ def _check_threshold(
     if is_volume and threshold is None:
         raise SceneError(
             f"{str(path)!r} is a volume, which needs a threshold: its value at the surface of what "
-            f"is inside, about "
-            "300 for bone in Hounsfield units"
+            "is inside, about 300 for bone in Hounsfield units"
         )
     if not is_volume and (threshold is not None or spacing is not None):
         raise SceneError(
