@@ -11,6 +11,7 @@ import mujoco
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom
+from ripple_sim.coupling.hooks import hook_physics
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RenderError
 from ripple_sim.export.renderer import RippleRenderer
@@ -26,12 +27,13 @@ def couple(
     lighting: str = "model",
     **options: Any,
 ) -> Ripples:
-    """Make a dm_control `Physics` or environment ripple: from now on each of its physics steps drives the ripples.
+    """Make a dm_control `Physics` or environment ripple.
 
-    `physics.step(nstep)` couples every one of its steps, also where dm_control begins the next one
-    already (`legacy_step`), so that tasks and environments of dm_control need no change;
-    `physics.reset` flattens the surfaces. `physics.render` takes what it took before, and draws
-    with the ripples, through `RippleRenderer`; text (`overlays`) is not drawn.
+    From now on each of its physics steps drives the ripples. `physics.step(nstep)` couples every
+    one of its steps, also where dm_control begins the next one already (`legacy_step`), so that
+    tasks and environments of dm_control need no change; `physics.reset` flattens the surfaces.
+    `physics.render` takes what it took before, and draws with the ripples, through
+    `RippleRenderer`; text (`overlays`) is not drawn.
 
     An environment of `composer` makes a new physics for each episode: give the environment, and the
     ripples are made anew with it, in the same `Ripples`.
@@ -74,7 +76,7 @@ def couple(
 
 
 def _render_flag(flag: Any) -> int:
-    """Number of a flag of `mujoco.mjtRndFlag`, which may be named as dm_control does: "wireframe"."""
+    """Number of a flag of `mujoco.mjtRndFlag`, also by dm_control's name of it: "wireframe"."""
     if not isinstance(flag, str):
         return int(flag)
     number = getattr(mujoco.mjtRndFlag, f"mjRND_{flag.upper()}", None)
@@ -105,17 +107,10 @@ def _refuse_with_surfaces(**options: Any) -> None:
 
 
 def _follow(physics: Any, ripples: Ripples, **looks: Any) -> None:
-    """Have a physics drive the ripples and draw with them; `looks` are keyword arguments of `RippleRenderer`."""
-    step = physics.step
-    reset = physics.reset
+    """Have a physics drive the ripples and draw with them.
 
-    def rippling_step(*args: Any, **kwargs: Any) -> None:
-        with ripples.following(physics.data):
-            step(*args, **kwargs)
-
-    def rippling_reset(*args: Any, **kwargs: Any) -> None:
-        reset(*args, **kwargs)
-        ripples.reset()
+    `looks` are keyword arguments of `RippleRenderer`.
+    """
 
     @functools.cache
     def renderer_of(height: int, width: int) -> RippleRenderer:
@@ -151,6 +146,9 @@ def _follow(physics: Any, ripples: Ripples, **looks: Any) -> None:
         with _overridden(renderer.scene, render_flag_overrides or {}):
             return renderer.render()
 
-    physics.step = rippling_step
-    physics.reset = rippling_reset
-    physics.render = rippling_render
+    hook_physics(
+        physics,
+        around_step=lambda: ripples.following(physics.data),
+        after_reset=ripples.reset,
+        render=rippling_render,
+    )

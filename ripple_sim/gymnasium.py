@@ -201,10 +201,10 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         return self._sensed(observation), {**info, **self._info()}
 
     def render(self) -> Any:
-        """Return a frame, uint8 [height, width, 3], its depth buffer, float32 [height, width], or both, by the mode.
+        """Return a frame, its depth buffer, or both, by the mode.
 
-        The depth buffer is 0 at MuJoCo's near plane and 1 at its far one. Other modes are the
-        environment's.
+        A frame is uint8 [height, width, 3], a depth buffer float32 [height, width]. The depth
+        buffer is 0 at MuJoCo's near plane and 1 at its far one. Other modes are the environment's.
         """
         if self.render_mode not in DRAWN_MODES:
             return self.env.render()

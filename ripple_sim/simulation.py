@@ -138,7 +138,7 @@ class Simulation:
     def _target(
         self, entry: RippleEntry, resolution: int | None, layout: str | None, rim: str | None
     ) -> Target:
-        """What an entry of the scene says of a target, with the overrides of the simulation."""
+        """The target of an entry of the scene, with the overrides of the simulation."""
         return Target(
             uniform_material(entry),
             resolution=resolution or entry.resolution,
@@ -161,7 +161,10 @@ class Simulation:
         operator: str = "fem",
         on_step: Callable[[Simulation], None] | None = None,
     ) -> Self:
-        """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
+        """Simulation of a scene with the options of a video or an export.
+
+        `options` has the attributes rate, resolution, layout, rim and backend.
+        """
         chosen = {
             name: getattr(options, name) for name in ("resolution", "layout", "rim", "backend")
         }
@@ -183,7 +186,9 @@ class Simulation:
         return self.ripples.energy(self.data)
 
     def advance_frame(self) -> None:
-        """Advance physics and waves to the next frame; `impulses` then holds all since the last one.
+        """Advance physics and waves to the next frame.
+
+        `impulses` then holds all impulses since the last frame.
 
         Raises
         ------
@@ -195,7 +200,9 @@ class Simulation:
         self._steps = 0
 
     def step(self) -> None:
-        """Advance physics and waves by one physics step; `advance_frame` then does the rest of the frame.
+        """Advance physics and waves by one physics step.
+
+        `advance_frame` then does the rest of the frame.
 
         Raises
         ------

@@ -22,6 +22,9 @@ from .geoms import (
     geom_name as geom_name,
     target_name as target_name,
 )
+from .hooks import (
+    adopt_warnings as adopt_warnings,
+)
 from .load import (
     ContactLoads as ContactLoads,
     StepContacts as StepContacts,
@@ -60,11 +63,12 @@ from .soft import (
     is_soft as is_soft,
     target_pose as target_pose,
 )
+from .solved_forces import (
+    SolvedForces as SolvedForces,
+)
 from .stepping import (
     Passed as Passed,
-    SolvedForces as SolvedForces,
     StepClock as StepClock,
-    adopt_warnings as adopt_warnings,
     divergence as divergence,
     missed_warning as missed_warning,
     physics_errors as physics_errors,

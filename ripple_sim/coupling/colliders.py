@@ -251,9 +251,10 @@ def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
 def add_convex_collider(
     spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequence[NDArray[np.float64]]
 ) -> None:
-    """Let a mesh geom collide through geoms of its convex parts, on its body, and no longer by itself.
+    """Let a mesh geom collide through geoms of its convex parts, and no longer by itself.
 
-    They have its contact settings and no mass: mass and looks stay with the geom.
+    The new geoms are on its body, with its contact settings and no mass: mass and looks stay with
+    the geom.
 
     Parameters
     ----------
@@ -283,14 +284,15 @@ def add_convex_collider(
 
 
 def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore) -> None:
-    """Let a mesh geom collide through a rigid flex of its triangles, of the same name, and no longer by itself.
+    """Let a mesh geom collide through a rigid flex of its triangles, and no longer by itself.
 
-    MuJoCo's contacts with a triangle are right as long as nothing penetrates it: they push along
-    the shortest line between the two. A geom that has penetrated is pushed out through the nearest
-    side, which is sideways for a flat geom with a triangle under its rim. So the triangles lie
-    inside the surface, and a contact margin of the same thickness holds other geoms off: they meet
-    the true surface. Sharp edges become rounded and thin parts thicker; the flex is as thick as
-    possible (2 to 5 % of the mesh's size) without putting either off by more than 2 %.
+    The flex has the name of the geom. MuJoCo's contacts with a triangle are right as long as
+    nothing penetrates it: they push along the shortest line between the two. A geom that has
+    penetrated is pushed out through the nearest side, which is sideways for a flat geom with a
+    triangle under its rim. So the triangles lie inside the surface, and a contact margin of the
+    same thickness holds other geoms off: they meet the true surface. Sharp edges become rounded and
+    thin parts thicker; the flex is as thick as possible (2 to 5 % of the mesh's size) without
+    putting either off by more than 2 %.
 
     An open mesh is a sheet that can be hit from both sides: the triangles are its own, and the
     margin, 1 % of its size, holds geoms off either side.
@@ -322,7 +324,7 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore)
 
 
 def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
-    """Remove the flex and the convex colliders of a geom, if it has any, and let it collide by itself again."""
+    """Remove the colliders of a geom, if it has any, and let it collide by itself again."""
     flex = spec.flex(geom.name)
     if flex is not None and set(flex.vertbody) == {geom.parent.name}:
         geom.contype = flex.contype
@@ -340,7 +342,7 @@ def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
 
 
 def flex_core(mesh: Mesh) -> FlexCore:
-    """What the flex collider of a mesh in the frame of its body is made of."""
+    """Vertices, triangles and margin of the flex collider of a mesh in the frame of its body."""
     size = float(np.ptp(mesh.V, axis=0).max())
     if not mesh.closed:
         return mesh.V, mesh.F, _SHEET * size
@@ -357,10 +359,11 @@ def flex_core(mesh: Mesh) -> FlexCore:
 
 
 def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
-    """Vertices [m], [n, 3], moved inwards until the planes of their triangles lie deeper by `depth` [m].
+    """Vertices [m], [n, 3], moved inwards by a depth [m].
 
-    Where more than three planes meet, the remaining squared distances, weighted by the corners'
-    angles, are least. Parts too thin for that keep a tenth of their thickness.
+    The planes of the vertices' triangles then lie deeper by `depth`. Where more than three planes
+    meet, the remaining squared distances, weighted by the corners' angles, are least. Parts too
+    thin for the depth keep a tenth of their thickness.
     """
     V = mesh.V
     F = mesh.F

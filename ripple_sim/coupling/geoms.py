@@ -35,7 +35,11 @@ ByGeom = Mapping[str, Value] | Mapping[int, Value] | Mapping[GeomKey, Value]
 
 
 def geom_name(model: mujoco.MjModel, geom: int) -> str:
-    """Name of a geom; without one "body/index", its index among the geoms of its body; or else "geom <id>"."""
+    """Name of a geom.
+
+    A geom without a name is called "body/index", by its index among the geoms of its body; or
+    "geom <id>", if the body has no name or another geom is called so.
+    """
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
     if name:
         return str(name)
@@ -84,7 +88,7 @@ def target_name(model: mujoco.MjModel, target: int) -> str:
 
 
 def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
-    """Id of what is to ripple: a geom, see `find_geom`, or else the flex or skin of a name, see `find_soft`.
+    """Id of a target: a geom, see `find_geom`, or a flex or a skin, see `find_soft`.
 
     Raises `SceneError` if there is nothing of that name, or a geom's type has no closed surface.
     """
@@ -128,7 +132,10 @@ def find_any(model: mujoco.MjModel, key: GeomKey) -> int:
 
 
 def to_body(model: mujoco.MjModel, geom: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points [..., 3] [m] of a target's atlas in the frame of the geom's body; soft targets are in the world."""
+    """Points [..., 3] [m] of a target's atlas in the frame of the geom's body.
+
+    Points of a flex or a skin are in the world, and stay.
+    """
     if is_soft(model, geom):
         return points
     return points @ rotation_in_body(model, geom).T + model.geom_pos[geom]

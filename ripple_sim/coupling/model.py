@@ -1,9 +1,9 @@
-"""`CoupledModel`: what a MuJoCo model says about what collides, computed once and shared by all steps.
+"""`CoupledModel`: what collides in a MuJoCo model, computed once and shared by all steps.
 
-Which geoms and flexes MuJoCo lets touch each other, and what collides in place of a mesh geom:
-geoms of its convex parts (convex colliders), or a rigid flex of its triangles (flex collider). Of a
-soft flex each vertex touches for itself. The contacts of flex colliders are loads by the sum of
-their whole forces, in place of that of normal ones.
+It says which geoms and flexes MuJoCo lets touch each other, and what collides in place of a mesh
+geom: geoms of its convex parts (convex colliders), or a rigid flex of its triangles (flex
+collider). Of a soft flex each vertex touches for itself. The load of a flex collider is the sum of
+the whole forces of its contacts, not of the normal forces alone; see `FlexContacts`.
 """
 
 from __future__ import annotations
@@ -75,7 +75,10 @@ def find_convex_colliders(model: mujoco.MjModel) -> dict[int, list[int]]:
 
 
 def find_flex_colliders(model: mujoco.MjModel) -> dict[int, int]:
-    """Flex that collides in place of a geom, by geom id: a rigid one of triangles, of its name and on its body."""
+    """Flex that collides in place of a geom, by geom id.
+
+    It is rigid, of triangles, and has the geom's name and body.
+    """
     found = {}
     for flex in range(model.nflex):
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
@@ -224,18 +227,21 @@ class CoupledModel:
                 self.of_flex[surface.flex] = target
 
     def collision_geoms(self, geom: int) -> tuple[int, ...]:
-        """Geoms whose contacts are those of this one: itself, or of a target those that collide for it."""
+        """Geoms whose contacts load this one: the geoms that collide for a target, or itself."""
         return self._collision_geoms.get(geom, (geom,))
 
     def are_still(self, data: mujoco.MjData, colliders: Sequence[int]) -> bool:
-        """Whether all sleep or are static, so that they press as before; vertices between bodies never sleep."""
+        """Whether all colliders sleep or are static, so that they press as before.
+
+        Vertices between several bodies never sleep.
+        """
         bodies = self.bodies[list(colliders)]
         return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
 
     def can_collide(self, geom: int) -> NDArray[np.bool_]:
-        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it, also as a pair.
+        """Geoms, [ngeom], that MuJoCo may collide with this one, or with geoms that collide for it.
 
-        They are on bodies that are not welded to that of this geom.
+        Explicit pairs count too. The geoms are on bodies that are not welded to this geom's body.
         """
         model = self.model
         types = self._contype
@@ -249,14 +255,14 @@ class CoupledModel:
         return found & self._apart(geom)
 
     def out_of_touch(self, geom: int) -> bool:
-        """Whether there are geoms or flexes that collide, but none that meets those that collide for this geom."""
+        """Whether geoms or flexes collide in the model, but none of them can touch this geom."""
         meets = self.can_collide(geom).any() or len(self.soft_flexes(geom))
         return not meets and bool(
             len(self._soft_flexes) or (self._collides & self._apart(geom)).any()
         )
 
     def soft_flexes(self, geom: int) -> NDArray[np.int64]:
-        """Flexes other than flex colliders that MuJoCo collides with those that collide for this geom."""
+        """Flexes that MuJoCo collides with geoms that collide for this one; no flex colliders."""
         model = self.model
         soft = self._soft_flexes
         of = list(self.collision_geoms(geom))
@@ -344,7 +350,9 @@ class FlexContacts:
         starts: Ints,
         along: Floats,
     ) -> tuple[Bools, Floats, Floats, Floats]:
-        """Contacts that share the sum of the whole forces of their pair; pairs whose sum does not push are left out.
+        """Contacts with their shares of the whole force of their pair.
+
+        Pairs whose whole force does not push are left out.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Models and data as users give them: taken out of other libraries' wrappers, and checked to belong together."""
+"""Models and data as users give them: unwrapped, and checked to belong together."""
 
 from __future__ import annotations
 
@@ -111,9 +111,10 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
 
 
 def check_targets(model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping[str, int]) -> None:
-    """Make sure that targets, by name their geom ids in the `other` model, are those of a model that is to be drawn.
+    """Make sure that the targets of another model are those of the model to be drawn.
 
-    Raises `SceneError` if any geom has another shape or place, or a target another name.
+    `targets` are geom ids in the `other` model, by name. Raises `SceneError` if any geom has
+    another shape or place, or a target another name.
     """
     if model is other:
         return
@@ -131,7 +132,10 @@ def check_targets(model: mujoco.MjModel, other: mujoco.MjModel, targets: Mapping
 
 
 def posed(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """The data, or where no poses were ever computed a copy with those of its `qpos`, as `mj_forward` computes them."""
+    """The data, or a copy with poses where none were ever computed.
+
+    The copy has the poses of its `qpos`, as `mj_forward` computes them.
+    """
     if data.xquat[0].any():  # that of the world
         return data
     data = copy.copy(data)

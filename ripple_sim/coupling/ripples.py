@@ -23,21 +23,20 @@ from .easing import Easing, bodies_of, easing_warning
 from .energy import Energy, body_energy
 from .geoms import ByGeom, GeomKey, find_any, rotation_in_body, target_name
 from .hertz import Hits, hertz_moduli
+from .hooks import adopt_warnings, followed
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .own_model import own_data, own_model
 from .rippling import RipplingSurface, rippling_surfaces
 from .soft import HighPass, is_soft
+from .solved_forces import SolvedForces
 from .stepping import (
     IN_TURN_WARNING,
     NO_RESET,
-    SolvedForces,
     StepClock,
-    adopt_warnings,
     disabled_warning,
     divergence,
     divergence_warning,
-    followed,
     missed_warning,
     physics_errors,
 )
@@ -207,7 +206,9 @@ class Ripples:
         return {name: target.geom for name, target in self._surfaces.items()}
 
     def change_material(self, name: GeomKey, **coefficients: Any) -> None:
-        """Change coefficients of a geom's material, by their names in `Material`; height and velocity stay.
+        """Change coefficients of a geom's material, by their names in `Material`.
+
+        Height and velocity of the waves stay.
 
         Raises
         ------
@@ -270,7 +271,9 @@ class Ripples:
         return where
 
     def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
-        """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.
+        """Hold a disc of a geom's surface still.
+
+        Waves go round it, and contacts there move nothing.
 
         Parameters
         ----------
@@ -313,18 +316,18 @@ class Ripples:
         self._change(name, held=held)
 
     def change_operator(self, operator: str) -> None:
-        """Change the wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
+        """Change the wave operator on all surfaces, by its name in `WaveSolver`.
 
-        Raises `SolverError` for an unknown operator.
+        Height and velocity of the waves stay. Raises `SolverError` for an unknown operator.
         """
         for name, target in list(self._surfaces.items()):
             self._change(name, options={**target.options, "operator": operator})
 
     def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
-        """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes.
+        """Carry a point [m] from the frame of a geom's body to the frame of the geom.
 
-        The points of `poke` and `make_rigid` are in the body's frame; those of an atlas, and of the
-        waves of one geom, `ripples[name]`, in the geom's.
+        MuJoCo chooses the frame of a mesh geom. Points of `poke` and `make_rigid` are in the body's
+        frame; points of an atlas, and of the waves `ripples[name]`, are in the geom's frame.
         """
         geom = self._surface(name).geom
         if is_soft(self.model, geom):  # it is in the world
@@ -334,20 +337,22 @@ class Ripples:
 
     @property
     def last_impulses(self) -> list[Impulse]:
-        """The impulses given to the surfaces in the latest call of `step` or `mj_step`, or within `following`.
+        """The impulses that the surfaces received in the latest `step`, `mj_step` or `following`.
 
-        One record for each pair of geoms and each physics step; of a geom that is wedged between
-        parts of the surface one for each place where it touches.
+        There is one record for each pair of geoms and each physics step. A geom that is wedged
+        between parts of the surface has one for each place where it touches.
         """
         return self._loads.impulses
 
     def step(self, data: mujoco.MjData) -> None:
-        """Apply the contact forces of the latest physics step to the surfaces, and advance the waves to `data.time`.
+        """Apply the contact forces of the latest physics step, and advance the waves.
 
-        The forces and poses in `data` after `mj_step` are those at the beginning of that step, over
-        which MuJoCo holds the forces: each contact gives normal force times time step. Of several
-        steps since the last call only the latest gives its impulses, and a warning says so; see
-        `mj_step`. If time stands still, nothing happens.
+        The waves go on to `data.time`.
+
+        After `mj_step` the forces and poses in `data` are those at the beginning of the step.
+        MuJoCo holds the forces over the step, so each contact gives normal force times time step.
+        Of several steps since the last call only the latest gives its impulses, and a warning says
+        so; see `mj_step`. If time stands still, nothing happens.
 
         If the simulation was reset (`mj_resetData`, a keyframe, MuJoCo's automatic reset of a
         simulation that diverges, or a time that went back), the waves are reset too, and of the
@@ -387,10 +392,10 @@ class Ripples:
 
     @contextlib.contextmanager
     def following(self, data: mujoco.MjData) -> Iterator[None]:
-        """Follow the physics steps that other code takes, such as an environment's `step`: a context manager.
+        """Follow the physics steps that other code takes, such as an environment's `step`.
 
-        Within the context each `mujoco.mj_step` or `mujoco.mj_step2` on this data is followed by a
-        `step`, whoever calls it, and however many steps are taken at once.
+        This is a context manager. Within it each `mujoco.mj_step` or `mujoco.mj_step2` on this data
+        is followed by a `step`, whoever calls it, and however many steps are taken at once.
 
         Raises
         ------
@@ -418,10 +423,10 @@ class Ripples:
         return Energy(bodies, sum(waves.energy() for waves in self._waves.values()))
 
     def vertices(self, name: GeomKey, data: mujoco.MjData) -> NDArray[np.float64] | None:
-        """Where the vertices of a target's mesh are [m], [n, 3]: of a flex or a skin by `data`, in the world.
+        """Where the vertices of a target's mesh are [m], [n, 3].
 
-        Of a geom that was moved by `ripples[name].move` in its own frame; None where nothing has
-        moved them.
+        Vertices of a flex or a skin are in the world, by `data`. Vertices of a geom are in its own
+        frame, if `ripples[name].move` has moved them; otherwise the result is None.
         """
         target = self._surface(name)
         soft = self._soft.get(target.geom)
@@ -469,16 +474,16 @@ class Ripples:
         self._check_amplitude()
 
     def _take_up_all(self, geom: int) -> None:
-        """Ease no forces on a target any more: the user gives its density."""
+        """Take up all forces on a target from now on: the user gives its density."""
         self._easings.pop(geom, None)
         if self._eased.pop(geom, None) is not None:
             self._loads.take_up_all(geom)
 
     def follow_shapes(self) -> None:
-        """Lay new atlases on the targets whose surfaces a program has changed in the model; their waves begin flat.
+        """Lay new atlases on targets whose surfaces a program has changed in the model.
 
-        That is their geom's size, the data of a height field or the vertices of a mesh. Each step
-        does so by itself.
+        A surface is changed by its geom's size, the data of its height field or the vertices of its
+        mesh. The waves on a new atlas begin flat. Each step does this by itself.
 
         Raises
         ------
@@ -498,9 +503,9 @@ class Ripples:
             )
 
     def _couple(self, before: AmplitudeCheck | None) -> CoupledModel:
-        """Have the model's contacts drive the waves as they are now, from nothing.
+        """Have the model's contacts drive the present waves, with new records of all contacts.
 
-        What was warned of `before` is not warned of again.
+        A target that `before` no longer watches is not warned of again.
         """
         coupled = CoupledModel(self.model, self._waves, self._contacts)
         rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
@@ -536,7 +541,7 @@ class Ripples:
         return target
 
     def _follow_shapes(self) -> list[str]:
-        """Lay new atlases on the targets whose surfaces were changed in the model; return the names of these."""
+        """Lay new atlases on targets whose surfaces were changed; return their names."""
         changed = [
             name
             for name, target in self._surfaces.items()
@@ -549,7 +554,10 @@ class Ripples:
         return changed
 
     def _change(self, name: GeomKey, **changes: Any) -> None:
-        """Change a surface's material, options or what is held; if that fails, nothing has changed."""
+        """Change a surface's material, options or held region.
+
+        If that fails, nothing has changed.
+        """
         surface = self._surface(name).rebuilt(**changes)
         geom = surface.geom
         self._surfaces[target_name(self.model, geom)] = surface

@@ -1,4 +1,4 @@
-"""The surfaces of the targets of a model: how their waves are made, and made anew after a change."""
+"""The surfaces of targets: how their waves are made, and made anew after a change."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class RipplingSurface:
     shape: WatchedShape | None = None
 
     def on_its_surface(self, model: mujoco.MjModel) -> RipplingSurface:
-        """The same, flat, on a new atlas of the surface that the model has now.
+        """A copy with flat waves, on a new atlas of the surface that the model has now.
 
         Raises `SceneError` if something belongs to single texels of the old atlas.
         """
@@ -76,7 +76,10 @@ class RipplingSurface:
         return dataclasses.replace(self, waves=new, shape=WatchedShape(model, self.geom))
 
     def rebuilt(self, **changes: Any) -> RipplingSurface:
-        """The same with a new solver in the state of the old one, after a change of its material, options or `held`."""
+        """A copy with a new solver, in the state of the old one.
+
+        `changes` are fields to change: material, options or held.
+        """
         changed = dataclasses.replace(self, **changes)
         old = self.waves
         material = changed.material
@@ -98,10 +101,11 @@ def _is_mapped(material: Material) -> bool:
 
 
 def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
-    """Where a site is in the frame of a target [m], [3]: of a geom on the same body, or welded to it.
+    """Where a site is in the frame of a target [m], [3].
 
-    In that of a flex or a skin, the world, it is where it stands in `qpos0`. Raises `SceneError`
-    for an unknown site, or one on a body that moves against the geom's.
+    The site is on the geom's body, or on one welded to it. A flex or a skin is in the world; the
+    site is then where it stands in `qpos0`. Raises `SceneError` for an unknown site, or one on a
+    body that moves against the geom's.
     """
     site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
     if site < 0:

@@ -39,7 +39,10 @@ def is_soft(model: mujoco.MjModel, target: int) -> bool:
 def target_pose(
     data: mujoco.MjData, target: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position [3] [m] and rotation [3, 3] of a target's frame in the world, copies; what is soft is in the world."""
+    """Position [3] [m] and rotation [3, 3] of a target's frame in the world, as copies.
+
+    The frame of a flex or a skin is the world.
+    """
     if is_soft(data.model, target):
         return np.zeros(3), np.eye(3)
     return data.geom_xpos[target].copy(), data.geom_xmat[target].reshape(3, 3).copy()
@@ -156,7 +159,10 @@ class SoftSurface:
 
     @property
     def degree(self) -> int:
-        """Degree of the polynomials that interpolate a flex between its nodes, 1 or 2; 0 where its vertices move."""
+        """Degree of the polynomials that interpolate a flex between its nodes: 1 or 2.
+
+        It is 0 for a skin, and for a flex whose vertices move by themselves.
+        """
         return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
 
     def _all(self, data: mujoco.MjData) -> NDArray[np.float64]:

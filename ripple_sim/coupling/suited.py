@@ -96,7 +96,19 @@ _SPHERE = 2
 
 
 class Extent(NamedTuple):
-    """How large a target is: its longest extent [m], area [m^2], volume [m^3], and half its usual thickness [m]."""
+    """How large a target is.
+
+    Attributes
+    ----------
+    size : float
+        Its longest extent [m].
+    area : float
+        [m^2]
+    volume : float
+        [m^3]
+    radius : float
+        Half its usual thickness [m].
+    """
 
     size: float
     area: float
@@ -121,7 +133,15 @@ class Extent(NamedTuple):
 
 
 class SuitedMaterial(NamedTuple):
-    """A material without unset coefficients, and how the target bears what is too heavy for it; None: as it is."""
+    """A material that suits a target.
+
+    Attributes
+    ----------
+    material : Material
+        Without unset coefficients.
+    easing : EasingLaw, optional
+        How forces of bodies too heavy for the target are eased; None: they are taken up whole.
+    """
 
     material: Material
     easing: EasingLaw | None = None
@@ -130,26 +150,25 @@ class SuitedMaterial(NamedTuple):
 def suited_material(
     coupled: CoupledModel, geom: int, extent: Extent, material: Material, *, can_ease: bool = False
 ) -> SuitedMaterial:
-    """The material with what it leaves to the model chosen; what is given stays, all of it where the density is.
+    """Choose the coefficients that a material leaves to the model.
 
-    - speed: waves cross the target in a quarter of a second, or as fast as a body is that has
-      fallen from a height of
-      the target's size, which is faster on targets smaller than 1 m;
-    - damping: they fall to a tenth in 1.5 s;
+    Coefficients that are given stay, and so does a material whose density is given.
+
+    - speed: waves cross the target in a quarter of a second; or, on targets smaller than 1 m, at
+      the speed of a body that has fallen from a height of the target's size, which is faster;
+    - damping: waves fall to a tenth in 1.5 s;
     - stiffness: (16 c / size)^2, so that dents are narrow and rings run from them; but no more than
-      (0.5 / dt)^2, which
-      the time step dt resolves;
+      (0.5 / dt)^2, which the time step dt resolves;
     - density: a fall of the heaviest body that can touch the target leaves a dent of less than a
-      quarter of the
-      target's radius, and at rest that body sinks by a twentieth at most: rings of some hundredth
-      of the size. The fall is from a height of the target's size, or from where bodies are above
-      the target, or it above them, in the model as it begins. Where nothing can touch it, it is the
-      mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3
-      times its volume over its area.
+      quarter of the target's radius, and at rest that body sinks by a twentieth at most. Rings are
+      then some hundredth of the size high. The fall is from a height of the target's size, or from
+      where bodies are above the target, or the target above them, in the model as it begins. Where
+      nothing can touch the target, the density is the mass of its body over its area; for a geom
+      without a mass, 1000 kg/m^3 times its volume over its area.
 
-    Where `can_ease`, the density is for the lightest body that can touch the target and is not
-    joined to it, whose ring is then seen, and forces are taken up as far as they dent the target by
-    a fifth of its radius, see `Easing`.
+    With `can_ease`, the density is for the lightest body that can touch the target and is not
+    joined to it, so that its ring is seen; forces are taken up as far as they dent the target by a
+    fifth of its radius, see `Easing`.
 
     Parameters
     ----------
@@ -196,11 +215,12 @@ def suited_material(
 
 
 def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
-    """Density with which a target bears what may lie on it and hit it, as `suited_material` has it [kg/m^2].
+    """Density with which a target bears what may lie on it and hit it [kg/m^2].
 
-    The least speed and stiffness of the material count. Bending b resists all waves as a speed q
-    sqrt(b) would, or more, with q the wave number of the longest. What yields is to stay elastic.
-    Over deep fluid it is not known: 0.
+    It is chosen as in `suited_material`. The least speed and stiffness of the material count.
+    Bending b resists all waves as a speed q sqrt(b) would, or more, with q the wave number of the
+    longest wave. A material that yields is to stay elastic. Over deep fluid the density is not
+    known: 0.
     """
     if material.deep:
         return 0.0
@@ -215,7 +235,7 @@ def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: 
 def _speed_and_stiffness(
     model: mujoco.MjModel, extent: Extent, material: Material
 ) -> tuple[float, float]:
-    """Those of the material, its highest and its least, or else suited ones."""
+    """Speed and stiffness of a material: its highest and its least, or suited ones if unset."""
     speed = _speed(model, extent) if "speed" in material.unset else float(np.max(material.speed))
     if "stiffness" in material.unset:  # dents are narrow, but no more than the time step resolves
         return speed, float(
@@ -225,7 +245,7 @@ def _speed_and_stiffness(
 
 
 def _filled_in(material: Material, speed: float, stiffness: float, density: float) -> Material:
-    """A material with these where it has no parameters of its own."""
+    """A material with its unset coefficients filled in."""
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
@@ -243,9 +263,9 @@ def _density_under(
     stiffness: float,
     limit: float = np.inf,
 ) -> float:
-    """The least with which a target bears a weight at rest and a hit; 0 where there is nothing to bear.
+    """The least density with which a target bears a weight at rest and a hit [kg/m^2].
 
-    Neither dents it deeper than the limit [m].
+    Neither dents the target deeper than the limit [m]. It is 0 where there is nothing to bear.
     """
     model = coupled.model
     mass, footprint = heaviest(coupled, geom)
@@ -296,7 +316,10 @@ def _density_for(
     dent: float,
     sink: float | None = None,
 ) -> float:
-    """The least with which a target is dented by a hit, and sinks under the body at rest, no deeper than this [m]."""
+    """The least density with which a hit dents a target no deeper than wanted [kg/m^2].
+
+    The hit dents it by `dent` at most, and the body at rest sinks in by `sink` at most [m].
+    """
     sink = _REST * extent.radius if sink is None else sink
     model = coupled.model
     weight = hit.weight * float(np.linalg.norm(model.opt.gravity))
@@ -317,16 +340,19 @@ def _density_for(
 
 
 def _stiffness_of_the_whole(extent: Extent, speed: float, stiffness: float) -> float:
-    """Stiffness of a material on a target, which gives way no further than its longest wave [1/s^2]."""
+    """Stiffness of a material on a target of finite size [1/s^2].
+
+    The target resists a load at least as its longest wave does.
+    """
     return max(stiffness, (_LONGEST * speed / extent.size) ** 2)
 
 
 def lightest_hit(coupled: CoupledModel, geom: int, extent: Extent) -> Hit | None:
-    """Hit of the lightest body that can touch a target, of those that it is not joined to; None if there are none.
+    """Hit of the lightest body that can touch a target and is not joined to it, or None.
 
-    It falls from the target's size, or from where it is above the target as the model begins, up to
-    twice the size: higher, bodies wait to be dropped. What is fixed to the world counts where the
-    target moves.
+    The body falls from a height of the target's size, or from where it is above the target as the
+    model begins, up to twice the size: higher up, bodies wait to be dropped. If the target moves,
+    geoms fixed to the world count too.
     """
     model = coupled.model
     reduced = _reduced_masses(coupled, geom)
@@ -373,7 +399,7 @@ def _height(coupled: CoupledModel, geom: int) -> float:
 
 
 def _resting(coupled: CoupledModel, geom: int) -> float:
-    """Mass of the heaviest body that can lie on a target, or that lies on it with others below [kg]."""
+    """Mass of the heaviest body that can lie on a target, or on which it can lie [kg]."""
     model = coupled.model
     masses = np.where(
         _moves(model), model.body_subtreemass[model.body_rootid][model.geom_bodyid], 0.0
@@ -388,17 +414,20 @@ def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
 
 
 def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
-    """Mass that the heaviest body that can touch a target brings with it [kg], and its footprint radius [m].
+    """Mass of the heaviest body that can touch a target [kg], and its footprint radius [m].
 
-    Of two bodies that both move it is the reduced mass, and a body stands for all that it is joined
-    to. Where nothing moves, the mass is 0.
+    If both bodies move, it is their reduced mass. A body has the mass of all that it is joined to.
+    Where nothing moves, the mass is 0.
     """
     reduced = _reduced_masses(coupled, geom)
     return float(reduced.max()), float(coupled.footprint_radii[[geom, int(reduced.argmax())]].min())
 
 
 def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
-    """Reduced mass of each geom's body and a target's [kg]; 0 where they cannot touch, or neither moves."""
+    """Reduced mass of each geom's body and a target's [kg].
+
+    It is 0 where the two cannot touch, or neither moves.
+    """
     model = coupled.model
     masses = model.body_subtreemass[model.body_rootid]
     inverse = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)[
@@ -409,12 +438,12 @@ def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
 
 
 def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
-    """What `Material.suited` asks for, of a target in its model: size, hit, radius and amplitude.
+    """Arguments of `Material.suited` for a target in its model: size, hit, radius and amplitude.
 
-    The hit is that of the body of median mass that can touch it, after a fall from the target's
-    size, or from where bodies are above it as the model begins, up to twice the size: higher, they
-    wait to be dropped. The dent is a twentieth of the size, or less on what is thin. Raises
-    `SceneError` if nothing that moves can touch the target, or it is soft.
+    The hit is that of the body of median mass that can touch the target, after a fall from a height
+    of the target's size, or from where bodies are above it as the model begins, up to twice the
+    size: higher up, bodies wait to be dropped. The dent is a twentieth of the size, or less on a
+    thin target. Raises `SceneError` if nothing that moves can touch the target, or it is soft.
     """
     geom = find_target(model, name)
     needs = (
@@ -444,9 +473,9 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
 def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> int:
     """Texels along a chart's side, a multiple of 16 from 32 to 256.
 
-    From 96 on, as many as put four texels into the footprint of what touches the target; but no
-    more than can be stepped in four substeps to a physics step, as far as that can be told before
-    the atlas is there.
+    It is 96, or more where that is needed for four texels in the footprint of the heaviest body
+    that can touch the target; but no more than can be stepped in four substeps a physics step, as
+    estimated before the atlas is made.
     """
     spacing = np.sqrt(extent.area / 6)  # times resolution
     _, footprint = heaviest(coupled, geom)
@@ -467,7 +496,7 @@ def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material
 
 
 class SuitedTargets(NamedTuple):
-    """What suits targets, by their names: materials without unset coefficients, resolutions, and laws of easing."""
+    """Materials without unset coefficients, resolutions, and laws of easing, by target name."""
 
     materials: dict[str, Material]
     resolutions: dict[str, int]
@@ -481,7 +510,7 @@ def suited_targets(
     *,
     can_ease: bool = False,
 ) -> SuitedTargets:
-    """What suits targets where it is not given.
+    """Choose materials' unset coefficients, and resolutions that are None.
 
     Raises `MeshError` if a target's mesh cannot ripple.
     """
@@ -521,7 +550,10 @@ def suited_targets(
 
 
 def _is_intricate(mesh: Mesh) -> bool:
-    """Whether charts take long on a mesh: a robot's cover of many triangles, with holes, handles or loose parts."""
+    """Whether charts take long on a mesh, as on a robot's cover.
+
+    It has many triangles, and holes, handles or loose parts.
+    """
     is_plain = (
         mesh.closed and mesh.component_count == 1 and len(mesh.V) - len(mesh.F) / 2 == _SPHERE
     )

@@ -72,7 +72,9 @@ def named_targets(
     given: ByGeom[Material | Target] | ByGeom[Material] | ByGeom[Target],
     common: Mapping[str, Any],
 ) -> dict[str, Target]:
-    """Targets by name, with what each leaves open filled in from the arguments that are common to all.
+    """Targets by name, with fields that they leave open filled in.
+
+    The values are those of the arguments that are common to all targets.
 
     Parameters
     ----------
@@ -116,7 +118,10 @@ def named_targets(
 def _value_for_each(
     model: mujoco.MjModel, targets: Iterable[str], field: str, value: Value | ByGeom[Value]
 ) -> dict[str, Value]:
-    """The value of a field for each target; a mapping may leave out those for which the field has no meaning."""
+    """The value of a field for each target.
+
+    A mapping may leave out targets for which the field has no meaning.
+    """
     if not isinstance(value, Mapping):
         return dict.fromkeys(targets, value)
     deprecated(
@@ -136,7 +141,10 @@ def _value_for_each(
 
 
 def contacts_of(targets: Mapping[str, Target], given: Any) -> ByGeom[Sequence[GeomKey]]:
-    """The geoms that collide for targets: as these name them, or, which is deprecated, as a mapping does."""
+    """The geoms that collide for targets, as the targets name them.
+
+    A mapping of them as an argument is deprecated.
+    """
     if given is None:
         given = {}
     elif isinstance(given, Mapping):

@@ -28,10 +28,10 @@ _MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB
 def height_field_triangles(
     model: mujoco.MjModel, field: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices [m], [n, 3], on the top of a height field in the frame of its geom, and triangles, [m, 3], facing up.
+    """Vertices [m], [n, 3], and triangles, [m, 3], of the top of a height field.
 
-    The cells are cut along the diagonal along which MuJoCo cuts them into prisms
-    (`mjc_ConvexHField`).
+    The vertices are in the frame of its geom, and the triangles face up. The cells are cut along
+    the diagonal along which MuJoCo cuts them into prisms (`mjc_ConvexHField`).
     """
     rows = int(model.hfield_nrow[field])
     columns = int(model.hfield_ncol[field])
@@ -95,7 +95,9 @@ _atlases: ResultCache[Atlas] = ResultCache(4, lambda atlas: atlas.areas.size <= 
 
 
 def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str = "auto") -> Atlas:
-    """Atlas of a geom's surface in the geom's frame [m], in a layout of `build_atlas`; of what is soft in the world.
+    """Atlas of a target's surface [m], in a layout of `build_atlas`.
+
+    It is in the geom's frame; the atlas of a flex or a skin is in the world.
 
     Raises
     ------
@@ -148,10 +150,10 @@ def _surface(model: mujoco.MjModel, geom: int) -> tuple[NDArray, NDArray, NDArra
 def mesh_arrays(
     model: mujoco.MjModel, mesh: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None]:
-    """Vertices [m], [n, 3], and triangles, [m, 3], of a mesh asset, and its own texture coordinates, if it has any.
+    """Vertices [m], [n, 3], triangles, [m, 3], and texture coordinates of a mesh asset.
 
-    These are those of the triangles' corners, [m, 3, 2]; v is counted from the upper edge of the
-    image.
+    Texture coordinates are those of the triangles' corners, [m, 3, 2], with v counted from the
+    upper edge of the image; None if the mesh has none.
     """
     faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
     V = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(np.float64)

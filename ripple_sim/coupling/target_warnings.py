@@ -1,7 +1,8 @@
-"""Warnings of targets that nothing can touch, that collide off the surface that ripples, or whose waves are too high.
+"""Warnings of targets that contacts do not meet, or whose waves are too high.
 
-Waves too high or too steep for the object that carries them are reported once a target, with what
-would do: heights are compared with the local radius, slopes with 1.
+Contacts do not meet a target if nothing can touch it, or if it collides off the surface that
+ripples. Waves are too high or too steep for their object by comparison of heights with the local
+radius and of slopes with 1; each target is warned of once, with a material that would do.
 """
 
 from __future__ import annotations
@@ -66,7 +67,10 @@ _PRINTED = tuple(
 
 
 def hull_gap(atlas: Atlas) -> float:
-    """Greatest distance from the convex hull of a mesh to its surface [m], on points 1/24 of its size apart."""
+    """Greatest distance from the convex hull of a mesh to its surface [m].
+
+    It is measured at points of the hull that are 1/24 of its size apart.
+    """
     hull = trimesh.Trimesh(atlas.mesh.V, atlas.mesh.F, process=False).convex_hull
     points, _ = trimesh.remesh.subdivide_to_size(
         hull.vertices, hull.faces, max_edge=float(hull.extents.max()) / 24
@@ -76,10 +80,11 @@ def hull_gap(atlas: Atlas) -> float:
 
 
 def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Iterable[int]) -> float:
-    """How deep bodies sink into a target's surface before they meet the geoms that collide for it [m].
+    """Distance of a target's surface from the geoms that collide for it [m].
 
-    Or how far above the surface they are held, where that is more: over half of it, since a part of
-    it may well lie inside a geom that collides for the target's neighbour too.
+    It is how deep bodies sink into the surface before they meet these geoms, or how far above the
+    surface they are held, whichever is more. The latter is the median over the surface, since a
+    part of it may well lie inside a geom that collides for the target's neighbour too.
 
     Parameters
     ----------
@@ -120,7 +125,10 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
 
 
 def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
-    """What to warn of where nothing touches a target, it collides off its surface, or contacts tell no forces."""
+    """Warnings of contacts that a target gets wrongly, or not at all.
+
+    Nothing can touch it, it collides off its surface, or MuJoCo tells no forces of its contacts.
+    """
     model = coupled.model
     name = coupled.names[geom]
     size = float(np.ptp(atlas.mesh.V, axis=0).max())
@@ -284,7 +292,9 @@ def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share:
 
 
 class AmplitudeCheck:
-    """Compares the heights of all targets with their local radii (`half_thickness`), and their slopes with 1.
+    """Warns of waves that are too high or too steep.
+
+    Heights are compared with the local radius (`half_thickness`), slopes with 1.
 
     Parameters
     ----------
@@ -322,7 +332,7 @@ class AmplitudeCheck:
             waves.crests()
 
     def flush(self) -> None:
-        """Look at the heights a last time, and warn of all that has been seen: the waves are about to end."""
+        """Look at the heights a last time, and warn of what was seen: the waves will end."""
         for geom, watch in list(self._watched.items()):
             watch.look()
             if watch.excess > 1:
@@ -339,7 +349,7 @@ class AmplitudeCheck:
         )
 
     def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:
-        """A material that would do: the same with a density that is so many times as high, or higher."""
+        """A material that would do, with a density higher by at least a factor."""
         material = waves.material
         given = {each.name: getattr(material, each.name) for each in _PRINTED}
         if any(np.ndim(value) for value in given.values()):
@@ -361,7 +371,7 @@ class AmplitudeCheck:
 
 
 class _WatchedTarget:
-    """One target's waves.
+    """The waves of one target, as far as they were looked at.
 
     Attributes
     ----------

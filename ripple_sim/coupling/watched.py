@@ -30,12 +30,16 @@ class WatchedArray:
         self.take(array)
 
     def take(self, array: NDArray) -> None:
-        """Remember what is there now."""
+        """Remember the array as it is now."""
         self._taken = _bytes_of(array).copy()
         self._step = max(len(self._taken) // _SAMPLES, 1)
 
     def changed(self, array: NDArray) -> bool:
-        """Whether something else is there than was taken: of a large array whatever this look comes across."""
+        """Whether the array differs from the remembered one, as far as this look goes.
+
+        An array of at most 1 MiB is compared whole. A larger one is compared at samples of all of
+        it, and over the next stretch.
+        """
         now = _bytes_of(array)
         taken = self._taken
         if len(now) <= _WHOLE:
@@ -48,7 +52,7 @@ class WatchedArray:
         )
 
     def differs(self, array: NDArray, start: int, count: int) -> bool:
-        """Whether something else is there than was taken from a byte on, over so many bytes."""
+        """Whether `count` bytes from the byte `start` on differ from the remembered ones."""
         part = slice(start, start + count)
         return not np.array_equal(_bytes_of(array)[part], self._taken[part])
 

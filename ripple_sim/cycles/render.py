@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.coupling.hooks import adopt_warnings
 from ripple_sim.errors import ExportError, VideoError
 from ripple_sim.export.exporter import Exporter, ExportSummary, scene_source
 from ripple_sim.export.options import ExportOptions

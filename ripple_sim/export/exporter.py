@@ -13,9 +13,9 @@ from typing import Self
 import mujoco
 
 from ripple_sim.coupling.geoms import ByGeom, by_name
+from ripple_sim.coupling.hooks import adopt_warnings
 from ripple_sim.coupling.own_model import check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Impulse, Ripples
-from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.encode.part import Settings
 from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.render.visuals.visual import find_look, paint_of

@@ -1,4 +1,4 @@
-"""Scenes: an MJCF model, its targets, a camera and a script of timed events, read from one TOML file."""
+"""Scenes: an MJCF model, its targets, a camera and timed events, read from one TOML file."""
 
 import lazy_loader
 

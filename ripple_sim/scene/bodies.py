@@ -1,6 +1,7 @@
-"""The MuJoCo model of a default scene: a target on a floor, and bodies parked above it until they drop.
+"""The MuJoCo model of a default scene: a target on a floor, and bodies that drop on it.
 
-Also domain randomisation: the free bodies of any model varied by a seed.
+The bodies are parked above the target until they drop. Also domain randomisation: the free bodies
+of any model varied by a seed.
 """
 
 from __future__ import annotations
@@ -142,9 +143,10 @@ def _landing_points(
     eye: NDArray[np.float64] | None,
     room: float,
 ) -> NDArray[np.float64]:
-    """Random points of the surface with nothing above them, or vertices where there are none, shape [count, 3] [m].
+    """Random points of the surface to drop bodies on, [count, 3] [m].
 
-    First those that face upwards, have room about them [m], and are seen from the eye.
+    They have nothing above them. Points that face upwards, have room about them [m] and are seen
+    from the eye come first. Where there are too few points, vertices take their place.
     """
     scene = RayScene(V, F)
     low = V.min(axis=0)

@@ -240,7 +240,10 @@ def _sampled(
 def _fitted(
     V: NDArray[np.float64], azimuth: float, elevation: float
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
-    """Point to look at [m], distance from there [m] and eye [m] with which a target fills its share of the frame."""
+    """View in which a target fills its share of the frame.
+
+    Returns the point to look at [m], the distance from there [m], and the eye [m].
+    """
     lookat = (V.min(axis=0) + V.max(axis=0)) / 2
     distance = 3 * SIZE
     tangent = np.tan(np.radians(_FOVY) / 2)
@@ -260,7 +263,11 @@ def _fitted(
 
 
 def _up(mesh: Mesh, usual: str) -> str:
-    """Axis along which a mesh has no extent; or else the usual one, unless it falls on that and not on the other."""
+    """Axis that is to point up.
+
+    A flat mesh lies down, so it is the axis along which the mesh has no extent. Otherwise it is the
+    usual axis, unless the mesh falls over on that one and stands on the other.
+    """
     extents = np.ptp(mesh.V, axis=0)
     if flat := [axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()]:
         return flat[0]
@@ -275,7 +282,10 @@ def _up(mesh: Mesh, usual: str) -> str:
 
 
 def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:
-    """Vertices scaled, turned upright, standing on z = 0 over the origin, or hovering if they lie flat [m]."""
+    """Vertices scaled, turned upright, and standing on z = 0 over the origin [m].
+
+    A mesh that lies flat hovers above the floor.
+    """
     V = mesh.V if up == "z" else mesh.V[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     V = V * (SIZE / np.ptp(V, axis=0).max())
     low = V.min(axis=0)
@@ -304,7 +314,10 @@ def find_scene(target: str | Path, *, seed: int | None = None) -> Scene:
 
 
 def is_scene(target: str | Path) -> bool:
-    """Whether a target is a scene, by its name or its file, and not a mesh; raises `SceneError` if there is neither."""
+    """Whether a target is a scene, by its name or its file, and not a mesh.
+
+    Raises `SceneError` if there is neither.
+    """
     path = Path(target)
     if str(target) in shipped_scenes() or path.suffix.lower() == ".toml":
         scene_path(target)

@@ -1,7 +1,7 @@
-"""Reading a scene: one MJCF, and one TOML file that names its targets, the camera, the duration and the script.
+"""Reading a scene: one MJCF, and one TOML file with all else.
 
-Names and numbers are checked against the model before anything is simulated, and the files that an
-MJCF names are looked at before MuJoCo opens them: it would wait for ever for one that is a FIFO.
+Names and numbers are checked against the model before anything is simulated. The files that an MJCF
+names are looked at before MuJoCo opens them: it would wait for ever for a FIFO.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ import numpy as np
 
 from ripple_sim.coupling.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.geoms import find_target, target_name
+from ripple_sim.coupling.hooks import adopt_warnings
 from ripple_sim.coupling.own_model import own_model
 from ripple_sim.coupling.rippling import site_on
-from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.coupling.suited import typical_hit
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, warn_caller
@@ -181,7 +181,7 @@ def _check_image(key: str, path: str, valid: str) -> None:
 
 
 def check_files(path: Path) -> None:
-    """Make sure that an MJCF and all that it includes or names are regular files, as far as they exist.
+    """Make sure that an MJCF and all files that it names are regular files, as far as they exist.
 
     Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is
     warned of. Raises `SceneError` naming the file.
@@ -225,7 +225,7 @@ def check_files(path: Path) -> None:
 
 
 def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
-    """Say how long MuJoCo will be silent over a flexcomp's grid whose points are all bodies."""
+    """Warn of a flexcomp's grid of bodies that MuJoCo takes long to set up."""
     if (
         flex.get("type", "grid") != "grid"
         or flex.get("rigid") == "true"
@@ -319,7 +319,10 @@ def load_scene(
 def scene_of(
     name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[str, ...] = ()
 ) -> Scene:
-    """The scene of a name and notes that the content of a scene file makes of a model, checked; raises as that does."""
+    """The scene that the content of a scene file makes of a model, checked.
+
+    Raises what `check_scene` raises.
+    """
     events = Events(
         **{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)}
     )
@@ -393,7 +396,10 @@ def load_model(
 
 @contextlib.contextmanager
 def refusal_of(name: str) -> Iterator[None]:
-    """Have what MuJoCo says of a model, by its name in messages, as ours: its refusal is a `SceneError`."""
+    """Turn MuJoCo's refusal of a model into a `SceneError`, and its warnings into ours.
+
+    `name` is what messages call the model.
+    """
     adopt_warnings()
     try:
         yield

@@ -1,4 +1,4 @@
-"""`[ripple.material]` of a scene file: coefficients as numbers or images, alone or on top of a preset.
+"""`[ripple.material]` of a scene file: coefficients as numbers or images, and presets.
 
 The coefficients are the fields of `Material`, and the parameters of a preset those of its
 constructor.
@@ -121,11 +121,11 @@ def preset_material(name: str, given: dict[str, Any]) -> Material:
 
 
 class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
+    """`[ripple.material]`: the wave equation's coefficients, as in `Material`.
 
-    Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a
-    preset, those that are left out are those of `Material()`. The last three are the same
-    everywhere: no map gives them.
+    Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}.
+    Coefficients that are left out are those of the preset, or without one those of `Material()`.
+    `deep`, `tightening` and `poisson` are the same everywhere: no map gives them.
     """
 
     speed: Coefficient | None = None

@@ -40,10 +40,11 @@ class Request:
 
 
 def parse_request(words: Iterable[str]) -> Request:
-    """Read names of overlays; "height" and "velocity" may have a range, such as "height=0.02" [m, m/s].
+    """Read names of overlays.
 
-    Raises `SceneError` for an unknown name, a range that is not a positive number or of an overlay
-    without range, or two heatmaps.
+    "height" [m] and "velocity" [m/s] may have a range, such as "height=0.02". Raises `SceneError`
+    for an unknown name, a range that is not a positive number or of an overlay without range, or
+    two heatmaps.
     """
     chosen: dict[str, float | None] = {}
     for word in words:

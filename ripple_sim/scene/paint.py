@@ -25,9 +25,10 @@ _SCENES = (".glb", ".gltf")
 
 
 def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
-    """Image of a mesh file, or None: named in an OBJ's material library or in a GLB, or NAME_texture.png beside it.
+    """Image of a mesh file, or None.
 
-    If several images colour one mesh, none is used, with a warning.
+    It is named in an OBJ's material library or in a GLB, or is the file NAME_texture.png beside the
+    mesh. If several images colour one mesh, none is used, with a warning.
 
     Returns
     -------
@@ -112,9 +113,10 @@ def _embedded(mesh_path: Path) -> list[Image.Image]:
 
 
 def vertex_colors(mesh_path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.uint8]] | None:
-    """Vertices of a PLY, OBJ, GLB or glTF file [n, 3] and their colours, sRGB [n, 3], or None if it has none.
+    """Vertices [n, 3] of a PLY, OBJ, GLB or glTF file, and their colours, sRGB [n, 3], or None.
 
-    A colour of a face counts as one of its corners. What has none in a file that has some is white.
+    A colour of a face counts as a colour of its corners. Parts without colours, in a file that has
+    some, are white. Without any colours the result is None.
     """
     mesh_path = Path(mesh_path)
     if not _may_be_coloured(mesh_path):
@@ -182,10 +184,11 @@ def _baked(
 def paint_target(
     spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None
 ) -> None:
-    """Give the geom "target" the image that is asked for or that the mesh names, or else its vertices' colours.
+    """Give the geom "target" its colours.
 
-    Raises `SceneError` if an image that is asked for cannot be read, or the mesh has no texture
-    coordinates.
+    They are those of the image that is asked for, of the image that the mesh names, or of the
+    mesh's vertices. Raises `SceneError` if an image that is asked for cannot be read, or the mesh
+    has no texture coordinates.
     """
     pixels = None
     corner_uv = mesh.corner_uv

@@ -75,16 +75,20 @@ class Scene:
 
 
 def through_camera(scene: Scene, name: str) -> Scene:
-    """The scene seen through a camera of its model; raises `SceneError` if the model has no such camera."""
+    """The scene seen through a camera of its model.
+
+    Raises `SceneError` if the model has no such camera.
+    """
     camera = CameraEntry(name=name)
     check_camera(scene.model, camera)
     return dataclasses.replace(scene, camera=camera)
 
 
 def with_exposure(scene: Scene, **changes: Any) -> Scene:
-    """The scene with other values of its camera's shutter, aperture, focus and exposures; None leaves one as it is.
+    """The scene with other values of its camera's shutter, aperture, focus and exposures.
 
-    Raises `SceneError` if a value is invalid, or would have no effect.
+    None leaves a value as it is. Raises `SceneError` if a value is invalid, or would have no
+    effect.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     camera = converted({**msgspec.structs.asdict(scene.camera), **given}, CameraEntry, "camera")

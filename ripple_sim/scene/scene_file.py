@@ -71,7 +71,7 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
 
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Make sure that the model has what the camera names, and that the exposure is possible; raises `SceneError`."""
+    """Raise `SceneError` if the model lacks what a camera names, or an optic is impossible."""
     for name, kind, count, missing in (
         (entry.name, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam, "camera {!r}; its cameras are"),
         (
@@ -260,7 +260,10 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
-    """Check a scene's table against the schema; raises `SceneError` naming the place, the value and what is valid."""
+    """Check a scene's table against the schema.
+
+    Raises `SceneError` naming the place, the value and what is valid.
+    """
     what = f"scene file {origin!r}"
     check_keys(table, SceneFile, what)
     _check_values(table, "", what)
@@ -268,7 +271,10 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
 
 
 def converted(table: Any, schema: type[Entry], what: str) -> Entry:
-    """A table read by a schema; raises `SceneError` with what it is, the key and the value if they do not fit."""
+    """A table read by a schema.
+
+    If the table does not fit, raises `SceneError` with `what` the table is, the key and the value.
+    """
     try:
         return msgspec.convert(table, schema)
     except msgspec.ValidationError as error:
@@ -281,7 +287,10 @@ def converted(table: Any, schema: type[Entry], what: str) -> Entry:
 
 
 def _words_at(schema: Any, message: str) -> tuple[str, ...]:
-    """The words that a field takes whose path stands at the end of a message of msgspec's, if it takes only some."""
+    """The words that a field takes, or none if it takes any.
+
+    The path of the field stands at the end of a message of msgspec's.
+    """
     found = re.search(r" - at `(.*)`$", message)
     kind = schema
     for name in re.findall(r"\w+", found[1] if found else ""):
@@ -317,7 +326,10 @@ def table_of(kind: Any) -> type[msgspec.Struct] | None:
 
 
 def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str = "") -> None:
-    """Refuse unknown keys before msgspec does, with the list of valid ones; raises `SceneError` with what it is."""
+    """Refuse unknown keys before msgspec does, with the list of valid ones.
+
+    Raises `SceneError` with `what` the table is.
+    """
     if not isinstance(table, dict):
         return
     fields = {field.name: field.type for field in msgspec.structs.fields(schema)}
@@ -338,7 +350,10 @@ def check_keys(table: Any, schema: type[msgspec.Struct], what: str, place: str =
 
 
 def uniform_material(entry: RippleEntry) -> Material:
-    """A target's material before its maps; one whose layer is still unknown promises nothing of wavelengths."""
+    """A target's material before its maps.
+
+    A material whose layer is still unknown promises nothing of wavelengths.
+    """
     material = entry.material.material()
     return dataclasses.replace(material, wavelengths=(0.0, np.inf)) if entry.inside else material
 

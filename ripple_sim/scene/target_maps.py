@@ -1,4 +1,4 @@
-"""What a scene file says of a target texel by texel, beside its material.
+"""Values of a target texel by texel in a scene file, beside its material.
 
 `[ripple.height]` is the shape of the surface at the beginning, also as an expression of position
 such as "0.02 * exp(-(x**2 + y**2) / 0.1**2)"; `rim` may be by region, where such expressions hold;
@@ -191,9 +191,9 @@ def check_rim(rim: str | dict[str, str]) -> None:
 
 
 def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
-    """What the rims of a target do, as `Ripples` takes it: a name, or a function of the rims' points.
+    """The `rim` of a target as `Ripples` takes it: a name, or a function of the rims' points.
 
-    That function raises `SceneError` for a closed surface, and for a condition that holds nowhere
+    The function raises `SceneError` for a closed surface, and for a condition that holds nowhere
     on the rims.
     """
     if isinstance(rim, str):
@@ -224,11 +224,12 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
 
 
 class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple.inside]]`: a body under the layer; the way to it from each texel inwards is the layer's thickness.
+    """`[[ripple.inside]]`: a body under the layer.
 
-    The material's preset is then one of a layer. Places are in the frame of the geom's body. Of
-    several bodies the nearest counts; where there is none below, the layer is as thick as at its
-    thickest, or as its limits let it be.
+    The distance to the body from each texel inwards is the layer's thickness. The material's preset
+    is then one of a layer. Places are in the frame of the geom's body. Of several bodies the
+    nearest counts; where no body is below, the layer is as thick as at its thickest, or as its
+    limits let it be.
     """
 
     mesh: str | None = None
@@ -267,7 +268,10 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
                 )
 
     def body(self) -> Mesh | Volume:
-        """What is inside, in the frame of the geom's body; raises `MeshError` if the file cannot be read."""
+        """What is inside, in the frame of the geom's body.
+
+        Raises `MeshError` if the file cannot be read.
+        """
         return load_inside(
             self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale
         )

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ripple_sim.capture.frame_source import FrameSource, Sighting, passes_of
 from ripple_sim.capture.snapshot import Snapshot, snapshots
 from ripple_sim.coupling.geoms import geom_name
-from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.coupling.hooks import adopt_warnings
 from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.encode.part import Settings
 from ripple_sim.encode.passes import PassFiles

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.hooks import adopt_warnings
 from ripple_sim.coupling.soft import target_pose
-from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.export.moving_mesh import Displaced, MovingMesh
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
