@@ -1,21 +1,17 @@
-from .files import check_mesh_file as check_mesh_file, load_mesh as load_mesh, repaired as repaired
+from .files import check_mesh_file as check_mesh_file, load_mesh as load_mesh
 from .mesh import (
     Mesh as Mesh,
     check_genus_zero as check_genus_zero,
     vertex_normals as vertex_normals,
 )
-from .ply import (
-    Element as Element,
-    Soup as Soup,
-    read_binary as read_binary,
-    read_text as read_text,
-    triangulate as triangulate,
-)
+from .ply import Element as Element, read_binary as read_binary, read_text as read_text
 from .queries import (
     ClosestPoints as ClosestPoints,
     RayScene as RayScene,
     downward_hits as downward_hits,
 )
+from .repair import repaired as repaired
+from .soup import Soup as Soup, triangulate as triangulate
 from .topology import (
     SPLITS as SPLITS,
     Edges as Edges,

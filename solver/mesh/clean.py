@@ -1,8 +1,8 @@
-"""Triangles on their way through cleaning, with what belongs to each of their corners; and the steps of that.
+"""The steps that clean a triangle soup; each triangle's corners carry their data along.
 
-Nothing is done that could be seen: equal vertices are merged, hairline cracks closed, and triangles
-dropped that collapse or repeat. Triangles without area, whose corners lie on a line, are taken out
-without opening the surface. Then all are wound alike.
+No step changes what a viewer sees. Equal vertices are merged and hairline cracks closed. Triangles
+that collapse or repeat are dropped. Triangles without area (their corners lie on a line) are taken
+out without opening the surface. At last all triangles are wound alike.
 """
 
 from __future__ import annotations
@@ -15,35 +15,41 @@ from scipy.spatial import cKDTree
 
 from .topology import SPLITS, distinct, edges_of, labels, sides_of, turned
 
+# Plurals in messages that do not end in "s".
 _PLURALS = {"vertex": "vertices"}
 
-# Relative to the size of the mesh: above the round-off of a file in float32, far below any gap that
-# is meant.
-_CRACK = 1e-6
+# Widest crack that is closed, in units of the mesh's size: above the round-off of a file in
+# float32, far below any gap that somebody modelled.
+_MAX_CRACK_WIDTH = 1e-6
 
-# In widths of a crack: a triangle that is longer does not vanish with it.
-_NEEDLE = 10
+# Longest triangle that may vanish when a crack is closed, in widths of the crack. A longer one is a
+# needle of the mesh.
+_MAX_COLLAPSED_LENGTH = 10
 
-# Height over longest side below which three corners lie on a line: a little above the round-off of
-# float64.
-_FLAT = 1e-12
-_ROUNDS = 64
+# Height of a triangle over its longest side, up to which its corners lie on a line: a little above
+# the round-off of float64.
+_MAX_SLIVER_HEIGHT = 1e-12
 
-# A part that encloses less, relative to its area, has no inside.
-_NO_INSIDE = 1e-12
+# Passes that take out slivers; slivers that are left after them are dropped.
+_MAX_SLIVER_PASSES = 64
+
+# A part that encloses less, in units of its area to the power 3/2, has no inside.
+_MIN_ENCLOSED_VOLUME = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
 class Corners:
-    """What belongs to the corners of triangles; side k of a triangle runs from corner k to corner k + 1.
+    """The corners of triangles and their data.
+
+    Side k of a triangle runs from corner k to corner k + 1.
 
     Attributes
     ----------
     F : int64 [triangle_count, 3]
-        Vertex, equal positions being one vertex.
+        Vertices after merging: equal positions are one vertex.
     given : int64 [triangle_count, 3]
-        Vertex as it was given: at places where surfaces touch, it tells which triangles were
-        joined.
+        Vertices in the user's arrays; -1 at vertices that cleaning added. Where surfaces touch,
+        they show which triangles were joined.
     uv : float64 [triangle_count, 3, 2] or None
         Texture coordinates.
     """
@@ -52,32 +58,33 @@ class Corners:
     given: NDArray[np.int64]
     uv: NDArray[np.float64] | None
 
-    def kept(self, keep: NDArray) -> Corners:
+    def subset(self, chosen: NDArray) -> Corners:
         """Some of the triangles, chosen by a mask or by number."""
-        return Corners(self.F[keep], self.given[keep], None if self.uv is None else self.uv[keep])
+        uv = None if self.uv is None else self.uv[chosen]
+        return Corners(self.F[chosen], self.given[chosen], uv)
 
-    def reversed(self, which: NDArray[np.bool_]) -> Corners:
-        """The same triangles, those chosen wound the other way."""
-        F, given = (np.where(which[:, None], x[:, ::-1], x) for x in (self.F, self.given))
-        return Corners(
-            F,
-            given,
-            None if self.uv is None else np.where(which[:, None, None], self.uv[:, ::-1], self.uv),
-        )
+    def reversed(self, chosen: NDArray[np.bool_]) -> Corners:
+        """All triangles, the chosen ones wound the other way."""
+        F = np.where(chosen[:, None], self.F[:, ::-1], self.F)
+        given = np.where(chosen[:, None], self.given[:, ::-1], self.given)
+        uv = None
+        if self.uv is not None:
+            uv = np.where(chosen[:, None, None], self.uv[:, ::-1], self.uv)
+        return Corners(F, given, uv)
 
     def split(
         self, point: NDArray[np.int64], given: NDArray[np.int64], share: NDArray[np.float64]
     ) -> Corners:
         """Insert vertices into sides, and cut the triangles there.
 
-        They keep their order, area and winding.
+        The pieces keep the order, area and winding of the triangles.
 
         Parameters
         ----------
         point, given : [triangle_count, 3]
-            Vertex to be inserted into each side, and its number as given; -1 where there is none.
+            Vertex to insert into each side, and its number in the user's arrays; -1 for no vertex.
         share : [triangle_count, 3]
-            Where it lies, from 0 at the side's first corner to 1 at the other.
+            Place of the vertex, from 0 at the side's first corner to 1 at the second.
         """
         sets = (point >= 0) @ [1, 2, 4]
         parents = []
@@ -86,8 +93,7 @@ class Corners:
             chosen = np.flatnonzero(sets == number)
             parents.append(np.repeat(chosen, len(pattern)))
             patterns.append(np.tile(pattern, (len(chosen), 1)))
-        # of each piece, the triangle of which it is a part, and its corners, as `SPLITS` numbers
-        # them
+        # for each piece the triangle that it was cut from, and its corners, numbered as in `SPLITS`
         order = np.argsort(np.concatenate(parents), kind="stable")
         parent = np.concatenate(parents)[order]
         corner = np.concatenate(patterns)[order]
@@ -103,9 +109,9 @@ class Corners:
 def counted(number: int, thing: str) -> str:
     """A number and its noun: 1 edge, 2 edges, 1,000 vertices."""
     *words, noun = thing.split()
-    return " ".join(
-        [f"{number:,}", *words, noun if number == 1 else _PLURALS.get(noun, noun + "s")]
-    )
+    if number != 1:
+        noun = _PLURALS.get(noun, noun + "s")
+    return " ".join([f"{number:,}", *words, noun])
 
 
 def place(point: NDArray[np.float64]) -> str:
@@ -114,35 +120,55 @@ def place(point: NDArray[np.float64]) -> str:
 
 
 def merged_vertices(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Triangles [m, 3] in which equal positions are one vertex, the first of them; and how many cracks' ends joined.
+    """Merge vertices at equal positions, and close cracks.
 
-    Those are boundary vertices that lie within round-off of each other. Inside of a surface none is
-    joined.
+    A crack lies between boundary vertices that are within round-off of each other. Vertices inside
+    of a surface are never joined to others nearby.
+
+    Returns
+    -------
+    F : [m, 3]
+        Each vertex is the first one at its position.
+    joined : int
+        Number of vertices that went when cracks were closed.
     """
     used = distinct(F)
     first = np.arange(len(V))
-    # + 0.0 turns -0.0 into 0.0, which are the same place
+    # + 0.0 turns -0.0 into 0.0, which is the same place
     first[used] = used[_first_equal(V[used] + 0.0)]
     F = first[F]
     edges = edges_of(F)
-    alone = edges.ends[edges.rim]
-    rim = np.unique(alone[alone[:, 0] != alone[:, 1]])
+    boundary = edges.ends[edges.rim]
+    rim = np.unique(boundary[boundary[:, 0] != boundary[:, 1]])
     if len(rim) == 0:
         return F, 0
-    width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
-    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
-    target = np.arange(len(V))
-    target[rim] = rim[np.unique(label, return_index=True)[1]][label]
-    # a needle is as thin as a crack, but no crack
-    lost = collapsed(target[F]) & ~collapsed(F)
-    length = np.linalg.norm(V[F[lost]] - V[np.roll(F[lost], 1, axis=1)], axis=-1).max(axis=1)
-    needles = np.isin(target, target[F[lost][length > _NEEDLE * width]])
-    joined = np.where(needles, np.arange(len(V)), target)[F]
+    joined = _crack_targets(V, F, rim)[F]
     return joined, len(distinct(F)) - len(distinct(joined))
 
 
+def _crack_targets(
+    V: NDArray[np.float64], F: NDArray[np.int64], rim: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The vertex with which each vertex [n] is to be joined so that cracks close, or itself.
+
+    `rim` has the boundary vertices. Joining them must not make a needle of the mesh vanish, which
+    is as thin as a crack, but long.
+    """
+    width = _MAX_CRACK_WIDTH * np.ptp(V[F.ravel()], axis=0).max()  # [m]
+    label = labels(cKDTree(V[rim]).query_pairs(width, output_type="ndarray"), len(rim))
+    first_of_label = rim[np.unique(label, return_index=True)[1]]
+    target = np.arange(len(V))
+    target[rim] = first_of_label[label]
+    vanishing = F[collapsed(target[F]) & ~collapsed(F)]
+    side = V[vanishing] - V[np.roll(vanishing, 1, axis=1)]
+    length = np.linalg.norm(side, axis=-1).max(axis=1)
+    needles = vanishing[length > _MAX_COLLAPSED_LENGTH * width]
+    at_needle = np.isin(target, target[needles])
+    return np.where(at_needle, np.arange(len(V)), target)
+
+
 def distinct_triangles(F: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Mask of the triangles with three different vertices that are the first with these three."""
+    """Mask of the triangles with three different vertices, the first of those with the same three."""
     return ~collapsed(F) & (_first_equal(np.sort(F, axis=1)) == np.arange(len(F)))
 
 
@@ -162,88 +188,99 @@ def _first_equal(rows: NDArray) -> NDArray[np.int64]:
 
 
 def without_slivers(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, int]:
-    """Drop triangles whose corners lie on a line, and say how many; unchanged where there are none.
+    """Drop slivers, triangles whose corners lie on a line, and return how many there were.
 
-    What bordered on the longest side of one gets the middle corner.
+    The triangle beyond the longest side of a sliver gets the sliver's middle corner, so that the
+    surface stays closed. Corners without slivers come back unchanged.
     """
-    flat, length = _flat(V, corners.F)
-    before = int(flat.sum())
-    for _ in range(_ROUNDS):
-        if not flat.any():
-            return corners, before
-        corners = _without_longest(V, corners, flat, length)
-        flat, length = _flat(V, corners.F)
-    return corners.kept(~flat), before
+    sliver, length = _slivers(V, corners.F)
+    count = int(sliver.sum())
+    for _ in range(_MAX_SLIVER_PASSES):
+        if not sliver.any():
+            return corners, count
+        corners = _without_longest_slivers(V, corners, sliver, length)
+        sliver, length = _slivers(V, corners.F)
+    return corners.subset(~sliver), count
 
 
-def _flat(
+def _slivers(
     V: NDArray[np.float64], F: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Mask of the triangles without area, and the lengths of all sides [m, 3]."""
+    """Mask of the triangles without area [m], and the lengths of all sides [m, 3]."""
     sides = V[np.roll(F, -1, axis=1)] - V[F]
     length = np.linalg.norm(sides, axis=-1)
     twice_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    return twice_area <= _FLAT * length.max(axis=1) ** 2, length
+    return twice_area <= _MAX_SLIVER_HEIGHT * length.max(axis=1) ** 2, length
 
 
-def _without_longest(
-    V: NDArray[np.float64], corners: Corners, flat: NDArray[np.bool_], length: NDArray[np.float64]
+def _without_longest_slivers(
+    V: NDArray[np.float64], corners: Corners, sliver: NDArray[np.bool_], length: NDArray[np.float64]
 ) -> Corners:
-    """Take out slivers of which no two are neighbours, the longest first; of the two arrays see `_flat`."""
+    """Take out the slivers that are longer than all slivers beside them.
+
+    So no two of them are neighbours. `sliver` and `length` are those of `_slivers`.
+    """
     F = corners.F
-    longest = length.argmax(axis=1)
+    longest_side = length.argmax(axis=1)
+    # the longest sliver has the highest rank; other triangles have -1
     rank = np.full(len(F), -1)
-    rank[np.lexsort((length.max(axis=1), flat))] = np.arange(len(F))
-    rank[~flat] = -1
+    rank[np.lexsort((length.max(axis=1), sliver))] = np.arange(len(F))
+    rank[~sliver] = -1
     edge = edges_of(F).of
     highest = np.full(edge.max() + 1, -1)
     np.maximum.at(highest, edge, np.repeat(rank[:, None], 3, axis=1))
-    out = flat & (highest[edge] == rank[:, None]).all(axis=1)
-    removed = np.flatnonzero(out)
-    source = np.full(len(highest), -1)
-    source[edge[removed, longest[removed]]] = removed
-    source = np.where(out[:, None], -1, source[edge])
-    corner = (longest[source] + 2) % 3
-    point, given = (np.where(source >= 0, x[source, corner], -1) for x in (F, corners.given))
+    removed = sliver & (highest[edge] == rank[:, None]).all(axis=1)
+    # the removed sliver, if any, whose longest side lies on each side of the other triangles
+    numbers = np.flatnonzero(removed)
+    sliver_at_edge = np.full(len(highest), -1)
+    sliver_at_edge[edge[numbers, longest_side[numbers]]] = numbers
+    beyond = np.where(removed[:, None], -1, sliver_at_edge[edge])
+    # the sliver's middle corner, opposite to its longest side, goes into that side
+    middle = (longest_side[beyond] + 2) % 3
+    point = np.where(beyond >= 0, F[beyond, middle], -1)
+    given = np.where(beyond >= 0, corners.given[beyond, middle], -1)
     share = np.linalg.norm(V[point] - V[F], axis=-1) / np.maximum(length, np.finfo(float).tiny)
-    split = corners.kept(~out).split(point[~out], given[~out], share[~out])
-    return split.kept(distinct_triangles(split.F))
+    rest = ~removed
+    split = corners.subset(rest).split(point[rest], given[rest], share[rest])
+    return split.subset(distinct_triangles(split.F))
 
 
 def oriented(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, list[str]]:
-    """Wind the triangles of a manifold, orientable surface alike, part by part, and say what was turned.
+    """Wind the triangles of each part of a manifold, orientable surface alike; notes say what turned.
 
-    A closed part faces outwards, wherever it lies; an open one, and one without volume, as most of
-    its triangles did.
+    A closed part faces outwards afterwards, wherever it lies. An open part, and a closed one
+    without volume, faces as most of its triangles did.
     """
     F = corners.F
     pairs, rim = sides_of(F)
     part = labels(pairs // 3, len(F))
     count = int(part.max()) + 1
     start = F.ravel()
-    flip = turned(pairs // 3, start[pairs[:, 0]] == start[pairs[:, 1]], len(F))
+    # joined sides run against each other where two triangles are wound alike
+    against = start[pairs[:, 0]] == start[pairs[:, 1]]
+    flip = turned(pairs // 3, against, len(F))
     volume, area = part_volumes(V, np.where(flip[:, None], F[:, ::-1], F), part)
     closed = np.bincount(part[rim // 3], minlength=count) == 0
     sizes = np.bincount(part)
     turns = np.bincount(part, weights=flip)
-    solid = closed & (np.abs(volume) > _NO_INSIDE * area**1.5)
-    over = np.where(solid, volume < 0, 2 * turns > sizes)
-    flip ^= over[part]
-    whole = np.bincount(part, weights=flip, minlength=count) == sizes
-    some = int((flip & ~whole[part]).sum())
+    has_inside = closed & (np.abs(volume) > _MIN_ENCLOSED_VOLUME * area**1.5)
+    turn_part = np.where(has_inside, volume < 0, 2 * turns > sizes)
+    flip ^= turn_part[part]
+    all_turned = np.bincount(part, weights=flip, minlength=count) == sizes
+    single_turns = int((flip & ~all_turned[part]).sum())
     notes = []
-    if whole.any():
-        which = "" if count == 1 else f"{int(whole.sum()):,} of {counted(count, 'part')} "
+    if all_turned.any():
+        which = "" if count == 1 else f"{int(all_turned.sum()):,} of {counted(count, 'part')} "
         notes.append(f"{which}turned inside out (the triangles faced inwards)")
-    if some:
-        notes.append(f"{counted(some, 'triangle')} reversed (inconsistent winding)")
+    if single_turns:
+        notes.append(f"{counted(single_turns, 'triangle')} reversed (inconsistent winding)")
     return (corners.reversed(flip) if flip.any() else corners), notes
 
 
 def part_volumes(
     V: NDArray[np.float64], F: NDArray[np.int64], part: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Signed volume of every part [m^3], exact where it is closed, and its area [m^2].
+    """Signed volume of every part [m^3], exact if the part is closed, and its area [m^2].
 
     `part` [triangle_count] is the part of every triangle, numbered from 0.
     """
@@ -251,12 +288,10 @@ def part_volumes(
     size = np.bincount(part)
     corners = V[F]
     middle = np.stack([np.bincount(part, weights=x) / size for x in corners.mean(axis=1).T], axis=1)
+    # seen from the middle of its part, a far part loses no digits
     a, b, c = np.moveaxis(corners - middle[part][:, None], 1, 0)
-    volume = (
-        np.bincount(part, weights=np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count) / 6
-    )
-    area = (
-        np.bincount(part, weights=np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
-        / 2
-    )
+    six_volumes = np.einsum("ij,ij->i", a, np.cross(b, c))
+    two_areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    volume = np.bincount(part, weights=six_volumes, minlength=count) / 6
+    area = np.bincount(part, weights=two_areas, minlength=count) / 2
     return volume, area

@@ -310,7 +310,7 @@ def _cleaned(
     merged, joined = merged_vertices(V, F)
     empty = collapsed(merged)
     keep = distinct_triangles(merged)
-    corners, slivers = without_slivers(V, Corners(merged, F, uv).kept(keep))
+    corners, slivers = without_slivers(V, Corners(merged, F, uv).subset(keep))
     if len(corners.F) == 0:
         raise MeshError(
             f"{name} has no triangle with an area: none has three different corners that lie on no "

@@ -1,7 +1,7 @@
-"""Runs pymeshfix on the arrays of one file and leaves the result in another.
+"""A program that runs pymeshfix on the arrays of one file and writes the result to another file.
 
-A program of its own, which `repair` starts: on some surfaces pymeshfix ends the process that it
-runs in.
+`repair` starts it as a process of its own, because on some surfaces pymeshfix ends the process in
+which it runs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def main(source: str, target: str) -> None:
-    """Fill the holes of all parts. The files hold V [n, 3] and F [m, 3]."""
+    """Fill the holes of all parts. Both files hold V [n, 3] and F [m, 3]."""
     from pymeshfix import PyTMesh
 
     with np.load(source) as arrays:

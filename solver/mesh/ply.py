@@ -1,6 +1,7 @@
-"""PLY files as triangles, text or binary: texture coordinates of vertices or of corners, polygons of any size.
+"""PLY files as triangles, text or binary, with texture coordinates of vertices or of corners.
 
-Polygons are cut into triangles by a fan, or by clipping ears where a fan folds.
+trimesh reads PLY files too, but fails on binary ones that mix polygons of several sizes, which are
+common.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError
-from .clean import counted
+from .soup import Soup, too_small, triangulate
 
+# NumPy's name of each number type of a PLY file.
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -24,17 +26,24 @@ _TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
+
+# NumPy's name of the byte order of each format; "" is text.
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+# Names under which programs store the texture coordinates of a vertex.
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 
 
 @dataclasses.dataclass
 class Element:
-    """A table of the file: so many rows of named values, of which some are lists (of a length type)."""
+    """A table of the file: rows of named values.
+
+    A value is a number, or a list that begins with its length.
+    """
 
     name: str
     rows: int
-    # name, type, and type of the length of each
+    # name, type, and type of the list's length (None for a number) of each column
     columns: list[tuple[str, str, str | None]] = dataclasses.field(default_factory=list)
 
 
@@ -143,105 +152,6 @@ def _ends_early(element: Element) -> MeshError:
     return MeshError(f"it ends before the {element.rows} rows of its element {element.name}")
 
 
-@dataclasses.dataclass(frozen=True)
-class Soup:
-    """Triangles read from a file, not validated.
-
-    Attributes
-    ----------
-    V : float64 [vertex_count, 3]
-    F : int64 [triangle_count, 3]
-    corner_uv : float64 [triangle_count, 3, 2] or None
-        Texture coordinates of the corners; 0 where the file has none for some of them.
-    notes : tuple of str
-        What was left out, one line each.
-    """
-
-    V: NDArray[np.float64]
-    F: NDArray[np.int64]
-    corner_uv: NDArray[np.float64] | None = None
-    notes: tuple[str, ...] = ()
-
-
-def too_small(sizes: NDArray[np.int64]) -> tuple[str, ...]:
-    """Note on faces of fewer than three corners [face_count], if there are any."""
-    count = int((sizes < 3).sum())
-    return (f"{counted(count, 'face')} with fewer than three corners left out",) if count else ()
-
-
-def triangulate(points: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Cut polygons into triangles of the same winding.
-
-    Parameters
-    ----------
-    points : [corner_count, 3]
-        Corners, polygon after polygon.
-    sizes : [polygon_count]
-        Corners of each polygon. Those of fewer than three (points and lines) give no triangle.
-
-    Returns
-    -------
-    int64 [triangle_count, 3]
-        Indices of corners, in the order of the polygons.
-    """
-    first = np.cumsum(sizes) - sizes
-    count = np.maximum(sizes - 2, 0)
-    owner = np.repeat(np.arange(len(sizes)), count)
-    step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    triangles = np.stack([first[owner], first[owner] + step + 1, first[owner] + step + 2], axis=1)
-    # polygons that are not convex: a triangle of their fan faces against the sum of all
-    many = np.flatnonzero(sizes[owner] > 3)
-    a, b, c = (points[triangles[many, k]] for k in range(3))
-    # values that are not finite are refused later, by name
-    with np.errstate(over="ignore", invalid="ignore"):
-        normals = np.cross(b - a, c - a)
-    of = owner[many]
-    total = np.stack(
-        [np.bincount(of, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1
-    )
-    for polygon in np.unique(of[np.einsum("ij,ij->i", normals, total[of]) < 0]):
-        corners = points[first[polygon] : first[polygon] + sizes[polygon]]
-        triangles[owner == polygon] = first[polygon] + _clip_ears(corners)
-    return triangles
-
-
-def _clip_ears(corners: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Triangles [n - 2, 3] of one simple polygon [n, 3], seen along its normal (Meisters 1975)."""
-    # Newell's normal is that of the best plane; an axis pair that suits it spares a rotation
-    normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-    axis = int(np.argmax(np.abs(normal)))
-    flat = np.delete(corners, axis, axis=1)
-    if (normal[axis] < 0) != (axis == 1):  # dropping y mirrors
-        flat = flat * [1, -1]
-    left = list(range(len(corners)))
-    triangles = []
-    while len(left) > 3:
-        at = next((i for i in range(len(left)) if _is_ear(flat, left, i)), 0)
-        triangles.append([left[at - 1], left[at], left[(at + 1) % len(left)]])
-        del left[at]
-    return np.array([*triangles, left])
-
-
-def _is_ear(flat: NDArray[np.float64], left: list[int], at: int) -> bool:
-    a = flat[left[at - 1]]
-    b = flat[left[at]]
-    c = flat[left[(at + 1) % len(left)]]
-    if _turn(a, b, c[None])[0] <= 0:
-        return False
-    others = flat[
-        [k for k in left if k not in (left[at - 1], left[at], left[(at + 1) % len(left)])]
-    ]
-    inside = (_turn(a, b, others) >= 0) & (_turn(b, c, others) >= 0) & (_turn(c, a, others) >= 0)
-    return not inside.any()
-
-
-def _turn(
-    a: NDArray[np.float64], b: NDArray[np.float64], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Twice the signed area of the triangles a, b, point."""
-    return (b[0] - a[0]) * (points[:, 1] - a[1]) - (b[1] - a[1]) * (points[:, 0] - a[0])
-
-
 def read_ply(content: bytes) -> Soup:
     """Triangles of a PLY file.
 
@@ -251,7 +161,8 @@ def read_ply(content: bytes) -> Soup:
     order, elements, data = _header(content)
     columns: dict[str, dict[str, Any]] = {}
     for element in elements:
-        columns[element.name], data = (read_binary if order else read_text)(element, data, order)
+        read = read_binary if order else read_text
+        columns[element.name], data = read(element, data, order)
         if "face" in columns and "vertex" in columns:
             break
     vertex = columns.get("vertex", {})
@@ -269,22 +180,44 @@ def read_ply(content: bytes) -> Soup:
         )
     index = corners.astype(np.int64)
     triangles = triangulate(V[index], sizes)
-    uv = None
-    pairs = faces.get("texcoord")
-    names = next((both for both in _UV_NAMES if vertex.keys() >= set(both)), None)
-    if pairs is not None and all(
-        len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)
-    ):
-        uv = np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
-    elif names is not None:
-        uv = np.stack([vertex[name] for name in names], axis=1).astype(np.float64)[index]
+    uv = _corner_uv(vertex, faces, index, sizes)
     return Soup(V, index[triangles], None if uv is None else uv[triangles], too_small(sizes))
 
 
+def _corner_uv(
+    vertex: dict[str, Any],
+    faces: dict[str, Any],
+    index: NDArray[np.int64],
+    sizes: NDArray[np.int64],
+) -> NDArray[np.float64] | None:
+    """Texture coordinates of all corners [corner_count, 2], stored with the faces or the vertices.
+
+    Parameters
+    ----------
+    vertex, faces
+        Columns of the vertices and of the faces, by name.
+    index : [corner_count]
+        Vertex of each corner, polygon after polygon.
+    sizes : [polygon_count]
+        Corners of each polygon.
+    """
+    pairs = faces.get("texcoord")
+    if pairs is not None and all(
+        len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)
+    ):
+        return np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
+    for names in _UV_NAMES:
+        if vertex.keys() >= set(names):
+            uv_of_vertex = np.stack([vertex[name] for name in names], axis=1).astype(np.float64)
+            return uv_of_vertex[index]
+    return None
+
+
 def _header(content: bytes) -> tuple[str, list[Element], bytes]:
-    head, found, data = content.partition(b"end_header")
+    """Byte order, elements, and the data behind the header."""
+    head, end, data = content.partition(b"end_header")
     lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
-    if not found or not lines or lines[0] != ["ply"]:
+    if not end or not lines or lines[0] != ["ply"]:
         raise MeshError("it has no header from ply to end_header, as a PLY file does")
     order = None
     elements = []

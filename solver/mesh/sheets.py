@@ -1,7 +1,7 @@
-"""Surfaces cut apart where they touch themselves, so that what is left is manifold.
+"""Cuts surfaces apart where they touch themselves, so that they become manifold.
 
-Of the sides of triangles that lie on the same edge two by two are joined. Where more than two meet,
-that says which sheet goes on in which.
+The sides of triangles that lie on one edge are joined two by two. Where more than two sides meet,
+this decides which sheet goes on in which other one.
 """
 
 from __future__ import annotations
@@ -12,16 +12,21 @@ from numpy.typing import NDArray
 from .clean import Corners, counted
 from .topology import labels, turned, undirected
 
-# Sides on one edge up to which every pair is weighed; beyond, only neighbours round the edge.
-_ALL_PAIRS = 12
+# Sides on one edge up to which every pair of them is weighed. Of more sides only neighbours round
+# the edge are paired.
+_MAX_SIDES_ALL_PAIRED = 12
 
-# Joining in a way that the vertices as given do not show is the last choice when windings are made
-# to agree.
-_APART = 1e6
+# Cost of joining two sides that do not share their vertices in the user's arrays, in units of the
+# mesh's size: the last choice when windings are made to agree.
+_COST_NOT_GIVEN = 1e6
 
-# Where a vertex is put into an edge, counted from the lower one: not in the middle, where another
-# may lie already.
-_BETWEEN = 0.382
+# Place of a vertex that is put into an edge, from 0 at the edge's lower vertex to 1 at the other.
+# Not the middle, where another vertex may lie already.
+_SPLIT_PLACE = 0.382
+
+# Weight of the bend [1/rad] that decides between two pairs which are bent alike, inwards and
+# outwards.
+_CONVEX_WEIGHT = 1e-6
 
 
 def matched(
@@ -31,7 +36,9 @@ def matched(
     sheet: NDArray[np.int64],
     flip: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
-    """Join sides of crowded edges two by two, the best pairs first, none that would make the surface one-sided.
+    """Join sides of crowded edges two by two, the best pairs first.
+
+    No pair is joined that would make the surface one-sided.
 
     Parameters
     ----------
@@ -47,36 +54,35 @@ def matched(
     -------
     int64 [pair_count, 2]
     """
-    key, forward = undirected(F)
+    edge, forward = undirected(F)
     forward = forward ^ np.repeat(flip, 3)
-    sides = sides[np.argsort(key[sides], kind="stable")]
-    angle = _angles(V, F, sides, key[sides])
-    order = np.lexsort((angle, key[sides]))
-    first, second = _candidates(key[sides])
+    sides = sides[np.argsort(edge[sides], kind="stable")]
+    angle = _angles(V, F, sides, edge[sides])
+    order = np.lexsort((angle, edge[sides]))
+    first, second = _candidates(edge[sides])
     first = order[first]
     second = order[second]
     one = sides[first]
     two = sides[second]
-    differ = forward[one] == forward[two]
-    apart = sheet[one // 3] != sheet[two // 3]
-    # a side that runs forward has the inside on the side of smaller angles, the other one on that
-    # of larger ones
-    inside = np.where(forward[one], angle[first] - angle[second], angle[second] - angle[first]) % (
-        2 * np.pi
-    )
-    # 0 where they go on straight, 1 where one lies on the other; of two equal bends the convex one,
-    # so that bodies that touch along an edge stay two
-    cost = np.abs(np.pi - inside) / np.pi + 1e-6 * inside + apart + 2.0 * differ
+    windings_differ = forward[one] == forward[two]
+    sheets_differ = sheet[one // 3] != sheet[two // 3]
+    # the inside is towards smaller angles at a side that runs forward, else towards larger ones
+    turn = np.where(forward[one], angle[first] - angle[second], angle[second] - angle[first])
+    inner_angle = turn % (2 * np.pi)
+    # 0 where the surface goes on straight, 1 where one triangle lies on the other
+    bend = np.abs(np.pi - inner_angle) / np.pi
+    # of two equal bends the convex one is better: bodies that touch along an edge stay two
+    cost = bend + _CONVEX_WEIGHT * inner_angle + sheets_differ + 2.0 * windings_differ
     best = np.argsort(cost, kind="stable")
-    return _chosen(np.stack([one, two], axis=1)[best], differ[best], sheet)
+    return _greedy_pairs(np.stack([one, two], axis=1)[best], windings_differ[best], sheet)
 
 
 def _angles(
     V: NDArray[np.float64], F: NDArray[np.int64], sides: NDArray[np.int64], key: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Angles at which triangles lie round their common edge, counted from the first on it, seen against the edge.
+    """Angles at which triangles lie round their common edge [rad], from 0 at the first one.
 
-    Sides are sorted by `key`, the number of their edge.
+    The edge points at the viewer. Sides are sorted by `key`, the number of their edge.
     """
     triangle = sides // 3
     k = sides % 3
@@ -84,21 +90,29 @@ def _angles(
     b = F[triangle, (k + 1) % 3]
     axis = V[np.maximum(a, b)] - V[np.minimum(a, b)]
     axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
+    # from the edge to the third corner, at right angles to the edge
     across = V[F[triangle, (k + 2) % 3]] - V[a]
     across = across - np.einsum("ij,ij->i", across, axis)[:, None] * axis
-    first = across[np.repeat(*_runs(key))]
+    begin, size = _runs(key)
+    first = across[np.repeat(begin, size)]
     turn = np.einsum("ij,ij->i", np.cross(first, across), axis)
     return np.arctan2(turn, np.einsum("ij,ij->i", first, across)) % (2 * np.pi)
 
 
 def _candidates(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of places in a sorted list that have the same key: all, or, of very many, neighbours in turn."""
+    """Pairs of places in a sorted list that have the same key.
+
+    Of a few places with one key all pairs, of many places only neighbours in turn.
+    """
     starts, sizes = _runs(key)
     first = [np.empty(0, dtype=np.int64)]
     second = [np.empty(0, dtype=np.int64)]
     for size in np.unique(sizes[sizes > 1]).tolist():
-        places = np.arange(size)
-        i, j = np.triu_indices(size, 1) if size <= _ALL_PAIRS else (places, np.roll(places, -1))
+        if size <= _MAX_SIDES_ALL_PAIRED:
+            i, j = np.triu_indices(size, 1)
+        else:
+            i = np.arange(size)
+            j = np.roll(i, -1)
         base = starts[sizes == size][:, None]
         first.append((base + i).ravel())
         second.append((base + j).ravel())
@@ -111,94 +125,109 @@ def _runs(ordered: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return first, np.diff(np.append(first, len(ordered)))
 
 
-def _chosen(
-    pairs: NDArray[np.int64], against: NDArray[np.bool_], sheet: NDArray[np.int64]
+class _OrientedSheets:
+    """Sheets that are joined to each other: a union-find structure that knows their windings."""
+
+    def __init__(self, count: int) -> None:
+        self._parent = list(range(count))
+        self._turned = [False] * count  # wound against the parent
+        self._size = [1] * count
+
+    def join(self, one: int, two: int, windings_differ: bool) -> bool:
+        """Join two sheets; False if that would make the surface one-sided."""
+        root_of_one, turned_one = self._root(one)
+        root_of_two, turned_two = self._root(two)
+        turn = windings_differ ^ turned_one ^ turned_two
+        if root_of_one == root_of_two:
+            return not turn
+        small, large = root_of_two, root_of_one
+        if self._size[root_of_one] < self._size[root_of_two]:
+            small, large = root_of_one, root_of_two
+        self._parent[small] = large
+        self._turned[small] = turn
+        self._size[large] += self._size[small]
+        return True
+
+    def _root(self, sheet: int) -> tuple[int, bool]:
+        """The root of a sheet, and whether the sheet is wound against it."""
+        turned = False
+        while self._parent[sheet] != sheet:
+            turned ^= self._turned[sheet]
+            sheet = self._parent[sheet]
+        return sheet, turned
+
+
+def _greedy_pairs(
+    pairs: NDArray[np.int64], windings_differ: NDArray[np.bool_], sheet: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """The pairs taken one after the other, as long as their sides are free and windings can still be made to agree."""
-    parent = list(range(int(sheet.max()) + 1))
-    odd = [False] * len(parent)  # turned against the parent
-    size = [1] * len(parent)
-
-    def root(node: int) -> tuple[int, bool]:
-        flip = False
-        while parent[node] != node:
-            flip ^= odd[node]
-            node = parent[node]
-        return node, flip
-
+    """Pairs of sides, taken in order, whose sides are free and whose sheets can still be joined."""
+    sheets = _OrientedSheets(int(sheet.max()) + 1)
     taken: set[int] = set()
     chosen = []
-    sheets = sheet[pairs // 3].tolist()
+    sheet_pairs = sheet[pairs // 3].tolist()
     for (first, second), (one, two), differ in zip(
-        pairs.tolist(), sheets, against.tolist(), strict=True
+        pairs.tolist(), sheet_pairs, windings_differ.tolist(), strict=True
     ):
         if first in taken or second in taken:
             continue
-        (a, flip_a) = root(one)
-        (b, flip_b) = root(two)
-        turn = differ ^ flip_a ^ flip_b
-        if a == b and turn:
-            continue
-        if a != b:
-            small, large = (a, b) if size[a] < size[b] else (b, a)
-            parent[small] = large
-            odd[small] = turn
-            size[large] += size[small]
-        taken |= {first, second}
-        chosen.append((first, second))
+        if sheets.join(one, two, differ):
+            taken |= {first, second}
+            chosen.append((first, second))
     return np.array(chosen, dtype=np.int64).reshape(-1, 2)
 
 
 def join_sides(
     V: NDArray[np.float64], corners: Corners
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Join the sides that lie on the same edge, two by two, to an orientable surface.
+    """Join the sides that lie on one edge, two by two, to an orientable surface.
 
-    Two alone on an edge belong together. Where more meet, first those are joined that share both
-    vertices as given; then, pair by pair, those whose windings agree, that are parts of one sheet
-    already, and between which the surface bends least. What remains single becomes a rim. A
-    one-sided surface stays open along a path.
+    Two sides alone on an edge belong together. On a crowded edge, with more than two sides, pairs
+    of sides with the same two vertices in the user's arrays are joined first. Then other pairs are
+    joined, best first: their windings agree, they belong to one sheet already, and the surface
+    bends little between them. Sides that stay single become rims. A one-sided surface is left open
+    along a path.
 
     Returns
     -------
     pairs : int64 [k, 2]
-        Sides that are joined, numbered 3 x triangle + side. All others are rims.
+        Sides that are joined, numbered 3 x triangle + side. All other sides are rims.
     crowded : int64 [j]
-        One side of every edge on which more than two lie.
+        One side of every crowded edge.
     one_sided : int64 [i]
-        Sides of pairs left apart, since joining them would make a one-sided surface.
+        Sides that are not joined, since joining them would make a one-sided surface.
     """
-    key, forward = undirected(corners.F)
-    order = np.argsort(key, kind="stable")
-    first, size = _runs(key[order])
-    of_crowded = order[np.repeat(size > 2, size)]
-    # pairs that belong together without a choice, and what it costs to join them
-    firm = order[first[size == 2][:, None] + [0, 1]]
-    given = undirected(corners.given)[0]
-    cost = np.where(given[firm[:, 0]] == given[firm[:, 1]], 0.0, _APART)
-    by_given = of_crowded[np.argsort(given[of_crowded], kind="stable")]
-    begins, length = _runs(given[by_given])
-    shared = by_given[begins[length == 2][:, None] + [0, 1]]
-    firm = np.vstack([firm, shared])
-    cost = np.append(cost, np.zeros(len(shared)))
+    edge, forward = undirected(corners.F)
+    order = np.argsort(edge, kind="stable")
+    first, size = _runs(edge[order])
+    crowded_sides = order[np.repeat(size > 2, size)]
+    # pairs that belong together without a choice
+    alone = order[first[size == 2][:, None] + [0, 1]]
+    given_edge = undirected(corners.given)[0]
+    by_given = crowded_sides[np.argsort(given_edge[crowded_sides], kind="stable")]
+    begins, length = _runs(given_edge[by_given])
+    given_together = by_given[begins[length == 2][:, None] + [0, 1]]
+    sure = np.vstack([alone, given_together])
+    # the cost of joining each of them: when windings cannot all agree, expensive pairs stay apart
+    not_given = np.where(given_edge[alone[:, 0]] == given_edge[alone[:, 1]], 0.0, _COST_NOT_GIVEN)
+    cost = np.append(not_given, np.zeros(len(given_together)))
     middle = V[corners.F].mean(axis=1)
-    cost = (
-        cost
-        + np.linalg.norm(np.diff(middle[firm // 3], axis=1)[:, 0], axis=1) / np.ptp(V, axis=0).max()
-    )
-    against = forward[firm[:, 0]] == forward[firm[:, 1]]
-    count = len(corners.F)
-    flip = turned(firm // 3, against, count, cost)
-    apart = against ^ flip[firm[:, 0] // 3] ^ flip[firm[:, 1] // 3]
-    pairs = firm[~apart]
-    if len(of_crowded):
-        free = np.ones(3 * count, dtype=bool)
+    distance = np.linalg.norm(np.diff(middle[sure // 3], axis=1)[:, 0], axis=1)
+    cost = cost + distance / np.ptp(V, axis=0).max()
+    against = forward[sure[:, 0]] == forward[sure[:, 1]]
+    triangle_count = len(corners.F)
+    flip = turned(sure // 3, against, triangle_count, cost)
+    apart = against ^ flip[sure[:, 0] // 3] ^ flip[sure[:, 1] // 3]
+    pairs = sure[~apart]
+    if len(crowded_sides):
+        free = np.ones(3 * triangle_count, dtype=bool)
         free[pairs] = False
-        sheet = labels(pairs // 3, count)
-        # the same agreement of windings, but with most triangles of every sheet as they are
-        flip ^= (2 * np.bincount(sheet, weights=flip) > np.bincount(sheet))[sheet]
-        pairs = np.vstack([pairs, matched(V, corners.F, of_crowded[free[of_crowded]], sheet, flip)])
-    return pairs, order[first[size > 2]], firm[apart][:, 0]
+        sheet = labels(pairs // 3, triangle_count)
+        # windings agree as before, but most triangles of every sheet stay as they are
+        mostly_flipped = 2 * np.bincount(sheet, weights=flip) > np.bincount(sheet)
+        flip ^= mostly_flipped[sheet]
+        free_sides = crowded_sides[free[crowded_sides]]
+        pairs = np.vstack([pairs, matched(V, corners.F, free_sides, sheet, flip)])
+    return pairs, order[first[size > 2]], sure[apart][:, 0]
 
 
 def cut_apart(
@@ -210,32 +239,27 @@ def cut_apart(
     ----------
     V : [vertex_count, 3]
     first_given : [vertex_count]
-        Lowest number under which each vertex was given.
+        Lowest number of each vertex in the user's arrays.
 
     Returns
     -------
     V, corners
-        A manifold, orientable surface. Vertices keep their order, those of a vertex that was cut
-        standing together.
+        A manifold, orientable surface. Vertices keep their order; the copies of a vertex that was
+        cut stand together.
     notes : list of str
         What was cut.
     """
     pairs, crowded, one_sided = join_sides(V, corners)
-    # the fan of triangles to which each corner belongs: corners are linked over joined sides
     start = corners.F.ravel()
     end = np.roll(corners.F, -1, axis=1).ravel()
-    following = np.roll(np.arange(len(start)).reshape(-1, 3), -1, axis=1).ravel()
-    (one, two) = pairs.T
-    (one_end, two_end) = following[pairs.T]
-    same_way = start[one] == start[two]
-    ends = np.where(same_way, two, two_end), np.where(same_way, two_end, two)
-    fan = labels(np.hstack([(one, ends[0]), (one_end, ends[1])]).T, len(start))
+    # every fan gets a vertex of its own
+    fan = _fans(corners.F, pairs)
     vertex = np.empty(fan.max() + 1, dtype=np.int64)
     vertex[fan] = start
-    whole = np.bincount(vertex, minlength=len(V))[vertex] == 1
-    lowest = np.full(len(vertex), corners.given.max() + 1)
-    np.minimum.at(lowest, fan, corners.given.ravel())
-    order = np.argsort(np.where(whole, first_given[vertex], lowest), kind="stable")
+    uncut = np.bincount(vertex, minlength=len(V))[vertex] == 1
+    lowest_given = np.full(len(vertex), corners.given.max() + 1)
+    np.minimum.at(lowest_given, fan, corners.given.ravel())
+    order = np.argsort(np.where(uncut, first_given[vertex], lowest_given), kind="stable")
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     cut = Corners(rank[fan].reshape(-1, 3), corners.given, corners.uv)
@@ -250,7 +274,7 @@ def cut_apart(
             f"cut open along {counted(len(one_sided), 'edge')}: one-sided, like a Moebius band"
         )
     touched = np.append(crowded, one_sided)
-    pinched = np.setdiff1d(vertex[~whole], np.append(start[touched], end[touched]))
+    pinched = np.setdiff1d(vertex[~uncut], np.append(start[touched], end[touched]))
     if len(pinched):
         notes.append(
             f"cut apart at {counted(len(pinched), 'vertex')} where the surface touched itself"
@@ -258,25 +282,43 @@ def cut_apart(
     return V, cut, notes
 
 
+def _fans(F: NDArray[np.int64], pairs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The fan of triangles to which each corner belongs [3 m]; joined sides link corners.
+
+    `pairs` [k, 2] are the joined sides, numbered 3 x triangle + side.
+    """
+    start = F.ravel()
+    next_corner = np.roll(np.arange(len(start)).reshape(-1, 3), -1, axis=1).ravel()
+    (one, two) = pairs.T
+    (one_end, two_end) = next_corner[pairs.T]
+    same_way = start[one] == start[two]
+    meets_one = np.where(same_way, two, two_end)
+    meets_one_end = np.where(same_way, two_end, two)
+    links = np.hstack([(one, meets_one), (one_end, meets_one_end)]).T
+    return labels(links, len(start))
+
+
 def _without_double_edges(
     V: NDArray[np.float64], corners: Corners, pairs: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], Corners]:
-    """Where two edges have both vertices in common, all but the first get a vertex of their own in between."""
+    """Give edges that share both vertices a vertex of their own in between, all but the first."""
     F = corners.F
     mate = np.arange(F.size)
     mate[pairs[:, 0]] = pairs[:, 1]
     mate[pairs[:, 1]] = pairs[:, 0]
+    # the lower one of an edge's two sides stands for the edge
     leader = np.minimum(np.arange(F.size), mate)
     key, forward = undirected(F)
     order = np.lexsort((leader, key))
-    lead = leader[order]
-    again = order[lead != lead[np.repeat(*_runs(key[order]))]]
-    if len(again) == 0:
+    leader_in_order = leader[order]
+    begin, size = _runs(key[order])
+    doubled = order[leader_in_order != leader_in_order[np.repeat(begin, size)]]
+    if len(doubled) == 0:
         return V, corners
-    leaders, number = np.unique(leader[again], return_inverse=True)
+    leaders, number = np.unique(leader[doubled], return_inverse=True)
     point, given = np.full((2, *F.shape), -1)
-    point.flat[again] = len(V) + number
+    point.flat[doubled] = len(V) + number
     low, high = np.divmod(key[leaders], F.max() + 1)
-    between = (1 - _BETWEEN) * V[low] + _BETWEEN * V[high]
-    share = np.where(forward, _BETWEEN, 1 - _BETWEEN).reshape(F.shape)
+    between = (1 - _SPLIT_PLACE) * V[low] + _SPLIT_PLACE * V[high]
+    share = np.where(forward, _SPLIT_PLACE, 1 - _SPLIT_PLACE).reshape(F.shape)
     return np.vstack([V, between]), corners.split(point, given, share)
