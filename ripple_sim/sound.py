@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.capture.frame_source import viewpoint
+from ripple_sim.capture.scene_camera import viewpoint
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.coupling.soft import target_pose
 from ripple_sim.encode.replace import MARK

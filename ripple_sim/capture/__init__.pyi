@@ -1,12 +1,7 @@
-from .frame_source import (
-    FrameSource as FrameSource,
-    Sensor as Sensor,
-    Sighting as Sighting,
-    focal_distance as focal_distance,
-    passes_of as passes_of,
-    surface_of as surface_of,
-    viewpoint as viewpoint,
-)
+from .exposure import FilmExposure as FilmExposure
+from .frame_source import FrameSource as FrameSource, surface_of as surface_of
+from .scene_camera import focal_distance as focal_distance, viewpoint as viewpoint
+from .sighting import Sighting as Sighting, passes_of as passes_of
 from .snapshot import (
     ShutterTimes as ShutterTimes,
     Snapshot as Snapshot,

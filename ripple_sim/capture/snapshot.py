@@ -1,9 +1,8 @@
-"""Frozen copies of a running simulation's state, one for each exposure of a frame.
+"""Copies of the state of a running simulation, one for each exposure of a frame.
 
-`exposures_of` says at which times while the shutter is open, and through which points of the lens;
-`ShutterTimes` takes the simulation there, between its physics steps, and `drawn_heights` makes
-height maps, wherever a surface is. `ShownWaves` tells whether there is anything to be seen of the
-waves.
+`exposures_of` gives the times of the exposures while the shutter is open, and their points of the
+lens. `ShutterTimes` takes the simulation to these times, also between its physics steps, and
+`drawn_heights` makes height maps. `ShownWaves` warns of waves that are too low to be seen.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ from ripple_sim.solver.waves.motion import MovedGradients
 Field: TypeAlias = NDArray[np.float32] | DeviceField
 Heights = dict[str, Field]
 
-_ROUNDING = 9  # decimals of a physics step: what is a whole step but for round-off is one
+_STEP_DECIMALS = 9  # of times in physics steps; a time off a whole step by round-off counts as it
 
-_SEEN = 5.0  # pixels of a height that catches the eye
-_GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
-_FULL_TURN = 360.0  # degrees of a rotary shutter: open from one frame to the next
+_VISIBLE_HEIGHT = 5.0  # of waves that catch the eye [pixels]
+_GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0  # its multiples are spread evenly modulo 1
+_FULL_TURN = 360.0  # of a rotary shutter [degrees], which is then open from frame to frame
 
 
 class ShutterTimes:
@@ -55,8 +54,7 @@ class ShutterTimes:
 
     def __init__(self, simulation: Simulation, times: NDArray[np.float64]) -> None:
         self._simulation = simulation
-        # in physics steps
-        self._places = np.round(times * simulation.steps_per_frame, _ROUNDING).tolist()
+        self._times_in_steps = np.round(times * simulation.steps_per_frame, _STEP_DECIMALS).tolist()
         self._start = mujoco.MjData(simulation.model)
         self._between = mujoco.MjData(simulation.model)
 
@@ -72,32 +70,33 @@ class ShutterTimes:
             same object as before where no time has passed.
         """
         simulation = self._simulation
-        done = 0
-        before = now = self._heights()
-        for place in self._places:
-            while done < place:
+        done = 0  # physics steps
+        now = self._heights()
+        before = now
+        for time in self._times_in_steps:
+            while done < time:
                 mujoco.mj_copyData(self._start, simulation.model, simulation.data)
                 simulation.step()
                 before = now
                 now = self._heights()
                 done += 1
-            rest = done - place
-            if rest == 0:
+            steps_back = done - time
+            if steps_back == 0:
                 yield simulation.data, now
             else:
-                self._go_back(rest * simulation.model.opt.timestep)
-                yield self._between, {name: _blend(now[name], before[name], rest) for name in now}
+                self._go_back(steps_back * simulation.model.opt.timestep)
+                heights = {name: _blend(now[name], before[name], steps_back) for name in now}
+                yield self._between, heights
 
     def _heights(self) -> Heights:
-        return {
-            name: self._simulation.ripples[name].snapshot() for name in self._simulation.ripples
-        }
+        ripples = self._simulation.ripples
+        return {name: ripples[name].snapshot() for name in ripples}
 
     def _go_back(self, duration: float) -> None:
         """Set the bodies to where they were a duration [s] ago, within the last step.
 
-        After `mj_step` MuJoCo's poses are those at the step's beginning. So are these, and the
-        motion that led to them is the one of the step before.
+        After `mj_step` the poses in MuJoCo's data are the ones at the beginning of the step. The
+        same holds for the poses set here: the bodies came there by the motion of the step before.
         """
         model = self._simulation.model
         data = self._between
@@ -111,6 +110,7 @@ class ShutterTimes:
 
 
 def _blend(first: Field, second: Field, share: float) -> Field:
+    """The first field, or the second one where `share` is 1, or linearly between the two."""
     if isinstance(first, DeviceField):
         return first.blend(second, share) if isinstance(second, DeviceField) else first
     return first + np.float32(share) * (second - first)
@@ -119,7 +119,9 @@ def _blend(first: Field, second: Field, share: float) -> Field:
 def drawn_heights(
     ripples: Ripples, name: str, limit: bool
 ) -> Callable[[Field, mujoco.MjData], AnyHeightMap]:
-    """What makes height maps of a target's heights [m], [C, n, n]; with the mesh's vertices, where these have moved.
+    """A function that makes height maps of a target's heights [C, n, n] [m].
+
+    Where the vertices of the target's mesh have moved, the height map contains their positions.
 
     Parameters
     ----------
@@ -128,55 +130,66 @@ def drawn_heights(
     limit : bool
         Whether heights that are too large for the object are bent, see `DisplacementLimit`.
     """
-    still = HeightMap.drawn(ripples[name].rest, limit)
+    at_rest = HeightMap.drawn(ripples[name].rest, limit)
     gradients = functools.cache(lambda: MovedGradients(ripples[name].rest))
 
     def drawn(height: Field, data: mujoco.MjData) -> AnyHeightMap:
-        height_map = still(height)
+        height_map = at_rest(height)
         V = ripples.vertices(name, data)
-        return (
-            height_map if V is None else MovedHeightMap(gradients()(np.asarray(height_map), V), V)
-        )
+        if V is None:
+            return height_map
+        return MovedHeightMap(gradients()(np.asarray(height_map), V), V)
 
     return drawn
 
 
 class ShownWaves:
-    """Takes note of how high waves are in pictures of a height [pixels], and warns of those that no picture shows."""
+    """Records how high the waves are in pictures, and warns of waves that no picture shows.
+
+    Parameters
+    ----------
+    ripples : Ripples
+    height : int
+        Of the pictures [pixels].
+    """
 
     def __init__(self, ripples: Ripples, height: int) -> None:
         self._ripples = ripples
         self._height = height
-        # by target: of the highest wave so far in pixels, these, its height [m], and the width of a
-        # pixel there [m]
+        # the highest wave so far, by target: height [pixels], height [m], and width of a pixel [m]
         self._highest = dict.fromkeys(ripples, (0.0, 0.0, 1.0))
 
     def look(self, data: mujoco.MjData, heights: Heights, pose: Pose) -> None:
-        """Take in a picture from a pose: the highest waves, in pixels of the nearest point that may be seen."""
+        """Record the highest waves of a picture from a pose.
+
+        Their height in pixels is that at the nearest point of the target that may be seen.
+        """
         model = self._ripples.model
         for name, height in heights.items():
             geom = self._ripples.geom_ids[name]
             distance = pose.distance
-            if geom < model.ngeom:  # what is soft has no place of its own
-                away = float(np.linalg.norm(data.geom_xpos[geom] - pose.position)) - float(
-                    model.geom_rbound[geom]
-                )
-                distance = max(away, 0.1 * distance)
-            pixel = pose.pixel_height(distance, self._height)
+            if geom < model.ngeom:  # a soft target has no position
+                to_middle = float(np.linalg.norm(data.geom_xpos[geom] - pose.position))
+                to_surface = to_middle - float(model.geom_rbound[geom])
+                distance = max(to_surface, 0.1 * distance)
+            pixel = pose.pixel_height(distance, self._height)  # [m]
             peak = height.peak if isinstance(height, DeviceField) else float(np.abs(height).max())
             self._highest[name] = max(self._highest[name], (peak / pixel, peak, pixel))
 
     def warn_of_low(self) -> None:
-        """Warn of targets whose waves were there, but never higher than a pixel, and say what would do."""
+        """Warn of targets whose waves were never higher than a pixel; name a density that helps.
+
+        There is no warning of targets without waves.
+        """
         for name, (pixels, peak, pixel) in self._highest.items():
             if 0 < pixels < 1:
                 density = np.asarray(self._ripples[name].material.density)
-                factor = _SEEN / pixels
+                factor = _VISIBLE_HEIGHT / pixels
                 lower = "" if density.ndim else f", {float(density) / factor:.2g} kg/m^2,"
                 warn_caller(
                     f"no wave on {name!r} was higher than a pixel: {peak:.2g} m at most, where a "
                     f"pixel is {pixel:.2g} m"
-                    f" wide. A density {factor:.2g} times lower{lower} would show {_SEEN:g} "
+                    f" wide. A density {factor:.2g} times lower{lower} would show {_VISIBLE_HEIGHT:g} "
                     f"pixels; so may "
                     'material = {preset = "suited"} in a scene file, Material.suited(size, hit) in '
                     "Python"
@@ -195,9 +208,10 @@ class ShownWaves:
 
 
 def exposures_of(camera: CameraEntry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The exposures whose mean is a frame, the same for every frame, in the order of time.
+    """Times and lens points of the exposures whose mean is a frame, in the order of time.
 
-    A single one, through the middle of the lens, without shutter and aperture.
+    They are the same for every frame. Without shutter and aperture there is a single exposure,
+    through the middle of the lens.
 
     Returns
     -------
@@ -208,8 +222,8 @@ def exposures_of(camera: CameraEntry) -> tuple[NDArray[np.float64], NDArray[np.f
     """
     count = camera.exposures if camera.shutter > 0 or camera.aperture > 0 else 1
     times = camera.shutter / _FULL_TURN * np.arange(count) / count
-    # the points in an order that visits all parts of the lens in any part of the time: from the
-    # middle outwards, moving bodies would begin sharp and end blurred
+    # any part of the time sees all parts of the lens: with points from the middle outwards, moving
+    # bodies would begin sharp and end blurred
     order = np.argsort(np.argsort(np.arange(count) * _GOLDEN_RATIO % 1.0))
     return times, camera.aperture / 2 * disc_points(count)[order]
 
@@ -229,14 +243,15 @@ def disc_points(count: int) -> NDArray[np.float64]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A simulation's state at one exposure of a frame, which stays as it is while the simulation goes on.
+    """The state of a simulation at one exposure of a frame; it does not follow the simulation.
 
     Attributes
     ----------
     number : int
         Of the frame, from 0.
     exposure : int
-        Of the frame's exposures, from 0, which is at the frame's own time: when the shutter opens.
+        Number of the exposure within its frame. Exposure 0 is at the frame's own time, when the
+        shutter opens.
     data : mujoco.MjData
         Copy of MuJoCo's state.
     heights, height_maps : dict
@@ -267,16 +282,16 @@ def state_digest(data: mujoco.MjData, heights: Iterable[NDArray[np.float32]]) ->
 
 
 def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snapshot]:
-    """Advance a simulation frame by frame, through the exposures of each frame that its camera takes.
+    """Advance a simulation frame by frame; yield a snapshot for each exposure of its camera.
 
     Parameters
     ----------
     simulation : Simulation
         At its beginning, which is frame 0.
     frames : int
-        How many.
+        Number of frames.
     alive : int
-        How many of the latest snapshots are in use at a time; older ones are overwritten.
+        Number of the latest snapshots that stay valid; older ones are overwritten.
     """
     states = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
     ripples = simulation.ripples
@@ -286,11 +301,11 @@ def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterato
         if number:
             simulation.advance_frame()
         impulses = simulation.impulses
-        shown = None
+        latest_heights = None
         for exposure, (state, heights) in enumerate(shutter_times):
-            if heights is not shown:
+            if heights is not latest_heights:  # time has passed
                 data = next(states)
-                shown = heights
+                latest_heights = heights
                 mujoco.mj_copyData(data, simulation.model, state)
                 height_maps = {name: drawn[name](height, data) for name, height in heights.items()}
             yield Snapshot(number, exposure, data, heights, height_maps, impulses)

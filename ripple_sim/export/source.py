@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import mujoco
 
-from ripple_sim.capture.frame_source import viewpoint
+from ripple_sim.capture.scene_camera import viewpoint
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.encode.part import Settings
 from ripple_sim.render.pose import Pose

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 
-from ripple_sim.capture.frame_source import focal_distance
+from ripple_sim.capture.scene_camera import focal_distance
 from ripple_sim.capture.snapshot import state_digest
 from ripple_sim.coupling.geoms import target_name
 from ripple_sim.coupling.ripples import Impulse

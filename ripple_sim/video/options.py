@@ -1,7 +1,7 @@
-"""`VideoOptions`: every option of a video, listed once for Python and for the command line; exports share some.
+"""`VideoOptions`: every option of a video, listed once for Python and for the command line.
 
-It imports nothing heavy, so that the help of a command comes at once; `settings` checks options and
-settles them.
+Exports share the options of `SceneOptions`. The module imports nothing heavy, so that the help of a
+command comes at once. `settings` checks the options and replaces those that are left open.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from ripple_sim.solver.errors import POSITIVE, Valid, check_fields, is_finite, w
 
 Backend = Literal["auto", "gl", "cpu"]
 
-# What holds for every output; what an output or a scene allows beyond that is checked when it is
-# known.
+# Checks that hold for every output. What an output or a scene allows is checked when it is known.
 IN_ANY_CASE = {
     "size": Valid(
         lambda size: min(size) > 0, "(width, height) in pixels, two whole numbers greater than 0"
@@ -43,9 +42,11 @@ class SceneOptions:
     resolution: int | None = None
     """Texels along the edge of a cube's chart; more resolve finer waves and take longer."""
     layout: str | None = None
-    """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
+    """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or
+    auto."""
     rim: str | None = None
-    """What the rims of open surfaces do: free, supported, clamped, or fixed as that of a drum's skin."""
+    """What the rims of open surfaces do: free, supported, clamped, or fixed as that of a drum's
+    skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     overwrite: bool = False
@@ -70,26 +71,29 @@ class VideoOptions(SceneOptions):
     supersample: int = 1
     """Render at this many times the width and height and average: finer edges and highlights."""
     shutter: float | None = None
-    """Shutter angle in degrees, for motion blur: 180 keeps the shutter open for half the time between frames."""
+    """Shutter angle in degrees, for motion blur: 180 keeps the shutter open for half the time
+    between frames."""
     aperture: float | None = None
     """Lens diameter in metres, for depth of field."""
     focus: float | str | tuple[float, float, float] | None = None
     """Focus: a distance in metres along the camera's axis, or the name of a body or geom."""
     exposures: int | None = None
-    """Exposures averaged per frame where shutter or aperture blur it; more are smoother and take longer."""
+    """Exposures averaged per frame where shutter or aperture blur it; more are smoother and take
+    longer."""
     transparent: bool = False
     """Leave out the background (.webp and folders of frames)."""
     frame_format: Literal["png", "exr"] = "png"
-    """Format of the frames in a folder: PNG, or EXR for linear light, without tone mapping or overlays (needs
-    OpenEXR)."""
+    """Format of the frames in a folder: PNG, or EXR for linear light, without tone mapping or
+    overlays (needs OpenEXR)."""
     passes: Sequence[str] = ()
-    """Passes beside every frame, in a folder NAME.passes: depth, normal, segmentation, flow, position, height.
-    Example: depth,flow."""
+    """Passes beside every frame, in a folder NAME.passes: depth, normal, segmentation, flow,
+    position, height. Example: depth,flow."""
     pass_format: Literal["npz", "exr"] = "npz"
     """Format of the passes: NumPy's, or EXR (needs OpenEXR)."""
     overlay: Sequence[str] | None = None
-    """Overlays on the video: height or velocity as a heatmap, contacts, grid, time, energy, sensors. Examples:
-    height,contacts,time or velocity=0.5,energy, where the colours end at 0.5 m/s."""
+    """Overlays on the video: height or velocity as a heatmap, contacts, grid, time, energy,
+    sensors. Examples: height,contacts,time or velocity=0.5,energy, where the colours end at 0.5
+    m/s."""
     sound: bool = False
     """Add what is heard at the camera to the video (.mp4 and .webm)."""
     compare: str | None = None

@@ -1,8 +1,8 @@
 """`render_video`: a scene rendered to a video. Simulation, rendering and encoding overlap.
 
-A `Film` is one simulation, or two side by side, rendered to frames with overlays, and with passes
-beside them; a `Shot` is everything that one exposure of it shows. The simulation runs in a thread
-of its own, a few frames ahead (`prefetched`); `Summary` is what it all took.
+A `Film` is one simulation, or two side by side, rendered to frames with overlays; passes may be
+written beside the frames. A `Shot` is everything that one exposure of a film shows. The simulation
+runs in a thread of its own, a few frames ahead (`prefetched`). `Summary` lists the times it took.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.capture.frame_source import FrameSource, Sighting, passes_of
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.sighting import Sighting, passes_of
 from ripple_sim.capture.snapshot import Snapshot, snapshots
 from ripple_sim.coupling.geoms import geom_name
 from ripple_sim.coupling.hooks import adopt_warnings
@@ -55,17 +56,27 @@ from ripple_sim.sound import Microphone, gain
 from .options import VideoOptions
 from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
 
-_END: Any = object()
-_WAITING = 2  # shots that wait to be rendered; one would do if all frames took the same time
+_END: Any = object()  # marks the end of an iterator
 
-# every so many frames the simulation's state is fingerprinted, to be compared when a render is
-# resumed
-_CHECKED = 16
+# Shots that wait to be rendered; one would do if all frames took the same time.
+_WAITING_SHOTS = 2
+
+# Frames from one fingerprint of the simulation's state to the next. A render that is resumed
+# compares them.
+_FINGERPRINT_INTERVAL = 16
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Shot:
-    """An exposure of a film's frame: a snapshot of each run, and the overlays' content, which a whole frame shares."""
+    """One exposure of a frame of a film.
+
+    Attributes
+    ----------
+    snapshots : tuple of Snapshot
+        One for each run.
+    notes : Notes
+        Content of the overlays, the same for all exposures of a frame.
+    """
 
     snapshots: tuple[Snapshot, ...]
     notes: Notes
@@ -81,7 +92,7 @@ class Shot:
         return self.snapshots[0].exposure
 
     def digest(self) -> str:
-        """Fingerprint of all runs, see `Snapshot.digest`."""
+        """Fingerprint of the state of all runs, see `Snapshot.digest`."""
         return "".join(snapshot.digest() for snapshot in self.snapshots)
 
 
@@ -106,66 +117,71 @@ class Film:
         on_frame: Sequence[Callable[[Simulation], None]] = (),
     ) -> None:
         self.simulations = simulations
+        self.seconds = 0.0  # spent on frames so far
         self._options = options
         self._frames = frames
         self._on_frame = on_frame
         self._request = parse_request(options.overlay or ())
         self._layout = Layout(*options.size)
         self._notebook = Notebook(self._request, simulations, frames, options.rate)
+        self._painter = self._make_painter()
         self._sources: list[FrameSource] = []
         self._submitted: deque[Shot] = deque()
         self._marks: list[list[PlacedMark]] = []
         self._pass_files: PassFiles | None = None
-        # the number of a frame whose passes are not written yet
+        # number and sighting of the latest frame, whose passes are not written yet
         self._last_seen: tuple[int, Sighting] | None = None
-        self.seconds = 0.0  # spent on frames so far
-        operators = compared_operators(options.compare)
-        ripples = simulations[0].ripples
+
+    def _make_painter(self) -> Painter:
+        operators = compared_operators(self._options.compare)
+        ripples = self.simulations[0].ripples
         spacings = {grid_spacing(ripples[name].atlas.resolution) for name in ripples}
-        self._painter = Painter(
+        return Painter(
             self._request,
             self._layout,
-            duration=frames / options.rate,
-            spacing=spacings.pop() if len(spacings) == 1 else 0,  # one that the targets share
+            duration=self._frames / self._options.rate,
+            spacing=spacings.pop() if len(spacings) == 1 else 0,  # 0: the targets differ
             titles=[TITLES[operator] for operator in operators] if len(operators) > 1 else [],
         )
 
     def write_passes(self, output: Path, frames: int = 0) -> None:
-        """Write the passes that the options ask for beside an output, which has so many frames already."""
+        """Have the passes that the options ask for written beside an output.
+
+        `frames` is the number of frames that the output has already.
+        """
         model = self.simulations[0].model
-        geoms = self.simulations[0].ripples.geom_ids
-        soft = {target + 1: name for name, target in geoms.items() if target >= model.ngeom}
-        # what each number of the segmentation stands for
-        segments = {
-            0: "background",
-            **{geom + 1: geom_name(model, geom) for geom in range(model.ngeom)},
-            **soft,
-        }
+        # name of each number of the segmentation: of geoms, and of soft targets, which come after
+        segments = {0: "background"}
+        for geom in range(model.ngeom):
+            segments[geom + 1] = geom_name(model, geom)
+        for name, target in self.simulations[0].ripples.geom_ids.items():
+            if target >= model.ngeom:
+                segments[target + 1] = name
         self._pass_files = PassFiles(
             output, self._options.pass_format, segments, frames, self._options.overwrite
         )
 
     def see(self, shot: Shot) -> None:
-        """Look at a shot whose frame is there already, for its passes, if they are not."""
-        if (
-            self._pass_files is not None
-            and shot.exposure == 0
-            and shot.number >= self._pass_files.complete
-        ):
-            self.prepare()
-            start = work_clock()
-            self._see((shot.number, self._sources[0].sighting(shot.snapshots[0])))
-            self.seconds += work_clock() - start
+        """Write the passes of a shot whose frame exists already, if its passes do not."""
+        if self._pass_files is None or shot.exposure > 0:
+            return
+        if shot.number < self._pass_files.complete:
+            return
+        self.prepare()
+        start = work_clock()
+        self._see((shot.number, self._sources[0].sighting(shot.snapshots[0])))
+        self.seconds += work_clock() - start
 
     def prepare(self) -> None:
-        """Make the renderers, which takes a while, before the first frame; the simulations may run meanwhile."""
+        """Make the renderers, which takes a while; the simulations may run meanwhile."""
         if self._sources:
             return
         count = len(self.simulations)
         options = self._options
-        ends = [round(self._layout.width * k / count) for k in range(count + 1)]
-        self._sources = [
-            FrameSource(
+        for k, simulation in enumerate(self.simulations):
+            left = round(self._layout.width * k / count)
+            right = round(self._layout.width * (k + 1) / count)
+            source = FrameSource(
                 simulation,
                 width=right - left,
                 height=self._layout.height,
@@ -174,8 +190,7 @@ class Film:
                 linear=options.linear,
                 annotate=self._annotated,
             )
-            for simulation, left, right in zip(self.simulations, ends[:-1], ends[1:], strict=True)
-        ]
+            self._sources.append(source)
 
     def shots(self, alive: int = 1) -> Iterator[Shot]:
         """Run the simulations; `alive` of the latest shots stay valid, see `snapshots`."""
@@ -183,35 +198,35 @@ class Film:
         for exposures in zip(*runs, strict=True):
             if exposures[0].exposure == 0:
                 notes = self._notebook.follow()
-                for look in self._on_frame:
-                    look(self.simulations[0])
+                for call in self._on_frame:
+                    call(self.simulations[0])
             yield Shot(exposures, notes)
 
     def render_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
-        """Render frames in their order, and wait for each shot when `ahead` later ones are submitted."""
+        """Render frames in their order; `ahead` shots are submitted before a shot is fetched."""
         for shot in shots:
             self.submit(shot)
-            if len(self._submitted) > ahead and (frame := self.fetch()) is not None:
-                yield frame
+            if len(self._submitted) > ahead:
+                frame = self.fetch()
+                if frame is not None:
+                    yield frame
         while self._submitted:
-            if (frame := self.fetch()) is not None:
+            frame = self.fetch()
+            if frame is not None:
                 yield frame
         self._see(None)
 
     def submit(self, shot: Shot) -> None:
-        """Draw an exposure without waiting for it: `fetch` returns it, after those submitted before.
+        """Draw an exposure without waiting for it: `fetch` returns shots in their order.
 
-        The shot must stay as it is until then.
+        The shot must stay as it is until it is fetched.
         """
         self.prepare()
         start = work_clock()
-        for number, (source, snapshot) in enumerate(
-            zip(self._sources, shot.snapshots, strict=True)
-        ):
+        for run, source in enumerate(self._sources):
+            snapshot = shot.snapshots[run]
             if self._request.heatmap and shot.exposure == 0:
-                geoms = self.simulations[number].ripples.geom_ids
-                for name, heatmap in shot.notes.heatmaps[number].items():
-                    source.renderer.set_heatmap(geoms[name], heatmap, shot.notes.heatmap_scale[0])
+                self._set_heatmaps(run, shot.notes)
             source.submit(snapshot)
             if self._pass_files is not None and shot.exposure == 0:
                 self._see((shot.number, source.sighting(snapshot)))
@@ -219,46 +234,62 @@ class Film:
         self.seconds += work_clock() - start
 
     def warn_of_unseen(self, whole: bool) -> None:
-        """Warn of waves that no frame shows, neither by their height nor by colours; of none only in a whole scene."""
+        """Warn of waves that no frame shows, neither by their height nor by colours.
+
+        After a `whole` scene also warn of targets without any wave.
+        """
         if not self._request.heatmap:
             self._sources[0].shown.warn_of_low()
         if whole:
             self._sources[0].shown.warn_of_none()
 
+    def _set_heatmaps(self, run: int, notes: Notes) -> None:
+        """Give the renderer of a run the heatmaps of a frame."""
+        geoms = self.simulations[run].ripples.geom_ids
+        limit, _ = notes.heatmap_scale
+        for name, heatmap in notes.heatmaps[run].items():
+            self._sources[run].renderer.set_heatmap(geoms[name], heatmap, limit)
+
     def _see(self, seen: tuple[int, Sighting] | None) -> None:
-        """Write the passes of the last frame, whose pixels flow to what is seen now, if anything."""
+        """Write the passes of the frame before, whose pixels flow to the frame that is seen now.
+
+        `seen` is the number and the sighting of a frame; None after the last one.
+        """
         if self._pass_files is None:
             return
-        # not before: a render that fails without a frame leaves all as it was
         if self._last_seen is None:
+            # not earlier: a render that fails before its first frame leaves all files as they were
             self._pass_files.begin()
         else:
             number, sighting = self._last_seen
-            passes = passes_of(
-                sighting, None if seen is None else seen[1], tuple(self._options.passes)
-            )
+            later = None if seen is None else seen[1]
+            passes = passes_of(sighting, later, tuple(self._options.passes))
             self._pass_files.write(number, passes)
         self._last_seen = seen
 
     def fetch(self) -> NDArray | None:
-        """Wait for the earliest exposure submitted, and return what `render` does."""
+        """Wait for the earliest shot submitted; return a frame after its last exposure, else None."""
         start = work_clock()
         shot = self._submitted.popleft()
         if shot.exposure == 0:
             self._marks = [self._placed_marks(run, shot) for run in range(len(self._sources))]
-        halves = [half for source in self._sources if (half := source.fetch()) is not None]
-        frame = None
-        if halves:  # the runs' images side by side, under the overlays
-            for half, marks in zip(halves, self._marks, strict=True):
-                draw_marks(half, marks, self._layout)
-            frame = halves[0]
-            if len(halves) > 1:
-                frame = np.concatenate(halves, axis=1)
-                middle = halves[0].shape[1]
-                seam = max(1, round(self._layout.em / 16))
-                frame[:, middle - seam : middle + seam] = 255
-            self._painter.paint(frame, shot.notes)
+        images = [source.fetch() for source in self._sources]
+        complete = [image for image in images if image is not None]
+        frame = self._composed(complete, shot.notes) if complete else None
         self.seconds += work_clock() - start
+        return frame
+
+    def _composed(self, images: list[NDArray], notes: Notes) -> NDArray:
+        """The images of the runs side by side, under the overlays; the images are drawn over."""
+        for image, marks in zip(images, self._marks, strict=True):
+            draw_marks(image, marks, self._layout)
+        frame = images[0]
+        if len(images) > 1:
+            frame = np.concatenate(images, axis=1)
+            middle = images[0].shape[1]
+            half_seam = max(1, round(self._layout.em / 16))
+            frame[:, middle - half_seam : middle + half_seam] = 255
+        self._painter.paint(frame, notes)
         return frame
 
     def _placed_marks(self, run: int, shot: Shot) -> list[PlacedMark]:
@@ -267,10 +298,11 @@ class Film:
             return []
         source = self._sources[run]
         snapshot = shot.snapshots[run]
-        notes = shot.notes
+        marks = shot.notes.marks[run]
+        scale, _ = shot.notes.mark_scale
         projection = Projection(source.camera(snapshot).pose(), source.width, source.height)
-        hiding = self.simulations[run].model, snapshot.data
-        return place_marks(notes.marks[run], notes.mark_scale[0], self._layout, projection, *hiding)
+        model = self.simulations[run].model
+        return place_marks(marks, scale, self._layout, projection, model, snapshot.data)
 
     def _annotated(self, surface: Surface) -> Surface:
         """A target's surface with the heatmap and the grid that the request asks for."""
@@ -303,20 +335,23 @@ Item = TypeVar("Item")
 
 @contextlib.contextmanager
 def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
-    """Run an iterable in a thread, at most `depth` items ahead; iterate over what this yields instead.
+    """Run an iterable in a thread, at most `depth` items ahead.
 
-    Items come in their order; the thread alone consumes them. An exception of the iterable is
-    raised in place of its next item. Leaving the block stops the thread at its current item.
+    The context is an iterator over the same items, in their order; only the thread runs the
+    iterable. An exception of the iterable is raised in place of its next item. Leaving the block
+    stops the thread at its current item.
     """
     iterator = iter(items)
     pool = ThreadPoolExecutor(1, "simulation", initializer=work_for, initargs=(user_line(),))
-    # one more than wait: it is held until there is room
+    # one item more than `depth`: the thread holds it until there is room
     waiting = deque(pool.submit(next, iterator, _END) for _ in range(depth + 1))
 
     def take() -> Iterator[Item]:
-        while (item := waiting.popleft().result()) is not _END:
+        item = waiting.popleft().result()
+        while item is not _END:
             waiting.append(pool.submit(next, iterator, _END))
             yield item
+            item = waiting.popleft().result()
 
     try:
         yield take()
@@ -326,12 +361,12 @@ def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
 
 @dataclasses.dataclass(frozen=True)
 class Summary:
-    """What a rendered video took.
+    """Frames and times of a rendered video.
 
-    Of its `frames`, those before `resumed_at` were there already. `renderer` is the driver's
-    GL_RENDERER, `backend` the wave solver's. Times in seconds; the stages overlap, so they add up
-    to more than `wall_seconds`. What was spent on compiling kernels, at their first use on a
-    machine, is told apart from the work of the stages.
+    The frames before `resumed_at` existed already. `renderer` is the driver's GL_RENDERER,
+    `backend` the backend of the wave solver. The times of the stages [s] add up to more than
+    `wall_seconds`, because the stages overlap. `compile_seconds`, for kernels that are used for the
+    first time on a machine, is not part of the stages' times.
     """
 
     output: Path
@@ -372,23 +407,23 @@ def render_video(
 ) -> Summary:
     """Simulate a scene and write its video.
 
-    The same scene and options give the same video on the same machine, bit for bit. Until it is
-    complete, finished frames are in a folder beside it, `output` with `.part` appended, and stay
-    there if the render is interrupted. Resumed, the simulation runs again up to there and is
-    checked to be the same; the frames are not rendered again.
+    The same scene and options give the same video on the same machine, bit for bit. Until the video
+    is complete, finished frames are in a folder beside it, `output` with `.part` appended; they
+    stay there if the render is interrupted. A render that is resumed runs the simulation again up
+    to the interruption and checks that it is the same; it does not render the frames again.
 
     Parameters
     ----------
     output : path
-        .mp4, .webm, .gif, .webp, or a folder for frames. It appears once it is complete.
+        .mp4, .webm, .gif, .webp, or a folder for frames. It appears when it is complete.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
     on_step : callable, optional
-        As for `Simulation`. It is called in a thread of its own, unless waves are computed by a
+        As for `Simulation`. It is called in the simulation's thread, unless waves are computed by a
         software driver.
     on_frame : callable, optional
-        Called with the simulation at the time of each frame, to record what it wants to; in the
-        same thread.
+        Called with the simulation at the time of each frame, for records of one's own, in the same
+        thread.
 
     Raises
     ------
@@ -413,31 +448,32 @@ def render_video(
             Simulation.of(scene, options, operator=operator, on_step=on_step)
             for operator in operators
         ]
-        microphone = (
-            Microphone(simulations[0].ripples, options.slow_motion) if options.sound else None
-        )
-        looks = [look for look in (on_frame, microphone and microphone.follow) if look]
-        film = Film(simulations, options, frames, looks)
+        on_frames = [] if on_frame is None else [on_frame]
+        microphone = None
+        if options.sound:
+            microphone = Microphone(simulations[0].ripples, options.slow_motion)
+            on_frames.append(microphone.follow)
+        film = Film(simulations, options, frames, on_frames)
         if options.passes:
             film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)
-        if not resumed_at:  # the frames before were not looked at
+        if not resumed_at:  # else it is not known what the frames before showed
             film.warn_of_unseen(whole=(options.duration or 0.0) >= scene.duration)
         if microphone is not None:
             pressure = microphone.pressure(frames / options.rate)
             writer.sound = pressure * gain(pressure)
+    substeps = sum(simulation.substeps_taken for simulation in simulations)
     return Summary(
         output=writer.path,
         frames=writer.frames,
         resumed_at=resumed_at,
         renderer=gl.renderer,
         backend=simulations[0].backend,
-        substeps_per_frame=sum(each.substeps_taken for each in simulations)
-        / max(writer.frames - 1, 1),
+        substeps_per_frame=substeps / max(writer.frames - 1, 1),
         compile_seconds=sum(compile_times().values()) - compiled,
         setup_seconds=ready - work_start,
-        physics_seconds=sum(each.physics_seconds for each in simulations),
-        wave_seconds=sum(each.wave_seconds for each in simulations),
+        physics_seconds=sum(simulation.physics_seconds for simulation in simulations),
+        wave_seconds=sum(simulation.wave_seconds for simulation in simulations),
         render_seconds=film.seconds,
         encode_seconds=writer.encode_seconds,
         wall_seconds=time.perf_counter() - start,
@@ -447,17 +483,22 @@ def render_video(
 def _write_frames(
     film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None
 ) -> float:
-    """Render and write the frames that the video still lacks; return the `work_clock` when the first could begin."""
+    """Render and write the frames that the video still lacks.
+
+    Return the `work_clock` [s] when everything was ready for the first frame.
+    """
     # a software driver renders on the processor, which is busy enough with one frame
     ahead = 0 if gl.software else 1
-    shots = film.shots(alive=_WAITING + ahead + 2)
-    # waves on a GPU and the renderer take turns with the OpenGL context; a software driver computes
-    # during its turn
+    shots = film.shots(alive=_WAITING_SHOTS + ahead + 2)
+    # Waves on a GPU and the renderer take turns with the OpenGL context. A software driver computes
+    # during its turn, so that a thread would gain nothing.
     own_thread = film.simulations[0].backend == "cpu" or not gl.software
-    with prefetched(shots, _WAITING) if own_thread else contextlib.nullcontext(shots) as shots:
+    thread = prefetched(shots, _WAITING_SHOTS) if own_thread else contextlib.nullcontext(shots)
+    with thread as shots:
         film.prepare()
         ready = work_clock()
-        for frame in film.render_all(_missing(shots, film, writer, progress, frames), ahead):
+        missing = _missing(shots, film, writer, progress, frames)
+        for frame in film.render_all(missing, ahead):
             writer.write(frame)
             if progress is not None:
                 progress(writer.frames, frames)
@@ -467,10 +508,10 @@ def _write_frames(
 def _missing(
     shots: Iterable[Shot], film: Film, writer: FrameWriter, progress: Progress | None, frames: int
 ) -> Iterator[Shot]:
-    """Check the simulation's states, and skip the frames that are there already."""
+    """Check the states of the simulation, and skip the frames that exist already."""
     resumed_at = writer.frames
     for shot in shots:
-        if shot.exposure == 0 and shot.number % _CHECKED == 0:
+        if shot.exposure == 0 and shot.number % _FINGERPRINT_INTERVAL == 0:
             writer.check_state(shot.number, shot.digest())
         if shot.number >= resumed_at:
             yield shot

@@ -1,7 +1,7 @@
-"""The options of a video checked and settled for one render.
+"""The options of a video, checked and completed for one render.
 
-The settings of a render, with fingerprints of its scene, its files and the software, tell whether
-an interrupted one can continue.
+The settings of a render, with fingerprints of its scene, its files and the software, decide whether
+an interrupted render can continue.
 """
 
 from __future__ import annotations
@@ -32,12 +32,15 @@ from ripple_sim.solver.gl import GLContext
 
 from .options import Backend, SceneOptions, VideoOptions
 
-# replace those of the scene's camera, by the same names
+# Options that replace the ones of the scene's camera with the same names.
 EXPOSURE = ("shutter", "aperture", "focus", "exposures")
 
 
 def origin(scene: Scene, options: SceneOptions) -> dict[str, str | int]:
-    """What the options of a video or an export change of a scene's waves, its fingerprint, and versions of packages."""
+    """What decides the waves of a video or an export, by the names in messages.
+
+    It consists of options, the fingerprint of the scene and the versions of packages.
+    """
     return {
         "the resolution": options.resolution or "the scene's",
         "the layout": options.layout or "the scene's",
@@ -62,7 +65,7 @@ def versions() -> dict[str, str]:
 def scene_digest(scene: Scene) -> str:
     """Fingerprint of the model, the surfaces, the camera and the script, 16 hexadecimal digits.
 
-    Of files the contents count, not the paths: it is the same where all lies in another folder.
+    Of files the contents count, not the paths: a scene in another folder has the same fingerprint.
     """
     hasher = hashlib.blake2b(digest_size=8)
     _add_fields(hasher, scene.model)
@@ -72,7 +75,8 @@ def scene_digest(scene: Scene) -> str:
     )
     for path in itertools.chain.from_iterable(entry.files() for entry in scene.targets):
         entries = entries.replace(msgspec.json.encode(path), b'""')
-        for file in sorted(Path(path).rglob("*")) if Path(path).is_dir() else [Path(path)]:
+        is_folder = Path(path).is_dir()
+        for file in sorted(Path(path).rglob("*")) if is_folder else [Path(path)]:
             if file.is_file():
                 hasher.update(file.read_bytes())
     hasher.update(entries)
@@ -80,13 +84,14 @@ def scene_digest(scene: Scene) -> str:
 
 
 def _add_fields(hasher: Any, struct: Any) -> None:
-    """Add the fields of a struct of MuJoCo, but for the paths of its files, and its size, in which these count."""
+    """Add the fields of a struct of MuJoCo.
+
+    The paths of its files are left out, and its size in memory, which depends on the paths.
+    """
     for name in dir(struct):
-        value = (
-            None
-            if name.startswith("_") or "path" in name or name == "nbuffer"
-            else getattr(struct, name)
-        )
+        if name.startswith("_") or "path" in name or name == "nbuffer":
+            continue
+        value = getattr(struct, name)
         if isinstance(value, int | float | bytes | np.ndarray):
             hasher.update(name.encode() + np.asarray(value).tobytes())
         elif type(value).__module__.startswith("mujoco") and not callable(value):
@@ -94,18 +99,18 @@ def _add_fields(hasher: Any, struct: Any) -> None:
 
 
 def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
-    """The options with None and "auto" replaced by what the scene, the output and this machine say.
+    """The options with None and "auto" replaced, by what scene, output and machine call for.
 
     Shutter, aperture, focus and exposures stay as they are: see `with_exposure`. Raises
     `VideoError` for an output of unknown format.
     """
-    # first: it refuses an unknown format
+    # before anything else: `default_fps` refuses an unknown format
     fps = default_fps(output) if options.fps is None else options.fps
     backend = options.backend
-    if backend == "auto":  # the one that is meant for the largest target of known resolution
-        sides = [options.resolution or entry.resolution for entry in scene.targets]
-        known = [6 * n * n for n in sides if n is not None]
-        backend = cast(Backend, auto_backend(max(known)) if known else auto_backend())
+    if backend == "auto":  # the largest target of known resolution decides
+        resolutions = [options.resolution or entry.resolution for entry in scene.targets]
+        texel_counts = [6 * n * n for n in resolutions if n is not None]
+        backend = cast(Backend, auto_backend(max(texel_counts)) if texel_counts else auto_backend())
     return dataclasses.replace(
         options,
         fps=fps,
@@ -121,6 +126,13 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
     The options are settled, and the scene has the exposure that they ask for.
     """
     width, height = options.size
+    optional: dict[str, str | int | float] = {}
+    if options.passes:
+        optional["the passes"] = f"{','.join(options.passes)} in {options.pass_format}"
+    if options.sound:
+        optional["the sound"] = "at the camera"
+    if options.linear:
+        optional["the version of OpenEXR"] = version("OpenEXR")
     return {
         "the size": f"{width}x{height}",
         "the frame rate": options.fps or 0,
@@ -137,20 +149,14 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         "the operators": ",".join(compared_operators(options.compare)),
         **origin(scene, options),
         "the OpenGL driver": f"{gl.renderer}, {gl.version}",
-        **(
-            {"the passes": f"{','.join(options.passes)} in {options.pass_format}"}
-            if options.passes
-            else {}
-        ),
-        **({"the sound": "at the camera"} if options.sound else {}),
-        **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
+        **optional,
     }
 
 
 def check_options(options: VideoOptions, output: Path) -> None:
-    """Make sure, before anything that takes time, that a video with these options can be written to `output`.
+    """Check that a video with these options can be written to `output`; raise `RippleError` if not.
 
-    Raises `RippleError`.
+    Call it before anything that takes time.
     """
     parse_request(options.overlay or ())
     operators = compared_operators(options.compare)

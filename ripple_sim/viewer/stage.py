@@ -12,7 +12,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from ripple_sim.capture.frame_source import viewpoint
+from ripple_sim.capture.scene_camera import viewpoint
 from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.export.moving_mesh import Displaced
 from ripple_sim.overlay.notes import round_up

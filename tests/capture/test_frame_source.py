@@ -11,7 +11,7 @@ from mujoco_models import posed
 from PIL import Image
 
 from ripple_sim import Simulation, VideoOptions, render_video
-from ripple_sim.capture import FrameSource, Sensor, focal_distance, snapshots, viewpoint
+from ripple_sim.capture import FilmExposure, FrameSource, focal_distance, snapshots, viewpoint
 from ripple_sim.render import Camera, perspective, view_matrix
 from ripple_sim.scene import CameraEntry, Scene, check_camera, with_exposure
 
@@ -148,7 +148,7 @@ def test_overlays_are_laid_over_the_mean(opengl, make_scene, tmp_path):
 
 
 def shrink(picture: np.ndarray, factor: int) -> np.ndarray:
-    frame = Sensor(factor).expose(picture)
+    frame = FilmExposure(factor).expose(picture)
     assert frame is not None
     return frame
 
@@ -173,15 +173,15 @@ def test_transparent_pixels_lend_no_colour():
 
 
 @pytest.mark.parametrize("channels", [3, 4])
-def test_the_sensor_averages_codes_and_linear_light_alike(channels):
+def test_a_film_exposure_averages_codes_and_linear_light_alike(channels):
     codes = np.random.default_rng(6).integers(0, 256, (3, 4, 6, channels), dtype=np.uint8)
     light = linear(codes)
     light[..., 3:] = codes[..., 3:] / 255
     light[..., :3] *= light[..., 3:] if channels == 4 else 1
-    sensor = Sensor(2, 3)
-    meter = Sensor(2, 3)
+    exposure = FilmExposure(2, 3)
+    meter = FilmExposure(2, 3)
     for number in range(3):
-        frame = sensor.expose(codes[number])
+        frame = exposure.expose(codes[number])
         mean = meter.expose(light[number].astype(np.float16))
     np.testing.assert_allclose(
         mean, light.reshape(3, 2, 2, 3, 2, channels).mean(axis=(0, 2, 4)), rtol=1e-3

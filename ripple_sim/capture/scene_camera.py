@@ -1,0 +1,95 @@
+"""`viewpoint`: where the camera of a scene stands; `focal_distance`: which distance is sharp."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render import Camera, FixedCamera
+from ripple_sim.render.pose import Pose
+from ripple_sim.scene.scene_file import CameraEntry
+
+_MIN_FOCAL_DISTANCE = 0.02  # in distances of the camera from what it looks at: the near plane
+
+_DEFAULT_DISTANCE = 1.5  # of the free camera from its aim, in extents of the model
+
+
+def viewpoint(
+    model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float
+) -> Camera | FixedCamera:
+    """Camera of a scene at a time [s].
+
+    A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise
+    MuJoCo's free camera, aimed at the model's middle where the scene says nothing else. With
+    `orbit` either circles by that many degrees a second; with `track` the free camera moves along
+    with a body's centre of mass, and the named one turns towards it.
+    """
+    tracked = None if entry.track is None else data.subtree_com[model.body(entry.track).id]
+    if entry.name is not None:
+        fixed = Camera.from_mjcf(model, data, entry.name)
+        if tracked is not None:
+            fixed = _aimed(fixed, tracked)
+        if entry.orbit:
+            fixed = _orbited(fixed, np.radians(entry.orbit) * time)
+        return fixed
+    base = np.zeros(3) if tracked is not None else model.stat.center
+    aim = base if entry.lookat is None else entry.lookat
+    x, y, z = (float(value) for value in (aim if tracked is None else tracked + aim))
+    distance = entry.distance
+    if distance is None:
+        distance = _DEFAULT_DISTANCE * float(model.stat.extent)
+    return Camera(
+        lookat=(x, y, z),
+        distance=distance,
+        azimuth=entry.azimuth + entry.orbit * time,
+        elevation=entry.elevation,
+        fovy=entry.fovy,
+    )
+
+
+def focal_distance(
+    model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, pose: Pose
+) -> float:
+    """Distance of the plane in focus from a scene's camera, along its axis [m]."""
+    if entry.focus is None:
+        return pose.distance
+    if isinstance(entry.focus, float):
+        return entry.focus
+    if isinstance(entry.focus, str):
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, entry.focus)
+        point = data.subtree_com[body] if body >= 0 else data.geom_xpos[model.geom(entry.focus).id]
+    else:
+        point = np.array(entry.focus)
+    return max(
+        float((pose.position - point) @ pose.rotation[:, 2]), _MIN_FOCAL_DISTANCE * pose.distance
+    )
+
+
+def _orbited(camera: FixedCamera, angle: float) -> FixedCamera:
+    """The camera turned by an angle [radians] about the vertical through the point it looks at."""
+    turn = np.array(
+        [
+            [np.cos(angle), -np.sin(angle), 0.0],
+            [np.sin(angle), np.cos(angle), 0.0],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    focus = camera.pose().focus
+    position = focus + turn @ (camera.position - focus)
+    return dataclasses.replace(camera, position=position, rotation=turn @ camera.rotation)
+
+
+def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:
+    """The camera turned in place, upright, towards a point [m]."""
+    back = camera.position - target
+    distance = float(np.linalg.norm(back))
+    right = np.cross([0.0, 0.0, 1.0], back)
+    if distance == 0 or not right.any():  # at the point itself, or exactly above or below it
+        return camera
+    right /= np.linalg.norm(right)
+    back = back / distance
+    rotation = np.stack([right, np.cross(back, right), back], axis=1)
+    return dataclasses.replace(camera, rotation=rotation, distance=distance)
