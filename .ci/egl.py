@@ -1,4 +1,6 @@
-"""Exit with 0 if an EGL device initialises and offers OpenGL, else say on stdout what is missing and exit with 1.
+"""Check EGL: exit with 0 if a device initialises and offers OpenGL.
+
+Otherwise print what is missing and exit with 1.
 
 Standard library only: it runs before anything else is installed.
 """

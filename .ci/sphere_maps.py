@@ -1,4 +1,4 @@
-"""Writes the sphere maps of the shipped scenes' targets again, and removes those that no scene needs any more."""
+"""Compute the sphere maps of the shipped scenes again, and remove those no scene needs."""
 
 import numpy as np
 

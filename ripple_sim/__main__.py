@@ -1,4 +1,7 @@
-"""Where the program starts, as `ripple-sim` or `python -m ripple_sim`: first of all, signals follow one rule."""
+"""Entry point of `ripple-sim` and of `python -m ripple_sim`.
+
+Signals are set up before anything else is imported.
+"""
 
 import atexit
 import sys

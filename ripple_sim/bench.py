@@ -111,7 +111,10 @@ def measure(
 def race(
     contestants: Mapping[str, Advance], rounds: int = _ROUNDS
 ) -> dict[str, NDArray[np.float64]]:
-    """Seconds a substep of each contestant, [rounds]; they take turns, so that a busy machine slows all alike."""
+    """Time the contestants: seconds a substep of each, [rounds].
+
+    They take turns, so that other programs on the machine slow all of them alike.
+    """
     dt = 1e-6
     frames = {}
     for name, advance in contestants.items():
@@ -141,7 +144,9 @@ def backend_advance(name: str, operator: WaveOperator) -> Advance:
 
 
 def cpu_speed(resolution: int) -> dict[str, float]:
-    """Texel updates a second of the CPU backend and of the bound of memory, in all cores; and their ratio.
+    """Texel updates a second of the CPU backend and of the memory bound, and their ratio.
+
+    Both use all cores.
 
     The smaller fields of N = 128 and 256 lie in the processor's caches, and so does what the bound
     streams there.
@@ -190,7 +195,10 @@ def memory_fields(texels: int) -> Floats32:
 
 
 def memory_stream(fields: Floats32, texels: int, threads: int) -> Advance:
-    """Stream the bytes of a substep through memory, each thread its own share; no thread waits for another."""
+    """Stream the bytes of a substep through memory.
+
+    Each thread has a share of its own and waits for no other thread.
+    """
     shares = list(itertools.pairwise(np.linspace(0, texels, threads + 1).astype(np.int64)))
     pool = ThreadPoolExecutor(threads)
 
@@ -258,7 +266,7 @@ def sphere_modes(
 
 
 def energy_drift(resolution: int = 64, steps: int = 10_000) -> dict[str, float]:
-    """Largest relative change of the energy over a number of steps in float32, and its trend over all of them."""
+    """Relative change of the energy in float32 over many steps: largest, and trend over all."""
     atlas = sphere_atlas(1.0, resolution)
     waves = WaveSolver(atlas, backend="cpu")
     waves.add_impulse([0.3, -0.5, 0.8], 1.0, 0.3)
@@ -299,7 +307,9 @@ def coupling_cost(
     resolution: int = RESOLUTION,
     rounds: int = ROUNDS,
 ) -> dict[str, dict[str, float]]:
-    """Seconds a step of `mj_step`, of the coupling (all of `Ripples.step` but the waves), and of the waves, by target.
+    """Seconds a step of `mj_step`, of the coupling and of the waves, by target.
+
+    The coupling is all of `Ripples.step` except the waves.
 
     The records of impulses, which are made when they are asked for, are counted too. The thread's
     own time is taken. A run is repeated; it is the same each time, so that the shortest time of
@@ -346,7 +356,10 @@ def rain(shape: Shape, bodies: int) -> mujoco.MjModel:
 def _run(
     model: mujoco.MjModel, seconds: float, resolution: int
 ) -> tuple[NDArray[np.float64], float]:
-    """Times of every step [s], [steps, 3]: physics, coupling, waves; and the mean number of bodies on the target."""
+    """Times of every step [s], [steps, 3], and the mean number of bodies on the target.
+
+    The columns are physics, coupling and waves.
+    """
     data = mujoco.MjData(model)
     material = Material(speed=0.6, damping=1.0, density=200.0)
     ripples = Ripples(model, {"target": material}, resolution=resolution, backend="cpu")
@@ -411,21 +424,19 @@ def as_text(report: Mapping[str, Any]) -> str:
     return "\n\n".join(
         [
             (
-                f"{machine['processors']} processors, {machine['renderer']}\nripple-sim "
-                f"{machine['version']}"
+                f"{machine['processors']} processors, {machine['renderer']}\n"
+                f"ripple-sim {machine['version']}"
             ),
             (
-                "Texel updates a second, in millions; the memory bound reads 28 bytes and writes 8 "
-                "a "
-                "texel, in all cores\n"
+                "Texel updates a second, in millions; the memory bound reads 28 bytes and writes "
+                "8 a texel, in all cores\n"
             )
             + table(["N", "CPU", "memory bound", "of it", "OpenGL"], rates),
             "Meshes at N = 128: seconds for the atlas, and milliseconds a wave step on the CPU\n"
             + table(["mesh", "triangles", "texels", "atlas", "step"], meshes),
             (
-                f"Coupling: {BODIES} bodies rain on a target that collides as its true surface, ms "
-                f"a "
-                f"step\n"
+                f"Coupling: {BODIES} bodies rain on a target that collides as its true surface, "
+                "ms a step\n"
             )
             + table(
                 ["target", "touching", "mj_step", "coupling", "waves", "coupling over mj_step"],

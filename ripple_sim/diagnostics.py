@@ -1,4 +1,4 @@
-"""The report of `ripple-sim info`: versions, OpenGL driver, wave solver; and what to install to render.
+"""The report of `ripple-sim info`: versions, OpenGL driver, wave solver, and advice.
 
 It names common reasons on Linux why OpenGL does not run headless, or not on the GPU, each with its
 fix. An OpenGL program without a window uses libEGL.so.1 (of libglvnd), which reads the vendor
@@ -75,17 +75,14 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[s
     ):
         found.append(
             "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in "
-            "software: "
-            f"{_install_nvidia()}"
+            f"software: {_install_nvidia()}"
         )
     if found or any(devices.glob("dri/renderD*")) or any(devices.glob("nvidia[0-9]*")):
         return found
     return [
         f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or "
-        f"{devices}/nvidia*): "
-        "nothing to fix; rendering is faster on a machine with a GPU (in a container, pass it "
-        "through with "
-        "--device /dev/dri or --gpus all)"
+        f"{devices}/nvidia*): nothing to fix; rendering is faster on a machine with a GPU (in a "
+        "container, pass it through with --device /dev/dri or --gpus all)"
     ]
 
 
@@ -107,10 +104,9 @@ def _vendor_problems() -> Iterator[str]:
     files, where = _vendor_files()
     if not files:
         yield (
-            f"there is no EGL vendor file (*.json) in {where}: "
-            "apt-get install libegl-mesa0 libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl "
-            "of the driver's "
-            f"version, or, {_CONTAINER}"
+            f"there is no EGL vendor file (*.json) in {where}: apt-get install libegl-mesa0 "
+            "libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl of the driver's version, "
+            f"or, {_CONTAINER}"
         )
     for file in files:
         if (library := _library_of(file)) is None:
@@ -136,9 +132,8 @@ def _device_problems(devices: Path) -> Iterator[str]:
             except KeyError:
                 group = str(number)
             yield (
-                f"this user has no access to the GPU's render node {node}: "
-                f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add "
-                f"{group})"
+                f"this user has no access to the GPU's render node {node}: sudo usermod -aG "
+                f"{group} $USER, then log in again (in a container: --group-add {group})"
             )
 
 
@@ -176,14 +171,16 @@ def _library_of(file: Path) -> str | None:
 
 
 def find_drawing_threads(renderer: str) -> list[str]:
-    """The problem of llvmpipe where the user has it draw in threads, if `renderer`, its GL_RENDERER, is llvmpipe."""
+    """The problem of llvmpipe with drawing threads, if the user has turned them on.
+
+    `renderer` is OpenGL's GL_RENDERER.
+    """
     threads = os.environ.get(DRAWING_THREADS, "0")
     if "llvmpipe" not in renderer.lower() or threads == "0":
         return []
     return [
         f"{DRAWING_THREADS}={threads} has llvmpipe draw in threads, which may write into freed "
-        f"memory and so end the "
-        f"program: unset {DRAWING_THREADS}, or set it to 0"
+        f"memory and so end the program: unset {DRAWING_THREADS}, or set it to 0"
     ]
 
 

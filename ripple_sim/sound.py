@@ -76,14 +76,16 @@ class Microphone:
             if highest < _HEARD:
                 ringing = 200 * size / 0.77 * slow_motion
                 warn_caller(
-                    f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound at "
-                    f"{highest:.2g} Hz at "
-                    f"most, below hearing ({_HEARD:g} Hz); a speed of {ringing:.2g} m/s would ring "
-                    f"at 200 Hz"
+                    f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound "
+                    f"at {highest:.2g} Hz at most, below hearing ({_HEARD:g} Hz); a speed of "
+                    f"{ringing:.2g} m/s would ring at 200 Hz"
                 )
 
     def place(self, data: mujoco.MjData, point: NDArray[np.float64]) -> None:
-        """Stand at a point in the world from now on [m], [3]; call it again when it or a target has moved."""
+        """Move to a point in the world [m], [3].
+
+        Call it again when the point or a target has moved.
+        """
         for name, geom in self._ripples.geom_ids.items():
             position, rotation = target_pose(data, geom)
             self._ears[name].stand(self._ripples[name], (point - position) @ rotation)
@@ -97,7 +99,10 @@ class Microphone:
         )
 
     def pressure(self, duration: float) -> NDArray[np.float64]:
-        """The pressure from time 0 on, over a duration of the simulation [s]: [k] [Pa], k = rate times duration."""
+        """The pressure [k] [Pa] from time 0 over a duration of the simulation [s].
+
+        k is the rate times the duration.
+        """
         at = np.arange(round(self.rate * duration)) / self.rate
         return sum((ear.heard(at, self.rate) for ear in self._ears.values()), np.zeros(len(at)))
 
@@ -146,7 +151,10 @@ class Ear:
         self._reach = 2 * float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
 
     def stand(self, waves: WaveSolver, here: NDArray[np.float64]) -> None:
-        """Be at a place in the target's frame now [m], and on a straight way to it since the last call."""
+        """Move to a place in the target's frame [m].
+
+        Between two calls the place moves on a straight line.
+        """
         middle = waves.atlas.positions.reshape(-1, 3).mean(axis=0)
         way = here - middle
         has_moved = not self._ways or bool(np.abs(way - self._ways[-1]).max() >= _SAME)
@@ -200,7 +208,10 @@ class Ear:
             np.add.at(self._series, places + 1, changes * late)
 
     def heard(self, at: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-        """The pressure at some times [s], filtered for samples at a rate; nothing, where it stood nowhere."""
+        """The pressure at given times [s], filtered for samples at a rate [1/s].
+
+        It is 0 if `stand` was never called.
+        """
         if not self._ways or not len(at):
             return np.zeros(len(at))
         ways = np.stack(
@@ -226,7 +237,10 @@ class Ear:
         return pressure
 
     def _placement(self, waves: WaveSolver, here: Floats, common: float) -> Placement:
-        """How the surface is heard from a place in its frame [m], whose way from the middle is common to all [m]."""
+        """The placement for a place in the target's frame [m].
+
+        `common` is the distance from the surface's middle [m], by which all delays are reduced.
+        """
         atlas = waves.atlas
         way = here - atlas.positions.reshape(-1, 3)
         distance = np.maximum(np.linalg.norm(way, axis=1), _NEAREST)
@@ -259,7 +273,10 @@ class Ear:
         return Placement(probes, every * delays)
 
     def _faded(self, times: NDArray) -> NDArray:
-        """How much of the last placement is heard at some times [s], [k]: all after as long as the one before took."""
+        """Share of the last placement in what is heard at given times [s], [k].
+
+        It rises from 0 to 1 over the time that the placement before lasted.
+        """
         span = self._times[-1] - self._times[-2]
         return (
             np.clip((times - self._times[-1]) / span, 0.0, 1.0) if span > 0 else np.ones(len(times))
@@ -273,7 +290,7 @@ def gain(pressure: NDArray[np.float64]) -> float:
 
 
 def write_wav(path: Path, signals: NDArray, rate: int) -> None:
-    """Write signals [k] or [k, channels] between -1 and 1 to a file of 16 bits a sample, marked as made here."""
+    """Write signals [k] or [k, channels] between -1 and 1 to a 16-bit WAV file with our mark."""
     codes = np.rint(np.clip(signals, -1, 1) * 32767).astype("<i2")
     channels = 1 if codes.ndim == 1 else codes.shape[1]
     mark = MARK.encode() + b"\0" * (2 - len(MARK) % 2)

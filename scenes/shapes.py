@@ -1,4 +1,4 @@
-"""The shipped target meshes, each a closed surface of genus 0 modelled with smoothly blended implicit solids.
+"""The shipped target meshes: closed surfaces of genus 0, modelled with implicit solids.
 
 `python -m ripple_sim.scenes.shapes` writes `meshes/duck.obj` and `meshes/limbed.obj` again.
 
@@ -82,7 +82,10 @@ def capsule(a: ArrayLike, b: ArrayLike, radius: float) -> Sdf:
 def pebble(
     centre: ArrayLike, radius: float, rounding: float, rotation: ArrayLike | None = None
 ) -> Sdf:
-    """All points within `rounding` [m] of a flat disc; its normal is the third column of `rotation`."""
+    """All points within `rounding` [m] of a flat disc.
+
+    The disc's normal is the third column of `rotation`.
+    """
     c = np.asarray(centre, dtype=np.float64)
     axes = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64)
 
@@ -182,7 +185,9 @@ Triangles = NDArray[np.int64]
 
 
 def duck(cell: float = 0.0235) -> tuple[Array, Triangles]:
-    """Model a bath duck about 1 m long that faces +x and stands on z = 0, mirrored in y = 0 up to the triangulation.
+    """Model a bath duck about 1 m long that faces +x and stands on z = 0.
+
+    It is symmetric about y = 0, except for the triangulation.
 
     Parameters
     ----------
@@ -199,7 +204,10 @@ def duck(cell: float = 0.0235) -> tuple[Array, Triangles]:
 
 
 def limbed(cell: float = 0.02) -> tuple[Array, Triangles]:
-    """Model a plump animal on four legs, 0.7 m long, standing on z = 0: concave between the legs and under the chin."""
+    """Model a plump animal on four legs, 0.7 m long, standing on z = 0.
+
+    It is concave between the legs and under the chin.
+    """
     legs = [
         capsule((x, y, 0.22), (1.25 * x, 1.4 * y, 0.05), 0.05)
         for x in (-0.17, 0.17)
@@ -214,7 +222,10 @@ def limbed(cell: float = 0.02) -> tuple[Array, Triangles]:
 
 
 def peanut(cell: float = 0.02) -> tuple[Array, Triangles]:
-    """Model two blended balls along x, 0.7 m long, about the origin: smooth, with a saddle all round its waist."""
+    """Model two blended balls along x, 0.7 m long, centred at the origin.
+
+    The surface is smooth, with a saddle all round its waist.
+    """
     solid = smooth_union(0.12, sphere((-0.17, 0.0, 0.0), 0.18), sphere((0.17, 0.0, 0.0), 0.18))
     return polygonise(solid, ((-0.4, -0.25, -0.25), (0.4, 0.25, 0.25)), cell)
 
@@ -258,7 +269,10 @@ def _turned(pitch: float = 0.0, yaw: float = 0.0) -> Array:
 
 
 def write_obj(path: Path, V: Array, F: Triangles) -> None:
-    """Write vertices to five significant decimals and triangles as a Wavefront file, all of it or nothing."""
+    """Write a Wavefront file, whole or not at all.
+
+    Vertices have five significant digits.
+    """
     lines = ["# made by python -m ripple_sim.scenes.shapes"]
     lines += [f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in V]
     lines += [f"f {a} {b} {c}" for a, b, c in F + 1]

@@ -1,4 +1,7 @@
-"""The tables and keys of scene files and plans, with their words, units, defaults and texts, taken from the code."""
+"""The tables of keys of scene files and plans, for the documentation.
+
+Words, units, defaults and texts are read from the code.
+"""
 
 from __future__ import annotations
 
@@ -125,7 +128,10 @@ def _table(name: str, entry: type[msgspec.Struct]) -> str:
 
 
 def key_texts(entry: type[msgspec.Struct]) -> dict[str, str]:
-    """Text of each key: the string under the field, or what `Material` says of the coefficient or the parameter."""
+    """The text of each key.
+
+    It is the string under the field, or what `Material` says about the coefficient or parameter.
+    """
     sources = {
         MaterialEntry: {"": Material},
         MaterialChange: {"": Material},

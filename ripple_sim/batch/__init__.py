@@ -1,4 +1,7 @@
-"""Batches: many scenes by one plan, each varied by its own seed, made by many workers, resumed after any kill."""
+"""Batches: many scenes from one plan, each varied by its own seed.
+
+Several workers make them. A batch can be killed at any time and resumed.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""Who makes scenes: processes of this machine, or the workers of a Dask cluster, which share the batch's folder."""
+"""Executors of a batch: processes of this machine, or the workers of a Dask cluster.
+
+All of them share the folder of the batch.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +57,7 @@ class DaskExecutor(Executor):
         except (OSError, ValueError) as error:
             raise BatchError(
                 f"no Dask scheduler answers at {shown(address)} ({error}); valid is an address "
-                f"such as tcp://host:8786"
+                "such as tcp://host:8786"
             ) from error
         self._address = address
         self._log = logging.getLogger("distributed.client")
@@ -89,8 +92,7 @@ class DaskExecutor(Executor):
             return None
         return BatchError(
             f"the Dask scheduler at {self._address} is gone; finished scenes are kept: start it, "
-            f"and run the same "
-            "command again to go on"
+            "and run the same command again to go on"
         )
 
 
@@ -102,13 +104,16 @@ def available_cores() -> list[int]:
 
 
 def usual_workers() -> int:
-    """How many workers use this machine well: one for every two cores, two at least where there are two."""
+    """Default number of workers: one for every two cores, and at least two on two cores."""
     cores = len(available_cores())
     return max(2, cores // 2) if cores > 1 else 1
 
 
 def shares(cores: list[int], workers: int) -> list[list[int]]:
-    """The cores shared out among workers as evenly as can be; more workers than cores share them all."""
+    """Divide the cores among the workers as evenly as possible.
+
+    If there are more workers than cores, every worker may use all cores.
+    """
     if workers > len(cores):
         return [cores] * workers
     ends = [len(cores) * number // workers for number in range(workers + 1)]
@@ -166,7 +171,10 @@ class LocalExecutor(Executor):
 
 
 def _begin(cores: list[int], line: tuple[str, int]) -> None:
-    """Begin a worker: before anything heavy is imported, it gets its share of the cores; its warnings name a line."""
+    """Set up a worker process before it imports anything heavy.
+
+    It gets its share of the cores, and the user's line that its warnings name.
+    """
     work_for(line)
     # Ctrl-C goes to all processes: the parent ends this one
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -189,7 +197,10 @@ def _end_with_parent() -> None:
 
 @contextlib.contextmanager
 def first_alone(work: Path, what: str) -> Iterator[None]:
-    """Let the first of something, by its name, be done alone on each machine; others that share `work` wait."""
+    """Run the block alone on this machine the first time that `what` is made.
+
+    Processes that share the folder `work` wait until the first one is done.
+    """
     ready = work / f"ready-{socket.gethostname()}-{what}"
     if not ready.exists():
         with (work / f"first-{socket.gethostname()}-{what}").open("w") as lock:

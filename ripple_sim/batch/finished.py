@@ -1,4 +1,4 @@
-"""The finished scenes of a batch, read back from folders and tar files, and packed into tar files."""
+"""Finished scenes of a batch: read from folders and tar files, and packed into tar files."""
 
 from __future__ import annotations
 
@@ -43,7 +43,10 @@ def facts_hash(facts: dict[str, Any]) -> str:
 
 
 class FinishedScene:
-    """A scene of a batch: in a folder, or in a tar file, whose `members` it has by their names behind its number."""
+    """A finished scene of a batch, in a folder or in a tar file.
+
+    In a tar file `members` are the files of the scene, by their names without the scene's number.
+    """
 
     def __init__(
         self, number: int, path: Path, members: dict[str, tarfile.TarInfo] | None = None
@@ -89,11 +92,11 @@ class FinishedScene:
         except Exception as error:  # whatever a damaged file holds
             raise BatchError(
                 f"scene {self.number} in {self._path} is damaged: {error}; remove it, and run the "
-                f"batch again"
+                "batch again"
             ) from error
 
     def facts(self) -> dict[str, Any]:
-        """What is known of it: seed, source, values drawn, counts, energies [J], files and their hashes."""
+        """The facts: seed, source, values drawn, counts, energies [J], files and their hashes."""
         with self._reported():
             found = msgspec.json.decode(self.read(FACTS), type=dict[str, Any])
             if found["hash"] != facts_hash(
@@ -137,7 +140,10 @@ class FinishedScene:
             }
 
     def impulses(self) -> NDArray:
-        """The impulses, a structured array: frame, time, geom, other, x, y, z, impulse, chart, row, column, inner."""
+        """The impulses as a structured array.
+
+        Its fields are frame, time, geom, other, x, y, z, impulse, chart, row, column and inner.
+        """
         dtype = np.dtype([(name, DTYPES[kind]) for name, (_, kind) in COLUMNS.items()])
         with self._reported():
             lines = list(csv.reader(io.StringIO(self.read(IMPULSES).decode())))[1:]
@@ -213,7 +219,9 @@ def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[
 
 
 def pack(batch: BatchFolder, first: int, end: int) -> None:
-    """Move the finished scenes from `first` to before `end` into one tar file, beside those that are there already.
+    """Move the finished scenes from `first` up to `end` (excluded) into one tar file.
+
+    Scenes that are already in the tar file stay in it.
 
     Killed at any time and called again, it loses and doubles nothing: folders go when the tar file
     is there.

@@ -40,7 +40,11 @@ DEATHS = 9
 
 
 def times_of(tar: Path) -> Path:
-    """The file that tells who made the scenes of a tar file and how long each took, which is not in their bytes."""
+    """The file that holds the times of the scenes in a tar file.
+
+    It says who made each scene and how long that took. The tar file does not contain this, so that
+    its bytes do not depend on it.
+    """
     return tar.with_suffix(".times.json")
 
 
@@ -60,7 +64,10 @@ def members(tar: Path) -> dict[int, dict[str, tarfile.TarInfo]]:
 
 
 class Failure(msgspec.Struct):
-    """How often a scene has failed, how often its worker died meanwhile, and what was said of the last time."""
+    """The failures of a scene.
+
+    It counts the scene's own errors and the deaths of its worker, and keeps the last message.
+    """
 
     errors: int = 0
     deaths: int = 0
@@ -92,13 +99,16 @@ class BatchFolder:
         self.page = path / "index.html"
 
     def make(self) -> None:
-        """Make the folders; raises `BatchError` where a link lies, since it leads to what is not the batch's."""
+        """Make the folders.
+
+        Raises `BatchError` if one of them is or contains a link, which would lead out of the batch.
+        """
         folders = (self.scenes, self.tars, self.failed, self.thumbnails, self.work)
         for path in (path for folder in (self.path, *folders) for path in _entries(folder)):
             if path.is_symlink():
                 raise BatchError(
                     f"{path} is a link, which no batch makes; remove it and run the same command "
-                    f"again"
+                    "again"
                 )
         for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
@@ -207,7 +217,10 @@ def _entries(folder: Path) -> list[Path]:
 
 
 class StoredPlan(msgspec.Struct, frozen=True):
-    """A plan with all that decides its scenes: fingerprints of its files, and versions of the software."""
+    """A plan, the fingerprints of its files, and the versions of the software.
+
+    Together they determine every byte of the scenes.
+    """
 
     plan: Plan
     files: dict[str, str]
@@ -247,8 +260,7 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
             )
             raise BatchError(
                 f"{batch.path} holds a batch by another plan: {key} was {shown(before.get(key))} "
-                f"and is "
-                f"{shown(now.get(key))}{more}; take it back, or name another folder"
+                f"and is {shown(now.get(key))}{more}; take it back, or name another folder"
             )
     elif batch.path.is_dir() and any(batch.path.iterdir()):
         raise BatchError(f"{batch.path} holds other files and no batch; name a new folder")

@@ -1,4 +1,4 @@
-"""The TOML file of a batch: what varies, from what it is drawn, how often, and what is kept of each scene.
+"""The TOML file of a batch: what varies, from which distributions, and what is stored.
 
 Keys of a plan are such as `camera.azimuth`, `ripple[duck].material.speed`, `geom[ball*].size[0]`.
 """
@@ -40,7 +40,11 @@ MOST_SCENES = 10_000_000
 
 
 class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """A random value: one of `uniform`, `log_uniform`, `normal`, `integers`, `choice`, `orientation`, `constant`."""
+    """A distribution, of exactly one kind.
+
+    The kinds are `uniform`, `log_uniform`, `normal`, `integers`, `choice`, `orientation` and
+    `constant`.
+    """
 
     uniform: tuple[Numbers, Numbers] | None = None
     """Lowest and highest number, or vectors of these."""
@@ -105,7 +109,10 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
         )
 
     def check(self, key: str) -> None:
-        """Make sure that it names one kind, and that its numbers fit; raises `SceneError` with the key."""
+        """Check that there is one kind, and that its numbers are valid.
+
+        Raises `SceneError` with the key.
+        """
         given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
         if len(given) != 1:
             raise SceneError(
@@ -173,15 +180,15 @@ def parse_key(key: str) -> tuple[Step, ...]:
     """Read a key of a plan; raises `SceneError` if it is not names between dots."""
     if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", key):
         raise SceneError(
-            f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or a "
-            f"pattern in "
-            "brackets, such as camera.azimuth, ripple[duck].material.speed or geom[ball*].size"
+            f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or "
+            "a pattern in brackets, such as camera.azimuth, ripple[duck].material.speed or "
+            "geom[ball*].size"
         )
     return tuple(re.findall(_STEP, key))
 
 
 def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
-    """Numbers of the items that a step chooses from items of these names; without brackets all of them.
+    """Indices of the items that a step of a key selects by their names; without brackets all.
 
     Raises `SceneError` if there is none.
     """
@@ -383,8 +390,7 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
         if name not in shipped and not os.path.isfile(path):  # noqa: PTH113 - False for what can be no name, too
             raise SceneError(
                 f"plan: there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, "
-                f"or give the path of "
-                "a TOML file, relative to the plan"
+                "or give the path of a TOML file, relative to the plan"
             )
         yield name if name in shipped else str(path.resolve())
     for pattern in content.meshes.files if content.meshes else ():
@@ -396,8 +402,8 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
         found += [file for file in within if file.suffix[1:].lower() in trimesh.available_formats()]
         if not found:
             raise SceneError(
-                f"plan: no mesh fits {pattern!r}; valid is a file, a folder or a pattern, relative "
-                f"to the plan"
+                f"plan: no mesh fits {pattern!r}; valid is a file, a folder or a pattern, "
+                "relative to the plan"
             )
         yield from map(str, found)
 

@@ -1,4 +1,4 @@
-"""What is told of a batch: its index, a Parquet table with a row a scene, and its page; and how far it is.
+"""Reports of a batch: the index (a Parquet table, a row a scene), a page, and the status.
 
 `load_batch` reads its finished scenes, one after another or by number.
 """
@@ -44,7 +44,7 @@ _LISTED = 5  # failures
 
 
 def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
-    """Write `index.html`: a thumbnail a scene, with what was drawn for it, and what the whole took."""
+    """Write `index.html`: a thumbnail for each scene, the values drawn for it, and the totals."""
     finished = [row for row in rows if row["status"] == "finished"]
     frames, size, seconds = (
         sum(row[key] for row in finished) for key in ("frames", "bytes", "seconds")
@@ -93,7 +93,7 @@ def parquet() -> Any:
 
 
 def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
-    """Write the table and the page of a batch's scenes, those that anybody has finished and those put aside.
+    """Write the table and the page of all scenes that are finished or put aside.
 
     `rows` has what is known by number, see `row`; finished scenes that it lacks are added to it.
     """
@@ -167,11 +167,17 @@ class Batch(Sequence):
         return len(self._scenes)
 
     def __getitem__(self, place: Any) -> Any:
-        """The scene at a place among those that are there; its number is another if some are missing."""
+        """The scene at an index among the finished scenes.
+
+        Its number differs from the index if scenes before it are missing.
+        """
         return self._scenes[place]
 
     def table(self) -> Any:
-        """The Parquet index as a table of pyarrow; where pandas is installed, its `to_pandas` makes a data frame."""
+        """The Parquet index as a pyarrow table.
+
+        If pandas is installed, the table's `to_pandas` makes a data frame.
+        """
         return parquet().read_table(BatchFolder(self.path).index)
 
 

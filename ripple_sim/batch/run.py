@@ -149,8 +149,7 @@ class BatchRun:
         if self.progress.free < self.options.keep_free and self.full is None:
             self.full = (
                 f"the disk has {self.progress.free / 1e9:.1f} GB left, less than the "
-                f"{self.options.keep_free / 1e9:g} "
-                "GB to be kept free"
+                f"{self.options.keep_free / 1e9:g} GB to be kept free"
             )
         if self.full is not None:
             self.pending.clear()
@@ -294,7 +293,9 @@ def run_batch(
 
 
 def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
-    """Make one scene in a temporary folder; tell the first ones' values, and the time and room that all will take.
+    """Make one scene in a temporary folder, and estimate what the whole batch takes.
+
+    The text lists the values of the first scenes, and the time and room for all.
 
     Raises `RippleError` if the plan or one of the first scenes is invalid.
     """
@@ -324,9 +325,8 @@ def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     folder = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     lines.append(
         f"{plan.count} scenes of {outcome.row['frames']} frames: {seconds:.1f} s and "
-        f"{size / 1e6:.2f} MB for one, "
-        f"so about {plan.count * seconds / 3600:.2g} h of work (here by {count} workers, at best "
-        f"{plan.count * seconds / 3600 / count:.2g} h) and {plan.count * size / 1e9:.2g} GB; "
-        f"{shutil.disk_usage(folder).free / 1e9:.1f} GB are free"
+        f"{size / 1e6:.2f} MB for one, so about {plan.count * seconds / 3600:.2g} h of work (here "
+        f"by {count} workers, at best {plan.count * seconds / 3600 / count:.2g} h) and "
+        f"{plan.count * size / 1e9:.2g} GB; {shutil.disk_usage(folder).free / 1e9:.1f} GB are free"
     )
     return "\n".join(lines)

@@ -65,8 +65,8 @@ def vary_table(
                 except (TypeError, ValueError, OverflowError) as error:
                     raise SceneError(
                         f"plan: {name} is {shown(old)} in the scene, which {shown(value)} cannot "
-                        f"{distribution.apply}; "
-                        "write a number into the scene file, or set the value"
+                        f"{distribution.apply}; write a number into the scene file, or set the "
+                        "value"
                     ) from error
             holder[place] = value
     return values
@@ -75,7 +75,10 @@ def vary_table(
 def _places(
     table: dict[str, Any], steps: Sequence[Step], before: str
 ) -> Iterator[tuple[Any, Any, str]]:
-    """Where values stand: the table or list that holds each, the key or number there, and the whole key."""
+    """Find the places that a key names.
+
+    Yields the table or list that holds the value, the key or index in it, and the full key.
+    """
     (key, chosen) = steps[0]
     rest = steps[1:]
     here = f"{before}.{key}" if before else key
@@ -110,7 +113,9 @@ def combined(old: Any, value: Any, apply: str) -> Any:
 def vary_model(
     spec: mujoco.MjSpec, entries: Mapping[str, Distribution], stream: Stream
 ) -> dict[str, Any]:
-    """Draw values for attributes of a model's elements, such as `geom[ball].size`, and set them in place.
+    """Draw values for attributes of a model's elements, and set them in place.
+
+    An attribute is given by a key such as `geom[ball].size`.
 
     Returns
     -------
@@ -137,14 +142,16 @@ def vary_model(
 
 
 def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int | None, str]]:
-    """Each element that a key fits, its attribute, the number in the attribute's brackets, and the whole key."""
+    """Find the attributes that a key names.
+
+    Yields the element, its attribute, the number in the attribute's brackets, and the full key.
+    """
     first, *steps = parse_key(key)
     kind, _ = first
     if not steps or kind not in (*ELEMENTS, *_GROUPS):
         raise SceneError(
             f"plan: {key!r} is no attribute of a model; valid are an element and its attribute, "
-            f"such as "
-            f"geom[ball].size, of {', '.join((*ELEMENTS, *_GROUPS))}"
+            f"such as geom[ball].size, of {', '.join((*ELEMENTS, *_GROUPS))}"
         )
     if kind in _GROUPS:
         found = [(getattr(spec, kind), kind)]

@@ -49,7 +49,10 @@ _ALWAYS = (1980, 1, 1, 0, 0, 0)
 
 
 def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
-    """Write a JPEG of the middle one of a scene's frames; where none are drawn, or as EXR, there is none."""
+    """Write a small JPEG of the middle frame of a scene.
+
+    Nothing is written if the scene has no frames, or EXR frames only.
+    """
     middle = None
     with contextlib.suppress(BatchError):
         for middle in itertools.islice(scene.frames(), frames // 2 + 1):  # noqa: B007 - the last one counts
@@ -62,7 +65,9 @@ def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
 
 
 class FrameRecord:
-    """Writes files into the folder of a scene, frame by frame; call it with the simulation at the time of each frame.
+    """Records a scene into files of its folder, frame by frame.
+
+    Call it with the simulation at the time of each frame.
 
     There will be a number of `frames`, `rate` of them in a second of the scene's time.
     """
@@ -118,7 +123,7 @@ class FrameRecord:
         self.frame += 1
 
     def finish(self) -> dict[str, Any]:
-        """Complete the files, and return what is to be known of the scene at a glance, in SI units."""
+        """Complete the files, and return the facts of the scene, in SI units."""
         if self._positions is not None:
             self._positions.flush()
             self._positions = None

@@ -95,14 +95,14 @@ def parse_overlay(word: str) -> tuple[str, ...]:
 
 
 def parse_material(word: str) -> tuple[str, dict[str, float]]:
-    """Read a material's name, and parameters of its own, from a word such as "steel-plate,thickness=0.002"."""
+    """Read a material's name and parameters, such as "steel-plate,thickness=0.002"."""
     name, *pairs = (part.strip() for part in word.split(","))
     found = [re.fullmatch(r"(\w+) *= *(.+)", pair) for pair in pairs]
     with contextlib.suppress(ValueError, TypeError):
         return name, {match[1]: float(match[2]) for match in found}  # type: ignore[index]
     raise ValueError(
         f"{shown(word)} is not valid; it must be a name, as steel-plate, or "
-        f"steel-plate,thickness=0.002"
+        "steel-plate,thickness=0.002"
     )
 
 

@@ -1,8 +1,11 @@
-"""The `ripple-sim` program: reads the command line, runs a command, turns errors into one line and an exit status.
+"""The `ripple-sim` program: reads the command line and runs a command.
 
-A command is a class: its fields are the arguments, the docstrings the help, and `run` does the
-work. Heavy imports are inside `run`, so that `--help` and usage errors are answered at once. Exit
-status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number after one.
+An error becomes one line on standard error and an exit status.
+
+A command is a class: its fields are the arguments, their docstrings are the help texts, and `run`
+does the work. Heavy imports are inside `run`, so that `--help` and usage errors are answered at
+once. The exit status is 0 (done), 1 (something failed), 2 (bad input), or 128 + the number of the
+signal that ended the command.
 """
 
 from __future__ import annotations
@@ -36,11 +39,12 @@ DONE = 0
 FAILED = 1
 BAD_INPUT = 2
 
-_LONGEST = 800  # of a message [characters]
+# [characters]: a longer message is cut
+_MAX_MESSAGE_LENGTH = 800
 
-# Address space [GB] that a small job takes, with its libraries, software OpenGL and kernels: with
-# less, these end the process, or blame something else.
-_ADDRESS_SPACE = {
+# [GB]: address space of a small job with its libraries, software OpenGL and kernels. With less they
+# end the process, or report another cause.
+_ADDRESS_SPACE_BY_COMMAND = {
     InfoCommand: 1.3,
     AtlasCommand: 1.2,
     ModesCommand: 1.2,
@@ -53,13 +57,16 @@ _ADDRESS_SPACE = {
 }
 
 _DESCRIPTION = (
-    "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation. "
-    "--version tells which."
+    "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation. --version "
+    "tells which."
 )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the program with the arguments `argv` (by default the process's own) and return its exit status."""
+    """Run the program and return its exit status.
+
+    The arguments `argv` are the process's own by default.
+    """
     end_at_once()
     _open_standard_streams()
     argv = list(sys.argv[1:] if argv is None else argv)
@@ -82,12 +89,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(command: Any) -> int:
     """Run a command and return the exit status."""
-    need = _ADDRESS_SPACE.get(type(command), 0)
-    most = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if resource.RLIM_INFINITY != most < 1e9 * need:
+    needed = _ADDRESS_SPACE_BY_COMMAND.get(type(command), 0)
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < 1e9 * needed:
         text = (
-            f"this needs {need} GB of address space, but the limit (ulimit -v) is "
-            f"{most / 1e9:.2f} GB; allow more"
+            f"this needs {needed} GB of address space, but the limit (ulimit -v) is "
+            f"{limit / 1e9:.2f} GB; allow more"
         )
         return _fail(text, FAILED)
     # MuJoCo's own renderer would take the OpenGL context away
@@ -121,9 +128,7 @@ def _run(command: Any) -> int:
         return _fail(
             (
                 f"not enough memory{f': {error}' if str(error) else ''}; ask for a lower "
-                f"resolution "
-                f"or "
-                f"size"
+                "resolution or size"
             ),
             FAILED,
         )
@@ -139,40 +144,52 @@ def _run(command: Any) -> int:
 
 
 def _give_up_output(error: OSError) -> int:
-    """Standard output has failed (full disk, closed pipe): nothing more goes there, not even at exit."""
+    """Give up standard output, which has failed (full disk, closed pipe).
+
+    Nothing more is written to it, not even at exit.
+    """
     sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
     return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
 
 
 def _fail(message: object, status: int, ending: BaseException | None = None) -> int:
-    """Print a message, with the notes of the exception that ended the command, in one line; return the status."""
+    """Print a message in one line, and return the status.
+
+    The notes of the exception that ended the command follow the message.
+    """
     notes = getattr(message if ending is None else ending, "__notes__", [])
     _say("; ".join([str(message), *notes]))
     return status
 
 
 def _say(message: str) -> None:
-    """Print a message on standard error, without line ends and long words, such as a name of thousands of letters."""
+    """Print a message on standard error, in one line.
+
+    Words of more than 200 characters are cut, such as a very long file name.
+    """
     text = " ".join(re.sub(r"(\S{120})\S{80,}", r"\1...", message).split())
-    text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+    if len(text) > _MAX_MESSAGE_LENGTH:
+        text = f"{text[:_MAX_MESSAGE_LENGTH]} ..."
     try:
         print(f"ripple-sim: {text}", file=sys.stderr, flush=True)
-    except (
-        OSError
-    ):  # standard error is full, or a closed pipe: nothing more goes there, not even at exit
+    except OSError:
+        # standard error is full or a closed pipe: nothing more is written to it, not even at exit
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
 
 
 class _Log(logging.Handler):
-    """Prints what is logged, that something takes long, as the program's lines."""
+    """Prints log records, such as that something takes long, as messages of the program."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print it."""
+        """Print a record."""
         _say(record.getMessage())
 
 
 def _open_standard_streams() -> None:
-    """Where the caller has closed one of them, open the null device: an output file would take its number."""
+    """Open the null device for each standard stream that the caller has closed.
+
+    Otherwise an output file would take the number of that stream.
+    """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
@@ -209,9 +226,11 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 
 
 def parse(argv: Sequence[str]) -> Any:
-    """Return the command to run, or None if the help, the version or a completion script was printed instead.
+    """Return the command to run.
 
-    Raises `RippleError` where it is invalid, which says where, and names the help.
+    None if the help, the version or a completion script was printed instead.
+
+    Raises `RippleError` if a word is invalid; the message names the word and the help.
     """
     if list(argv) == ["--version"]:
         print(f"ripple-sim {__version__}")
@@ -221,7 +240,7 @@ def parse(argv: Sequence[str]) -> Any:
         names = ", ".join(COMMANDS)
         raise RippleError(
             f"there is no command {shown(argv[0])}{near}; commands are {names}; see ripple-sim "
-            f"--help"
+            "--help"
         )
     complaint = io.StringIO()
     try:
@@ -236,9 +255,8 @@ def parse(argv: Sequence[str]) -> Any:
     except SystemExit as ending:
         if not ending.code:
             return None
-    # tyro's complaint is a title, a rule, what is wrong, a rule, and hints; it is framed where
-    # stdout is UTF-8. What is between the first two rules counts, without the help texts (indented
-    # by 8).
+    # tyro prints a title, a rule, the problem, a rule, and hints, in a frame if stdout is UTF-8.
+    # The text between the first two rules is the problem; help texts in it are indented by 8.
     text = re.sub(r"\x1b\[[0-9;]*m", "", complaint.getvalue())
     parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
     part = parts[1] if len(parts) > 1 else text
@@ -252,7 +270,7 @@ def parse(argv: Sequence[str]) -> Any:
 
 
 def _nearest(word: str, words: Iterable[str]) -> str:
-    """A question that names the word that was probably meant, or nothing."""
+    """A question with the nearest of `words`, or an empty text if none is near."""
     near = difflib.get_close_matches(word, list(words), n=1)
     return f" (did you mean {near[0]}?)" if near else ""
 

@@ -1,7 +1,7 @@
 """Commands that show a scene or write it to a file: `render`, `drop`, `export` and `view`.
 
-On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a
-log gets lines where the job takes long.
+Commands that write a file show a progress bar on a terminal, which also says what is being
+compiled. A pipe or a log gets a line for every tenth of a job that takes long.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from ripple_sim.viewer.window import Window
 
 
-# A job that is over within this time [s] prints no progress into a pipe or a log.
+# [s]: a job that ends within this time prints no progress into a pipe or a log
 _SILENT_TIME = 10.0
 
-# What the kernels of a package do, in a user's words; the longest name that fits counts.
+# What the kernels of a package compute, in a user's words. The longest matching name is taken.
 _STAGES = {
     "ripple_sim.solver.layouts.sphere_map": "the sphere map",
     "ripple_sim.solver.layouts.patches": "the charts",
@@ -54,8 +54,8 @@ _STAGES = {
 }
 
 
-# Fields, defaults and help of commands are those of the options; what is not here is read as its
-# type says.
+# The commands inherit fields, defaults and help texts from the options. A field is repeated here if
+# its words on the command line are read in another way than its type says.
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _SceneCommand(SceneOptions):
     size: arguments.Size = SceneOptions.size
@@ -67,10 +67,10 @@ class _SceneCommand(SceneOptions):
     camera: Annotated[
         str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")
     ] = None
-    """Camera of the MJCF."""
+    """Name of a camera in the MJCF."""
 
     def seen(self, scene: Scene) -> Scene:
-        """The scene through the camera that is asked for."""
+        """The scene, seen through the camera that the user named."""
         from ripple_sim.scene.scene import through_camera
 
         return scene if self.camera is None else through_camera(scene, self.camera)
@@ -78,17 +78,17 @@ class _SceneCommand(SceneOptions):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ExportCommand(_SceneCommand, ExportOptions):
-    """Simulate a scene, and write it to the file of another program."""
+    """Simulate a scene, and write it to a file for other programs."""
 
     fps: arguments.Count = ExportOptions.fps
     triangles: arguments.Count = ExportOptions.triangles
     chunk: arguments.Limit = ExportOptions.chunk
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
-    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...), on which bodies
-    then drop."""
+    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...). Bodies drop on a
+    mesh."""
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Output file; its ending says what is written: .usdc, .usda or .usdz (the moving scene), .html (a player),
-    .zarr (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or what is heard)."""
+    """Output file. Its ending chooses the format: .usdc, .usda or .usdz (the moving scene), .html (a player), .zarr
+    (fields over time), .csv or .parquet (impulses, or signals), .wav (signals, or sound)."""
     seed: arguments.SceneSeed = None
     """Seed of the scene's random variation, or of the bodies that drop on a mesh."""
 
@@ -122,7 +122,7 @@ class ExportCommand(_SceneCommand, ExportOptions):
 
 
 class _Rate(ProgressColumn):
-    """The rate; or what is being compiled, and for how many seconds so far."""
+    """The rate, or what is being compiled and for how many seconds so far."""
 
     def render(self, task: Task) -> Text:
         from ripple_sim.solver.compile_clock import compile_times, compiling
@@ -137,13 +137,16 @@ class _Rate(ProgressColumn):
 
 
 def _stage(module: str) -> str:
-    """What a module's kernels do."""
+    """What the kernels of a module compute, in a user's words."""
     fitting = [package for package in _STAGES if f"{module}.".startswith(f"{package}.")]
     return _STAGES[max(fitting, key=len)] if fitting else module
 
 
 def _progress_lines() -> Callable[[int, int], None]:
-    """A function of the frames done and of all frames that prints a line at each tenth, once the job takes long."""
+    """Make a progress function for a pipe or a log: it prints a line at each tenth.
+
+    It prints nothing until the job has taken `_SILENT_TIME`.
+    """
     start = time.monotonic()
     told = 0
 
@@ -163,7 +166,9 @@ def _progress_lines() -> Callable[[int, int], None]:
 
 @contextlib.contextmanager
 def frame_progress(title: str, total: int | None = None) -> Iterator[Callable[[int, int], None]]:
-    """Show how far a job is on stderr while the block runs; yields a function of the frames done and of all frames.
+    """Show the progress of a job on stderr while the block runs.
+
+    Yields a function to call with the frames done and the number of all frames.
 
     A terminal gets a title, and below it frames done of a total, rate and remaining time. A pipe or
     a log gets a line at each tenth of a job that takes long.
@@ -196,26 +201,26 @@ class _VideoCommand(_SceneCommand, VideoOptions):
     overlay: arguments.Overlay = None
     compare: arguments.Baseline = VideoOptions.compare
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Output file ending in .mp4, .webm, .gif or .webp, or a name without ending for a folder of frames."""
+    """Output file: .mp4, .webm, .gif or .webp, or a name without an ending for a folder of frames."""
     device: arguments.Device = None
-    """EGL device to render on, by number, where there are several; else that of MUJOCO_EGL_DEVICE_ID."""
+    """Number of the EGL device to render on. By default the device in MUJOCO_EGL_DEVICE_ID, if it is set."""
     renderer: Literal["gl", "cycles"] = "gl"
-    """Ours, with OpenGL, or Cycles, Blender's path tracer (needs bpy), which takes seconds to minutes a frame."""
+    """gl is the OpenGL renderer. cycles is Blender's path tracer (needs bpy), at seconds to minutes a frame."""
     samples: arguments.Count = 64
-    """Paths a pixel that Cycles takes."""
+    """Paths per pixel, for Cycles."""
 
     def options(self) -> VideoOptions:
-        """Options that the user chose."""
+        """The options of the video, as `VideoOptions`."""
         return VideoOptions(
             **{field.name: getattr(self, field.name) for field in dataclasses.fields(VideoOptions)}
         )
 
     def check_input(self) -> None:
-        """Make sure that what is to be rendered exists."""
+        """Check that the scene or the mesh exists."""
         raise NotImplementedError
 
     def load(self) -> Scene:
-        """Make the scene that is rendered."""
+        """Load or make the scene."""
         raise NotImplementedError
 
     def run(self) -> None:
@@ -254,9 +259,8 @@ class _VideoCommand(_SceneCommand, VideoOptions):
             f"renderer  {summary.renderer}\n"
             f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
             f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics "
-            f"{summary.physics_seconds:.1f} s, "
-            f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
-            f"encoding {summary.encode_seconds:.1f} s"
+            f"{summary.physics_seconds:.1f} s, waves {summary.wave_seconds:.1f} s, rendering "
+            f"{summary.render_seconds:.1f} s, encoding {summary.encode_seconds:.1f} s"
         )
 
     def _run_cycles(self) -> None:
@@ -286,10 +290,10 @@ class RenderCommand(_VideoCommand):
     scene: Annotated[Positional[str], arg(metavar="SCENE")]
     """Name of a shipped scene, such as duck, or path of a scene file (TOML)."""
     seed: arguments.SceneSeed = None
-    """Seed of the scene's random variation, in place of the one in its [random]."""
+    """Seed of the scene's random variation. It replaces the seed in the [random] table."""
 
     def check_input(self) -> None:
-        """Make sure that there is such a scene."""
+        """Check that the scene exists."""
         from ripple_sim.scene.source import scene_path
 
         scene_path(self.scene)
@@ -310,18 +314,18 @@ class DropCommand(_VideoCommand):
     bodies: arguments.Count = 12
     """Number of falling bodies."""
     seed: arguments.Seed = 0
-    """Seed for the bodies' places and sizes; the same seed gives the same video."""
+    """Seed of the places and sizes of the bodies. The same seed gives the same video."""
     up: arguments.UpAxis = None
-    """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
+    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is turned upright."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
-    """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
+    """Image for the texture coordinates of the mesh. By default the image that the file names, or NAME_texture.png."""
     repair: bool = False
-    """Close the mesh's holes (needs the package pymeshfix)."""
+    """Close the holes of the mesh (needs the package pymeshfix)."""
     wrap: bool = False
-    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
+    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in pieces."""
 
     def check_input(self) -> None:
-        """Make sure that there is such a file."""
+        """Check that the mesh exists."""
         from ripple_sim.solver.mesh.files import check_mesh_file
 
         check_mesh_file(self.mesh)
@@ -348,10 +352,10 @@ class DropCommand(_VideoCommand):
 class ViewCommand:
     """Open a scene or a mesh in an interactive window.
 
-    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N:
-    next frame. R: reset. T: throw a ball at the pointer. O: next operator (fem, uncorrected,
+    Click: poke the surface. Drag: orbit. Shift and drag: pan. Wheel: zoom. Space: pause or resume.
+    N: next frame. R: reset. T: throw a ball at the pointer. O: next operator (fem, uncorrected,
     paper). C: heatmap on or off. S: screenshot. V: start or stop a recording. H: list of keys. Q:
-    quit. Sliders set the poke's impulse and the material.
+    quit. Sliders set the impulse of a poke and the material.
     """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
@@ -359,27 +363,27 @@ class ViewCommand:
     size: arguments.Size = (800, 600)
     """Window size in pixels."""
     resolution: arguments.Count = 64
-    """Texels along the edge of a chart; more resolve finer waves and take longer."""
+    """Texels along the edge of a chart. More texels resolve finer waves and take longer."""
     bodies: arguments.Seed = 3
-    """Number of bodies that fall on a mesh; 0 for none."""
+    """Number of bodies that fall on a mesh. 0 for none."""
     seed: arguments.Seed = 0
-    """Seed for the bodies' places and sizes."""
+    """Seed of the places and sizes of the bodies."""
     up: arguments.UpAxis = None
-    """Axis of the mesh that points up; by default a flat sheet lies down, and what would fall over stands."""
+    """Axis of the mesh that points up. By default a flat sheet lies down, and an unstable mesh is turned upright."""
     repair: bool = False
-    """Close the mesh's holes (needs the package pymeshfix)."""
+    """Close the holes of the mesh (needs the package pymeshfix)."""
     wrap: bool = False
-    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
+    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in pieces."""
     folder: Annotated[Path, arg(metavar="FOLDER")] = Path()
     """Folder for screenshots and videos."""
     web: bool = False
-    """Serve a web page to a browser on this machine instead of a window (needs the extra ripple-sim[web])."""
+    """Serve a web page for a browser instead of opening a window (needs the extra ripple-sim[web])."""
     port: arguments.Count = 8080
     """Port of the web page."""
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
-    """Address of the web page; any other than this machine's own lets other machines see and drive the viewer."""
+    """Address of the web page. Any address but 127.0.0.1 lets other machines see and control the viewer."""
     benchmark: bool = False
-    """Measure the window's update rate, print it, and exit."""
+    """Measure the update rate of the window, print it, and exit."""
 
     def run(self) -> None:
         """Show the scene until the user quits."""
@@ -388,8 +392,7 @@ class ViewCommand:
         from ripple_sim.viewer.opening import display_problem
         from ripple_sim.viewer.window import benchmark, check_display, run
 
-        # refuse what cannot work before anything that takes time: first what is asked for, then
-        # what this machine lacks
+        # checks come before anything that takes time: first the arguments, then the machine
         is_scene(self.scene)
         check_size(*self.size)
         if not self.folder.is_dir():

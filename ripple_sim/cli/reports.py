@@ -1,6 +1,6 @@
-"""Commands that print a report, `bench`, `cache`, `info` and `materials`, and `batch`, which ends with one.
+"""Commands that print a report: `bench`, `cache`, `info`, `materials` and `batch`.
 
-A batch shows how far it is by a bar on a terminal, and by a line a minute in a log.
+A batch shows its progress as a bar on a terminal, and as a line every minute in a log.
 """
 
 from __future__ import annotations
@@ -24,19 +24,21 @@ from .arguments import Gigabytes, Limit, Shard
 if TYPE_CHECKING:
     from ripple_sim.batch.run import Progress
 
-# Of the wave whose speed and decay are told [m].
+# [m]: `materials` shows the speed and decay of a wave of this length
 _WAVELENGTH = 0.05
-_BETWEEN = 60.0  # lines in a log [s]
+
+# [s]: time between the lines of progress in a log
+_LOG_INTERVAL = 60.0
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BenchCommand:
-    """Measure the wave solver: speed beside the bound of memory, cost of the coupling, accuracy against theory."""
+    """Measure this machine: speed of the wave solver, cost of the coupling, and accuracy."""
 
     meshes: Annotated[
         Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")
     ] = ()
-    """Meshes of which to time the atlas and the wave step, in addition to the duck."""
+    """Meshes whose atlas and wave step are timed in addition to those of the duck."""
     json: bool = False
     """Print JSON."""
 
@@ -52,13 +54,17 @@ class BenchCommand:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CacheCommand:
-    """Show where atlases are kept, and how much room they take: at most RIPPLE_SIM_CACHE_LIMIT megabytes, or 500."""
+    """Show where atlases are kept and how much room they take, or remove them.
+
+    The cache holds RIPPLE_SIM_CACHE_LIMIT megabytes at most, 500 by default; the least recently
+    used atlas goes first.
+    """
 
     clear: bool = False
-    """Remove them."""
+    """Remove all atlases from the cache."""
 
     def run(self) -> None:
-        """Clear the cache if asked to, and print what is in it."""
+        """Clear the cache if requested, and print its size."""
         from ripple_sim.solver.cache import cache_folder, cache_limit, cached_files, removed
 
         limit = cache_limit()
@@ -73,7 +79,7 @@ class CacheCommand:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class InfoCommand:
-    """Show versions, the OpenGL driver and the wave solver, and what to install if rendering is not possible."""
+    """Show versions, the OpenGL driver and the wave solver, and what rendering lacks."""
 
     json: bool = False
     """Print JSON."""
@@ -88,10 +94,10 @@ class InfoCommand:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MaterialsCommand:
-    """List the real materials by name, with speed and decay of a wave of 5 cm, sources, and where they hold."""
+    """List the presets of real materials, with the speed and decay of a 5 cm wave, and sources."""
 
     json: bool = False
-    """Print them as JSON."""
+    """Print JSON."""
 
     def run(self) -> None:
         """Print the table."""
@@ -124,33 +130,33 @@ class MaterialsCommand:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BatchCommand:
-    """Make many scenes by one plan, each varied by its own seed."""
+    """Make many scenes from one plan, each varied by its own seed."""
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN|DIR")]
-    """The plan (TOML), or the folder of a batch to go on with."""
+    """The plan (TOML), or the folder of a batch to continue."""
     output: Annotated[
         Path | None, arg(aliases=["-o"], metavar="DIR", help_behavior_hint="(needed with a plan)")
     ] = None
-    """Folder of the batch. Run again, it makes what is not there yet."""
+    """Folder of the batch. The same command again makes the scenes that are missing."""
     workers: Limit = None
-    """Processes that make scenes; by default one for every two cores, at least two."""
+    """Number of processes that make scenes. By default one for every two cores, at least two."""
     shard: Shard = None
-    """Make a part of the scenes only, for several machines."""
+    """Make only part I of N of the scenes, to share a batch among machines."""
     dask: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="(optional)")] = None
-    """Address of a Dask scheduler whose workers make the scenes (needs Dask); they share the folder."""
+    """Address of a Dask scheduler (needs Dask). Its workers make the scenes, and must see the same folder."""
     limit: Limit = None
-    """Make at most so many scenes in this run."""
+    """Largest number of scenes to make in this run."""
     keep_free: Gigabytes = 1.0
-    """Stop when the disk has no more room than this."""
+    """Stop when the disk has less free room than this."""
     status: bool = False
-    """Tell how far the batch is, and make nothing."""
+    """Print the progress of the batch, and make nothing."""
     retry_failed: bool = False
-    """Try the scenes again that were put aside."""
+    """Try again the scenes that were put aside after repeated failures."""
     dry_run: bool = False
-    """Make one scene for a trial, and tell the first scenes' values, the time and the room that all will take."""
+    """Make one scene as a trial, and print the values of the first scenes and the time and room for all."""
 
     def run(self) -> None:
-        """Do what is asked for."""
+        """Make the batch, or print its status or the result of a trial."""
         from ripple_sim.batch.plan import read_plan
         from ripple_sim.batch.report import parquet, status_text
         from ripple_sim.errors import BatchError
@@ -185,7 +191,7 @@ class BatchCommand:
 
 
 def progress_text(progress: Progress) -> str:
-    """Frames, rate, time left, failures, room taken and left on the disk, in a line."""
+    """One line: frames, rate, time left, failures, and room taken and free on the disk."""
     left = progress.scenes - progress.finished - progress.aside
     parts = [f"{progress.frames} frames"]
     if progress.made and progress.seconds:
@@ -219,7 +225,7 @@ def batch_progress() -> Iterator[Callable[[Progress], None]]:
 
         def log(progress: Progress) -> None:
             nonlocal told
-            if time.monotonic() - told >= _BETWEEN:
+            if time.monotonic() - told >= _LOG_INTERVAL:
                 told = time.monotonic()
                 done = progress.finished + progress.aside
                 print(

@@ -1,4 +1,6 @@
-"""Ctrl-C, SIGTERM and SIGHUP: one line, status 128 + the signal's number, and what is unfinished is cleaned up.
+"""Ctrl-C, SIGTERM and SIGHUP end a command with one line and status 128 + the signal's number.
+
+Unfinished files are cleaned up.
 
 Before a command begins there is nothing to clean up, and the process ends at once. Later the signal
 becomes an exception. Where that would do harm a timer tries again until it is over: within calls of
@@ -44,13 +46,19 @@ def word_of(status: int) -> str | None:
 
 
 def end_at_once() -> None:
-    """Let the signals end the process, with one line; a signal ignored by the parent stays ignored."""
+    """Let the signals end the process at once, with one line.
+
+    A signal that the parent process ignores stays ignored.
+    """
     signal.setitimer(signal.ITIMER_REAL, 0)
     _handle(_end)
 
 
 def end_in_good_order() -> None:
-    """Let the signals raise `KeyboardInterrupt` or `SystemExit`; a signal ignored by the parent stays ignored."""
+    """Let the signals raise `KeyboardInterrupt` or `SystemExit`.
+
+    A signal that the parent process ignores stays ignored.
+    """
     _handle(_raise)
 
 

@@ -1,7 +1,7 @@
-"""Commands on a mesh: `atlas`, which reports what its charts are like, and `modes`, how it rings.
+"""Commands on a mesh: `atlas` reports the quality of its charts, and `modes` how it rings.
 
-The report of an atlas tells of the mesh, what was done to it, the quality of the atlas, and the
-time of each stage.
+The report of an atlas describes the mesh and its repairs, the quality of the atlas, and the time
+of each stage.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .arguments import Count, LayoutName, NamedMaterial, RimName, UpAxis
 if TYPE_CHECKING:
     from ripple_sim.solver import Atlas, Modes
 
-# By figure of `Atlas.quality`: what it is called in the text, and its unit.
+# Label and unit in the text for each figure of `Atlas.quality`.
 _FIGURES = {
     "solid_angle": ("solid angle of the map", "sr"),
     "flipped": ("folded triangles", ""),
@@ -52,33 +52,35 @@ class AtlasCommand:
     ] = None
     """Save the atlas to this file (NPZ)."""
     resolution: Count = 128
-    """Texels along the edge of a cube's chart, N: about 6 N^2 in all, in every layout."""
+    """Texels along the edge of a cube's chart, N. Every layout has about 6 N^2 texels in all."""
     layout: LayoutName = "auto"
-    """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube for round bodies."""
+    """Layout of the charts: cube (for a closed mesh in one part without handles), patches (any mesh), or auto, which
+    takes the cube for round bodies."""
     method: Annotated[str, arg(metavar="{progressive,conformal}")] = "progressive"
-    """Sphere map of the cube: progressive (fold-free, even area) or conformal (preserves angles; starves limbs)."""
+    """Sphere map of the cube layout: progressive (even areas, no folds) or conformal (keeps angles, but gives limbs
+    few texels)."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
-    """Write an image of the mesh with its charts, and of the charts, coloured by stretch; with --inside, of the
-    thickness."""
+    """Write an image of the mesh and its charts, coloured by stretch, or with --inside by thickness."""
     inside: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
-    """Tell how thick the layer is over what lies inside, a mesh or a volume (NIfTI, NRRD, DICOM folder, .npy)."""
+    """Report the thickness of the layer between the mesh and this one inside it, or this volume (NIfTI, NRRD, DICOM
+    folder, .npy)."""
     threshold: Annotated[float | None, arg(metavar="VALUE", help_behavior_hint="(optional)")] = None
-    """Value of the volume inside at its surface."""
+    """Value at the surface of the object in the volume."""
     spacing: Annotated[float | None, arg(metavar="M", help_behavior_hint="(optional)")] = None
-    """Between the voxels of a .npy inside [m]."""
+    """Distance between the voxels of a .npy volume [m]."""
     up: UpAxis = None
     """Axis of the mesh that points up in the image."""
     repair: bool = False
-    """Close the mesh's holes (needs the package pymeshfix)."""
+    """Close the holes of the mesh (needs the package pymeshfix)."""
     wrap: bool = False
-    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
+    """Replace the mesh by a closed surface around it: for parts that intersect, or scans in pieces."""
     json: bool = False
     """Print JSON."""
     overwrite: bool = False
-    """Replace files that ripple-sim has not made; the mesh itself never."""
+    """Replace files that ripple-sim has not made. The mesh itself is never replaced."""
 
     def run(self) -> None:
-        """Build the atlas, save and plot it if asked to, and print its figures."""
+        """Build the atlas, save and plot it if requested, and print its figures."""
         from ripple_sim.solver import build_atlas, load_mesh, thickness_map
 
         self._check()
@@ -109,7 +111,7 @@ class AtlasCommand:
         print(json_format.dumps(report, indent=2) if self.json else report_text(report))
 
     def _check(self) -> None:
-        """Refuse, before anything that takes time, what cannot be written or makes no sense."""
+        """Check paths and options before anything that takes time."""
         from ripple_sim.solver import AtlasError
         from ripple_sim.solver.mesh.files import check_mesh_file
         from ripple_sim.solver.texels.atlas import check_atlas_place
@@ -148,7 +150,7 @@ class AtlasCommand:
 
 
 def _check_other(path: Path, read: Path | None, what: str) -> None:
-    """Refuse to write over a file that is read."""
+    """Check that `path` is not the file that is read."""
     from ripple_sim.solver import AtlasError
 
     if read is not None and path.exists() and read.exists() and path.samefile(read):
@@ -164,10 +166,10 @@ def atlas_report(
 ) -> dict[str, Any]:
     """Figures of an atlas, as JSON can hold them.
 
-    They are of the mesh in the file at a path (`size` of the bounding box [m], `area` [m^2],
-    `volume` [m^3], `notes` on what was done to it and why it got its layout), of its charts (C, n,
-    n), the `method` of the cube's sphere map, `quality` (see `Atlas.quality`), quantiles of the
-    `thickness` [m] of a layer, and wall time of each stage [s].
+    The mesh has a `size` (of its bounding box [m]), an `area` [m^2], a `volume` [m^3], and `notes`
+    on its repairs and on the choice of its layout. The atlas has `charts` (C, n, n), the `method` of
+    the cube's sphere map, and a `quality` (see `Atlas.quality`). `thickness` has quantiles of the
+    thickness of a layer [m], and `seconds` the wall time of each stage [s].
     """
     mesh = atlas.mesh
     known: dict[str, Any] = {}
@@ -196,7 +198,7 @@ def atlas_report(
 
 
 def charts_text(shape: Sequence[int], method: str | None) -> str:
-    """Number and size of charts of a shape (C, n, n), and the sphere map that the cube layout has, as text."""
+    """Describe charts of shape (C, n, n) as text, and the sphere map of the cube layout."""
     return (
         f"{' x '.join(map(str, shape))} texels, "
         f"{'patches' if method is None else f'{method} sphere map'}"
@@ -231,32 +233,33 @@ def report_text(report: dict[str, Any]) -> str:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ModesCommand:
-    """Find the modes of a mesh: at which frequencies it rings, in which shapes, and how fast they die."""
+    """Find the modes of a mesh: the frequencies and shapes in which it rings, and their decay."""
 
     mesh: Annotated[Positional[Path], arg(metavar="MESH")]
     """Mesh file (OBJ, OFF, PLY, STL, GLB ...), in metres."""
     material: NamedMaterial
-    """One of ripple-sim materials, or membrane, layer, jelly, plate or water; with parameters of its own if they
-    follow, such as steel-plate,thickness=0.002."""
+    """A preset from `ripple-sim materials`, or membrane, layer, jelly, plate or water. Parameters may follow, as in
+    steel-plate,thickness=0.002."""
     count: Annotated[Count, arg(aliases=["-n"])] = 20
-    """How many, from the lowest on."""
+    """Number of modes, from the lowest frequency up."""
     resolution: Count = 64
-    """Texels along the edge of a cube's chart, N: about 6 N^2 in all, in every layout."""
+    """Texels along the edge of a cube's chart, N. Every layout has about 6 N^2 texels in all."""
     layout: LayoutName = "auto"
-    """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube for round bodies."""
+    """Layout of the charts: cube (for a closed mesh in one part without handles), patches (any mesh), or auto, which
+    takes the cube for round bodies."""
     rim: RimName = "free"
-    """Rim of an open mesh: free, fixed as that of a drum, or supported or clamped as that of a plate."""
+    """Rim of an open mesh: free, fixed (a drum's skin), supported or clamped (a plate)."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
-    """Write an image with a picture of each mode."""
+    """Write an image that shows every mode."""
     up: UpAxis = None
     """Axis of the mesh that points up in the image."""
     json: bool = False
     """Print JSON."""
     overwrite: bool = False
-    """Replace files that ripple-sim has not made; the mesh itself never."""
+    """Replace files that ripple-sim has not made. The mesh itself is never replaced."""
 
     def run(self) -> None:
-        """Find the modes, plot them if asked to, and print a table."""
+        """Find the modes, plot them if requested, and print a table."""
         from ripple_sim.scene.material_entry import preset_material
         from ripple_sim.solver import build_atlas, load_mesh, modes
         from ripple_sim.solver.mesh.files import check_mesh_file

@@ -1,4 +1,6 @@
-"""Renders a stage with Cycles, frame by frame: `python blender_process.py SETTINGS.json`, in a process of its own.
+"""Render a USD stage with Cycles: `python blender_process.py SETTINGS.json`.
+
+It runs in a process of its own.
 
 Blender is under the GPL, which is why nothing of ripple-sim is imported here and only files and
 lines pass between the two. Each frame becomes NUMBER.npy, linear, and then the line "frame NUMBER".
@@ -81,7 +83,9 @@ def save(scene, folder, number):
 
 
 def set_world(scene, settings):
-    """The sky and the soft boxes: as the camera sees them, as they are reflected, and as they light the rest.
+    """Set up the world: the sky and the soft boxes of the studio.
+
+    The camera, reflections and diffuse light see different versions of them.
 
     Return the nodes that take the axes of each box. Where directions are chosen for light alone,
     Cycles does not know what kind of ray will meet the sky: surfaces choose them.
@@ -119,7 +123,10 @@ def set_world(scene, settings):
 
 
 def soft_boxes(tree, boxes):
-    """Radiance of the boxes, far away, and for each the nodes that take its axes: to it, across, up."""
+    """Radiance of the boxes, which are far away, and the nodes for the axes of each box.
+
+    The axes are towards the box, across and up.
+    """
     direction = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
     total = [0.0, 0.0, 0.0]
     axes = []
@@ -156,7 +163,10 @@ def mixed(tree, share, first, second):
 
 
 def vectors(tree, operation, first, second):
-    """Vector or number of an operation on two vectors, or to scale a vector, given as they are or as sockets."""
+    """Add a vector operation, and return its output socket.
+
+    The operands are vectors or sockets, or for a scaling a vector and a number.
+    """
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = operation
     set_input(tree, node.inputs[0], first)
@@ -212,7 +222,10 @@ def axes_of(camera, box):
 
 
 def fading_floor(settings):
-    """Let the floor, if there is one, fade into the sky; return the node that takes the point from which it does."""
+    """Let the floor, if there is one, fade into the sky.
+
+    Returns the node that takes the point from which the floor fades.
+    """
     meshes = (each for each in bpy.data.objects if each.type == "MESH")
     floor = next((each for each in meshes if each.name.split(".")[0] == settings["floor"]), None)
     if floor is None or not floor.data.materials:

@@ -1,4 +1,6 @@
-"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles in a process of Blender's own.
+"""`render_cycles`: simulate a scene, write it as USD, and render it with Cycles.
+
+Cycles runs in a Blender process of its own.
 
 Beside the stage Blender is told frames, sky, soft boxes, and the floor that fades into the sky. The
 linear radiance that it gives back gets the colours of a frame as the renderer's.
@@ -55,9 +57,8 @@ OLDEST = (5, 0)  # bpy before it has other names for what the importer of USD is
 _LAST = 300  # characters of what a process said last
 _ADVICE = (
     "on Python 3.13 install it with: pip install 'ripple-sim[cycles]'; otherwise give it an "
-    "environment of its own "
-    f"(python3.11 -m venv blender; blender/bin/pip install 'bpy>=5.0') and set "
-    f"{PYTHON}=blender/bin/python"
+    "environment of its own (python3.11 -m venv blender; blender/bin/pip install 'bpy>=5.0') and "
+    f"set {PYTHON}=blender/bin/python"
 )
 
 # what the renderer's soft boxes give to diffuse surfaces, over what lights of their size and
@@ -159,14 +160,16 @@ def _wait_for(number: int, process: subprocess.Popen, errors: Path) -> None:
 
 
 def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
-    """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
+    """Settings for the Blender process, as JSON can hold them.
+
+    They are the light and background at the first frame, and the camera's shutter and size.
+    """
     model = source.model
     pose = source.pose(data)
     if not pose.has_square_pixels(source.size[0] / source.size[1]):
         warn_caller(
             "Cycles shows the camera with square pixels, which it has not; ripple-sim render "
-            "without --renderer cycles "
-            "shows it as it is"
+            "without --renderer cycles shows it as it is"
         )
     lighting = lighting_of(model, data, pose, source.lighting)
     studio = lighting.studio
@@ -209,7 +212,9 @@ def render_cycles(
     samples: int = SAMPLES,
     progress: Progress | None = None,
 ) -> ExportSummary:
-    """Simulate a scene and write its video with frames by Cycles, of the same camera, lamps and looks.
+    """Simulate a scene, and write a video with frames rendered by Cycles.
+
+    Camera, lamps and looks are those of the OpenGL renderer.
 
     The run goes to a USD file in a temporary folder, which a process of Blender's own renders.
 
@@ -270,7 +275,9 @@ def render_cycles(
 
 
 def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) -> str:
-    """Make sure, before anything that takes time, that Cycles can render with these options; return its Python.
+    """Check that Cycles can render with these options, before anything that takes time.
+
+    Returns the Python interpreter that has bpy.
 
     Raises `RippleError`.
     """

@@ -1,4 +1,7 @@
-"""Encoding: frames go in one by one, a finished file or folder of frames appears at the end or not at all."""
+"""Encoding: frames go in one by one; a complete file or folder appears at the end.
+
+After an error nothing appears.
+"""
 
 import lazy_loader
 

@@ -24,7 +24,7 @@ _BLOCK = 960  # samples that are encoded together, 20 ms
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stream:
-    """Size [pixels] and rate [frames/s] of a video, and what is heard with it, one channel from -1 to 1."""
+    """Size [pixels] and rate [frames/s] of a video, and its sound, one channel from -1 to 1."""
 
     width: int
     height: int

@@ -48,7 +48,10 @@ _VALID = (
 
 
 def _still(write: Callable[[NDArray], None]) -> SimpleNamespace:
-    """One frame in an image file of its own: written by a function of the frame it is complete, and no file is open."""
+    """A segment of one frame, in an image file of its own.
+
+    Once `write` has returned, the file is complete and closed.
+    """
     return SimpleNamespace(write=write, finish=lambda: None, close=lambda: None)
 
 
@@ -165,7 +168,9 @@ def check_output(
     overlaid: bool = False,
     overwrite: bool = False,
 ) -> None:
-    """Make sure that a video of this size and frame rate [1/s] can be written to `path`; leave nothing behind.
+    """Check that a video of this size and frame rate [1/s] can be written to `path`.
+
+    The check leaves nothing behind.
 
     Raises
     ------
@@ -183,30 +188,28 @@ def check_output(
         if frame_format != "png" and form != frame_format:
             raise VideoError(
                 f"cannot write {frame_format.upper()} frames to {path}: name a folder, without an "
-                f"ending"
+                "ending"
             )
         if form == "exr":
             check_exr()
             if overlaid:
                 raise VideoError(
                     "EXR frames are linear light, without overlays and comparisons; leave these "
-                    "out (--overlay '', and "
-                    "no --compare), or write PNG frames"
+                    "out (--overlay '', and no --compare), or write PNG frames"
                 )
         if transparent and form not in _WITH_OPACITY:
             raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
         check_size(width, height)
         if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
             raise VideoError(
-                f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at "
-                f"{_H264_BLOCKS} "
-                "blocks of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp "
-                "or a folder of frames"
+                f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends "
+                f"at {_H264_BLOCKS} blocks of 16x16, such as 8192x4352: make it smaller, or write "
+                ".webm, .gif, .webp or a folder of frames"
             )
         if form in _SUBSAMPLED and (width % 2 or height % 2):
             raise VideoError(
-                f"frame size is {width}x{height}; {form} needs an even width and height, "
-                f"such as {width + width % 2}x{height + height % 2}"
+                f"frame size is {width}x{height}; {form} needs an even width and height, such as "
+                f"{width + width % 2}x{height + height % 2}"
             )
         highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
         if not isinstance(fps, int) or not 1 <= fps <= highest:
@@ -230,12 +233,12 @@ def check_size(width: int, height: int) -> None:
     if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
         raise VideoError(
             f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each "
-            f"side"
+            "side"
         )
 
 
 def check_replaceable(path: Path, overwrite: bool) -> None:
-    """Make sure that a file was made here, or that a folder holds frames from here and nothing else.
+    """Check that a file was made here, or that a folder holds only frames made here.
 
     Raises
     ------
@@ -247,7 +250,7 @@ def check_replaceable(path: Path, overwrite: bool) -> None:
         if not (overwrite or made_here(path)):
             raise VideoError(
                 f"cannot write {path}: it exists and was not {MARK}; name another file, or add "
-                f"--overwrite"
+                "--overwrite"
             )
         return
     strangers = [
@@ -258,13 +261,12 @@ def check_replaceable(path: Path, overwrite: bool) -> None:
     if strangers:
         raise VideoError(
             f"cannot write frames to {path}: it holds other files ({min(strangers)}); name a new "
-            f"folder"
+            "folder"
         )
     if not overwrite and (others := [each.name for each in path.iterdir() if not made_here(each)]):
         raise VideoError(
-            f"cannot write frames to {path}: it holds frames that were not {MARK} ({min(others)}); "
-            f"name a new folder, "
-            "or add --overwrite"
+            f"cannot write frames to {path}: it holds frames that were not {MARK} "
+            f"({min(others)}); name a new folder, or add --overwrite"
         )
 
 

@@ -155,12 +155,12 @@ class Part:
         elif self._states[frame] != digest:
             raise VideoError(
                 f"cannot resume {self.video}: at frame {frame} the simulation is not in the state "
-                f"it was in before; a "
-                "hook, a library or the processor has changed: leave --resume out to start again"
+                "it was in before; a hook, a library or the processor has changed: leave "
+                "--resume out to start again"
             )
 
     def finish(self) -> None:
-        """Put the file, or else the folder of segments, in the video's place, and remove everything else.
+        """Move the finished file or folder to the video's place, and remove everything else.
 
         Raises `VideoError` if there is something in that place by now that was not made here.
         """
@@ -177,7 +177,10 @@ class Part:
         self.remove()
 
     def keep(self) -> str:
-        """Leave the complete segments for later, and say so; without any, remove everything and say nothing."""
+        """Keep the complete segments for a later run, and return a message that says so.
+
+        Without any segment, remove everything and return an empty message.
+        """
         if not self.frames:
             self.remove()
             return ""
@@ -200,8 +203,7 @@ class Part:
             if before != now:
                 raise VideoError(
                     f"cannot resume {self.video}: {name} was {before} and now is {now}; restore "
-                    f"it, or leave --resume "
-                    "out to start again"
+                    "it, or leave --resume out to start again"
                 )
 
     def _claim(self) -> None:
@@ -210,13 +212,12 @@ class Part:
         except BlockingIOError as error:
             raise VideoError(
                 f"another process is writing {self.video}; wait until it is done, or name another "
-                f"file"
+                "file"
             ) from error
         if strangers := sorted(self._strangers()):
             raise VideoError(
                 f"cannot write {self.video}: its folder {self.folder.name} holds other files "
-                f"({strangers[0]}); "
-                "move it away, or name another file"
+                f"({strangers[0]}); move it away, or name another file"
             )
 
     def _strangers(self) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The passes of a video: one file a frame, NumPy's .npz or OpenEXR, in a folder beside the video."""
+"""The passes of a video: one file a frame, .npz or OpenEXR, in a folder beside the video."""
 
 from __future__ import annotations
 
@@ -73,7 +73,9 @@ class PassFiles:
             self.complete += 1
 
     def begin(self) -> None:
-        """Remove the passes of an earlier run, and say whose come now: before the first frame that has passes.
+        """Remove the passes of an earlier run, and record whose passes come now.
+
+        Call it before the first frame that has passes.
 
         Raises `VideoError` if the folder has become another's since `check_passes`, and
         `EncodingError` if it cannot be written.
@@ -140,7 +142,10 @@ def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: boo
 
 
 def _check_folder(video: Path, overwrite: bool) -> None:
-    """Raise `VideoError` if a video's folder of passes holds another's, or anything that was not made here."""
+    """Check that a folder of passes holds only passes of this video that were made here.
+
+    Raises `VideoError` otherwise.
+    """
     folder = passes_folder(video)
 
     def own(file: Path) -> bool:
@@ -155,7 +160,7 @@ def _check_folder(video: Path, overwrite: bool) -> None:
     if owner not in (None, final_path(video).name) and not overwrite:
         raise VideoError(
             f"cannot write passes to {folder}: they are those of {owner}; name another output, or "
-            f"add --overwrite"
+            "add --overwrite"
         )
 
 

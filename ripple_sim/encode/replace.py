@@ -1,4 +1,4 @@
-"""What may be replaced: files that are written here have a mark, by which a later job knows them without being told."""
+"""Which files may be replaced: every file written here carries a mark."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TAIL = 1 << 10
 
 
 def made_here(path: Path) -> bool:
-    """Whether a path is a regular file that was written here, or an empty one, with which nothing is lost."""
+    """Whether a path is a regular file that was written here, or an empty one."""
     found = path.lstat()
     if not stat.S_ISREG(found.st_mode):
         return False
@@ -69,14 +69,17 @@ def mark_gif(path: Path) -> None:
 def check_folder(
     kind: type[Exception], what: str, folder: Path, own: Callable[[Path], object]
 ) -> None:
-    """Raise an error of a kind if a folder, to which `what` is to be written, holds anything but files of our own."""
+    """Check that a folder, to which `what` will be written, holds only files made here.
+
+    Raises an error of type `kind` otherwise.
+    """
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise kind(f"cannot write {what} to {folder}: it is not a folder; name another output")
     for each in folder.iterdir() if folder.is_dir() else ():
         if not (is_plain(each) and own(each)):
             raise kind(
                 f"cannot write {what} to {folder}: it holds other files ({each.name}); name "
-                f"another output"
+                "another output"
             )
 
 

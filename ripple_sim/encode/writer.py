@@ -1,4 +1,6 @@
-"""Frames go in one by one, a video comes out at the end or not at all: `open_writer` starts or continues one.
+"""`open_writer` starts or continues a video.
+
+Frames go in one by one, and the complete video appears at the end or not at all.
 
 `FrameWriter` takes the frames and stores them as segments, in a thread of its own, and joins these.
 """
@@ -30,7 +32,9 @@ QUEUE_FRAMES = 8
 
 
 class FrameWriter:
-    """Takes frames, stores them as segments of a `Part`, in a thread of its own, and joins these to the finished video.
+    """Takes frames and writes a video, in a thread of its own.
+
+    The frames are stored as segments of a `Part`, which are joined at the end.
 
     Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it.
     A resumable writer then keeps what is finished, unless the same exception would occur again.
@@ -98,7 +102,9 @@ class FrameWriter:
         self.frames += 1
 
     def check_state(self, frame: int, digest: str) -> None:
-        """Record the fingerprint, in hexadecimal digits, of a frame's state, or compare it with the recorded one.
+        """Record the fingerprint of a frame's state, or compare it with the recorded one.
+
+        The fingerprint is a string of hexadecimal digits.
 
         Raises
         ------
@@ -167,7 +173,10 @@ class FrameWriter:
             raise EncodingError(f"cannot write the video {self.path}: {reason}") from error
 
     def _stop(self) -> None:
-        """Encode what is in the queue, put the video in its place unless it is given up, and end the thread."""
+        """Encode the frames in the queue, then end the thread.
+
+        The video is put in its place unless it is given up.
+        """
         if self._thread.is_alive():
             self._queue.put(None)
             self._thread.join()

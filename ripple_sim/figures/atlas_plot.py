@@ -1,4 +1,6 @@
-"""Figures of an atlas: the mesh with the texel grid, charts, stretch and quality; or the thickness of its layer.
+"""Figures of an atlas: the mesh with its texel grid, charts, stretch and quality.
+
+Another figure shows the thickness of a layer in place of the stretch.
 
 Every pixel of an image is traced to its place on the charts, so the grid is exactly the atlas's.
 """
@@ -92,7 +94,10 @@ def lit(
     openness: NDArray[np.float64],
     view: View,
 ) -> NDArray[np.float64]:
-    """Colours under a soft light from the upper left, with a little sheen; flat enough for colours to be read."""
+    """Shade colours under a soft light from the upper left, with a little sheen.
+
+    The shading is weak, so that the colours can be read.
+    """
     local = normals @ view.axes.T
     local /= np.maximum(np.linalg.norm(local, axis=1, keepdims=True), 1e-9)
     diffuse = 0.5 + 0.5 * local @ _LIGHT
@@ -195,7 +200,10 @@ class AtlasPainter:
         *,
         on_surface: bool,
     ) -> NDArray[np.float64]:
-        """Colours of places on the charts [k, 3]: the texel's, under a grid of fine lines and the charts' borders.
+        """Colours of points on the charts [k, 3].
+
+        They are the colours of the texels, under a grid of fine lines and the borders of the
+        charts.
 
         The lines are equally wide on the surface, or else in the charts.
         """
@@ -214,7 +222,7 @@ class AtlasPainter:
 
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:
-        """Width of rows and of columns on the surface, in units of an even spread's, [2, C, n, n]."""
+        """Width of rows and columns on the surface, relative to an even spread, [2, C, n, n]."""
         with_halo = self._atlas.texels.halo_positions
         areas = self._atlas.areas
         own = with_halo[:, 1:-1, 1:-1]
@@ -246,7 +254,10 @@ def sphere_image(
 
 
 def cross(painter: AtlasPainter, resolution: int, size: int) -> NDArray[np.float64]:
-    """RGBA image [3 size, 4 size, 4] of a cube's charts unfolded: the belt, and a chart above and below it."""
+    """RGBA image [3 size, 4 size, 4] of a cube's six charts, unfolded.
+
+    Four charts are in the middle row, with one above and one below.
+    """
     image = np.zeros((3 * size, 4 * size, 4))
     for chart, i, k in [(chart, 1, k) for k, chart in enumerate(BELT)] + [
         (ABOVE, 0, 1),
@@ -261,7 +272,7 @@ def cross(painter: AtlasPainter, resolution: int, size: int) -> NDArray[np.float
 def squares(
     painter: AtlasPainter, shape: tuple[int, int, int], width: int, height: int
 ) -> NDArray[np.float64]:
-    """RGBA image, at most [height, width, 4], of all charts side by side, the first at the upper left."""
+    """RGBA image, at most [height, width, 4], of all charts side by side from the upper left."""
     count, n, _ = shape
     columns = max(range(1, count + 1), key=lambda k: min(width / k, height / -(-count // k)))
     rows = -(-count // columns)
@@ -288,7 +299,11 @@ TEXT, FAINT = "#1b2432", "#6b7685"
 
 
 def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
-    """Raise `AtlasError` if the ending is unknown, the folder missing, or the file another's that must not go."""
+    """Check that a figure can be written.
+
+    Raises `AtlasError` if the ending is unknown, the folder is missing, or another file is in the
+    way.
+    """
     path = Path(path)
     if path.suffix.lower() not in _ENDINGS:
         raise AtlasError(
@@ -307,8 +322,7 @@ def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
     if final.exists() and not (overwrite or made_here(final)):
         raise AtlasError(
             f"plot file {str(path)!r} cannot be written: it exists and was not {MARK}; name "
-            f"another file, or add "
-            "--overwrite"
+            "another file, or add --overwrite"
         )
 
 
@@ -341,7 +355,10 @@ def show(
 
 
 def save_plot(figure: Figure, path: str | Path) -> None:
-    """Write a figure, whole or not at all, with the mark of files made here; raise `AtlasError` if that fails."""
+    """Write a figure, marked as made here, whole or not at all.
+
+    Raises `AtlasError` if that fails.
+    """
     ending = Path(path).suffix.lower()
     told: dict[str, Any] = {"Software" if ending == ".png" else "Creator": MARK}
     mark: dict[str, Any] = {"metadata": told | ({"Date": None} if ending == ".svg" else {})}
@@ -494,7 +511,10 @@ def plot_thickness(
     subtitle: str = "",
     up: str = "y",
 ) -> None:
-    """Write a figure of the thickness [m] of a layer, [C, n, n], see `thickness_map`; else as `plot_atlas`."""
+    """Write a figure of the thickness [m] of a layer, [C, n, n], from `thickness_map`.
+
+    Otherwise it is like `plot_atlas`.
+    """
     check_plot_path(path)
     low, high = np.quantile(thickness, _SHOWN)
     shade = np.clip((thickness - low) / max(high - low, 1e-9 * high), 0, 1)

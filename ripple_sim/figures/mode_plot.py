@@ -1,4 +1,4 @@
-"""A sheet with a picture of each mode of a surface: bent as it swings, out in red and in in blue."""
+"""A sheet with a picture of each mode of a surface, deflected, red outwards, blue inwards."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ _LARGEST = 640
 
 
 class ModePainter(AtlasPainter):
-    """Paints the shapes of modes on the surface that the texels themselves span, which is fine enough to bend."""
+    """Draws the shapes of modes on the surface that the texels span.
+
+    That surface is fine enough to show the bending.
+    """
 
     def __init__(self, atlas: Atlas) -> None:
         fine = texel_atlas(atlas.texels)

@@ -1,4 +1,4 @@
-"""What the viewer's user has to hand: keys, an orbiting camera, sliders, and a recorder of screenshots and videos.
+"""Controls of the viewer: keys, an orbiting camera, sliders, screenshots and recordings.
 
 They are the same for the window, the web page and the help.
 """
@@ -75,7 +75,10 @@ def level(camera: pv.Camera) -> None:
 
 
 def ray(renderer: pv.Renderer, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Origin [m] and unit direction, in the world, of the ray from the camera through a pixel, from the lower left."""
+    """The ray from the camera through a pixel, which is counted from the lower left.
+
+    Returns its origin [m] and unit direction, in the world.
+    """
     renderer.SetDisplayPoint(x, y, 0.5)
     renderer.DisplayToWorld()
     point = np.array(renderer.GetWorldPoint())
@@ -89,7 +92,10 @@ def ray(renderer: pv.Renderer, x: int, y: int) -> tuple[NDArray[np.float64], NDA
 
 
 class Recorder:
-    """Writes screenshots and one video at a time to a folder; files are called name-1.png, name-1.mp4 and so on."""
+    """Writes screenshots, and one video at a time, to a folder.
+
+    Files are called name-1.png, name-1.mp4 and so on.
+    """
 
     def __init__(self, folder: Path, name: str, fps: int) -> None:
         self.folder = folder

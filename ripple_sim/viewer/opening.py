@@ -101,7 +101,9 @@ class Balls:
     def throw(
         self, data: mujoco.MjData, origin: ArrayLike, through: ArrayLike, seconds: float
     ) -> bool:
-        """Throw a ball from one point of the world to be at another after a time [s], on a parabola.
+        """Throw a ball from one point of the world, so that it reaches another after a time [s].
+
+        It flies on a parabola.
 
         Returns whether there was a ball to throw.
         """
@@ -126,7 +128,9 @@ class Balls:
 
 
 def poke_strength(material: Material, size: float) -> tuple[float, float]:
-    """Radius [m] and impulse [N s] of a poke that presses a surface of a size [m] in by a few per cent of that.
+    """Radius [m] and impulse [N s] of a poke, for a surface of a size [m].
+
+    The poke presses the surface in by a few per cent of the size.
 
     The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle
     moving at 4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.

@@ -42,7 +42,9 @@ def launch_passive(
     show_left_ui: bool = True,
     show_right_ui: bool = True,
 ) -> RippleViewer:
-    """Open MuJoCo's viewer beside a loop of one's own, as `mujoco.viewer.launch_passive` does, and show the ripples.
+    """Open MuJoCo's viewer beside your own loop, and show the ripples.
+
+    It is used like `mujoco.viewer.launch_passive`.
 
     Nothing has to be prepared in the model: targets are drawn as some thousand triangles of their
     colour, without textures, in place of their still surfaces. Where the mouse pulls at a target's
@@ -76,7 +78,7 @@ def launch_passive(
     if not isinstance(ripples, Ripples) or ripples.model is not model:
         raise SceneError(
             f"the viewer shows ripples of the model that it is given, not {ripples!r}: "
-            f"Ripples(model, ...)"
+            "Ripples(model, ...)"
         )
     data = own_data(model, data)
     if problem := display_problem():
@@ -123,7 +125,10 @@ class RippleViewer:
         return self._handle.perturb
 
     def sync(self, state_only: bool = False) -> None:
-        """Show the present state and the ripples, and take over what the user has done, to the surfaces too."""
+        """Show the present state and the ripples, and apply the user's input.
+
+        Where the mouse pulls at a target, the surface is pulled too.
+        """
         self._press()
         scene = self._handle.user_scn
         model = self._ripples.model
@@ -164,13 +169,20 @@ class RippleViewer:
                 array[:] = own
 
     def close(self) -> None:
-        """Close the window, and wait until it is: a program that ends before may crash in MuJoCo."""
+        """Close the window, and wait until it is closed.
+
+        A program that ends before that may crash in MuJoCo.
+        """
         self._handle.close()
         for thread in self._threads - {threading.current_thread()}:
             thread.join(_PATIENCE)
 
     def _press(self) -> None:
-        """The surface follows the mouse: a force as of a spring that pulls it to there, over the time since then."""
+        """Let the surface follow the mouse.
+
+        The force is that of a spring from the surface to the pointer, and acts over the time since
+        the last call.
+        """
         data = self._data
         pull = self._handle.perturb
         elapsed = data.time - self._time

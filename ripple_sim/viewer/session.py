@@ -106,7 +106,10 @@ class Session:
         return {self._balls.geoms[i] for i in self._balls.parked}
 
     def material(self, name: str) -> float:
-        """Coefficient of the first surface's material, one of `SLIDERS`; where it is a map, its largest value."""
+        """A coefficient of the first surface's material, one of `SLIDERS`.
+
+        If it is a map, its largest value is returned.
+        """
         waves = self.simulation.ripples[self.simulation.scene.targets[0].geom]
         return self._material.get(name, float(np.max(getattr(waves.material, name))))
 
@@ -170,7 +173,9 @@ class Session:
     def pick(
         self, origin: ArrayLike, direction: ArrayLike
     ) -> tuple[str, NDArray[np.float64], float] | None:
-        """Where a ray from a point [m] of the world first meets an undisplaced rippling surface, or None.
+        """Find where a ray from a point [m] in the world first meets a rippling surface.
+
+        The surfaces are taken without their displacement. None if the ray meets no surface.
 
         Returns the name of the geom, the point in its frame [m], and the distance in lengths of the
         direction.
@@ -194,7 +199,10 @@ class Session:
         return min(hits, key=lambda hit: hit[2], default=None)
 
     def poke(self, origin: ArrayLike, direction: ArrayLike) -> NDArray[np.float64] | None:
-        """Press on the first surface on a ray, with `poke_impulse`; return the point in its frame [m], if any."""
+        """Poke the first surface on a ray with `poke_impulse`.
+
+        Returns the point in the surface's frame [m], or None if the ray meets no surface.
+        """
         if (hit := self.pick(origin, direction)) is None:
             return None
         name, point, _ = hit
@@ -202,7 +210,9 @@ class Session:
         return point
 
     def throw(self, origin: ArrayLike, direction: ArrayLike) -> bool:
-        """Throw a ball from a point [m] of the world along a direction; it comes down where that meets a surface.
+        """Throw a ball from a point [m] in the world along a direction.
+
+        It comes down where the ray meets a surface.
 
         Beside the surface it flies through the point of the ray that is nearest to the first
         surface's middle. Returns whether there was a ball.

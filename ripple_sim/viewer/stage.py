@@ -68,7 +68,10 @@ def is_endless(model: mujoco.MjModel, geom: int, reach: float) -> bool:
 def add_floor(
     plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float64]
 ) -> pv.Actor:
-    """Add a plane as a disc around a middle [m], unlit: software OpenGL is much slower with light, and it is large."""
+    """Add a plane as an unlit disc around a middle [m].
+
+    The disc is large, and light is slow in software OpenGL.
+    """
     disc = pv.Disc(inner=0.0, outer=radius, normal=(0, 0, 1), r_res=_FADE_RINGS, c_res=_FADE_SIDES)
     away = np.linalg.norm(disc.points, axis=1) / radius
     share = np.clip((away - 0.1) / 0.7, 0, 1)[:, None]
@@ -125,7 +128,10 @@ class BodyActors:
 
 
 class SkinActor:
-    """A rippling surface of an sRGB colour: points, normals and heights are written into the arrays that VTK reads."""
+    """A rippling surface of one sRGB colour.
+
+    Points, normals and heights are written into the arrays that VTK reads.
+    """
 
     def __init__(
         self,

@@ -1,4 +1,6 @@
-"""The viewer in a browser on the same machine: trame sends frames of an off-screen window, and events come back.
+"""The viewer in a browser: trame sends the frames of an off-screen window.
+
+Events come back from the page.
 
 Who has the address of this run may use the viewer's page, and only from the page itself. Any page
 that is open in the user's browser can send requests to a port of this machine. So the address holds
@@ -77,10 +79,8 @@ def exposure(host: str, folder: Path) -> str:
     """What is open to others where a host is not local, in one line."""
     return (
         f"ripple-sim: --host {host} lets other machines connect: whoever has the address sees and "
-        f"drives this scene, "
-        f"and writes screenshots and videos to {folder.absolute()}; nothing is encrypted, so the "
-        f"address can be read "
-        "on its way"
+        f"drives this scene, and writes screenshots and videos to {folder.absolute()}; nothing is "
+        "encrypted, so the address can be read on its way"
     )
 
 
@@ -120,7 +120,10 @@ def restrict(server: Any, *, host: str, port: int, secret: str) -> None:
 
 
 def guard(host: str) -> Callable[[web.Request, Handler], Awaitable[web.StreamResponse]]:
-    """Middleware that refuses requests which other sites can have caused, at a server that listens at `host`."""
+    """Make the middleware that refuses requests from other sites.
+
+    The server listens at `host`.
+    """
 
     @web.middleware
     async def refuse_strangers(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -169,8 +172,8 @@ def check_web(port: int, host: str) -> None:
         name for name in ("trame", "trame_vtk") if importlib.util.find_spec(name) is None
     ]:
         raise DisplayError(
-            f"--web needs {' and '.join(missing)}, which is not installed; install it with: "
-            "pip install 'ripple-sim[web]'"
+            f"--web needs {' and '.join(missing)}, which is not installed; install it with: pip "
+            "install 'ripple-sim[web]'"
         )
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
@@ -179,14 +182,16 @@ def check_web(port: int, host: str) -> None:
             trial.bind(found[0][4])
     except (OSError, OverflowError, UnicodeError) as error:
         raise DisplayError(
-            f"cannot serve on port {port} of {host}: {error}; name another one with --port, or one "
-            f"of this machine's "
-            "addresses with --host"
+            f"cannot serve on port {port} of {host}: {error}; name another one with --port, or "
+            "one of this machine's addresses with --host"
         ) from error
 
 
 def serve(window: Window, port: int, host: str) -> None:
-    """Serve an off-screen window at a host's name or address until it is closed or the program is interrupted."""
+    """Serve an off-screen window at a host name or address.
+
+    It returns when the window is closed or the program is interrupted.
+    """
     from trame.app import get_server
 
     server = get_server("ripple-sim")
@@ -203,9 +208,8 @@ def serve(window: Window, port: int, host: str) -> None:
             server.start(exec_mode="coroutine", open_browser=False, show_connection_info=False)
         )
         shown = (
-            f"shows {window.plotter.title}, which starts when the page is opened; press "
-            f"Ctrl+C "
-            f"to stop"
+            f"shows {window.plotter.title}, which starts when the page is opened; press Ctrl+C to "
+            "stop"
         )
         print(f"{address(host, port, secret)} {shown}", flush=True)
         await page.animate()
@@ -270,7 +274,7 @@ class _Page:
         window.render = self._view.update
 
     async def animate(self) -> None:
-        """Run the session frame by frame, from when the page is first opened until the window is closed.
+        """Run the session frame by frame, from the first opening of the page until the end.
 
         Trame's own animation draws and sends the frames: without one it would draw at every
         movement of the pointer. The next frame is drawn once the browser has the last one, or they

@@ -1,4 +1,4 @@
-"""`Window`: a session that is drawn, with the user's keys, clicks and sliders; its loop on the desktop, and its speed.
+"""`Window`: a drawn session with its keys, clicks and sliders; `run` and `benchmark`.
 
 It has one method for each of `CONTROLS`, and for a click.
 """
@@ -36,7 +36,9 @@ _STATUS_EVERY = 0.25
 
 
 class Window:
-    """A session in a PyVista plotter, on screen or off, frame by frame, with its user's input and texts over it.
+    """A session in a PyVista plotter, on screen or off.
+
+    It advances frame by frame, takes the user's input, and writes texts over the picture.
 
     Parameters
     ----------
@@ -144,11 +146,17 @@ class Window:
         self.update()
 
     def poke_at(self, x: int, y: int) -> bool:
-        """Poke the surface under a pixel, counted from the lower left; return whether there is a rippling one."""
+        """Poke the surface under a pixel, which is counted from the lower left.
+
+        Returns whether there is a rippling surface.
+        """
         return self.session.poke(*ray(self.plotter.renderer, x, y)) is not None
 
     def throw(self) -> None:
-        """Throw a ball from the camera at the pointer, or at the middle if that has never been over the window."""
+        """Throw a ball from the camera at the pointer.
+
+        The target is the middle of the window if the pointer has never been over it.
+        """
         width, height = self.size()
         x, y = self.pointer() or (width // 2, height // 2)
         if not self.session.throw(*ray(self.plotter.renderer, x, y)):
@@ -212,8 +220,8 @@ class Window:
         )
         recording = "   recording" if self.recorder.recording else ""
         return (
-            f"{session.time:.2f} s   operator {session.operator}   "
-            f"{state}{recording}\n{self.message}"
+            f"{session.time:.2f} s   operator {session.operator}   {state}{recording}\n"
+            f"{self.message}"
         )
 
     def say(self, message: str) -> None:
@@ -280,7 +288,10 @@ class Window:
             self._closed_with()
 
     def tick(self, draw: bool = True) -> bool:
-        """Advance by one frame, and draw it if asked to; return whether there was anything new and it was drawn."""
+        """Advance by one frame, and draw it if `draw` is set.
+
+        Returns whether a new frame was drawn.
+        """
         try:
             moved = self.session.advance()
         except RippleError as error:
@@ -303,7 +314,10 @@ class Window:
         )
 
     def pointer(self) -> tuple[int, int] | None:
-        """Pixel under the pointer, from the lower left; None if it has never been over the window."""
+        """The pixel under the pointer, from the lower left.
+
+        None if the pointer has never been over the window.
+        """
         x, y = self.plotter.iren.get_event_position()
         return None if (x, y) == (0, 0) else (x, y)
 
@@ -341,7 +355,9 @@ def run(window: Window) -> None:
 
 
 def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
-    """Highest update rate of a window, and where the time goes: simulation, drawing, and processor time.
+    """Measure the highest update rate of a window.
+
+    The report also has the time of simulation and drawing, and the processor time.
 
     The best of several runs of some updates without waiting, each with a poke and a ball at the
     start. Processor time is that of all threads, which other programs hardly change.
@@ -374,10 +390,12 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
 
 
 def check_display() -> None:
-    """Make sure that a window can be opened; raises `DisplayError` with what is missing, and the alternatives."""
+    """Check that a window can be opened.
+
+    Raises `DisplayError` with what is missing and the alternatives.
+    """
     if problem := display_problem():
         raise DisplayError(
             f"no window can be opened: {problem}; add --web to use a browser instead, or render a "
-            f"video with "
-            "`ripple-sim render` or `ripple-sim drop`"
+            "video with `ripple-sim render` or `ripple-sim drop`"
         )

@@ -1,4 +1,6 @@
-"""Sphere maps of the shipped scenes' targets: to compute one takes kernels that nothing else needs.
+"""Sphere maps of the shipped scenes' targets.
+
+They are shipped because computing one takes kernels that nothing else needs.
 
 Each is a NumPy array under a hash of its mesh, so that a changed mesh finds none and is mapped
 anew. `make sphere-maps` writes them again.
