@@ -12,13 +12,10 @@ from .mesh.files import load_mesh as load_mesh
 from .mesh.mesh import Mesh as Mesh
 from .mesh.volume import Volume as Volume, load_volume as load_volume
 from .mesh.wrap import Wrap as Wrap, wrap as wrap
-from .operator.assembly import (
-    absorbing_damping as absorbing_damping,
-    build_operator as build_operator,
-    hold as hold,
-)
+from .operator.assembly import build_operator as build_operator
 from .operator.material import Material as Material
 from .operator.modes import Modes as Modes, modes as modes
+from .operator.regions import absorbing_damping as absorbing_damping, hold as hold
 from .texels.atlas import Atlas as Atlas, texel_atlas as texel_atlas
 from .texels.maps import texture_map as texture_map, vertex_map as vertex_map
 from .texels.texel_mesh import TexelMesh as TexelMesh

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Floats, Ints
-from ripple_sim.solver.operator.presets import depth_under
+from ripple_sim.solver.operator.suited_law import depth_under
 from ripple_sim.solver.texels.thickness import half_thickness
 
 from .model import CoupledModel

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, WaveSolver
-from ripple_sim.solver.operator.assembly import hold
+from ripple_sim.solver.operator.regions import hold
 
 from .easing import EasingLaw
 from .geoms import find_target, target_name

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.errors import warn_caller
-from ripple_sim.solver.operator.presets import (
+from ripple_sim.solver.operator.suited_law import (
     BOUNCE,
     FOOTPRINT,
     damping_for,

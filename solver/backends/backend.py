@@ -25,7 +25,8 @@ from ..files import atomic_write
 from ..gl import GLContext, shared_context
 from ..layouts.cube.convention import cube_topology
 from ..operator.deep_water import FluidOperator
-from ..operator.wave_operator import WaveOperator, damped_step
+from ..operator.step import damped_step
+from ..operator.wave_operator import WaveOperator
 from ..texels.stencil import Stencil
 from .cpu import CPUBackend, RowLayout
 from .field_backend import FieldBackend

@@ -13,15 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from ..operator.bending import Bending
 from ..operator.curvatures import STEPS, Curvatures
+from ..operator.step import StepCoefficients, number_or_field, step_coefficients
 from ..operator.volume import volume_rate
-from ..operator.wave_operator import (
-    Bending,
-    StepCoefficients,
-    WaveOperator,
-    number_or_field,
-    step_coefficients,
-)
+from ..operator.wave_operator import WaveOperator
 from ..texels.stencil import Stencil
 from ..texels.topology import TexelTopology
 from . import kernels

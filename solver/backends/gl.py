@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ..gl import GLContext, shared_context
 from ..kernel import Ints
+from ..operator.bending import Bending
 from ..operator.curvatures import KINDS, Curvatures
+from ..operator.step import step_coefficients
 from ..operator.volume import volume_rate
-from ..operator.wave_operator import Bending, WaveOperator, step_coefficients
+from ..operator.wave_operator import WaveOperator
 from ..texels import cells
 from ..texels.moving import MovedStencil, interpolate
 from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links

@@ -1,9 +1,6 @@
 from .assembly import (
     OPERATORS as OPERATORS,
-    MovingOperator as MovingOperator,
-    absorbing_damping as absorbing_damping,
     build_operator as build_operator,
-    hold as hold,
     source_grip as source_grip,
 )
 from .coefficients import (
@@ -28,10 +25,18 @@ from .material import (
     warn_of_wavelengths as warn_of_wavelengths,
 )
 from .modes import Modes as Modes, elastic_matrix as elastic_matrix
+from .moving_operator import MovingOperator as MovingOperator
 from .plate_rim import RIMS as RIMS, Rim as Rim
-from .presets import (
+from .presets import PRESETS as PRESETS
+from .regions import absorbing_damping as absorbing_damping, hold as hold
+from .step import (
+    StepCoefficients as StepCoefficients,
+    damped_step as damped_step,
+    number_or_field as number_or_field,
+    step_coefficients as step_coefficients,
+)
+from .suited_law import (
     BOUNCE as BOUNCE,
-    PRESETS as PRESETS,
     damping_for as damping_for,
     density_after as density_after,
     density_for as density_for,
@@ -44,11 +49,4 @@ from .volume import (
     VolumeRate as VolumeRate,
     volume_rate as volume_rate,
 )
-from .wave_operator import (
-    SAFETY as SAFETY,
-    StepCoefficients as StepCoefficients,
-    WaveOperator as WaveOperator,
-    damped_step as damped_step,
-    number_or_field as number_or_field,
-    step_coefficients as step_coefficients,
-)
+from .wave_operator import SAFETY as SAFETY, WaveOperator as WaveOperator

@@ -114,7 +114,7 @@ class FluidOperator(WaveOperator):
 
     @functools.cached_property
     def keeps_volume(self) -> Bools:
-        """All parts keep it, since a fluid does."""
+        """All parts keep their volume, as a fluid does."""
         return np.ones_like(super().keeps_volume)
 
     @functools.cached_property

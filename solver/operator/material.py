@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import POSITIVE, SolverError, is_finite, shown, warn_caller
 from ..texels.atlas import Atlas
 from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, require_positive
-from .presets import PRESETS, suited_coefficients
+from .presets import PRESETS
+from .suited_law import suited_coefficients
 
 # omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the
 # lowest normal mode of an incompressible layer bonded to a rigid base: its frequency is within 3.0

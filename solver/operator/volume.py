@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import SolverError, shown
 from ..kernel import Bools, Floats, Floats32, Ints
-from .wave_operator import WaveOperator, damped_step
+from .step import damped_step
+from .wave_operator import WaveOperator
 
 # What is smaller than this, against the greatest, is round-off.
 _NOTHING = 1e-12

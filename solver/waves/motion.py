@@ -11,8 +11,8 @@ from ..errors import SolverError, shown, warn_caller
 from ..kernel import Floats, Floats32, Ints, kernel
 from ..mesh.mesh import Mesh
 from ..mesh.topology import Folds, edges_of
-from ..operator.assembly import MovingOperator
 from ..operator.material import Material
+from ..operator.moving_operator import MovingOperator
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from ..texels.moving import MovedPlaces, SurfaceRide

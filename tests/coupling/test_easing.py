@@ -5,7 +5,7 @@ import pytest
 
 from ripple_sim.coupling.easing import Easing, EasingLaw
 from ripple_sim.solver import sphere_atlas
-from ripple_sim.solver.operator.presets import depth_under
+from ripple_sim.solver.operator.suited_law import depth_under
 
 DT = 0.001
 LAW = EasingLaw(most=10.0, rate=50.0, thickness=1.0)
