@@ -26,7 +26,7 @@ from PIL import Image
 from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.encode.replace import MARK, made_here
-from ripple_sim.overlay.notes import color_table
+from ripple_sim.overlay.color_map import color_table
 from ripple_sim.render.passes.floor import find_floor
 from ripple_sim.render.surfaces.vertices import memory_order
 from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, lighting_of

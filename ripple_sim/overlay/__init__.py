@@ -1,4 +1,4 @@
-"""Overlays on frames: heatmap, contacts, texel grid, time, energy; titles for two runs side by side."""
+"""Overlays on frames: heatmap, contacts, grid, time, energy, and titles of runs side by side."""
 
 import lazy_loader
 

@@ -1,37 +1,27 @@
-from .marks import (
-    MEMORY as MEMORY,
-    ContactMarks as ContactMarks,
-    Mark as Mark,
-    Sprite as Sprite,
-    draw_arrow as draw_arrow,
-    text_width as text_width,
-)
-from .notes import (
-    MOST_POINTS as MOST_POINTS,
+from .color_map import (
     SIZE as SIZE,
-    TITLES as TITLES,
-    Limit as Limit,
-    Notebook as Notebook,
-    Notes as Notes,
     color_table as color_table,
     colors as colors,
-    compared_operators as compared_operators,
+    lab_to_srgb as lab_to_srgb,
+)
+from .layout import Layout as Layout
+from .marks import MEMORY as MEMORY, ContactMarks as ContactMarks, Mark as Mark
+from .notes import (
+    MOST_POINTS as MOST_POINTS,
+    Notebook as Notebook,
+    Notes as Notes,
     curve as curve,
     grid_spacing as grid_spacing,
-    lab_to_srgb as lab_to_srgb,
     magnitude as magnitude,
-    number as number,
-    readable as readable,
-    round_up as round_up,
 )
-from .panels import (
-    EnergyPlot as EnergyPlot,
-    Layout as Layout,
-    Painter as Painter,
+from .operators import TITLES as TITLES, compared_operators as compared_operators
+from .painter import Painter as Painter
+from .panels import arrow_key as arrow_key, color_bar as color_bar, label as label
+from .placed_marks import (
     Projection as Projection,
-    arrow_key as arrow_key,
-    color_bar as color_bar,
     draw_marks as draw_marks,
-    label as label,
     place_marks as place_marks,
 )
+from .plots import EnergyPlot as EnergyPlot
+from .scales import Limit as Limit, number as number, readable as readable, round_up as round_up
+from .sprite import Sprite as Sprite, draw_arrow as draw_arrow, text_width as text_width

@@ -28,22 +28,12 @@ from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.encode.part import Settings
 from ripple_sim.encode.passes import PassFiles
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay.notes import (
-    TITLES,
-    Notebook,
-    Notes,
-    color_table,
-    compared_operators,
-    grid_spacing,
-)
-from ripple_sim.overlay.panels import (
-    Layout,
-    Painter,
-    PlacedMark,
-    Projection,
-    draw_marks,
-    place_marks,
-)
+from ripple_sim.overlay.color_map import color_table
+from ripple_sim.overlay.layout import Layout
+from ripple_sim.overlay.notes import Notebook, Notes, grid_spacing
+from ripple_sim.overlay.operators import TITLES, compared_operators
+from ripple_sim.overlay.painter import Painter
+from ripple_sim.overlay.placed_marks import PlacedMark, Projection, draw_marks, place_marks
 from ripple_sim.render import Surface
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import Scene, with_exposure

@@ -24,7 +24,7 @@ from ripple_sim.encode.output import video_format
 from ripple_sim.encode.part import Settings
 from ripple_sim.encode.passes import check_passes
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay.notes import compared_operators
+from ripple_sim.overlay.operators import compared_operators
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import Scene, check_duration
 from ripple_sim.solver.backends.backend import auto_backend

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ripple_sim.capture.scene_camera import viewpoint
 from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.export.moving_mesh import Displaced
-from ripple_sim.overlay.notes import round_up
+from ripple_sim.overlay.scales import round_up
 from ripple_sim.render.passes.floor import find_floor
 from ripple_sim.render.surfaces.surface import target_color
 from ripple_sim.render.visuals.shapes import shape_of, sizes

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ripple_sim.cli import DropCommand, RenderCommand, ViewCommand, arguments, parse
-from ripple_sim.overlay import notes
+from ripple_sim.overlay import operators
 from ripple_sim.scene import drop
 from ripple_sim.solver.layouts import build
 from ripple_sim.solver.operator import plate_rim
@@ -68,7 +68,7 @@ def test_what_is_not_valid_is_quoted_with_what_would_be(
 
 
 def test_names_are_those_of_the_rooms_that_have_them() -> None:
-    assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, notes.BASELINES)
+    assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, operators.BASELINES)
     assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, plate_rim.RIMS)
 
 

@@ -14,8 +14,8 @@ from ripple_sim.overlay import (
     Painter,
     Sprite,
     draw_arrow,
-    marks as patch_module,
     number,
+    sprite as sprite_module,
 )
 from ripple_sim.scene import parse_request
 
@@ -55,10 +55,10 @@ def test_sprite_over_the_border_is_cut(place: tuple[int, int]) -> None:
 
 
 def test_number_is_written_in_a_font_that_has_its_signs() -> None:
-    assert Path(patch_module._font(20).path).name == "DejaVuSans.ttf"
-    missing = patch_module._font(40).getmask("\U0010ffff").getbbox()
+    assert Path(sprite_module._font(20).path).name == "DejaVuSans.ttf"
+    missing = sprite_module._font(40).getmask("\U0010ffff").getbbox()
     for sign in number(-1.0)[0], "µ", "\N{MULTIPLICATION SIGN}":
-        assert patch_module._font(40).getmask(sign).getbbox() != missing
+        assert sprite_module._font(40).getmask(sign).getbbox() != missing
 
 
 def test_arrow_has_its_length_and_fades() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mujoco_models import posed
 
-from ripple_sim.overlay.notes import round_up
+from ripple_sim.overlay.scales import round_up
 from ripple_sim.viewer import BACKGROUND, add_floor, is_endless
 from ripple_sim.viewer.stage import _STEPS
 
