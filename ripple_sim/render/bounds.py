@@ -10,26 +10,31 @@ from numpy.typing import NDArray
 
 from .pose import Pose
 
-_CLOSEST = 0.01  # gap between the eye and a ball, in radii, below which it may show anywhere
+# Gap between the eye and a ball, in radii of the ball, up to which the ball's box is the whole frame.
+_MIN_GAP_OF_BOX = 0.01
 
 
 def within(
     balls: NDArray[np.float64], point: NDArray[np.float64], reach: float
 ) -> NDArray[np.float64]:
-    """The balls that any point within `reach` [m] of a point [3] touches."""
-    return balls[np.linalg.norm(balls[:, :3] - point, axis=1) - balls[:, 3] < reach]
+    """The balls that are closer than `reach` [m] to a point [3]."""
+    distances = np.linalg.norm(balls[:, :3] - point, axis=1) - balls[:, 3]
+    return balls[distances < reach]
 
 
 def enclosing(balls: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Centre [3] and radius of a ball that contains others."""
+    """Centre [3] and radius of a ball that contains all balls [m]."""
     centres = balls[:, :3]
     radii = balls[:, 3]
-    centre = ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0)) / 2
-    return centre, float((np.linalg.norm(centres - centre, axis=1) + radii).max())
+    lower_corner = (centres - radii[:, None]).min(axis=0)
+    upper_corner = (centres + radii[:, None]).max(axis=0)
+    centre = (lower_corner + upper_corner) / 2
+    radius = float((np.linalg.norm(centres - centre, axis=1) + radii).max())
+    return centre, radius
 
 
 def balls_about(triangles: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Balls that each contain a share of some triangles, which are close together.
+    """Balls about triangles: each ball contains a group of triangles that are close together.
 
     Parameters
     ----------
@@ -37,20 +42,23 @@ def balls_about(triangles: NDArray[np.float64], count: int) -> NDArray[np.float6
         Corners [m].
     count : int
         The least number of balls, unless there are fewer triangles.
+
+    The triangles are halved along their longest extent until there are enough groups.
     """
     groups = [triangles]
     while len(groups) < min(count, len(triangles)):
         halves = []
         for group in groups:
             middles = group.mean(axis=1)
-            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
+            longest_axis = np.ptp(middles, axis=0).argmax()
+            order = np.argsort(middles[:, longest_axis], kind="stable")
             halves += [group[half] for half in np.array_split(order, 2) if len(half)]
         groups = halves
     corners = [group.reshape(-1, 3) for group in groups]
-    centres = np.array([(each.min(axis=0) + each.max(axis=0)) / 2 for each in corners])
+    centres = np.array([(points.min(axis=0) + points.max(axis=0)) / 2 for points in corners])
     radii = [
-        np.linalg.norm(each - centre, axis=1).max()
-        for each, centre in zip(corners, centres, strict=True)
+        np.linalg.norm(points - centre, axis=1).max()
+        for points, centre in zip(corners, centres, strict=True)
     ]
     return np.column_stack([centres, radii])
 
@@ -61,8 +69,8 @@ def boxes_of(balls: NDArray[np.float64], pose: Pose, size: tuple[int, int]) -> N
     Returns
     -------
     int64 [k, 4]
-        Left, lower, right and upper edge [pixels], counted from the lower left. Balls behind the
-        camera have a box of size 0.
+        Left, lower, right and upper edge [pixels], counted from the lower left. A ball behind the
+        camera has a box of size 0; a ball that may show anywhere has the whole frame.
     """
     centres = balls[:, :3]
     radii = balls[:, 3]
@@ -71,20 +79,22 @@ def boxes_of(balls: NDArray[np.float64], pose: Pose, size: tuple[int, int]) -> N
     middle = -local[:, 2]
     near = middle - radii
     far = middle + radii
-    seen = np.isfinite(radii) if pose.orthographic else near > _CLOSEST * radii
-    scale = np.array(size) / (2 * pose.half_sizes(size[0] / size[1]))
-    # in perspective the nearest point of the ball's box is seen under the widest angle
-    corners = np.stack(
-        [
-            _on_screen(beside[seen] + side * radii[seen, None], depth[seen, None], pose)
-            for side in (-1, 1)
-            for depth in (near, far)
-        ]
-    )
-    origin = np.array(size) / 2
+    # balls whose box may be smaller than the frame
+    bounded = np.isfinite(radii) if pose.orthographic else near > _MIN_GAP_OF_BOX * radii
+    # corners of the box about the ball in the world; its front and its back may each show wider
+    corners = []
+    for side in (-1, 1):
+        for depth in (near, far):
+            corner = beside[bounded] + side * radii[bounded, None]
+            corners.append(_on_screen(corner, depth[bounded, None], pose))
+    corners_on_screen = np.stack(corners)
+    pixels_per_metre = np.array(size) / (2 * pose.half_sizes(size[0] / size[1]))
+    middle_of_frame = np.array(size) / 2
+    lower_left = middle_of_frame + pixels_per_metre * corners_on_screen.min(axis=0)
+    upper_right = middle_of_frame + pixels_per_metre * corners_on_screen.max(axis=0)
     boxes = np.tile([0, 0, *size], (len(radii), 1))
-    boxes[seen, :2] = np.clip(np.floor(origin + scale * corners.min(axis=0)), 0, size)
-    boxes[seen, 2:] = np.clip(np.ceil(origin + scale * corners.max(axis=0)), 0, size)
+    boxes[bounded, :2] = np.clip(np.floor(lower_left), 0, size)
+    boxes[bounded, 2:] = np.clip(np.ceil(upper_right), 0, size)
     boxes[far <= 0] = 0
     return boxes
 
@@ -92,7 +102,11 @@ def boxes_of(balls: NDArray[np.float64], pose: Pose, size: tuple[int, int]) -> N
 def _on_screen(
     beside: NDArray[np.float64], depth: NDArray[np.float64], pose: Pose
 ) -> NDArray[np.float64]:
-    """Where points beside the eye [k, 2], at depths [k, 1] [m], are off the middle of the frame; see `half_sizes`."""
+    """Offsets of points from the middle of the frame [k, 2] [m]; see `Pose.half_sizes`.
+
+    `beside` [k, 2] has the offsets of the points to the right and up of the eye [m], `depth` [k, 1]
+    the distances along the camera's axis [m].
+    """
     if pose.orthographic:
         return beside - depth * pose.shear
     return beside / depth - pose.shear
@@ -100,7 +114,8 @@ def _on_screen(
 
 def scissor_of(boxes: NDArray[np.int64]) -> tuple[int, int, int, int] | None:
     """Smallest scissor (left, lower, width, height) about boxes [k, 4]; None if all are empty."""
-    boxes = boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]
+    has_area = (boxes[:, :2] < boxes[:, 2:]).all(axis=1)
+    boxes = boxes[has_area]
     if not len(boxes):
         return None
     left, lower = (int(edge) for edge in boxes[:, :2].min(axis=0))

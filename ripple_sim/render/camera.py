@@ -26,9 +26,20 @@ from .pose import Pose
 
 @dataclass(frozen=True)
 class Camera:
-    """MuJoCo's free camera: looks at a point from a distance [m], at an azimuth and an elevation [degrees].
+    """MuJoCo's free camera, which looks at a point.
 
-    At azimuth 0 it looks along +x, at 90 along +y; a negative elevation looks down.
+    Attributes
+    ----------
+    lookat : tuple of float
+        Point that the camera looks at, in the world [m].
+    distance : float
+        Distance from the point [m].
+    azimuth : float
+        Direction of view about the vertical [degrees]: along +x at 0, along +y at 90.
+    elevation : float
+        Elevation of the direction of view [degrees]; a negative elevation looks down.
+    fovy : float
+        Vertical field of view [degrees].
     """
 
     lookat: tuple[float, float, float]
@@ -48,12 +59,11 @@ class Camera:
         if not (valid and self.distance > 0 and 0 < self.fovy < 180):
             raise RippleError(
                 f"camera {shown(self)} is invalid: lookat must be three numbers, every number "
-                f"finite, the distance "
-                "positive [m], and fovy between 0 and 180 degrees"
+                "finite, the distance positive [m], and fovy between 0 and 180 degrees"
             )
 
     def pose(self) -> Pose:
-        """Return position and axes in the world."""
+        """Return the camera's pose in the world."""
         azimuth, elevation = np.radians([self.azimuth, self.elevation])
         forward = np.array(
             [
@@ -64,13 +74,12 @@ class Camera:
         )
         right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
         rotation = np.stack([right, np.cross(right, forward), -forward], axis=1)
-        return Pose(
-            np.asarray(self.lookat) - self.distance * forward, rotation, self.distance, self.fovy
-        )
+        position = np.asarray(self.lookat) - self.distance * forward
+        return Pose(position, rotation, self.distance, self.fovy)
 
     @staticmethod
     def from_mjcf(model: Any, data: Any, name: str | int) -> FixedCamera:
-        """Return a camera of a MuJoCo model, by its name or its id, as posed in `data`.
+        """Return a camera of a MuJoCo model, by its name or its id, at its pose in `data`.
 
         Raises
         ------
@@ -84,27 +93,26 @@ class Camera:
 FixedCamera: TypeAlias = Pose
 
 
-# Both have a `pose()`; where the renderer takes a viewpoint, anything that has one will do.
+# Both have a method `pose()`. The renderer takes any object with such a method as a viewpoint.
 Viewpoint: TypeAlias = Camera | Pose
 
 
 def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> Viewpoint:
-    """The viewpoint of whatever stands for a camera, as posed in `data`.
+    """Return the viewpoint for a camera that is given in any way, at its pose in `data`.
 
-    Cameras of MuJoCo's see what they see in MuJoCo: orthographic ones, those with intrinsics, and
-    clip planes too.
+    MuJoCo's cameras show the same view as in MuJoCo, including parallel rays, intrinsics and clip
+    planes.
 
     Parameters
     ----------
     camera : Viewpoint, str, int or mujoco.MjvCamera
-        A viewpoint itself; the name or the id of a camera in the MJCF; -1 for MuJoCo's free camera,
-        aimed at the model's middle; or a camera of MuJoCo's that is free, tracks a body or is
-        fixed.
+        A viewpoint; the name or the id of a camera in the MJCF; -1 for MuJoCo's free camera, which
+        looks at the model's middle; or an `MjvCamera` that is free, tracks a body or is fixed.
 
     Raises
     ------
     SceneError
-        If it is anything else, or names what the model does not have.
+        If `camera` is anything else, or names a camera or body that the model does not have.
     """
     if callable(getattr(camera, "pose", None)):
         return camera

@@ -20,76 +20,91 @@ from .pose import Pose
 # model's middle than to the things that it shows.
 MIN_FOCUS_DISTANCE = 0.05
 
-
 # Least distance of the focus of a camera that a body carries [extents of the model]: such a camera
 # shows the body's surroundings.
 _MIN_FOCUS_DISTANCE_ON_BODY = 0.5
 
-
-_AT_BODY = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY)
-
-
-_AT_MASS = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM)
+# Modes of cameras that turn to a body, and to the centre of mass of its subtree.
+_TARGET_BODY = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODY)
+_TARGET_CENTRE_OF_MASS = int(mujoco.mjtCamLight.mjCAMLIGHT_TARGETBODYCOM)
 
 
 def mujoco_camera(model: mujoco.MjModel, camera: Any) -> mujoco.MjvCamera:
-    """What stands for a camera of MuJoCo's, see `find_viewpoint`, as an `MjvCamera` that fits the model.
+    """Return an `MjvCamera` that fits the model, for one of MuJoCo's cameras.
+
+    The camera is given by name, id or as an `MjvCamera`, see `find_viewpoint`.
 
     Raises
     ------
     SceneError
-        If it is anything else, or names what the model does not have.
+        If `camera` is anything else, or names a camera or body that the model does not have.
     """
-    kinds = mujoco.mjtCamera
     if isinstance(camera, numbers.Integral | str):
-        found = mujoco.MjvCamera()
-        if isinstance(camera, numbers.Integral) and camera == -1:
-            mujoco.mjv_defaultFreeCamera(model, found)
-        else:
-            found.type = kinds.mjCAMERA_FIXED
-            found.fixedcamid = mjcf_camera_id(model, camera)
-        return found
+        return _mujoco_camera_by_name(model, camera)
     if not isinstance(camera, mujoco.MjvCamera):
         raise SceneError(
             f"camera is {type(camera).__name__}; valid are a Camera, a FixedCamera, the name or "
-            f"the id of a camera in "
-            "the model, -1 for the free camera, and a mujoco.MjvCamera"
+            "the id of a camera in the model, -1 for the free camera, and a mujoco.MjvCamera"
         )
+    _check_mujoco_camera(model, camera)
+    return camera
+
+
+def _mujoco_camera_by_name(model: mujoco.MjModel, name: Any) -> mujoco.MjvCamera:
+    """Return an `MjvCamera` for a camera of the MJCF, by its name or id; -1 is the free camera."""
+    camera = mujoco.MjvCamera()
+    if isinstance(name, numbers.Integral) and name == -1:
+        mujoco.mjv_defaultFreeCamera(model, camera)
+    else:
+        camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        camera.fixedcamid = mjcf_camera_id(model, name)
+    return camera
+
+
+def _check_mujoco_camera(model: mujoco.MjModel, camera: mujoco.MjvCamera) -> None:
+    """Raise `SceneError` unless the type of an `MjvCamera` is known and its id is in the model."""
+    kinds = mujoco.mjtCamera
     if camera.type == kinds.mjCAMERA_FIXED:
         mjcf_camera_id(model, camera.fixedcamid)
     elif camera.type == kinds.mjCAMERA_TRACKING:
         if not 0 <= camera.trackbodyid < model.nbody:
             raise SceneError(
                 f"the MjvCamera's trackbodyid is {camera.trackbodyid}; valid are 0 to "
-                f"{model.nbody - 1}, the model's "
-                "bodies"
+                f"{model.nbody - 1}, the model's bodies"
             )
     elif camera.type != kinds.mjCAMERA_FREE:
         raise SceneError(
-            f"the MjvCamera's type is {camera.type}; valid are mjCAMERA_FREE "
-            f"({int(kinds.mjCAMERA_FREE)}), "
-            f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and mjCAMERA_FIXED "
-            f"({int(kinds.mjCAMERA_FIXED)})"
+            f"the MjvCamera's type is {camera.type}; valid are "
+            f"mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
+            f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and "
+            f"mjCAMERA_FIXED ({int(kinds.mjCAMERA_FIXED)})"
         )
-    return camera
 
 
 def mjcf_camera_id(model: mujoco.MjModel, name: Any) -> int:
-    """Id of a camera of the MJCF, given by its name or its id; raises `SceneError`, as `mujoco.Renderer` words it."""
-    named = isinstance(name, str)
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name) if named else int(name)
-    if not 0 <= index < model.ncam:
-        wrong = (
-            f'"{name}" does not exist'
-            if named
-            else f"id {index} is out of range [-1, {model.ncam})"
-        )
-        names = ", ".join(f"{model.camera(i).name!r} (id {i})" for i in range(model.ncam)) or "none"
-        shown_name = repr(name) if named else index
-        raise SceneError(
-            f"The camera {wrong}. The model has no camera {shown_name}; it has: {names}"
-        )
-    return index
+    """Id of a camera of the MJCF, by its name or its id.
+
+    Raises
+    ------
+    SceneError
+        If the model has no such camera. The message begins with the words of `mujoco.Renderer`.
+    """
+    is_name = isinstance(name, str)
+    kind = mujoco.mjtObj.mjOBJ_CAMERA
+    camera_id = mujoco.mj_name2id(model, kind, name) if is_name else int(name)
+    if 0 <= camera_id < model.ncam:
+        return camera_id
+    if is_name:
+        mistake = f'"{name}" does not exist'
+        shown_name = repr(name)
+    else:
+        mistake = f"id {camera_id} is out of range [-1, {model.ncam})"
+        shown_name = str(camera_id)
+    cameras = [f"{model.camera(i).name!r} (id {i})" for i in range(model.ncam)]
+    raise SceneError(
+        f"The camera {mistake}. The model has no camera {shown_name}; "
+        f"it has: {', '.join(cameras) or 'none'}"
+    )
 
 
 def pose_of_mjcf_camera(model: mujoco.MjModel, data: mujoco.MjData, name: str | int) -> Pose:
@@ -118,26 +133,26 @@ def pose_of_mjcf_camera(model: mujoco.MjModel, data: mujoco.MjData, name: str | 
 def pose_in_mujoco(
     model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera, distance: float
 ) -> Pose:
-    """What a camera of MuJoCo's sees in MuJoCo."""
+    """Pose with the view that an `MjvCamera` has in MuJoCo; `distance` is that of the focus [m]."""
     scene = mujoco.MjvScene()
     mujoco.mjv_updateCamera(model, data, camera, scene)
     return pose_of_scene(scene.camera, distance)
 
 
 def pose_of_scene(cameras: Sequence[mujoco.MjvGLCamera], distance: float) -> Pose:
-    """The camera of a scene of MuJoCo's, `mujoco.MjvScene.camera`, as `mjr_render` sees with it.
+    """Pose with the view that `mjr_render` has of a scene, from `mujoco.MjvScene.camera`.
 
     Parameters
     ----------
     cameras : sequence of mujoco.MjvGLCamera
-        Of the left and the right eye, whose mean it is.
+        The cameras of the left and the right eye; the view is that of their mean.
     distance : float
-        Of the focus, which a scene does not know [m].
+        Distance of the focus, which a scene does not contain [m].
 
     Raises
     ------
     SceneError
-        If they see nothing: they were never updated, or their frustum is empty.
+        If the cameras see nothing: they were never updated, or their frustum is empty.
     """
     left, right = cameras
     if left.orthographic != right.orthographic:
@@ -152,25 +167,24 @@ def pose_of_scene(cameras: Sequence[mujoco.MjvGLCamera], distance: float) -> Pos
     if not (0 < near < far and low < high):
         raise SceneError(
             f"the scene's camera sees nothing: its frustum is {low:g} m to {high:g} m high, from "
-            f"{near:g} m to {far:g} "
-            "m away; call mjv_updateScene or mjv_updateCamera, or set its frustum so that near is "
-            "positive and less "
-            "than far, and bottom less than top"
+            f"{near:g} m to {far:g} m away; call mjv_updateScene or mjv_updateCamera, or set its "
+            "frustum so that near is positive and less than far, and bottom less than top"
         )
     forward = np.array(camera.forward, dtype=np.float64)
     forward /= np.linalg.norm(forward)
     across = np.cross(forward, np.array(camera.up, dtype=np.float64))
     across /= np.linalg.norm(across)
-    # in perspective the frustum is that of the near plane
+    # in perspective MuJoCo measures the frustum at the near plane, a pose one metre from the eye
     scale = 1.0 if camera.orthographic else 1 / near
     half_height = scale * (high - low) / 2
+    fovy = float(np.degrees(2 * np.arctan(half_height)))
+    if camera.orthographic:
+        fovy = 2 * half_height  # [m]
     return Pose(
-        np.array(camera.pos, dtype=np.float64),
-        np.stack([across, np.cross(across, forward), -forward], axis=1),
-        distance,
-        fovy=2 * half_height
-        if camera.orthographic
-        else float(np.degrees(2 * np.arctan(half_height))),
+        position=np.array(camera.pos, dtype=np.float64),
+        rotation=np.stack([across, np.cross(across, forward), -forward], axis=1),
+        distance=distance,
+        fovy=fovy,
         orthographic=bool(camera.orthographic),
         centre=(scale * float(camera.frustum_center), scale * (low + high) / 2),
         half_width=scale * float(camera.frustum_width) or None,
@@ -181,16 +195,17 @@ def pose_of_scene(cameras: Sequence[mujoco.MjvGLCamera], distance: float) -> Pos
 def set_scene_camera(
     cameras: Sequence[mujoco.MjvGLCamera], pose: Pose, model: mujoco.MjModel
 ) -> None:
-    """Let both cameras of a scene of MuJoCo's see what a pose sees, through the middle of its lens.
+    """Give both cameras of a scene the view of a pose, through the middle of its lens.
 
-    Where the pose says nothing of clip planes they are the model's, but the near one no farther
-    than the pose needs.
+    Without clip planes of the pose, the model's are taken. The near plane is then at most as far
+    away as the pose's default, and the far plane lies at least twice as far as the focus.
     """
     extent = model.stat.extent
-    near, far = pose.clip or (
-        min(model.vis.map.znear * extent, pose.clip_planes[0]),
-        max(model.vis.map.zfar * extent, 2 * pose.distance),
-    )
+    if pose.clip:
+        near, far = pose.clip
+    else:
+        near = min(model.vis.map.znear * extent, pose.clip_planes[0])
+        far = max(model.vis.map.zfar * extent, 2 * pose.distance)
     scale = 1.0 if pose.orthographic else near
     for camera in cameras:
         camera.pos = pose.position
@@ -206,16 +221,16 @@ def set_scene_camera(
 
 
 def with_camera_poses(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """The data, or where no poses of cameras were ever computed a copy that has them and those of the lights.
+    """Return the data, or a copy with poses of cameras and lights if the data has none.
 
-    `mj_kinematics` alone leaves them at zero; it warns of that.
+    `mj_kinematics` alone leaves the poses of cameras at zero. A warning says so.
     """
     if not model.ncam or np.asarray(data.cam_xmat).any():
         return data
     warn_caller(
         "the data has no poses of cameras, which mj_kinematics alone does not compute: they are "
-        "computed for this "
-        "picture; call mj_forward, or mj_comPos and mj_camlight after mj_kinematics"
+        "computed for this picture; call mj_forward, or mj_comPos and mj_camlight after "
+        "mj_kinematics"
     )
     data = copy.copy(data)
     for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
@@ -224,19 +239,26 @@ def with_camera_poses(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjDa
 
 
 def _focus_distance(model: mujoco.MjModel, data: mujoco.MjData, camera: int) -> float:
-    """How far from a camera of the MJCF what it is about lies [m].
+    """Distance of the focus from a camera of the MJCF [m].
 
-    That is the body that it turns to; or, where a body carries it, the middle of all that moves
-    along; or else the model's middle.
+    The focus is the body that the camera turns to; or, for a camera that a moving body carries, the
+    centre of mass of everything that moves along; or else the model's middle.
     """
     position = data.cam_xpos[camera]
+    mode = model.cam_mode[camera]
     target = int(model.cam_targetbodyid[camera])
     carrier = int(model.cam_bodyid[camera])
-    extent = float(model.stat.extent)
-    if model.cam_mode[camera] in (_AT_BODY, _AT_MASS) and target >= 0:
-        aim = data.xpos[target] if model.cam_mode[camera] == _AT_BODY else data.subtree_com[target]
-        return max(float(np.linalg.norm(position - aim)), MIN_FOCUS_DISTANCE * extent)
-    if model.body_weldid[carrier]:  # which is 0 where it is fixed to the world
-        away = float(np.linalg.norm(position - data.subtree_com[model.body_rootid[carrier]]))
-        return max(away, _MIN_FOCUS_DISTANCE_ON_BODY * extent)
-    return max(float(np.linalg.norm(position - model.stat.center)), MIN_FOCUS_DISTANCE * extent)
+    # `body_weldid` is 0 for bodies that are fixed to the world
+    is_carried = bool(model.body_weldid[carrier])
+    min_distance = MIN_FOCUS_DISTANCE
+    if mode == _TARGET_BODY and target >= 0:
+        focus = data.xpos[target]
+    elif mode == _TARGET_CENTRE_OF_MASS and target >= 0:
+        focus = data.subtree_com[target]
+    elif is_carried:
+        focus = data.subtree_com[model.body_rootid[carrier]]
+        min_distance = _MIN_FOCUS_DISTANCE_ON_BODY
+    else:
+        focus = model.stat.center
+    distance = float(np.linalg.norm(position - focus))
+    return max(distance, min_distance * float(model.stat.extent))

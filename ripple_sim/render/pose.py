@@ -12,17 +12,18 @@ from ripple_sim.solver.errors import warn_caller
 
 from .projection import parallel_depth, perspective, perspective_depth, view_along
 
-# Clip planes of a camera that says nothing of them, in its distances.
-_NEAR = 0.02
+# Distances of the clip planes of a camera without any [distances of the focus].
+_DEFAULT_NEAR = 0.02
+_DEFAULT_FAR = 200.0
 
+# Relative round-off of MuJoCo's frustums, which have single precision.
+_FRUSTUM_ROUND_OFF = 1e-4
 
-_FAR = 200.0
+# The near plane is moved no farther than this share of the distance of the first ball in front.
+_NEAR_SHARE_OF_FIRST_BALL = 0.99
 
-
-_ROUND_OFF = 1e-4  # of MuJoCo's frustums, which have single precision, relative
-
-
-_SLACK = 0.99  # of the distance of the first thing, where the near plane may be
+# Least depth by which points are divided in perspective [m]; points behind the camera have less.
+_MIN_DEPTH = 1e-12
 
 
 @dataclass(frozen=True)
@@ -32,25 +33,26 @@ class Pose:
     Attributes
     ----------
     position : array, shape [3]
-        [m].
+        Position in the world [m].
     rotation : array, shape [3, 3]
         Its columns are right, up and backwards: a camera looks along -z, as in OpenGL and MuJoCo.
     distance : float
-        Of the focus, the point that the camera is about [m].
+        Distance of the focus, the point that the camera looks at [m].
     fovy : float
-        Vertical field of view [degrees]; of an orthographic camera the height of what it sees [m].
+        Vertical field of view [degrees]. Of an orthographic camera: height of the visible part of
+        the world [m].
     lens : tuple of float
-        The eye may be off the camera's position, at a point of the lens (to the right, up) [m].
-        Points of the plane in focus then stay where they are in the frame.
+        Offset of the eye from the camera's position, to a point of the lens (to the right, up) [m].
+        Points of the plane in focus stay at the same place of the frame.
     focal_distance : float
-        Of the plane in focus [m].
+        Distance of the plane in focus [m].
     orthographic : bool
         Whether rays are parallel, in place of a perspective view.
     centre : tuple of float
-        Where the middle of the frame is off the camera's axis (to the right, up): a metre in front
-        of the eye, or with parallel rays anywhere [m].
+        Offset of the frame's middle from the camera's axis (to the right, up) [m]. In perspective
+        it is measured one metre in front of the eye; with parallel rays it is the same everywhere.
     half_width : float, optional
-        Half the width of what is seen, there [m]; by default pixels are square.
+        Half the width of the frame, measured likewise [m]; by default pixels are square.
     clip : tuple of float, optional
         Distances of the near and the far plane [m]; by default they follow the distance of the
         focus.
@@ -69,71 +71,85 @@ class Pose:
 
     @property
     def eye(self) -> NDArray[np.float64]:
-        """Where the ray through the middle of the frame starts [m], shape [3]; in perspective all rays do."""
+        """Start of the ray through the middle of the frame [m], shape [3].
+
+        In perspective all rays start there.
+        """
         offset = np.add(self.lens, self.centre) if self.orthographic else np.asarray(self.lens)
         return self.position + self.rotation[:, :2] @ offset
 
     @property
     def shear(self) -> NDArray[np.float64]:
-        """How far the ray through the middle of the frame goes right and up, a metre in front of the eye."""
-        blur = -np.divide(self.lens, self.focal_distance)
-        return blur if self.orthographic else blur + self.centre
+        """Slope of the ray through the frame's middle: to the right and up, per metre ahead."""
+        lens_shear = -np.divide(self.lens, self.focal_distance)
+        return lens_shear if self.orthographic else lens_shear + self.centre
 
     @property
     def focus(self) -> NDArray[np.float64]:
-        """Point that the camera is about [m], shape [3]."""
+        """Point that the camera looks at [m], shape [3]."""
         return self.position - self.distance * self.rotation[:, 2]
 
     @property
     def clip_planes(self) -> tuple[float, float]:
         """Distances of the near and the far plane [m]."""
-        return self.clip or (_NEAR * self.distance, _FAR * self.distance)
+        return self.clip or (_DEFAULT_NEAR * self.distance, _DEFAULT_FAR * self.distance)
 
     def planes_about(self, balls: NDArray[np.float64]) -> tuple[float, float]:
-        """The clip planes, the near one moved on to the first of some balls [m].
+        """The clip planes, with the near plane moved forward to the first of some balls [m].
 
-        Depths are the more precise the farther away it is, and MuJoCo's is very near by default.
+        Depths are more precise with a farther near plane, and MuJoCo's default is very near.
         """
         near, far = self.clip_planes
         if self.clip is None or not len(balls):
             return near, far
+        radii = balls[:, 3]
         depth = (self.eye - balls[:, :3]) @ self.rotation[:, 2]
-        in_front = depth + balls[:, 3] > 0
-        first = float((depth - balls[:, 3])[in_front].min(initial=far))
-        return float(np.clip(_SLACK * first, near, max(near, far / 2))), far
+        in_front = depth + radii > 0
+        first = float((depth - radii)[in_front].min(initial=far))
+        farthest_near = max(near, far / 2)
+        near = float(np.clip(_NEAR_SHARE_OF_FIRST_BALL * first, near, farthest_near))
+        return near, far
 
     @property
     def half_height(self) -> float:
-        """Half the height of what is seen: a metre in front of the eye, or with parallel rays anywhere [m]."""
-        return self.fovy / 2 if self.orthographic else float(np.tan(np.radians(self.fovy) / 2))
+        """Half the height of the frame [m].
+
+        In perspective it is measured one metre in front of the eye.
+        """
+        if self.orthographic:
+            return self.fovy / 2
+        return float(np.tan(np.radians(self.fovy) / 2))
 
     def half_sizes(self, aspect: float) -> NDArray[np.float64]:
-        """Half the width and height of what is seen, likewise [m]; `aspect` is the frame's width over its height."""
+        """Half the width and half the height of the frame, measured like `half_height` [m].
+
+        `aspect` is the frame's width over its height.
+        """
         half_width = aspect * self.half_height if self.half_width is None else self.half_width
         return np.array([half_width, self.half_height])
 
     def is_plain(self, aspect: float) -> bool:
-        """Whether it is in perspective, looks along the middle of its frame, and has square pixels."""
-        centred = np.allclose(self.centre, 0.0, atol=_ROUND_OFF * self.half_height)
+        """Whether the view is in perspective, centred on its axis, with square pixels."""
+        centred = np.allclose(self.centre, 0.0, atol=_FRUSTUM_ROUND_OFF * self.half_height)
         return not self.orthographic and centred and self.has_square_pixels(aspect)
 
     def has_square_pixels(self, aspect: float) -> bool:
-        """Whether pixels of a frame of an aspect, width over height, are as wide as high."""
-        return bool(
-            np.isclose(self.half_sizes(aspect)[0], aspect * self.half_height, rtol=_ROUND_OFF)
-        )
+        """Whether pixels are as wide as high; `aspect` is the frame's width over its height."""
+        half_width, _ = self.half_sizes(aspect)
+        square = np.isclose(half_width, aspect * self.half_height, rtol=_FRUSTUM_ROUND_OFF)
+        return bool(square)
 
     def in_perspective(self, aspect: float, shown_by: str) -> Pose:
-        """For what can show no other: itself in plain perspective, where what is in focus has the same height.
+        """Return a pose in plain perspective, for viewers that can show no other.
 
-        It warns once that `shown_by` shows it otherwise than it is.
+        The plane in focus has the same height. A warning says once that `shown_by` changes the
+        view.
         """
         if self.is_plain(aspect):
             return self
         warn_caller(
             f"{shown_by} shows the camera in perspective, centred and with square pixels, which it "
-            f"is not; "
-            "RippleRenderer and ripple-sim render show it as it is"
+            "is not; RippleRenderer and ripple-sim render show it as it is"
         )
         half_height = self.half_height / self.distance if self.orthographic else self.half_height
         fovy = float(np.degrees(2 * np.arctan(half_height)))
@@ -142,15 +158,15 @@ class Pose:
         )
 
     def pose(self) -> Pose:
-        """Itself: a pose is a viewpoint."""
+        """Return the pose itself, so that a pose is a viewpoint."""
         return self
 
     def projection(
         self, aspect: float, planes: tuple[float, float] | None = None
     ) -> NDArray[np.float64]:
-        """Eye to clip coordinates, shape [4, 4]; see `view_matrix`.
+        """Matrix from eye to clip coordinates, shape [4, 4]; see `view_matrix`.
 
-        The `planes` are the clip planes by default.
+        `planes` are the distances of the near and the far plane [m], by default `clip_planes`.
         """
         near, far = planes or self.clip_planes
         if not self.orthographic and self.half_width is None:
@@ -165,17 +181,22 @@ class Pose:
         return projection
 
     def local(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Points [..., 3] of the world as the eye has them: to the right and up [..., 2], and distances [...] [m].
+        """Points of the world [..., 3] in the eye's frame.
 
-        The former are off the ray through the middle of the frame, the latter along the camera's
-        axis.
+        Returns
+        -------
+        array, shape [..., 2]
+            Offsets to the right and up from the ray through the middle of the frame [m].
+        array, shape [...]
+            Distances along the camera's axis [m].
         """
         local = (points - self.eye) @ self.rotation
         depth = -local[..., 2]
-        return local[..., :2] - depth[..., None] * self.shear, depth
+        beside = local[..., :2] - depth[..., None] * self.shear
+        return beside, depth
 
     def ways(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """From where the rays to points of the world start to the points, both [..., 3] [m]."""
+        """Vectors from the starts of rays to the points [..., 3] of the world that they hit [m]."""
         if not self.orthographic:
             return points - self.eye
         _, depth = self.local(points)
@@ -184,39 +205,47 @@ class Pose:
     def pixels(
         self, points: NDArray[np.float64], size: tuple[int, int]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where points of the world are in a frame of a size (width, height).
+        """Pixels that show points of the world, in a frame of a size (width, height).
 
         Returns
         -------
         array, shape [..., 2]
-            Columns and rows, from the frame's upper left corner [pixels]; nonsense behind a camera
-            in perspective.
+            Columns and rows, from the frame's upper left corner [pixels]. Points behind a camera in
+            perspective have meaningless ones.
         array, shape [...]
             Distances along the camera's axis [m].
         """
         beside, depth = self.local(points)
         if not self.orthographic:
-            beside = beside / np.maximum(depth, 1e-12)[..., None]
+            beside = beside / np.maximum(depth, _MIN_DEPTH)[..., None]
         scale = np.array(size) / (2 * self.half_sizes(size[0] / size[1]))
         return np.array(size) / 2 + scale * beside * [1, -1], depth
 
     def points(self, depth: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Points of the world [height, width, 3] that the pixels of a frame show at distances along the axis [m]."""
+        """Points of the world that the pixels of a frame show, shape [height, width, 3] [m].
+
+        `depth` [height, width] has the distances of the points along the camera's axis [m].
+        """
         height, width = depth.shape
         half_width, half_height = self.half_sizes(width / height)
         right = half_width * (2 * (np.arange(width) + 0.5) - width) / width
         up = half_height * (1 - 2 * (np.arange(height) + 0.5) / height)
-        offset = np.stack([*np.meshgrid(right, up), np.zeros((height, width))], axis=-1)
+        right_of_pixels, up_of_pixels = np.meshgrid(right, up)
+        offset = np.stack([right_of_pixels, up_of_pixels, np.zeros((height, width))], axis=-1)
         along = np.array([*self.shear, -1.0])
         depth = depth[..., None].astype(np.float64)
         local = offset + depth * along if self.orthographic else depth * (offset + along)
         return self.eye + local @ self.rotation.T
 
     def pixel_height(self, depth: float, height: int) -> float:
-        """Height of a pixel of a frame [m] at a distance along the axis [m]; `height` is the frame's [pixels]."""
-        return 2 * self.half_height * (1.0 if self.orthographic else depth) / height
+        """Height of a pixel [m] at a distance along the camera's axis [m].
+
+        `height` is the frame's [pixels].
+        """
+        distance = 1.0 if self.orthographic else depth
+        return 2 * self.half_height * distance / height
 
 
 def view_matrix(pose: Pose) -> NDArray[np.float64]:
-    """World to eye coordinates, shape [4, 4]."""
+    """Matrix from world to eye coordinates, shape [4, 4]."""
     return view_along(pose.rotation.T, pose.rotation.T @ pose.eye)

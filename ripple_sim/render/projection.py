@@ -7,17 +7,29 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def view_along(rotation: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World to eye coordinates, shape [4, 4]; `eye` is the eye's position along the rows of `rotation`."""
+    """Matrix from world to eye coordinates, shape [4, 4].
+
+    The rows of `rotation` are the directions right, up and backwards; `eye` is the eye's position
+    along those directions [m].
+    """
     return np.block([[rotation, -eye[:, None]], [np.array([0.0, 0.0, 0.0, 1.0])]])
 
 
 def perspective(
     fovy: float, aspect: float, near: float, far: float, shear: ArrayLike = (0.0, 0.0)
 ) -> NDArray[np.float64]:
-    """Eye to clip coordinates, shape [4, 4].
+    """Matrix from eye to clip coordinates in perspective, shape [4, 4].
 
-    `fovy` in degrees; `aspect` is width over height; `near` and `far` in metres; for `shear` see
-    `Pose`.
+    Parameters
+    ----------
+    fovy : float
+        Vertical field of view [degrees].
+    aspect : float
+        Width over height of the frame.
+    near, far : float
+        Distances of the clip planes [m].
+    shear : array_like, shape [2]
+        See `Pose.shear`.
     """
     scale = 1.0 / np.tan(np.radians(fovy) / 2)
     projection = np.zeros((4, 4))
@@ -29,17 +41,20 @@ def perspective(
 
 
 def perspective_depth(near: float, far: float) -> NDArray[np.float64]:
-    """What a perspective camera makes of the last two coordinates, shape [2, 2]."""
+    """Lower right block [2, 2] of a perspective camera's matrix: z and w from z and w."""
     return np.array([[(near + far) / (near - far), 2 * near * far / (near - far)], [-1.0, 0.0]])
 
 
 def parallel_depth(near: float, far: float) -> NDArray[np.float64]:
-    """What an orthographic camera makes of the last two coordinates, shape [2, 2]."""
+    """Lower right block [2, 2] of an orthographic camera's matrix: z and w from z and w."""
     return np.array([[2 / (near - far), (near + far) / (near - far)], [0.0, 1.0]])
 
 
 def orthographic(half_width: float, depth: float) -> NDArray[np.float64]:
-    """Eye to clip coordinates of a square box from 0 to `depth` [m] in front of the eye, shape [4, 4]."""
+    """Matrix from eye to clip coordinates with parallel rays, shape [4, 4].
+
+    It shows a square box from 0 to `depth` [m] in front of the eye.
+    """
     matrix = np.diag([1 / half_width, 1 / half_width, -2 / depth, 1.0])
     matrix[2, 3] = -1.0
     return matrix
