@@ -14,31 +14,31 @@ from ripple_sim.render.resources import Resources
 from .floor import Floor
 from .shadows import ShadowMaps
 
+# Texels along a side of the picture of the objects above the floor, from below.
 _CEILING_SIZE = 224
 
-
+# Texels along a side of the floor map.
 _MAP_SIZE = 112
 
-
-# of mipmaps that are looked up
+# Highest mipmap levels that shaders look up: of the occlusion, and of the light of the occluders.
 _MAP_LEVELS = 5
-
-
 _BOUNCE_LEVELS = 3
 
-
-_INFLUENCE = 0.8  # radius, in half widths of the map
+# Distance up to which an object darkens the floor [half widths of the floor map].
+_OCCLUSION_REACH = 0.8
 
 
 class FloorOcclusion:
-    """The floor map: its ambient visibility (1 - occlusion), where shadows may fall, and the light of what occludes it.
+    """The floor map: three textures over the square of the floor below the objects.
 
-    Without a floor there is a single texel, which counts nowhere.
+    They contain the floor's ambient visibility (1 - occlusion) and places where shadows may fall,
+    the light that occluders throw on the floor, and the floor's light as objects see it. Without a
+    floor there is a single texel, whose value has no effect.
 
     Parameters
     ----------
     options : mapping
-        Defines of the light as for `DeferredShading`.
+        Defines of the light, as for `DeferredShading`.
     floor : Floor, optional
     """
 
@@ -47,7 +47,10 @@ class FloorOcclusion:
     ) -> None:
         self._floor = floor
         if floor is None:
-            self._map = self._seen = self._bounce = resources.texture((1, 1), 4, bytes(4))
+            texel = resources.texture((1, 1), 4, bytes(4))
+            self._map = texel
+            self._bounce = texel
+            self._seen = texel
             return
         self._pass = resources.vertex_array(
             resources.program("passes/floor_occlusion", **options, TILES=0), []
@@ -58,23 +61,22 @@ class FloorOcclusion:
         self._ceiling_framebuffer = resources.framebuffer(
             [self._ceiling], resources.depth_renderbuffer(ceiling)
         )
-        self._map, self._bounce, self._seen = maps = [
-            resources.clamped_texture((_MAP_SIZE, _MAP_SIZE), components, mipmaps=True, dtype=dtype)
-            for components, dtype in ((2, "f2"), (4, "f2"), (4, "f1"))
-        ]
-        self._map_framebuffer = resources.framebuffer(maps)
+        size = _MAP_SIZE, _MAP_SIZE
+        self._map = resources.clamped_texture(size, 2, mipmaps=True, dtype="f2")
+        self._bounce = resources.clamped_texture(size, 4, mipmaps=True, dtype="f2")
+        self._seen = resources.clamped_texture(size, 4, mipmaps=True, dtype="f1")
+        self._map_framebuffer = resources.framebuffer([self._map, self._bounce, self._seen])
 
     def look_up(self, ctx: moderngl.Context, cast: Callable[..., None]) -> None:
-        """Draw what is above the floor from below, with the scene's `cast`."""
+        """Draw the objects above the floor from below; `cast` is `DrawnScene.cast`."""
         floor = self._floor
         if floor is None:
             return
-        # height above the floor becomes depth; this mirrors the scene: what faces the floor goes
-        # clockwise
-        turned = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
-        view = view_along(
-            turned, turned @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2])
-        )
+        # The height above the floor becomes the depth. The view is a mirror image, in which
+        # triangles that face the floor are clockwise.
+        rotation = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
+        middle = floor.origin + floor.rotation[:, :2] @ floor.centre[:2]
+        view = view_along(rotation, rotation @ middle)
         matrix = orthographic(floor.half_width, floor.half_width) @ view
         self._ceiling_framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
@@ -84,7 +86,7 @@ class FloorOcclusion:
         ctx.front_face = "ccw"
 
     def shade(self, ctx: moderngl.Context, shadows: ShadowMaps) -> None:
-        """Fill the map from the height of what is above, and from the shadows."""
+        """Fill the map from the heights of the objects above the floor, and from the shadows."""
         floor = self._floor
         if floor is None:
             return
@@ -95,7 +97,7 @@ class FloorOcclusion:
         self._pass.program["extent"] = (
             2 * floor.half_width,
             floor.half_width,
-            _INFLUENCE * floor.half_width,
+            _OCCLUSION_REACH * floor.half_width,
         )
         self._pass.render(moderngl.TRIANGLES, vertices=3)
 

@@ -15,56 +15,70 @@ from ripple_sim.render.projection import orthographic, perspective, view_along
 from ripple_sim.render.resources import Resources
 from ripple_sim.render.visuals.lights import Light
 
-# Texels along a side: as many as make one about as wide as a pixel, where the casters fill the
-# frame.
-_LEAST = 512
+# Texels along a side of a map. A texel is about as wide as a pixel of the frame, where the casters
+# fill the frame.
+_MIN_SIZE = 512
+_MAX_SIZE = 1536
+_TEXELS_PER_PIXEL = 1.4
+_SIZE_STEP = 256
 
+# Width of the widest penumbra, as a share of the map's width.
+_MAX_PENUMBRA = 0.15
 
-_MOST = 1536
+# Widest field of view of a map of a near light [degrees].
+_MAX_FOV = 130.0
 
+# How far behind the casters shadows are drawn [radii of the ball about the casters].
+_SHADOW_LENGTH = 30.0
 
-_PER_PIXEL = 1.4
-
-
-_STEP = 256
-
-
-_WIDEST = 0.15  # penumbra, as a share of the map
-
-
-_STEEPEST_FOV = 130.0  # [degrees]
-
-
-_REACH = 30.0  # how far behind the casters shadows fall, in radii of the casters' ball
-
-
+# Edge of the square of shadow texels that a texel of the blockers stands for.
 _TEXELS_PER_BLOCKER = 4
 
+# Mipmap levels of the blockers: a texel of the last is as wide as twice the widest penumbra.
+_BLOCKER_LEVELS = 7
 
-_LEVELS = 7  # of mipmaps of the blockers: as wide as twice the widest penumbra
+# From clip coordinates, -1 to 1, to places in a shadow map, 0 to 1.
+_CLIP_TO_MAP = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]])
+
+# A light within this many radii of the casters' centre takes the widest field of view.
+_NEAR_CASTERS = 1.1
+
+# The half angle of a near light's view is rounded up to multiples of 1/64 [rad], so that shadow
+# edges do not crawl.
+_HALF_ANGLE_STEPS = 64
+
+# The near plane lies halfway between the light and the casters, but at least at this share of the
+# far plane's distance.
+_MIN_NEAR_SHARE = 0.004
+
+# A view whose direction has at least this vertical part takes y in place of z as its upward helper.
+_NEARLY_VERTICAL = 0.999
 
 
 class ShadowMaps:
-    """Square depth maps, side by side, of the scene as the lights see it.
+    """Square depth maps of the scene, seen from the lights, side by side in one texture.
 
     Parameters
     ----------
     count : int
         How many lights may cast shadows, 1 to MAX_SHADOWS.
     height : int
-        Of the frame [pixels].
+        Height of the frame [pixels].
 
     Attributes
     ----------
     size : int
-        Texels along a side.
+        Texels along a side of a map.
     views : list
-        Matrices of 16 numbers, column by column, of the lights that cast shadows in this frame.
+        A matrix from the world to clip coordinates for each light that casts shadows in this frame:
+        16 numbers, column by column.
     """
 
     def __init__(self, resources: Resources, count: int, height: int) -> None:
         self._count = count
-        self.size = size = int(np.clip(_STEP * round(_PER_PIXEL * height / _STEP), _LEAST, _MOST))
+        steps = round(_TEXELS_PER_PIXEL * height / _SIZE_STEP)
+        size = int(np.clip(_SIZE_STEP * steps, _MIN_SIZE, _MAX_SIZE))
+        self.size = size
         self.views: list[tuple[float, ...]] = []
         self._depth = resources.depth_texture((count * size, size))
         self._depth.compare_func = ""
@@ -84,23 +98,33 @@ class ShadowMaps:
     def fit(
         self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float
     ) -> list[Light]:
-        """Aim the maps at a ball [m] that contains all casters, set the frame's shadows, and return their lights."""
+        """Aim the maps at a ball that contains all casters, and set the shadows of the frame.
+
+        Parameters
+        ----------
+        centre : array, shape [3]
+            Centre of the ball [m].
+        radius : float
+            Radius of the ball [m].
+
+        Returns
+        -------
+        list of Light
+            The lights that cast shadows, in the order of their maps.
+        """
         casting = [light for light in lights if light.shadow][: self._count]
         self.views = []
         for shadow, light in zip(frame.values["shadows"], casting, strict=False):
-            aim = _fit_far if light.position is None else _fit_near
-            matrix = aim(shadow, light, self.size, centre, radius)
-            to_map = (
-                np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]])
-                @ matrix
-            )
-            shadow["matrix"] = to_map.T
-            shadow["planes"] = np.linalg.inv(to_map)
-            self.views.append(tuple(matrix.T.ravel()))
+            fit_light = _fit_far_light if light.position is None else _fit_near_light
+            world_to_clip = fit_light(shadow, light, self.size, centre, radius)
+            world_to_map = _CLIP_TO_MAP @ world_to_clip
+            shadow["matrix"] = world_to_map.T  # column by column
+            shadow["planes"] = np.linalg.inv(world_to_map)
+            self.views.append(tuple(world_to_clip.T.ravel()))
         return casting
 
     def draw(self, cast: Callable[..., None]) -> None:
-        """Draw all maps, with the scene's `cast`."""
+        """Draw all maps; `cast` is `DrawnScene.cast`."""
         for index, view in enumerate(self.views):
             self._target.viewport = (index * self.size, 0, self.size, self.size)
             self._target.use()
@@ -109,13 +133,13 @@ class ShadowMaps:
             cast(CasterMap.DEPTH, matrix=view)
 
     def find_blockers(self, ctx: moderngl.Context) -> None:
-        """Prefilter the maps for the search for blockers."""
+        """Filter the maps in advance for the search for blockers, which widen penumbras."""
         self._blockers_target.use()
         self._depth.use(Unit.SHADOW_MAPS)
         ctx.disable(moderngl.DEPTH_TEST)
         self._find_blockers.render(moderngl.TRIANGLES, vertices=3)
         ctx.enable(moderngl.DEPTH_TEST)
-        self._blockers.build_mipmaps(max_level=_LEVELS)
+        self._blockers.build_mipmaps(max_level=_BLOCKER_LEVELS)
 
     def bind(self) -> None:
         """Bind the maps for the shaders, once with and once without the depth test."""
@@ -125,67 +149,76 @@ class ShadowMaps:
         self._blockers.use(Unit.BLOCKERS)
 
 
-def _fit_far(
+def _fit_far_light(
     shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float
 ) -> NDArray[np.float64]:
-    """Fit a box to the ball; it grows in coarse steps and moves by whole texels, so that shadow edges do not crawl.
+    """Fit the box of a far light's parallel rays to the ball, and set the shadow's uniforms.
 
-    It extends behind the ball, where the shadows fall.
+    The box grows in coarse steps and moves by whole texels, so that shadow edges do not crawl. It
+    extends behind the ball, where the shadows fall. Returns the matrix from the world to clip
+    coordinates, shape [4, 4].
     """
-    half_width = 2.0 ** (np.ceil(4 * np.log2(radius)) / 4)
-    texel = 2 * half_width / size
+    half_width = 2.0 ** (np.ceil(4 * np.log2(radius)) / 4)  # [m], in steps of a quarter octave
+    texel = 2 * half_width / size  # [m]
     rotation = _axes(light.direction)
     eye = rotation @ centre
     eye[:2] = np.round(eye[:2] / texel) * texel
     eye[2] += half_width
-    depth = (2 + _REACH) * half_width
+    depth = (2 + _SHADOW_LENGTH) * half_width
     shadow["depth"] = depth, 0, 0, 1
     shadow["width"] = 2 * half_width, 0, size, 0
-    shadow["penumbra"] = light.size, 0, _WIDEST, 0
+    shadow["penumbra"] = light.size, 0, _MAX_PENUMBRA, 0
     return orthographic(half_width, depth) @ view_along(rotation, eye)
 
 
-def _fit_near(
+def _fit_near_light(
     shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float
 ) -> NDArray[np.float64]:
-    """Fit the light's view to the ball, no wider than its beam."""
+    """Fit a near light's view to the ball, no wider than its beam, and set the shadow's uniforms.
+
+    Returns the matrix from the world to clip coordinates, shape [4, 4].
+    """
     position: Any = light.position
-    away = float(np.linalg.norm(centre - position))
-    towards = light.direction if away < radius else (position - centre) / away
-    widest = np.radians(_STEEPEST_FOV / 2)
-    half = widest if away < 1.1 * radius else min(float(np.arcsin(radius / away)), widest)
-    if light.cutoff < half:
+    distance = float(np.linalg.norm(centre - position))  # [m]
+    # backwards along the view
+    towards = light.direction if distance < radius else (position - centre) / distance
+    max_half_angle = np.radians(_MAX_FOV / 2)
+    half_angle = max_half_angle
+    if distance >= _NEAR_CASTERS * radius:
+        half_angle = min(float(np.arcsin(radius / distance)), max_half_angle)
+    if light.cutoff < half_angle:
         towards = light.direction
-        half = light.cutoff
-    half = np.ceil(half * 64) / 64
-    far = away + _REACH * radius
-    near = max(0.5 * (away - radius), 0.004 * far)
+        half_angle = light.cutoff
+    half_angle = np.ceil(half_angle * _HALF_ANGLE_STEPS) / _HALF_ANGLE_STEPS
+    far = distance + _SHADOW_LENGTH * radius
+    near = max(0.5 * (distance - radius), _MIN_NEAR_SHARE * far)
     shadow["depth"] = 0, near * far, near - far, far
-    shadow["width"] = 0, 2 * np.tan(half), size, 0
-    shadow["penumbra"] = 0, light.size, _WIDEST, 0
+    shadow["width"] = 0, 2 * np.tan(half_angle), size, 0
+    shadow["penumbra"] = 0, light.size, _MAX_PENUMBRA, 0
     rotation = _axes(towards)
-    return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ view_along(
-        rotation, rotation @ position
-    )
+    projection = perspective(float(np.degrees(2 * half_angle)), 1.0, near, far)
+    return projection @ view_along(rotation, rotation @ position)
 
 
 def _axes(back: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows right, up and back of a view along -back."""
-    helper = [0.0, 0.0, 1.0] if abs(back[2]) < 0.999 else [0.0, 1.0, 0.0]
+    """Right, up and back, the rows [3, 3], of a view along -back."""
+    helper = [0.0, 0.0, 1.0] if abs(back[2]) < _NEARLY_VERTICAL else [0.0, 1.0, 0.0]
     right = np.cross(helper, back)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(back, right), back])
 
 
 class TransmissionMaps:
-    """Square maps in colour, side by side, of the transparent objects of a scene as the lights see them.
+    """Square maps of the light that transparent objects let through, seen from the lights.
+
+    The maps are in colour, side by side in one texture.
 
     Parameters
     ----------
     count : int
         How many lights may cast shadows, 1 to MAX_SHADOWS.
     size : int
-        Texels along a side.
+        Texels along a side of a map.
     """
 
     def __init__(self, resources: Resources, count: int, size: int) -> None:
@@ -196,7 +229,7 @@ class TransmissionMaps:
         )
 
     def draw(self, views: Sequence[tuple[float, ...]], cast: Callable[..., None]) -> None:
-        """Draw all maps, of the lights' `ShadowMaps.views`, with the scene's `cast`."""
+        """Draw all maps for `ShadowMaps.views`; `cast` is `DrawnScene.cast`."""
         self._target.viewport = (0, 0, *self._target.size)
         self._target.use()
         self._target.clear(depth=1.0)
