@@ -30,7 +30,8 @@ except ImportError as error:
         "install 'ripple-sim[gymnasium]'"
     ) from error
 
-_SIZE = 480  # of frames where an environment does not say [pixels]
+# Width and height of frames where an environment gives none [pixels].
+_DEFAULT_SIZE = 480
 
 
 def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -51,7 +52,9 @@ def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
 def frame_size(env: Any) -> tuple[int, int]:
     """Width and height of an environment's frames [pixels]."""
     viewer = getattr(env, "mujoco_renderer", env)
-    return getattr(viewer, "width", None) or _SIZE, getattr(viewer, "height", None) or _SIZE
+    width = getattr(viewer, "width", None) or _DEFAULT_SIZE
+    height = getattr(viewer, "height", None) or _DEFAULT_SIZE
+    return width, height
 
 
 def environment_camera(
@@ -70,8 +73,8 @@ def environment_camera(
     for name, value in (getattr(viewer, "default_cam_config", None) or {}).items():
         setattr(camera, name, value)
     camera.fixedcamid = int(getattr(viewer, "camera_id", -1))
-    free = camera.fixedcamid == -1
-    camera.type = mujoco.mjtCamera.mjCAMERA_FREE if free else mujoco.mjtCamera.mjCAMERA_FIXED
+    is_free = camera.fixedcamid == -1
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE if is_free else mujoco.mjtCamera.mjCAMERA_FIXED
     return camera
 
 
@@ -136,9 +139,9 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         sensors: Mapping[str, Mapping[str, Any]] | None = None,
         **options: Any,
     ) -> None:
-        given = {"looks": looks, "lighting": lighting, "sensors": sensors, **options}
-        RecordConstructorArgs.__init__(self, materials=materials, **given)
-        EzPickle.__init__(self, env, materials, **given)
+        arguments = {"looks": looks, "lighting": lighting, "sensors": sensors, **options}
+        RecordConstructorArgs.__init__(self, materials=materials, **arguments)
+        EzPickle.__init__(self, env, materials, **arguments)
         gymnasium.Wrapper.__init__(self, env)
         if self.render_mode not in (None, *DRAWN_MODES):
             warn_caller(
@@ -149,16 +152,22 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         self._looks = looks
         self._options = options
         self._lighting = lighting
+        # of MuJoCo's free camera [m], once it is used
         self._lookat: NDArray[np.float64] | None = None
         self._renders_by_itself = True
         self._in_place = None
+        # arguments of each sensor
+        self._sensor_arguments = sensors or {}
         # samples of each sensor in a control step
-        self._given = sensors or {}
         self._counts = dict[str, int]()
+        # samples of each sensor that no observation had yet
         self._blocks: dict[str, NDArray[np.float32]] = {}
         self._couple()
-        if not self._given:
-            return
+        if self._sensor_arguments:
+            self.observation_space = self._space_with_sensors()
+
+    def _space_with_sensors(self) -> gymnasium.spaces.Dict:
+        """The environment's space of observations, with those of the sensors beside it."""
         own = self.env.observation_space
         spaces = (
             dict(own.spaces) if isinstance(own, gymnasium.spaces.Dict) else {"observation": own}
@@ -174,7 +183,7 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             shape = round(count), len(sensor.points)
             self._counts[name] = shape[0]
             spaces[name] = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
-        self.observation_space = gymnasium.spaces.Dict(spaces)
+        return gymnasium.spaces.Dict(spaces)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Step the environment, and the ripples with each of its physics steps."""
@@ -264,12 +273,10 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         if self._in_place is not None:
             self._in_place.close()
         self._in_place = None
-        self._sensors = {
-            name: self.ripples[given["geom"]].sensor(
-                **{key: value for key, value in given.items() if key != "geom"}
-            )
-            for name, given in self._given.items()
-        }
+        self._sensors = {}
+        for name, arguments in self._sensor_arguments.items():
+            others = {key: value for key, value in arguments.items() if key != "geom"}
+            self._sensors[name] = self.ripples[arguments["geom"]].sensor(**others)
 
     def _sensed(self, observation: Any) -> Any:
         """An observation with the next block of each sensor, if there are any."""
@@ -277,8 +284,8 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
             return observation
         blocks = {}
         for name, sensor in self._sensors.items():
-            there = np.concatenate([self._blocks[name], sensor.read().values])
-            blocks[name], self._blocks[name] = np.split(there, [self._counts[name]])
+            samples = np.concatenate([self._blocks[name], sensor.read().values])
+            blocks[name], self._blocks[name] = np.split(samples, [self._counts[name]])
         own = isinstance(self.env.observation_space, gymnasium.spaces.Dict)
         return {**(observation if own else {"observation": observation}), **blocks}
 

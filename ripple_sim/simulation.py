@@ -17,13 +17,14 @@ from ripple_sim.coupling.target import Target
 from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.scene_file import RippleEntry, apply_maps, uniform_material
+from ripple_sim.scene.scene_file import RippleEntry, SensorEntry, apply_maps, uniform_material
 from ripple_sim.scene.target_maps import rim_of
 from ripple_sim.solver.compile_clock import work_clock
 from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
+from ripple_sim.solver.waves.sensor import Sensor
 
-# More is a mistake in a unit, and would seem to hang.
-_MOST_STEPS_PER_FRAME = 100_000
+# More physics steps in a frame are a mistake in a unit, and would seem to hang.
+_MAX_STEPS_PER_FRAME = 100_000
 
 
 class Simulation:
@@ -93,47 +94,53 @@ class Simulation:
         self.scene = scene
         self._on_step = on_step
         self.model = copy.copy(scene.model)
-        # the smallest number of equal steps that are no longer than the model's
-        timestep = self.model.opt.timestep
-        steps = 1 / (fps * timestep)
-        if not steps < _MOST_STEPS_PER_FRAME:
-            raise SceneError(
-                f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are "
-                f"at most {_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
-            )
-        self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
-        self.model.opt.timestep = 1 / (fps * self.steps_per_frame)
+        self._divide_frames(fps)
         self.data = mujoco.MjData(self.model)
+        targets = {
+            entry.geom: self._target(entry, resolution, layout, rim) for entry in scene.targets
+        }
         self.ripples = Ripples(
-            self.model,
-            {entry.geom: self._target(entry, resolution, layout, rim) for entry in scene.targets},
-            backend=backend,
-            operator=operator,
-            two_way=scene.two_way,
+            self.model, targets, backend=backend, operator=operator, two_way=scene.two_way
         )
         self.limited = {}
         for entry in scene.targets:
             apply_maps(self.ripples, entry)
-            self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
-        shaped = {entry.geom: entry.height for entry in scene.targets if entry.height is not None}
-        self._heights = {
-            geom: height.heights(self.ripples, geom) for geom, height in shaped.items()
-        }
+            name = target_name(self.model, find_target(self.model, entry.geom))
+            self.limited[name] = entry.limit
+        # heights at the beginning [m], by geom
+        self._heights = {}
+        for entry in scene.targets:
+            if entry.height is not None:
+                self._heights[entry.geom] = entry.height.heights(self.ripples, entry.geom)
+        # materials at the beginning, by geom
         self._materials = {name: self.ripples[name].material for name in self.ripples}
-        self.physics_seconds = self.wave_seconds = 0.0
+        # work so far [s]
+        self.physics_seconds = 0.0
+        self.wave_seconds = 0.0
         self.reset()
-        self.sensors = {}
-        for sensor in scene.sensors:
-            points = [sensor.point] if sensor.point is not None else sensor.points
-            at = (
-                sensor.site
-                if sensor.site is not None
-                else self.ripples.to_geom(sensor.geom, points)
+        self.sensors = {entry.name: self._sensor(entry) for entry in scene.sensors}
+
+    def _divide_frames(self, fps: float) -> None:
+        """Shorten the model's time step, so that a frame is a whole number of equal steps."""
+        timestep = self.model.opt.timestep
+        steps = 1 / (fps * timestep)
+        if not steps < _MAX_STEPS_PER_FRAME:
+            raise SceneError(
+                f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are "
+                f"at most {_MAX_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
             )
-            waves = self.ripples[sensor.geom]
-            self.sensors[sensor.name] = waves.sensor(
-                at, sensor.kind, sensor.rate, thickness=sensor.thickness
-            )
+        self.steps_per_frame = max(1, math.ceil(steps - 1e-9))
+        self.model.opt.timestep = 1 / (fps * self.steps_per_frame)
+
+    def _sensor(self, entry: SensorEntry) -> Sensor:
+        """Have a sensor of the scene listen to its surface."""
+        if entry.site is not None:
+            place: Any = entry.site
+        else:
+            points = [entry.point] if entry.point is not None else entry.points
+            place = self.ripples.to_geom(entry.geom, points)
+        waves = self.ripples[entry.geom]
+        return waves.sensor(place, entry.kind, entry.rate, thickness=entry.thickness)
 
     def _target(
         self, entry: RippleEntry, resolution: int | None, layout: str | None, rim: str | None
@@ -219,7 +226,8 @@ class Simulation:
         with physics_errors():
             mujoco.mj_step(self.model, self.data)
         stepped = work_clock()
-        if (broken := divergence(self.data)) is not None:
+        broken = divergence(self.data)
+        if broken is not None:
             raise SimulationError(
                 f"the physics became unstable at {self.data.time:.4g} s ({broken}); use a shorter "
                 "time step in the MJCF's <option>, or softer contacts"

@@ -12,6 +12,7 @@ from .contacts import (
     places_facing as places_facing,
 )
 from .energy import Energy as Energy, VelocityChange as VelocityChange
+from .flex_contacts import FlexContacts as FlexContacts
 from .geoms import (
     TARGET_TYPES as TARGET_TYPES,
     ByGeom as ByGeom,
@@ -22,6 +23,7 @@ from .geoms import (
     geom_name as geom_name,
     target_name as target_name,
 )
+from .high_pass import HighPass as HighPass, coarse_motions as coarse_motions
 from .hooks import (
     adopt_warnings as adopt_warnings,
 )
@@ -32,7 +34,6 @@ from .load import (
 )
 from .model import (
     CoupledModel as CoupledModel,
-    FlexContacts as FlexContacts,
     find_flex_colliders as find_flex_colliders,
     flex_thickness as flex_thickness,
 )
@@ -55,9 +56,7 @@ from .rest_filter import (
 )
 from .ripples import Impulse as Impulse, Ripples as Ripples
 from .soft import (
-    HighPass as HighPass,
     SoftSurface as SoftSurface,
-    coarse_motions as coarse_motions,
     first_flex as first_flex,
     first_skin as first_skin,
     is_soft as is_soft,

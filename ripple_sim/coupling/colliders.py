@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import importlib.metadata
+import itertools
 from collections.abc import Sequence
 
 import mujoco
@@ -34,37 +35,42 @@ ROUTES = ("auto", "sdf", "flex", "convex", "hull")
 # Starting points of MuJoCo's search for contacts with a signed distance. Fewer miss contacts; its
 # default of 40 takes five times as long.
 SDF_INITPOINTS = 10
-# MuJoCo makes room for as many contacts of a pair, but finds up to 50 where the other geom is a
-# mesh.
+
+# The same where another geom is a mesh. MuJoCo makes room for as many contacts of a pair, but finds
+# up to 50 with a mesh.
 _MESH_INITPOINTS = 50
 
 # CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface.
 # With a third of its usual iterations it finds as good cuts in half the time.
 _DECOMPOSITION = {"threshold": 0.05, "mcts_iterations": 60, "seed": 0}
 
-# What a geom's stand-ins collide like.
-_SETTINGS = ("contype", "conaffinity", "condim", "priority", "solmix", "gap")
-_LISTS = ("friction", "solref", "solimp")
+# Contact settings that the colliders of a geom take from it: numbers, and arrays.
+_NUMBER_SETTINGS = ("contype", "conaffinity", "condim", "priority", "solmix", "gap")
+_ARRAY_SETTINGS = ("friction", "solref", "solimp")
 
-# MuJoCo's viewers and ours do not show this group.
-_HIDDEN = 3
+# Group of the colliders: MuJoCo's viewers and ours do not show it.
+_HIDDEN_GROUP = 3
 
-# Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
+# Thicknesses of a flex over the mesh's size: the first within the tolerance is taken, or the last.
 _THICKNESSES = (0.05, 0.04, 0.03, 0.02)
 
 # Thickness of a sheet over its size, on either side.
-_SHEET = 0.01
+_SHEET_THICKNESS = 0.01
 
-# Vertices at sharp corners move by this many thicknesses at most; those of a cube need 1.73.
-_SHARPEST = 2.0
+# Thicknesses by which vertices at sharp corners move at most; those of a cube need 1.73.
+_MAX_CORNER_SHIFT = 2.0
 
 # Weight of the isotropic term over that of the triangles' planes: it settles the directions that
 # they leave open.
-_ROUNDING = 1e-3
+_ISOTROPIC_WEIGHT = 1e-3
 
-# Vertices move by this share of the local thickness at most, so that opposite sides of a thin part
+# Share of the local thickness by which vertices move at most, so that opposite sides of a thin part
 # stay apart.
-_DEEPEST = 0.45
+_MAX_INSET_SHARE = 0.45
+
+# Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the
+# surface [m].
+FlexCore = tuple[NDArray[np.float64], NDArray[np.int64], float]
 
 
 def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujoco.MjsGeom:
@@ -133,22 +139,24 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     if not (found.contype or found.conaffinity):
         found.contype = found.conaffinity = 1
     if found.meshname and route == "sdf":
-        others = (
-            each
-            for each in spec.geoms
-            if each.name != found.name and (each.contype or each.conaffinity)
-        )
-        choose, count = (
-            (max, _MESH_INITPOINTS)
-            if any(each.meshname for each in others)
-            else (min, SDF_INITPOINTS)
-        )
-        spec.option.sdf_initpoints = choose(spec.option.sdf_initpoints, count)
+        _enlarge_sdf_search(spec, found.name)
     if core is not None:
         add_flex_collider(spec, found, core)
     if parts is not None:
         add_convex_collider(spec, found, parts)
     return found
+
+
+def _enlarge_sdf_search(spec: mujoco.MjSpec, name: str) -> None:
+    """Give MuJoCo's search for contacts with an SDF geom as many starting points as it needs."""
+    others = [
+        geom for geom in spec.geoms if geom.name != name and (geom.contype or geom.conaffinity)
+    ]
+    count = spec.option.sdf_initpoints
+    if any(geom.meshname for geom in others):
+        spec.option.sdf_initpoints = max(count, _MESH_INITPOINTS)
+    else:
+        spec.option.sdf_initpoints = min(count, SDF_INITPOINTS)
 
 
 def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
@@ -166,11 +174,6 @@ def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
     raise SceneError(
         f"the specification has no geom {key!r}; its named geoms are {names or 'none'}"
     )
-
-
-# Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the
-# surface [m].
-FlexCore = tuple[NDArray[np.float64], NDArray[np.int64], float]
 
 
 def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
@@ -275,10 +278,10 @@ def add_convex_collider(
             type=_GEOM.mjGEOM_MESH,
             meshname=name,
             mass=0.0,
-            group=_HIDDEN,
+            group=_HIDDEN_GROUP,
             margin=geom.margin,
-            **{each: getattr(geom, each) for each in _SETTINGS},
-            **{each: np.array(getattr(geom, each)) for each in _LISTS},
+            **{each: getattr(geom, each) for each in _NUMBER_SETTINGS},
+            **{each: np.array(getattr(geom, each)) for each in _ARRAY_SETTINGS},
         )
     geom.contype = geom.conaffinity = 0
 
@@ -305,7 +308,7 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore)
     core : FlexCore
         See `flex_core`.
     """
-    (V, F, thickness) = core
+    V, F, thickness = core
     body = geom.parent
     body.name = body.name or f"body of {geom.name}"
     spec.add_flex(
@@ -316,9 +319,9 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore)
         elem=F.ravel().astype(np.int32),
         radius=0.0,
         margin=geom.margin + thickness,
-        group=_HIDDEN,
-        **{name: getattr(geom, name) for name in _SETTINGS},
-        **{name: np.array(getattr(geom, name)) for name in _LISTS},
+        group=_HIDDEN_GROUP,
+        **{name: getattr(geom, name) for name in _NUMBER_SETTINGS},
+        **{name: np.array(getattr(geom, name)) for name in _ARRAY_SETTINGS},
     )
     geom.contype = geom.conaffinity = 0
 
@@ -330,30 +333,28 @@ def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
         geom.contype = flex.contype
         geom.conaffinity = flex.conaffinity
         spec.delete(flex)
-    i = 0
-    while (
-        part := spec.geom(part_name(geom.name, i))
-    ) is not None and part.parent.name == geom.parent.name:
+    for i in itertools.count():
+        name = part_name(geom.name, i)
+        part = spec.geom(name)
+        if part is None or part.parent.name != geom.parent.name:
+            break
         geom.contype = part.contype
         geom.conaffinity = part.conaffinity
         spec.delete(part)
-        spec.delete(spec.mesh(part_name(geom.name, i)))
-        i += 1
+        spec.delete(spec.mesh(name))
 
 
 def flex_core(mesh: Mesh) -> FlexCore:
     """Vertices, triangles and margin of the flex collider of a mesh in the frame of its body."""
     size = float(np.ptp(mesh.V, axis=0).max())
     if not mesh.closed:
-        return mesh.V, mesh.F, _SHEET * size
+        return mesh.V, mesh.F, _SHEET_THICKNESS * size
     points = np.concatenate([mesh.V, mesh.V[mesh.F].mean(axis=1)])
     for share in _THICKNESSES:
         thickness = share * size
         core = inset(mesh, thickness)
-        if (
-            np.abs(ClosestPoints(core, mesh.F).distances(points) - thickness).max()
-            <= GAP_TOLERANCE * size
-        ):
+        distances = ClosestPoints(core, mesh.F).distances(points)
+        if np.abs(distances - thickness).max() <= GAP_TOLERANCE * size:
             break
     return core, mesh.F, thickness
 
@@ -379,13 +380,12 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
         )
         np.add.at(sums, F[:, k], angle[:, None] * normals)
         np.add.at(weights, F[:, k], angle)
-    squares += _ROUNDING * weights[:, None, None] * np.eye(3)
-    outward = (1 + _ROUNDING) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
+    squares += _ISOTROPIC_WEIGHT * weights[:, None, None] * np.eye(3)
+    outward = (1 + _ISOTROPIC_WEIGHT) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
     length = np.maximum(np.linalg.norm(outward, axis=1), np.finfo(np.float64).tiny)
     outward /= length[:, None]
-    # to the other side of the mesh, infinite where there is none
+    # to the other side of the mesh, infinite where there is none [m]
     thickness = 1e-3 * depth + RayScene(V, F).cast(V - 1e-3 * depth * outward, -outward)[1]
-    return (
-        V
-        - np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * thickness)[:, None] * outward
-    )
+    shift = depth * np.minimum(length, _MAX_CORNER_SHIFT)
+    shift = np.minimum(shift, _MAX_INSET_SHARE * thickness)
+    return V - shift[:, None] * outward

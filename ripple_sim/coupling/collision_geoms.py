@@ -13,6 +13,7 @@ from ripple_sim.errors import SceneError
 from .geoms import ByGeom, GeomKey, by_name, find_any, find_geom, geom_name
 from .soft import is_soft
 
+# Types of geoms without a size.
 ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 
@@ -32,7 +33,7 @@ def named_collision_geoms(
             f"contacts is {contacts!r}; valid is a mapping of rippling geoms to lists of geoms"
         )
     rippling = {find_any(model, name): name for name in targets}
-    found = {}
+    solids_by_target = {}
     for name, keys in by_name(model, contacts, "contacts").items():
         target = find_any(model, name)
         if is_soft(model, target):
@@ -48,22 +49,29 @@ def named_collision_geoms(
             )
         if isinstance(keys, str) or not isinstance(keys, Iterable):
             raise SceneError(f"contacts of geom {name!r} is {keys!r}; valid is a list of geoms")
-        found[target] = tuple(dict.fromkeys(find_geom(model, key) for key in keys))
-        for geom in found[target]:
-            other = geom_name(model, geom)
-            weld = model.body_weldid[model.geom_bodyid]
-            if weld[geom] != weld[target]:
-                theirs, own = (model.body(model.geom_bodyid[each]).name for each in (geom, target))
-                raise SceneError(
-                    f"contacts of geom {name!r} names geom {other!r} on body {theirs!r}, which "
-                    f"moves by itself; valid are geoms of body {own!r} and of those welded to it"
-                )
+        solids = tuple(dict.fromkeys(find_geom(model, key) for key in keys))
+        for geom in solids:
+            _check_named(model, target, name, geom)
             if geom != target and geom in rippling:
                 raise SceneError(
-                    f"contacts of geom {name!r} names geom {other!r}, which ripples itself and "
-                    "keeps its contacts; take it out of one of the two"
+                    f"contacts of geom {name!r} names geom {geom_name(model, geom)!r}, which "
+                    "ripples itself and keeps its contacts; take it out of one of the two"
                 )
-    return found
+        solids_by_target[target] = solids
+    return solids_by_target
+
+
+def _check_named(model: mujoco.MjModel, target: int, name: str, geom: int) -> None:
+    """Refuse a geom on a body that moves against the target's body."""
+    weld = model.body_weldid[model.geom_bodyid]
+    if weld[geom] == weld[target]:
+        return
+    body = model.body(model.geom_bodyid[geom]).name
+    own_body = model.body(model.geom_bodyid[target]).name
+    raise SceneError(
+        f"contacts of geom {name!r} names geom {geom_name(model, geom)!r} on body {body!r}, which "
+        f"moves by itself; valid are geoms of body {own_body!r} and of those welded to it"
+    )
 
 
 def find_collision_geoms(
@@ -74,11 +82,11 @@ def find_collision_geoms(
 ) -> dict[int, tuple[int, ...]]:
     """Geoms whose contacts load each target, by the target's geom id.
 
-    Those that a target names, and itself where it collides. A target that does neither takes the
-    geoms of its body that collide, but for planes, height fields, those that ripple themselves, and
-    those that others name. Where there are none, or in the world, it takes those of bodies welded
-    to its own; in the world, whose geoms need not belong together, only those whose middle lies in
-    the box around the target.
+    A target is loaded by the geoms that it names, and by itself where it collides. A target that
+    neither collides nor names geoms takes the colliding geoms of its body, except planes, height
+    fields, geoms that ripple themselves, and geoms that other targets name. Where its body has no
+    such geoms, or is the world, it takes those of bodies welded to its own. Geoms of the world need
+    not belong together: there it takes only those whose middle lies in the box around the target.
 
     Parameters
     ----------
@@ -91,26 +99,39 @@ def find_collision_geoms(
         Of some targets' ids to the ids that they name.
     """
     targets = list(targets)
-    weld = model.body_weldid[model.geom_bodyid]
+    # geoms that may collide for targets that name none
     free = collides & ~np.isin(model.geom_type, ENDLESS)
-    free[[*targets, *(geom for geoms in named.values() for geom in geoms)]] = False
-    found = {}
+    free[targets] = False
+    for geoms in named.values():
+        free[list(geoms)] = False
+    solids_by_target = {}
     for target in targets:
         own = (target,) if collides[target] else ()
         if own or target in named:
-            found[target] = tuple(dict.fromkeys((*own, *named.get(target, ()))))
-            continue
-        body = model.geom_bodyid[target]
-        kin = free & (model.geom_bodyid == body)
-        if not (body and kin.any()):
-            kin = free & (weld == weld[target])
-            if not weld[target]:
-                data = mujoco.MjData(model)
-                mujoco.mj_kinematics(model, data)
-                rotation = data.geom_xmat.reshape(-1, 3, 3)
-                box = model.geom_aabb
-                middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
-                away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
-                kin &= (np.abs(away) <= box[target, 3:]).all(axis=1)
-        found[target] = tuple(np.flatnonzero(kin).tolist())
-    return found
+            solids_by_target[target] = tuple(dict.fromkeys((*own, *named.get(target, ()))))
+        else:
+            kin = _kin(model, target, free)
+            solids_by_target[target] = tuple(np.flatnonzero(kin).tolist())
+    return solids_by_target
+
+
+def _kin(model: mujoco.MjModel, target: int, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of the free geoms, [ngeom], collide for a target that names none."""
+    body = model.geom_bodyid[target]
+    kin = free & (model.geom_bodyid == body)
+    if body and kin.any():
+        return kin
+    weld = model.body_weldid[model.geom_bodyid]
+    kin = free & (weld == weld[target])
+    return kin if weld[target] else kin & _in_box(model, target)
+
+
+def _in_box(model: mujoco.MjModel, target: int) -> NDArray[np.bool_]:
+    """Whether the middles of geoms, [ngeom], lie in the box around a target."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    rotation = data.geom_xmat.reshape(-1, 3, 3)
+    box = model.geom_aabb
+    middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
+    away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
+    return (np.abs(away) <= box[target, 3:]).all(axis=1)

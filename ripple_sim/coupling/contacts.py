@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
-from .model import CoupledModel, FlexContacts
+from .flex_contacts import FlexContacts
+from .model import CoupledModel
 from .solver_balance import SolverBalance
 from .target_mesh import target_mesh
 from .wrap_check import WrapCheck

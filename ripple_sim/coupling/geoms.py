@@ -14,23 +14,23 @@ from ripple_sim.solver.errors import shown
 
 from .soft import find_soft, is_soft, soft_name, soft_names
 
+# Types of geoms that can ripple, by MuJoCo's number, with MuJoCo's name in the MJCF.
 TARGET_TYPES = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name
     for name in ("mesh", "sdf", "sphere", "ellipsoid", "capsule", "cylinder", "box", "hfield")
 }
 
 
-# So many geoms are listed in a message.
-_LISTED = 40
+# Geoms that a message lists at most.
+_MAX_LISTED = 40
 
-
+# A geom as a user names it: by its name, "body/index", "geom <id>", or its id.
 GeomKey = str | int
-
 
 Value = TypeVar("Value")
 
-
-# values by geom; a mapping of names alone, or of ids alone, is another type than one of both
+# Values by geom. For a type checker, a mapping of names alone, or of ids alone, is another type
+# than a mapping of both.
 ByGeom = Mapping[str, Value] | Mapping[int, Value] | Mapping[GeomKey, Value]
 
 
@@ -69,15 +69,13 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
     names = [geom_name(model, geom) for geom in range(model.ngeom)]
     if isinstance(key, str) and key in names:
         return names.index(key)
-    more = f" and {model.ngeom - _LISTED} more" if model.ngeom > _LISTED else ""
-    soft = (
-        f"; its flexes and skins are {', '.join(map(repr, soft_names(model)))}"
-        if soft_names(model)
-        else ""
-    )
+    listed = ", ".join(map(repr, names[:_MAX_LISTED])) or "none"
+    if model.ngeom > _MAX_LISTED:
+        listed += f" and {model.ngeom - _MAX_LISTED} more"
+    if soft_names(model):
+        listed += f"; its flexes and skins are {', '.join(map(repr, soft_names(model)))}"
     raise SceneError(
-        f"the model has no geom {key!r}; its geoms are "
-        f"{', '.join(map(repr, names[:_LISTED])) or 'none'}{more}{soft}: give a name, "
+        f"the model has no geom {key!r}; its geoms are {listed}: give a name, "
         '"body/index", or an id'
     )
 
@@ -109,15 +107,15 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
     """
     if not isinstance(values, Mapping):
         raise SceneError(f"{what} is {shown(values)}; valid is a dict of them by geom")
-    found: dict[str, Value] = {}
+    value_by_name: dict[str, Value] = {}
     for key, value in values.items():
         name = target_name(model, find_any(model, key))
-        if name in found:
+        if name in value_by_name:
             raise SceneError(
                 f"{what} has two entries for geom {name!r}, one of them as {key!r}; valid is one"
             )
-        found[name] = value
-    return found
+        value_by_name[name] = value
+    return value_by_name
 
 
 def find_any(model: mujoco.MjModel, key: GeomKey) -> int:

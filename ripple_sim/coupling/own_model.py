@@ -15,30 +15,49 @@ from ripple_sim.errors import SceneError
 
 from .geoms import target_name
 
-# Numbers that two models of one signature share.
+# Counts by which messages tell models apart.
 _SIZES = ("nq", "nv", "nu", "nbody", "ngeom")
 
-
-# Beginnings of the names of the arrays that say what is where and of what shape, and of those that
-# say how it moves and collides; and endings of those that only say how it looks.
+# Beginnings of the names of the arrays that say what is where, and of what shape.
 _SHAPES = (
-    "body_parentid", "geom_type", "geom_size", "geom_bodyid", "geom_dataid", "geom_pos", "geom_quat", "mesh_vert",
-    "mesh_face", "flex_vert", "flex_elem", "skin_vert", "skin_face",
-)  # fmt: skip
+    "body_parentid",
+    "geom_type",
+    "geom_size",
+    "geom_bodyid",
+    "geom_dataid",
+    "geom_pos",
+    "geom_quat",
+    "mesh_vert",
+    "mesh_face",
+    "flex_vert",
+    "flex_elem",
+    "skin_vert",
+    "skin_face",
+)
 
-
+# Beginnings of the names of the arrays that say how bodies move and collide.
 _DYNAMICS = ("body_", "jnt_", "dof_", "geom_", "mesh_", "flex_", "skin_")
 
-
+# Endings of the names of the arrays that only say how bodies look.
 _LOOKS = ("_rgba", "_matid", "_group", "_user")
 
+# Arrays of a model whose numbers are checked.
+_CHECKED = (
+    "opt.gravity",
+    "opt.wind",
+    "body_pos",
+    "body_quat",
+    "body_mass",
+    "geom_pos",
+    "geom_size",
+    "qpos0",
+)
+
+# Longest time step of the physics [s]: in a longer one no contact is met.
+_MAX_TIMESTEP = 1.0
 
 # Models that were found to be copies of one another stay so, whatever is changed in them later.
 _copies: WeakKeyDictionary[mujoco.MjModel, WeakSet[mujoco.MjModel]] = WeakKeyDictionary()
-
-
-# Of physics [s]: no contact is met in longer ones.
-_LONGEST_STEP = 1.0
 
 
 def own_model(model: Any) -> mujoco.MjModel:
@@ -52,21 +71,12 @@ def own_model(model: Any) -> mujoco.MjModel:
         raise SceneError(
             f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's"
         )
-    if not 0 < found.opt.timestep <= _LONGEST_STEP:
+    if not 0 < found.opt.timestep <= _MAX_TIMESTEP:
         raise SceneError(
             f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 "
-            f"and up to {_LONGEST_STEP:g}, such as 0.002 (<option timestep=...>)"
+            f"and up to {_MAX_TIMESTEP:g}, such as 0.002 (<option timestep=...>)"
         )
-    for name in (
-        "opt.gravity",
-        "opt.wind",
-        "body_pos",
-        "body_quat",
-        "body_mass",
-        "geom_pos",
-        "geom_size",
-        "qpos0",
-    ):
+    for name in _CHECKED:
         values = operator.attrgetter(name)(found)
         wrong = values[~(np.abs(values) <= mujoco.mjMAXVAL)]  # NaN, too
         if len(wrong):
@@ -93,12 +103,15 @@ def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco
     if other is model or other in _copies.get(model, ()):
         return found
     kinds = _SHAPES if drawn else _DYNAMICS
-    if found.signature and model.signature:
-        differing = (
-            "signature" if found.signature != model.signature else _differing(model, other, kinds)
-        )
-    else:  # MuJoCo drops signatures in pickling, and gives the data a model of its own: then sizes have to do
-        differing = "sizes" if _sizes(other) != _sizes(model) else None
+    differing: str | None = None
+    if not (found.signature and model.signature):
+        # MuJoCo drops signatures in pickling, and gives the data a model of its own
+        if _sizes(other) != _sizes(model):
+            differing = "sizes"
+    elif found.signature != model.signature:
+        differing = "signature"
+    else:
+        differing = _differing(model, other, kinds)
     if differing:
         raise SceneError(
             f"data belongs to another model ({_sizes(other)}) than that of the ripples "
@@ -146,14 +159,15 @@ def posed(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
 
 def _differing(model: mujoco.MjModel, other: mujoco.MjModel, kinds: tuple[str, ...]) -> str | None:
     """Name of the first array in which two models differ, of those whose names begin so."""
-    names = (name for name in dir(model) if name.startswith(kinds) and not name.endswith(_LOOKS))
-    return next(
-        (name for name in names if not np.array_equal(getattr(model, name), getattr(other, name))),
-        None,
-    )
+    for name in dir(model):
+        if not name.startswith(kinds) or name.endswith(_LOOKS):
+            continue
+        if not np.array_equal(getattr(model, name), getattr(other, name)):
+            return name
+    return None
 
 
 def _sizes(model: mujoco.MjModel) -> str:
-    """What tells models apart: name, and how much they have of everything."""
+    """The name of a model and its counts, for messages."""
     name = model.names.split(b"\0", 1)[0].decode()
     return ", ".join([repr(name), *(f"{size} {getattr(model, size)}" for size in _SIZES)])

@@ -18,17 +18,19 @@ from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
 
+from .amplitude_check import AmplitudeCheck
 from .collision_geoms import named_collision_geoms
 from .easing import Easing, bodies_of, easing_warning
 from .energy import Energy, body_energy
 from .geoms import ByGeom, GeomKey, find_any, rotation_in_body, target_name
 from .hertz import Hits, hertz_moduli
+from .high_pass import HighPass
 from .hooks import adopt_warnings, followed
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .own_model import own_data, own_model
 from .rippling import RipplingSurface, rippling_surfaces
-from .soft import HighPass, is_soft
+from .soft import is_soft
 from .solved_forces import SolvedForces
 from .stepping import (
     IN_TURN_WARNING,
@@ -41,14 +43,14 @@ from .stepping import (
     physics_errors,
 )
 from .target import Target, contacts_of, named_targets
-from .target_warnings import AmplitudeCheck, collision_warnings
+from .target_warnings import collision_warnings
 from .tunnelling import TunnellingCheck
 from .two_way import TwoWay, require_suited_options
 
 __all__ = ["Impulse", "Ripples"]
 
 # How far off the surface a poke may be without a warning, over the object's size.
-_FAR = 0.1
+_MAX_POKE_DISTANCE = 0.1
 
 
 class Ripples:
@@ -154,34 +156,15 @@ class Ripples:
         adopt_warnings()
         self._contacts = named_collision_geoms(self.model, self, contacts_of(targets, contacts))
         self._moduli = hertz_moduli(self.model, targets)
-        self._fine = {name: bool(target.high_pass) for name, target in targets.items()}
+        self._has_high_pass = {name: bool(target.high_pass) for name, target in targets.items()}
         self._has_two_way = two_way
         coupled = self._couple(None)
-        self._check_tunnelling = TunnellingCheck(
-            coupled, [geom for geom in self._waves if geom not in coupled.soft]
-        )
-        for geom, waves in self._waves.items():
-            if geom not in coupled.soft:
-                for message in collision_warnings(coupled, geom, waves.atlas):
-                    warn_caller(message)
-        if two_way and self._moduli:
-            raise SceneError(
-                "with two_way the surface itself says how long a hit takes; take two_way=False, or "
-                "pulse='contact'"
-            )
-        if two_way and coupled.soft:
-            raise SceneError(
-                "flexes and skins cannot push back: their waves have the masses that their nodes "
-                "and bones have already; take two_way=False, or geoms as targets alone"
-            )
-        if two_way:
-            require_suited_options(self.model)
-        if self._waves and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-            warn_caller(
-                "the integrator RK4 averages four contact forces in each step, of which MuJoCo "
-                "keeps only the last: impulses are off by some per cent; use "
-                'integrator="implicitfast", or a short time step'
-            )
+        rigid_targets = [geom for geom in self._waves if geom not in coupled.soft]
+        self._check_tunnelling = TunnellingCheck(coupled, rigid_targets)
+        for geom in rigid_targets:
+            for message in collision_warnings(coupled, geom, self._waves[geom].atlas):
+                warn_caller(message)
+        self._check_options(coupled)
         for name, target in targets.items():
             if not target.limit:
                 self.allow_any_height(name)
@@ -189,6 +172,27 @@ class Ripples:
         self._clock = StepClock()
         self._solved = SolvedForces(self.model)
         self._warned: set[str] = set()
+
+    def _check_options(self, coupled: CoupledModel) -> None:
+        """Refuse options that do not go together, and warn of the integrator RK4."""
+        if self._has_two_way and self._moduli:
+            raise SceneError(
+                "with two_way the surface itself says how long a hit takes; take two_way=False, or "
+                "pulse='contact'"
+            )
+        if self._has_two_way and coupled.soft:
+            raise SceneError(
+                "flexes and skins cannot push back: their waves have the masses that their nodes "
+                "and bones have already; take two_way=False, or geoms as targets alone"
+            )
+        if self._has_two_way:
+            require_suited_options(self.model)
+        if self._waves and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            warn_caller(
+                "the integrator RK4 averages four contact forces in each step, of which MuJoCo "
+                "keeps only the last: impulses are off by some per cent; use "
+                'integrator="implicitfast", or a short time step'
+            )
 
     def __getitem__(self, name: GeomKey) -> WaveSolver:
         """Waves of a geom, by name or id."""
@@ -203,7 +207,7 @@ class Ripples:
     @property
     def geom_ids(self) -> dict[str, int]:
         """Geom id of every target, by name; a flex or a skin has one after all geoms."""
-        return {name: target.geom for name, target in self._surfaces.items()}
+        return {name: surface.geom for name, surface in self._surfaces.items()}
 
     def change_material(self, name: GeomKey, **coefficients: Any) -> None:
         """Change coefficients of a geom's material, by their names in `Material`.
@@ -263,7 +267,7 @@ class Ripples:
         where = waves.add_impulse(place, impulse, radius)
         off = float(np.linalg.norm(place - where.point))
         size = float(np.ptp(waves.atlas.mesh.V, axis=0).max())
-        if off > _FAR * size:
+        if off > _MAX_POKE_DISTANCE * size:
             warn_caller(
                 f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its "
                 "size); the nearest point is poked. Points are in the frame of the geom's body [m]"
@@ -320,8 +324,8 @@ class Ripples:
 
         Height and velocity of the waves stay. Raises `SolverError` for an unknown operator.
         """
-        for name, target in list(self._surfaces.items()):
-            self._change(name, options={**target.options, "operator": operator})
+        for name, surface in list(self._surfaces.items()):
+            self._change(name, options={**surface.options, "operator": operator})
 
     def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of a geom's body to the frame of the geom.
@@ -428,9 +432,9 @@ class Ripples:
         Vertices of a flex or a skin are in the world, by `data`. Vertices of a geom are in its own
         frame, if `ripples[name].move` has moved them; otherwise the result is None.
         """
-        target = self._surface(name)
-        soft = self._soft.get(target.geom)
-        return target.waves.vertices if soft is None else soft.vertices(data)
+        surface = self._surface(name)
+        soft = self._soft.get(surface.geom)
+        return surface.waves.vertices if soft is None else soft.vertices(data)
 
     def reset(self) -> None:
         """Flatten all surfaces, and let time begin anew."""
@@ -459,19 +463,38 @@ class Ripples:
         self._check_tunnelling(solved)
         for target, surface in self._soft.items():
             self._waves[target].move(surface.vertices(solved))
+        self._step_waves(data, solved, passed.elapsed, pending=unsolved is not None)
+        self._check_amplitude()
+
+    def _step_waves(
+        self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, pending: bool
+    ) -> None:
+        """Advance the waves under the contact forces of the latest physics step.
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+            The user's; two-way coupling corrects it.
+        solved : mujoco.MjData
+            With the contact forces, see `SolvedForces`.
+        elapsed : float
+            [s]
+        pending : bool
+            Whether the forces are those of the coming step.
+        """
         shared = None
         if self._two_way is not None:
-            shared = self._two_way.solve(data, solved, passed.elapsed, pending=unsolved is not None)
-        loads = self._loads.loads(solved, passed.elapsed)
+            shared = self._two_way.solve(data, solved, elapsed, pending=pending)
+        loads = self._loads.loads(solved, elapsed)
         for geom, easing in self._eased.items():
             self._warn_once(f"eased {geom}", easing_warning(target_name(self.model, geom), easing))
         for target, filtered in self._high_pass.items():
             loads[target] = filtered(loads[target])
         for geom, waves in self._waves.items():
-            waves.step(passed.elapsed, load=loads[geom] if shared is None else shared.get(geom))
+            load = loads[geom] if shared is None else shared.get(geom)
+            waves.step(elapsed, load=load)
         if self._two_way is not None:
             self._two_way.settle()
-        self._check_amplitude()
 
     def _take_up_all(self, geom: int) -> None:
         """Take up all forces on a target from now on: the user gives its density."""
@@ -493,7 +516,8 @@ class Ripples:
         MeshError
             If the new surface does not suit the layout.
         """
-        if changed := self._follow_shapes():
+        changed = self._follow_shapes()
+        if changed:
             self._couple(self._check_amplitude)
             names = ", ".join(map(repr, changed))
             self._warn_once(
@@ -513,7 +537,7 @@ class Ripples:
         self._high_pass = {
             target: HighPass(self._waves[target], surface)
             for target, surface in coupled.soft.items()
-            if surface.flex >= 0 and self._fine[target_name(self.model, target)]
+            if surface.flex >= 0 and self._has_high_pass[target_name(self.model, target)]
         }
         hits = {geom: Hits(coupled, geom, modulus) for geom, modulus in self._moduli.items()}
         bodies = bodies_of(coupled)
@@ -530,27 +554,27 @@ class Ripples:
         return coupled
 
     def _surface(self, name: GeomKey) -> RipplingSurface:
-        target = self._surfaces.get(name) if isinstance(name, str) else None
-        if target is None:
-            target = self._surfaces.get(target_name(self.model, find_any(self.model, name)))
-        if target is None:
+        surface = self._surfaces.get(name) if isinstance(name, str) else None
+        if surface is None:
+            surface = self._surfaces.get(target_name(self.model, find_any(self.model, name)))
+        if surface is None:
             raise SceneError(
                 f"geom {name!r} does not ripple; the rippling geoms are "
                 f"{', '.join(map(repr, self._surfaces))}"
             )
-        return target
+        return surface
 
     def _follow_shapes(self) -> list[str]:
         """Lay new atlases on targets whose surfaces were changed; return their names."""
         changed = [
             name
-            for name, target in self._surfaces.items()
-            if target.shape is not None and target.shape.changed(self.model)
+            for name, surface in self._surfaces.items()
+            if surface.shape is not None and surface.shape.changed(self.model)
         ]
         for name in changed:
-            target = self._surfaces[name].on_its_surface(self.model)
-            self._surfaces[name] = target
-            self._waves[target.geom] = target.waves
+            surface = self._surfaces[name].on_its_surface(self.model)
+            self._surfaces[name] = surface
+            self._waves[surface.geom] = surface.waves
         return changed
 
     def _change(self, name: GeomKey, **changes: Any) -> None:

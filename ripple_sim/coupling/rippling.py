@@ -59,13 +59,13 @@ class RipplingSurface:
         """
         name = target_name(model, self.geom)
         old = self.waves
-        bound = [
+        ties = [
             ("a region of it is held still", self.held is not None),
             ("its material is given texel by texel", _is_mapped(self.material)),
             ("sensors listen to it", bool(old.listeners.all)),
         ]
-        for what, so in bound:
-            if so:
+        for what, is_tied in ties:
+            if is_tied:
                 raise SceneError(
                     f"the surface of {name!r} was changed in the model, and {what}, which belongs "
                     "to the old one: make new Ripples for the model as it is now"
@@ -152,12 +152,12 @@ def rippling_surfaces(
         layout = target.layout or "auto"
         own_options = {**options, "rim": target.rim, "conserve_volume": target.conserve_volume}
         material = suited.materials[name]
-        waves = WaveSolver(
-            target_atlas(model, geom, suited.resolutions[name], layout), material, **own_options
-        )
+        atlas = target_atlas(model, geom, suited.resolutions[name], layout)
+        waves = WaveSolver(atlas, material, **own_options)
         waves.listeners.find_points = functools.partial(site_on, model, geom)
         shape = WatchedShape(model, geom)
         surfaces[name] = RipplingSurface(
             geom, material, own_options, waves, layout=layout, shape=shape
         )
-    return surfaces, {find_target(model, name): law for name, law in suited.easings.items()}
+    easings = {find_target(model, name): law for name, law in suited.easings.items()}
+    return surfaces, easings

@@ -1,8 +1,7 @@
 """Soft targets: flexes and skins, whose surfaces move in the world.
 
 Their ids come after those of geoms and of the vertices of flexes; see `CoupledModel`. A
-`SoftSurface` is the mesh and where it is. A `HighPass` leaves a flex its coarse motion: its waves
-get what it cannot follow.
+`SoftSurface` is the mesh and where it is.
 """
 
 from __future__ import annotations
@@ -10,15 +9,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Load, Mesh, WaveSolver
-
-# Share of a mass that is added to each coarse motion's own: some are next to the same.
-_LEAST = 1e-9
+from ripple_sim.solver import Mesh
 
 
 def first_flex(model: mujoco.MjModel) -> int:
@@ -99,21 +93,8 @@ class SoftSurface:
         self.flex = -1
         self._skin = -1
         if target < first_skin(model):
-            flex = self.flex = target - first_flex(model)
-            if model.flex_dim[flex] == 1:
-                raise SceneError(
-                    f"flex {soft_name(model, target)!r} is a cable, which cannot ripple; valid are "
-                    "surfaces and solids (dim 2 and 3)"
-                )
-            # the triangles themselves, or those of the outside of tetrahedra
-            F = model.flex_elem
-            first = model.flex_elemdataadr[flex]
-            count = model.flex_elemnum[flex]
-            if model.flex_dim[flex] == 3:
-                F = model.flex_shell
-                first = model.flex_shelldataadr[flex]
-                count = model.flex_shellnum[flex]
-            F = F[first : first + 3 * count].reshape(-1, 3)
+            self.flex = target - first_flex(model)
+            F = self._flex_triangles(soft_name(model, target))
         else:
             self._skin = target - first_skin(model)
             first = int(model.skin_boneadr[self._skin])
@@ -132,11 +113,26 @@ class SoftSurface:
             raise SceneError(
                 f"the surface of {soft_name(model, target)!r} is not that of its vertices"
             )
-        self.geoms = (
-            []
-            if self._skin < 0
-            else np.flatnonzero(np.isin(model.geom_bodyid, self.bodies)).tolist()
-        )
+        self.geoms: list[int] = []
+        if self._skin >= 0:
+            self.geoms = np.flatnonzero(np.isin(model.geom_bodyid, self.bodies)).tolist()
+
+    def _flex_triangles(self, name: str) -> NDArray[np.int32]:
+        """Triangles of a flex, [m, 3]: its own, or those of the outside of its tetrahedra."""
+        model = self._model
+        flex = self.flex
+        if model.flex_dim[flex] == 1:
+            raise SceneError(
+                f"flex {name!r} is a cable, which cannot ripple; valid are surfaces and solids "
+                "(dim 2 and 3)"
+            )
+        if model.flex_dim[flex] == 3:
+            first = model.flex_shelldataadr[flex]
+            count = model.flex_shellnum[flex]
+            return model.flex_shell[first : first + 3 * count].reshape(-1, 3)
+        first = model.flex_elemdataadr[flex]
+        count = model.flex_elemnum[flex]
+        return model.flex_elem[first : first + 3 * count].reshape(-1, 3)
 
     def vertices(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Where the vertices of the mesh are in the world [m], [n, 3]."""
@@ -166,12 +162,16 @@ class SoftSurface:
         return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
 
     def _all(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Where all vertices of the model are in the world [m], also those at one place."""
         model = self._model
-        if self._skin < 0:
-            first = model.flex_vertadr[self.flex]
-            return np.array(
-                data.flexvert_xpos[first : first + model.flex_vertnum[self.flex]], dtype=np.float64
-            )
+        if self._skin >= 0:
+            return self._all_of_skin(data)
+        first = model.flex_vertadr[self.flex]
+        count = model.flex_vertnum[self.flex]
+        return np.array(data.flexvert_xpos[first : first + count], dtype=np.float64)
+
+    def _all_of_skin(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        model = self._model
         first = model.skin_vertadr[self._skin]
         count = model.skin_vertnum[self._skin]
         V = model.skin_vert[first : first + count].astype(np.float64)
@@ -188,68 +188,7 @@ class SoftSurface:
             which = slice(begin, begin + model.skin_bonevertnum[bone])
             vertices = model.skin_bonevertid[which]
             weights = model.skin_bonevertweight[which, None]
-            placed = (V[vertices] - model.skin_bonebindpos[bone]) @ rotation.reshape(
-                3, 3
-            ).T + data.xpos[body]
+            on_bone = V[vertices] - model.skin_bonebindpos[bone]
+            placed = on_bone @ rotation.reshape(3, 3).T + data.xpos[body]
             np.add.at(moved, vertices, weights * placed)
         return moved
-
-
-class HighPass:
-    """Takes out of a load what would set the surface in a motion that its flex makes itself.
-
-    The forces that are left do no work on any coarse velocity: M B u is taken off, with M the
-    texels' masses, the columns of B the coarse motions along the normals, and B' M B u = B' f.
-
-    Parameters
-    ----------
-    waves : WaveSolver
-    surface : SoftSurface
-        Of a flex.
-    """
-
-    def __init__(self, waves: WaveSolver, surface: SoftSurface) -> None:
-        self._mass = waves.operator.mass.reshape(-1)
-        self._basis = coarse_motions(waves, surface)
-        gram = csc_array(self._basis.T @ (self._basis * self._mass[:, None]))
-        gram.setdiag(np.maximum(gram.diagonal(), _LEAST * gram.diagonal().max()) * (1 + _LEAST))
-        self._solve = splu(gram).solve
-
-    def __call__(self, load: Load) -> Load:
-        """The fine part of a load: forces on all texels."""
-        if not len(load.texels):
-            return load
-        forces = np.bincount(load.texels, load.forces, len(self._mass)).astype(np.float64)
-        # sparse products, and einsum, stay off the threads of BLAS, which wait for one another on a
-        # busy machine
-        coarse = self._solve(_times(self._basis.T, forces))
-        return Load(np.arange(len(forces)), forces - self._mass * _times(self._basis, coarse))
-
-
-def _times(
-    matrix: csr_array | NDArray[np.float64], vector: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    return (
-        np.einsum("ij,j->i", matrix, vector) if isinstance(matrix, np.ndarray) else matrix @ vector
-    )
-
-
-def coarse_motions(waves: WaveSolver, surface: SoftSurface) -> csr_array | NDArray[np.float64]:
-    """Motions of the texels along their normals that a flex makes itself, [T, k].
-
-    Of a flex with its own vertices as degrees of freedom: each of these moves along the normal, and
-    heights between them are linear. Of one that is interpolated between 8 or 27 nodes: all
-    polynomials of that degree along each axis.
-    """
-    atlas = waves.rest
-    texels = np.arange(atlas.areas.size)
-    if not surface.degree:
-        corners = np.asarray(atlas.mesh.F)[atlas.triangles.reshape(-1)]
-        entries = atlas.barycentrics.reshape(-1), (np.repeat(texels, 3), corners.reshape(-1))
-        return csr_array(entries, shape=(len(texels), len(atlas.mesh.V)))
-    x = atlas.positions.reshape(-1, 3)
-    x = 2 * (x - x.min(axis=0)) / np.ptp(x, axis=0) - 1
-    powers = np.stack(np.meshgrid(*[np.arange(surface.degree + 1)] * 3), axis=-1).reshape(-1, 3)
-    functions = np.prod(x[:, None] ** powers, axis=2)
-    # motion by motion in memory: products with vectors are then sums along it
-    return np.concatenate([functions.T * n for n in atlas.normals.reshape(-1, 3).T]).T

@@ -33,66 +33,78 @@ from .model import CoupledModel
 from .soft import SoftSurface, is_soft
 from .target_mesh import target_mesh
 
-# Waves cross the target in the first time and fall to a tenth in the second [s].
-_CROSSING = 0.25
-_DECAY = 1.5
+# Time in which waves cross the target [s].
+_CROSSING_TIME = 0.25
 
-# MuJoCo's default, in place of that of a geom without a mass: those of the world have none
-# [kg/m^3].
-_DENSITY = 1000.0
+# Time in which waves fall to a tenth [s].
+_DECAY_TIME = 1.5
 
-# By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is
-# warned of. The estimates are half of what a hard, short hit does, and many times what the slow
-# push of a limb does.
-_HIT = 0.085
-_REST = 0.05
+# MuJoCo's default density, for geoms without a mass: geoms of the world have none [kg/m^3].
+_DEFAULT_DENSITY = 1000.0
 
-# The same where forces are eased: the lightest body leaves a ring that is seen, and none dents the
-# target deeper. It sinks in by the second share at rest.
-_SHOWN = 0.17
-_SUNK = 0.1
-_EASED = 0.12
+# Dents over the target's radius, of a fall and of a body at rest. Dents beyond a quarter of the
+# radius are warned of. The estimates are half of what a hard, short hit does, and many times what
+# the slow push of a limb does.
+_HIT_DENT = 0.085
+_REST_DENT = 0.05
 
-# The least density over that for the heaviest body: what is lighter still is a speck.
-_SPECK = 1e-6
+# The same where forces are eased. The lightest body leaves a ring that is seen, and sinks in by the
+# second share at rest.
+_EASED_HIT_DENT = 0.17
+_EASED_REST_DENT = 0.1
 
-# How long most of a contact's impulse takes, over the time constant of its `solref`.
-_PULSE = 0.4
+# Dent over the target's radius up to which forces are taken up, see `EasingLaw`.
+_EASED_DENT = 0.12
+
+# The least density over the one for the heaviest body: a body that is lighter still is a speck.
+_MIN_DENSITY_RATIO = 1e-6
+
+# Time that most of a contact's impulse takes, over the time constant of its `solref`.
+_PULSE_SHARE = 0.4
 
 # Wave number of the longest wave on a ball, times its size: sqrt(8).
-_LONGEST = 8**0.5
+_LONGEST_WAVE_NUMBER = 8**0.5
 
-# Of the stiffness alone, sqrt(k) times the time step at most: a swing takes twelve steps or more.
-# What swings faster is not resolved, and takes up energy from contacts that last a step.
-_STIFFEST = 0.5
+# Most that sqrt(stiffness) times the time step may be: a swing takes twelve steps or more. Faster
+# swings are not resolved, and take up energy from contacts that last a step.
+_MAX_PHASE_STEP = 0.5
 
-# Of a typical hit: its dent over the target's size, and at most over half its usual thickness.
-_DENT = 0.05
-_THIN = 0.5
+# Dent of a typical hit over the target's size, and at most over half its usual thickness.
+_TYPICAL_DENT = 0.05
+_MAX_TYPICAL_DENT = 0.5
+
+# Resolutions that are chosen, in texels along a chart's side: the least, the usual and the most.
 LEAST = 32
 USUAL = 96
 MOST = 256
-_STEP = 16
+# Chosen resolutions are multiples of this.
+_RESOLUTION_STEP = 16
 
-# A footprint's radius is to hold so many texels, and a physics step is to take at most so many
-# substeps.
-_TEXELS = 4.0
-_SUBSTEPS = 4.0
+# Texels that the radius of a footprint is to hold.
+_FOOTPRINT_TEXELS = 4.0
+
+# Most substeps of the waves in a physics step.
+_MAX_SUBSTEPS = 4.0
 
 # Stable time step over the time that a wave takes from texel to texel, on meshes with limbs (0.29
 # to 0.65 on the meshes tried), by which the operator's largest eigenvalue is (2 c / (0.35 d))^2 at
 # a mean spacing d.
-_STABLE = 0.35
+_STABLE_SHARE = 0.35
 
-# Rings of a body so many times as light as what the surface is to bear are not seen.
-_HEAVY = 100.0
-_SOFT = 64  # resolution of flexes and skins
+# Rings of a body so many times as light as the weight that the surface is to bear are not seen.
+_MAX_MASS_RATIO = 100.0
 
-# A mesh of so many triangles that is no sphere in shape (whose Euler characteristic is 2) gets this
-# resolution at most: laying charts on it takes three to ten times as long at 96.
+# Resolution of flexes and skins, in texels along a chart's side.
+_SOFT_RESOLUTION = 64
+
+# A mesh of so many triangles that is no sphere in shape gets this resolution at most, since charts
+# take long on it: on a jaco base 3.3 s of processor time at 32, 11.0 s at 48, and no result within
+# 120 s at 96.
 _MANY_TRIANGLES = 10_000
-_INTRICATE = 48
-_SPHERE = 2
+_INTRICATE_RESOLUTION = 48
+
+# Euler characteristic of a sphere.
+_SPHERE_EULER = 2
 
 
 class Extent(NamedTuple):
@@ -199,12 +211,12 @@ def suited_material(
             lightest,
             speed,
             stiffness,
-            dent=_SHOWN * extent.radius,
-            sink=_SUNK * extent.radius,
+            dent=_EASED_HIT_DENT * extent.radius,
+            sink=_EASED_REST_DENT * extent.radius,
         )
-        density = min(density, max(shown, _SPECK * density))
+        density = min(density, max(shown, _MIN_DENSITY_RATIO * density))
     easing = EasingLaw.of(
-        _EASED,
+        _EASED_DENT,
         extent.radius,
         radius=max(footprint, FOOTPRINT * extent.size),
         density=density,
@@ -224,12 +236,14 @@ def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: 
     """
     if material.deep:
         return 0.0
-    speed, bending, stiffness, limit = (
-        float(np.min(getattr(material, name)))
-        for name in ("speed", "bending", "stiffness", "yield_height")
-    )
-    speed = float(np.hypot(speed, _LONGEST / extent.size * bending**0.5))
-    return min(_density_under(coupled, geom, extent, speed, stiffness, limit), 1e12)
+    speed = float(np.min(material.speed))
+    bending = float(np.min(material.bending))
+    stiffness = float(np.min(material.stiffness))
+    yield_height = float(np.min(material.yield_height))
+    speed_by_bending = _LONGEST_WAVE_NUMBER / extent.size * bending**0.5
+    speed = float(np.hypot(speed, speed_by_bending))
+    density = _density_under(coupled, geom, extent, speed, stiffness, yield_height)
+    return min(density, 1e12)
 
 
 def _speed_and_stiffness(
@@ -237,18 +251,19 @@ def _speed_and_stiffness(
 ) -> tuple[float, float]:
     """Speed and stiffness of a material: its highest and its least, or suited ones if unset."""
     speed = _speed(model, extent) if "speed" in material.unset else float(np.max(material.speed))
-    if "stiffness" in material.unset:  # dents are narrow, but no more than the time step resolves
-        return speed, float(
-            min(narrow_stiffness(extent.size, speed), (_STIFFEST / model.opt.timestep) ** 2, 1e12)
-        )
-    return speed, float(np.min(material.stiffness))
+    if "stiffness" not in material.unset:
+        return speed, float(np.min(material.stiffness))
+    # dents are narrow, but no more than the time step resolves
+    narrow = narrow_stiffness(extent.size, speed)
+    resolved = (_MAX_PHASE_STEP / model.opt.timestep) ** 2
+    return speed, float(min(narrow, resolved, 1e12))
 
 
 def _filled_in(material: Material, speed: float, stiffness: float, density: float) -> Material:
     """A material with its unset coefficients filled in."""
     suited = {
         "speed": speed,
-        "damping": damping_for(_DECAY),
+        "damping": damping_for(_DECAY_TIME),
         "stiffness": stiffness,
         "density": float(np.clip(density, 1e-12, 1e12)),
     }
@@ -271,17 +286,9 @@ def _density_under(
     mass, footprint = heaviest(coupled, geom)
     fall = _fall(model, max(extent.size, _height(coupled, geom)))
     hit = Hit(mass, _resting(coupled, geom), footprint, fall)
-    dent = min(_HIT * extent.radius, limit)
-    return _density_for(
-        coupled,
-        geom,
-        extent,
-        hit,
-        speed,
-        stiffness,
-        dent=dent,
-        sink=min(_REST * extent.radius, limit),
-    )
+    dent = min(_HIT_DENT * extent.radius, limit)
+    sink = min(_REST_DENT * extent.radius, limit)
+    return _density_for(coupled, geom, extent, hit, speed, stiffness, dent=dent, sink=sink)
 
 
 class Hit(NamedTuple):
@@ -314,29 +321,25 @@ def _density_for(
     stiffness: float,
     *,
     dent: float,
-    sink: float | None = None,
+    sink: float,
 ) -> float:
     """The least density with which a hit dents a target no deeper than wanted [kg/m^2].
 
     The hit dents it by `dent` at most, and the body at rest sinks in by `sink` at most [m].
     """
-    sink = _REST * extent.radius if sink is None else sink
     model = coupled.model
-    weight = hit.weight * float(np.linalg.norm(model.opt.gravity))
-    impulse = BOUNCE * hit.mass * hit.speed
-    duration = max(
-        _PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep
-    )
-    stiffness = _stiffness_of_the_whole(extent, speed, stiffness)
-    of = {
+    weight = hit.weight * float(np.linalg.norm(model.opt.gravity))  # [N]
+    impulse = BOUNCE * hit.mass * hit.speed  # [N s]
+    time_constant = max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep)  # [s]
+    duration = max(_PULSE_SHARE * time_constant, model.opt.timestep)
+    surface = {
         "radius": max(hit.footprint, FOOTPRINT * extent.size),
         "speed": speed,
-        "stiffness": stiffness,
+        "stiffness": _stiffness_of_the_whole(extent, speed, stiffness),
     }
-    return max(
-        density_under(weight, sink, **of),
-        density_after(impulse, dent, duration=duration, **of),
-    )
+    bearing = density_under(weight, sink, **surface)
+    springy = density_after(impulse, dent, duration=duration, **surface)
+    return max(bearing, springy)
 
 
 def _stiffness_of_the_whole(extent: Extent, speed: float, stiffness: float) -> float:
@@ -344,7 +347,7 @@ def _stiffness_of_the_whole(extent: Extent, speed: float, stiffness: float) -> f
 
     The target resists a load at least as its longest wave does.
     """
-    return max(stiffness, (_LONGEST * speed / extent.size) ** 2)
+    return max(stiffness, (_LONGEST_WAVE_NUMBER * speed / extent.size) ** 2)
 
 
 def lightest_hit(coupled: CoupledModel, geom: int, extent: Extent) -> Hit | None:
@@ -373,11 +376,13 @@ def lightest_hit(coupled: CoupledModel, geom: int, extent: Extent) -> Hit | None
 
 
 def _density(mass: float, extent: Extent) -> float:
-    return (mass if mass > 0 else _DENSITY * extent.volume) / extent.area
+    """Mass of a body over the area of a target [kg/m^2]; a mass of 0 stands for none given."""
+    return (mass if mass > 0 else _DEFAULT_DENSITY * extent.volume) / extent.area
 
 
 def _speed(model: mujoco.MjModel, extent: Extent) -> float:
-    return max(extent.size / _CROSSING, _fall(model, extent.size))
+    """Suited wave speed [m/s]."""
+    return max(extent.size / _CROSSING_TIME, _fall(model, extent.size))
 
 
 def _fall(model: mujoco.MjModel, height: float) -> float:
@@ -401,11 +406,12 @@ def _height(coupled: CoupledModel, geom: int) -> float:
 def _resting(coupled: CoupledModel, geom: int) -> float:
     """Mass of the heaviest body that can lie on a target, or on which it can lie [kg]."""
     model = coupled.model
-    masses = np.where(
-        _moves(model), model.body_subtreemass[model.body_rootid][model.geom_bodyid], 0.0
-    )
+    tree_masses = model.body_subtreemass[model.body_rootid]
+    masses = np.where(_moves(model), tree_masses[model.geom_bodyid], 0.0)
     touching = coupled.can_collide(geom)
-    return float(max(masses[touching].max(), masses[geom])) if touching.any() else 0.0
+    if not touching.any():
+        return 0.0
+    return float(max(masses[touching].max(), masses[geom]))
 
 
 def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
@@ -420,7 +426,9 @@ def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
     Where nothing moves, the mass is 0.
     """
     reduced = _reduced_masses(coupled, geom)
-    return float(reduced.max()), float(coupled.footprint_radii[[geom, int(reduced.argmax())]].min())
+    other = int(reduced.argmax())
+    footprint = coupled.footprint_radii[[geom, other]].min()
+    return float(reduced.max()), float(footprint)
 
 
 def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
@@ -430,9 +438,8 @@ def _reduced_masses(coupled: CoupledModel, geom: int) -> NDArray[np.float64]:
     """
     model = coupled.model
     masses = model.body_subtreemass[model.body_rootid]
-    inverse = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)[
-        model.geom_bodyid
-    ]
+    inverse_by_body = np.where(model.body_weldid != 0, 1 / np.maximum(masses, 1e-300), 0.0)
+    inverse = inverse_by_body[model.geom_bodyid]
     total = np.where(coupled.can_collide(geom), inverse + inverse[geom], 0.0)
     return np.divide(1.0, total, out=np.zeros_like(total), where=total > 0)
 
@@ -466,7 +473,7 @@ def typical_hit(model: mujoco.MjModel, name: str) -> dict[str, Any]:
         "size": extent.size,
         "hit": (mass, fall),
         "radius": footprint,
-        "amplitude": min(_DENT, _THIN * extent.radius / extent.size),
+        "amplitude": min(_TYPICAL_DENT, _MAX_TYPICAL_DENT * extent.radius / extent.size),
     }
 
 
@@ -477,21 +484,22 @@ def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material
     that can touch the target; but no more than can be stepped in four substeps a physics step, as
     estimated before the atlas is made.
     """
-    spacing = np.sqrt(extent.area / 6)  # times resolution
+    spacing = np.sqrt(extent.area / 6)  # of texels, times the resolution [m]
     _, footprint = heaviest(coupled, geom)
-    resolved = _TEXELS * spacing / footprint if 0 < footprint < np.inf else 0.0
-    n = int(np.clip(_STEP * np.ceil(resolved / _STEP), USUAL, MOST))
-    speed, bending, viscosity, stiffness = (
-        float(np.max(getattr(material, name)))
-        for name in ("speed", "bending", "viscosity", "stiffness")
-    )
+    resolved = _FOOTPRINT_TEXELS * spacing / footprint if 0 < footprint < np.inf else 0.0
+    n = int(np.clip(_RESOLUTION_STEP * np.ceil(resolved / _RESOLUTION_STEP), USUAL, MOST))
+    speed = float(np.max(material.speed))
+    bending = float(np.max(material.bending))
+    viscosity = float(np.max(material.viscosity))
+    stiffness = float(np.max(material.stiffness))
     while n > LEAST:
-        eigenvalue = (2 / (_STABLE * (spacing / n))) ** 2
+        eigenvalue = (2 / (_STABLE_SHARE * (spacing / n))) ** 2
         wave = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness
         viscous = viscosity * eigenvalue
-        if coupled.model.opt.timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4 <= _SUBSTEPS:
+        substeps = coupled.model.opt.timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
+        if substeps <= _MAX_SUBSTEPS:
             break
-        n -= _STEP
+        n -= _RESOLUTION_STEP
     return n
 
 
@@ -517,36 +525,45 @@ def suited_targets(
     suited = dict(materials)
     texels = {name: n for name, n in resolutions.items() if n is not None}
     easings: dict[str, EasingLaw] = {}
-    geoms = {name: find_target(model, name) for name in materials}
-    for name, target in list(geoms.items()):
+    geoms = {}
+    for name in materials:
+        target = find_target(model, name)
         if is_soft(model, target):
-            surface = SoftSurface(model, geoms.pop(name))
-            extent = Extent.of(surface.mesh)
-            if materials[name].unset:
-                # by its size and the mass of its bodies: what may hit it is not looked at
-                density = _density(float(model.body_mass[surface.bodies].sum()), extent)
-                found = _speed_and_stiffness(model, extent, materials[name])
-                suited[name] = _filled_in(materials[name], *found, density)
-            texels.setdefault(name, _SOFT)
-    left = [name for name in geoms if materials[name].unset or name not in texels]
-    if not left:
+            suited[name] = _suited_to_soft(model, target, materials[name])
+            texels.setdefault(name, _SOFT_RESOLUTION)
+        else:
+            geoms[name] = target
+    open_names = [name for name in geoms if materials[name].unset or name not in texels]
+    if not open_names:
         return SuitedTargets(suited, texels, easings)
     coupled = CoupledModel(model, geoms.values())
-    for name in left:
+    for name in open_names:
         mesh = target_mesh(model, geoms[name])
         extent = Extent.of(mesh)
-        found_material = suited_material(
-            coupled, geoms[name], extent, materials[name], can_ease=can_ease
-        )
-        suited[name] = found_material.material
-        if found_material.easing is not None:
-            easings[name] = found_material.easing
+        choice = suited_material(coupled, geoms[name], extent, materials[name], can_ease=can_ease)
+        suited[name] = choice.material
+        if choice.easing is not None:
+            easings[name] = choice.easing
         elif "density" in materials[name].unset:
             _warn_of_unseen(coupled, name, geoms[name], extent)
         if name not in texels:
             n = suited_resolution(coupled, geoms[name], extent, suited[name])
-            texels[name] = min(n, _INTRICATE) if _is_intricate(mesh) else n
+            texels[name] = min(n, _INTRICATE_RESOLUTION) if _is_intricate(mesh) else n
     return SuitedTargets(suited, texels, easings)
+
+
+def _suited_to_soft(model: mujoco.MjModel, target: int, material: Material) -> Material:
+    """The material of a flex or a skin, filled in by its size and the mass of its bodies.
+
+    What may hit it is not looked at.
+    """
+    if not material.unset:
+        return material
+    surface = SoftSurface(model, target)
+    extent = Extent.of(surface.mesh)
+    density = _density(float(model.body_mass[surface.bodies].sum()), extent)
+    speed, stiffness = _speed_and_stiffness(model, extent, material)
+    return _filled_in(material, speed, stiffness, density)
 
 
 def _is_intricate(mesh: Mesh) -> bool:
@@ -554,10 +571,9 @@ def _is_intricate(mesh: Mesh) -> bool:
 
     It has many triangles, and holes, handles or loose parts.
     """
-    is_plain = (
-        mesh.closed and mesh.component_count == 1 and len(mesh.V) - len(mesh.F) / 2 == _SPHERE
-    )
-    return len(mesh.F) > _MANY_TRIANGLES and not is_plain
+    euler = len(mesh.V) - len(mesh.F) / 2  # of a closed mesh
+    is_sphere = mesh.closed and mesh.component_count == 1 and euler == _SPHERE_EULER
+    return len(mesh.F) > _MANY_TRIANGLES and not is_sphere
 
 
 def _warn_of_unseen(coupled: CoupledModel, name: str, geom: int, extent: Extent) -> None:
@@ -565,7 +581,7 @@ def _warn_of_unseen(coupled: CoupledModel, name: str, geom: int, extent: Extent)
     reduced = _reduced_masses(coupled, geom)
     heavy = max(_resting(coupled, geom), float(reduced.max()))
     light = float(reduced[reduced > 0].min(initial=np.inf))
-    if heavy > _HEAVY * light:
+    if heavy > _MAX_MASS_RATIO * light:
         warn_caller(
             f"the surface of geom {name!r} is to bear {heavy:.2g} kg: hits of bodies as light as "
             f"{light:.2g} kg will not be seen; Material.suited(size={extent.size:.2g}, "

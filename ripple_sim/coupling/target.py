@@ -16,9 +16,10 @@ from ripple_sim.solver.operator.plate_rim import Rim
 from .geoms import ByGeom, GeomKey, Value, by_name, find_target
 
 # Version in which keyword arguments of `Ripples` no longer take mappings by geom.
-_MAPPINGS_GO = "2.0"
+_MAPPINGS_END = "2.0"
+
 # Fields that mean nothing to some targets: only hits with Hertz's pulse have a modulus.
-_MAY_BE_MISSING = ("modulus",)
+_OPTIONAL_FIELDS = ("modulus",)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Target:
 
 def named_targets(
     model: mujoco.MjModel,
-    given: ByGeom[Material | Target] | ByGeom[Material] | ByGeom[Target],
+    materials: ByGeom[Material | Target] | ByGeom[Material] | ByGeom[Target],
     common: Mapping[str, Any],
 ) -> dict[str, Target]:
     """Targets by name, with fields that they leave open filled in.
@@ -79,7 +80,7 @@ def named_targets(
     Parameters
     ----------
     model : mujoco.MjModel
-    given : mapping
+    materials : mapping
         Geom to its `Material` or `Target`.
     common : mapping
         Field of `Target` to a value for all targets, or, which is deprecated, to a mapping of
@@ -91,21 +92,20 @@ def named_targets(
         For an unknown geom, one that cannot ripple, one that is given twice or that a mapping
         leaves out, and for a value that is neither a `Material` nor a `Target`.
     """
-    if not isinstance(given, Mapping):
+    if not isinstance(materials, Mapping):
         raise SceneError(
-            f"materials is {type(given).__name__}; valid is a mapping of geom names to Material or "
+            f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material or "
             "Target"
         )
-    for key, value in given.items():
+    for key, value in materials.items():
         find_target(model, key)
         if not isinstance(value, (Material, Target)):
             raise SceneError(
                 f"material of geom {key!r} is {shown(value)}; valid is a Material or a Target"
             )
-    targets = {
-        name: value if isinstance(value, Target) else Target(value)
-        for name, value in by_name(model, given, "materials").items()
-    }
+    targets = {}
+    for name, value in by_name(model, materials, "materials").items():
+        targets[name] = value if isinstance(value, Target) else Target(value)
     for field, value in common.items():
         values = _value_for_each(model, targets, field, value)
         for name, target in targets.items():
@@ -127,11 +127,11 @@ def _value_for_each(
     deprecated(
         f"{field} as a mapping by geom",
         f"Target(material, {field}=...) for each geom",
-        _MAPPINGS_GO,
+        _MAPPINGS_END,
     )
     values = by_name(model, value, field)
     missing = [name for name in targets if name not in values]
-    if missing and field not in _MAY_BE_MISSING:
+    if missing and field not in _OPTIONAL_FIELDS:
         raise SceneError(
             f"{field} has no entry for geom {missing[0]!r}; it has "
             f"{', '.join(map(repr, values)) or 'none'}: give every rippling geom one, or one "
@@ -140,22 +140,22 @@ def _value_for_each(
     return values
 
 
-def contacts_of(targets: Mapping[str, Target], given: Any) -> ByGeom[Sequence[GeomKey]]:
+def contacts_of(targets: Mapping[str, Target], contacts: Any) -> ByGeom[Sequence[GeomKey]]:
     """The geoms that collide for targets, as the targets name them.
 
     A mapping of them as an argument is deprecated.
     """
-    if given is None:
-        given = {}
-    elif isinstance(given, Mapping):
+    if contacts is None:
+        contacts = {}
+    elif isinstance(contacts, Mapping):
         deprecated(
             "contacts as an argument",
             "Target(material, contacts=[...]) for each geom",
-            _MAPPINGS_GO,
+            _MAPPINGS_END,
         )
     else:
-        return given  # refused where it is read
+        return contacts  # refused where it is read
     named = {
         name: target.contacts for name, target in targets.items() if target.contacts is not None
     }
-    return {**given, **named}
+    return {**contacts, **named}

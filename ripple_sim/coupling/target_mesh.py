@@ -21,8 +21,22 @@ from .soft import SoftSurface, is_soft
 
 # Longest edge of a triangle over the size of the primitive.
 _LONGEST_EDGE = 1 / 24
+
 _CYLINDER_SIDES = 96
-_MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB
+
+# Subdivisions of an icosahedron for a sphere or an ellipsoid.
+_SPHERE_SUBDIVISIONS = 4
+
+# Sides of a capsule along and around its caps.
+_CAPSULE_SIDES = (48, 48)
+
+# Atlases that are kept, and their most texels: 20 MB.
+_KEPT_ATLASES = 4
+_MAX_KEPT_TEXELS = 100_000
+
+_atlases: ResultCache[Atlas] = ResultCache(
+    _KEPT_ATLASES, lambda atlas: atlas.areas.size <= _MAX_KEPT_TEXELS
+)
 
 
 def height_field_triangles(
@@ -64,10 +78,10 @@ def primitive_triangles(
     scale = 2.0 ** np.floor(np.log2(size.max()))
     size = size / scale
     if kind == "ellipsoid":
-        solid = trimesh.creation.icosphere(subdivisions=4)
+        solid = trimesh.creation.icosphere(subdivisions=_SPHERE_SUBDIVISIONS)
         solid.apply_scale(size)
     elif kind == "capsule":
-        solid = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=(48, 48))
+        solid = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=_CAPSULE_SIDES)
         solid.apply_translation([0, 0, -solid.bounds.mean(axis=0)[2]])
     elif kind == "cylinder":
         solid = trimesh.creation.cylinder(
@@ -89,9 +103,6 @@ def primitive_triangles(
         on_side = radius > size[0] * (np.cos(np.pi / _CYLINDER_SIDES) - 1e-9)
         V[on_side, :2] *= (size[0] / radius[on_side])[:, None]
     return scale * V, F
-
-
-_atlases: ResultCache[Atlas] = ResultCache(4, lambda atlas: atlas.areas.size <= _MOST_TEXELS)
 
 
 def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str = "auto") -> Atlas:
@@ -138,13 +149,19 @@ def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
 def _surface(model: mujoco.MjModel, geom: int) -> tuple[NDArray, NDArray, NDArray | None, str]:
     """What `Mesh.from_arrays` takes: vertices, triangles, texture coordinates, name."""
     kind = TARGET_TYPES[int(model.geom_type[geom])]
+    asset = int(model.geom_dataid[geom])
     name = f"mesh of geom {geom_name(model, geom)!r}"
     if kind == "hfield":
-        return *height_field_triangles(model, int(model.geom_dataid[geom])), None, name
+        V, F = height_field_triangles(model, asset)
+        return V, F, None, name
     if kind not in ("mesh", "sdf"):
-        return *primitive_triangles(kind, model.geom_size[geom]), None, name
-    V, F, uv = mesh_arrays(model, int(model.geom_dataid[geom]))
-    return V, F, None if uv is None else np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1), name
+        V, F = primitive_triangles(kind, model.geom_size[geom])
+        return V, F, None, name
+    V, F, uv = mesh_arrays(model, asset)
+    if uv is not None:
+        # `Mesh` counts v from the lower edge of the image
+        uv = np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1)
+    return V, F, uv, name
 
 
 def mesh_arrays(
@@ -155,10 +172,13 @@ def mesh_arrays(
     Texture coordinates are those of the triangles' corners, [m, 3, 2], with v counted from the
     upper edge of the image; None if the mesh has none.
     """
-    faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
-    V = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]].astype(np.float64)
-    first = model.mesh_texcoordadr[mesh]
-    uv = None
-    if first >= 0:
-        uv = model.mesh_texcoord[first + model.mesh_facetexcoord[faces]].astype(np.float64)
-    return V, model.mesh_face[faces].astype(np.int64), uv
+    first_face = model.mesh_faceadr[mesh]
+    faces = slice(first_face, first_face + model.mesh_facenum[mesh])
+    first_vertex = model.mesh_vertadr[mesh]
+    V = model.mesh_vert[first_vertex:][: model.mesh_vertnum[mesh]].astype(np.float64)
+    F = model.mesh_face[faces].astype(np.int64)
+    first_uv = model.mesh_texcoordadr[mesh]
+    if first_uv < 0:
+        return V, F, None
+    uv = model.mesh_texcoord[first_uv + model.mesh_facetexcoord[faces]].astype(np.float64)
+    return V, F, uv

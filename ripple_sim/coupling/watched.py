@@ -12,13 +12,18 @@ from numpy.typing import NDArray
 
 from .soft import is_soft
 
-_WHOLE = 1 << 20  # bytes that are compared whole at each look: some 0.05 ms
-# bytes of a larger array that are compared at each look, one stretch after another
+# Arrays up to this size are compared whole at each look, in some 0.05 ms [bytes].
+_MAX_WHOLE_SIZE = 1 << 20
+
+# Length of the stretch of a larger array that is compared at each look, one after another [bytes].
 _STRETCH = 1 << 18
-_SAMPLES = 4096  # of a larger array that are compared at each look
+
+# Samples of a larger array that are compared at each look.
+_SAMPLES = 4096
 
 
 def _bytes_of(array: NDArray) -> NDArray[np.uint8]:
+    """The bytes of a contiguous array, not copied."""
     return array.reshape(-1).view(np.uint8)
 
 
@@ -26,6 +31,7 @@ class WatchedArray:
     """Tells whether an array was written to; it must be contiguous."""
 
     def __init__(self, array: NDArray) -> None:
+        # where the next stretch begins [bytes]
         self._next = 0
         self.take(array)
 
@@ -42,14 +48,13 @@ class WatchedArray:
         """
         now = _bytes_of(array)
         taken = self._taken
-        if len(now) <= _WHOLE:
+        if len(now) <= _MAX_WHOLE_SIZE:
             return not np.array_equal(now, taken)
         stretch = slice(self._next, self._next + _STRETCH)
         self._next = stretch.stop if stretch.stop < len(now) else 0
-        return not (
-            np.array_equal(now[stretch], taken[stretch])
-            and np.array_equal(now[:: self._step], taken[:: self._step])
-        )
+        if not np.array_equal(now[stretch], taken[stretch]):
+            return True
+        return not np.array_equal(now[:: self._step], taken[:: self._step])
 
     def differs(self, array: NDArray, start: int, count: int) -> bool:
         """Whether `count` bytes from the byte `start` on differ from the remembered ones."""
@@ -79,6 +84,7 @@ class WatchedShape:
         )
 
     def _arrays(self, model: mujoco.MjModel) -> list[NDArray]:
+        """The arrays that say what the surface is."""
         geom = self._geom
         if is_soft(model, geom):
             return []

@@ -20,7 +20,7 @@ from .events import DropEntry
 
 _GEOM = mujoco.mjtGeom
 
-# type, half-sizes over the body's radius
+# Type and half-sizes over the body's radius, by name of a shape.
 BODY_SHAPES = {
     "sphere": (_GEOM.mjGEOM_SPHERE, (1.0, 0.0, 0.0)),
     "box": (_GEOM.mjGEOM_BOX, (0.8, 0.8, 0.8)),
@@ -29,29 +29,54 @@ BODY_SHAPES = {
     "cylinder": (_GEOM.mjGEOM_CYLINDER, (0.9, 0.5, 0.0)),
 }
 
+# Hues of the bodies in turn, 0 to 1.
 _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 
-# Of the bodies [m], [kg/m^3], and how high above the target they start [m].
+# Range of the bodies' radii [m].
 _RADII = (0.05, 0.085)
+
+# Of the bodies [kg/m^3].
 _DENSITY = 400.0
+
+# Range of the heights above the target from which bodies fall [m].
 _HEIGHTS = (0.8, 1.2)
 
-_CLEAR = 0.2  # between the middles of bodies that fall one after the other [m]
-# least upward part of the normal, and room on all sides [m], of a good landing point
-_UPWARD = 0.6
-_ROOM = 0.05
-_STEPS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-_TRIED = 1000  # points, among which there may be no good one
-# of landing points that are tried: next to nothing of an upright sheet is seen from above
-_MOST_ROUNDS = 200
+# Standard gravity, as in MuJoCo's default [m/s^2].
+_GRAVITY = 9.81
 
-# Mass [kg] and speed [m/s] with which a ball of mean radius falls on the target, and its
-# footprint's radius [m].
+# Time over which bodies begin to fall, and when the first one does [s].
+_FALLING_TIME = 3.4
+_FIRST_FALL = 0.1
+
+# Distance between the middles of bodies that fall one after the other [m].
+_CLEARANCE = 0.2
+
+# Height at which the first body is parked; the others are a metre above one another [m].
+_PARKED_HEIGHT = 20.0
+
+# Least upward part of the normal of a good landing point.
+_MIN_UPWARD = 0.6
+
+# Room on all sides of a good landing point [m], and the directions in which it is looked for.
+_ROOM = 0.05
+_DIRECTIONS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+
+# Landing points that are tried at most, as there may be no good one.
+_MAX_TRIED_POINTS = 1000
+
+# Points that are tried in a round, and rounds at most: next to nothing of an upright sheet is seen
+# from above.
+_POINTS_PER_ROUND = 64
+_MAX_ROUNDS = 200
+
+# Mass [kg] and speed [m/s] with which a ball of mean radius falls on the target.
 _MEAN_RADIUS = (_RADII[0] + _RADII[1]) / 2
 TYPICAL_HIT = (
     _DENSITY * 4 / 3 * np.pi * _MEAN_RADIUS**3,
-    float(np.sqrt(2 * 9.81 * sum(_HEIGHTS) / 2)),
+    float(np.sqrt(2 * _GRAVITY * sum(_HEIGHTS) / 2)),
 )
+
+# Radius of its footprint [m].
 TYPICAL_FOOTPRINT = _MEAN_RADIUS / 2
 
 
@@ -79,6 +104,42 @@ def drop_model(
     scale : float
         Of the bodies' sizes.
     """
+    spec = _target_on_floor(V, F)
+    landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
+    interval = _FALLING_TIME / max(len(shapes), 1)
+    drops: list[DropEntry] = []
+    last = 0.0, 0.0, -np.inf
+    for i, (shape, (x, y, z)) in enumerate(zip(shapes, landing.tolist(), strict=True)):
+        kind, proportions = BODY_SHAPES[shape]
+        radius = scale * rng.uniform(*_RADII)
+        name = f"body_{i}"
+        # parked high above until it drops, out of sight and out of reach of the others
+        body = spec.worldbody.add_body(
+            name=name, pos=[0.0, 0.0, _PARKED_HEIGHT + i], quat=rng.standard_normal(4)
+        )
+        body.add_freejoint()
+        color = colorsys.hsv_to_rgb(
+            _HUES[i % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95)
+        )
+        body.add_geom(
+            name=name,
+            type=kind,
+            size=[radius * p for p in proportions],
+            density=_DENSITY,
+            rgba=[*color, 1],
+        )
+        start = z + rng.uniform(*_HEIGHTS)
+        # not into the one before, which has fallen for a while
+        if np.hypot(last[0] - x, last[1] - y) < _CLEARANCE:
+            fallen = _GRAVITY / 2 * interval**2
+            start = max(start, min(last[2] - fallen + _CLEARANCE, z + _HEIGHTS[1]))
+        last = x, y, start
+        drops.append(DropEntry(body=name, time=_FIRST_FALL + interval * i, position=last))
+    return spec, drops
+
+
+def _target_on_floor(V: NDArray[np.float64], F: NDArray[np.int64]) -> mujoco.MjSpec:
+    """Model of a mesh on a floor, without bodies."""
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.002
     # enough starting points to find the contacts of a body with a target, a fifth of the default's
@@ -103,36 +164,7 @@ def drop_model(
     )
     floor.rgba = [0.86, 0.87, 0.88, 1]
     floor.friction = [0.8, 0.01, 0.02]
-    landing = _landing_points(V, F, len(shapes), rng, eye, _ROOM * scale)
-    interval = 3.4 / max(len(shapes), 1)
-    drops: list[DropEntry] = []
-    last = 0.0, 0.0, -np.inf
-    for i, (shape, (x, y, z)) in enumerate(zip(shapes, landing.tolist(), strict=True)):
-        kind, proportions = BODY_SHAPES[shape]
-        radius = scale * rng.uniform(*_RADII)
-        name = f"body_{i}"
-        # parked high above until it drops, out of sight and out of reach of the others
-        body = spec.worldbody.add_body(
-            name=name, pos=[0.0, 0.0, 20.0 + i], quat=rng.standard_normal(4)
-        )
-        body.add_freejoint()
-        color = colorsys.hsv_to_rgb(
-            _HUES[i % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95)
-        )
-        body.add_geom(
-            name=name,
-            type=kind,
-            size=[radius * p for p in proportions],
-            density=_DENSITY,
-            rgba=[*color, 1],
-        )
-        start = z + rng.uniform(*_HEIGHTS)
-        # not into the one before, which has fallen for a while
-        if np.hypot(last[0] - x, last[1] - y) < _CLEAR:
-            start = max(start, min(last[2] - 9.81 / 2 * interval**2 + _CLEAR, z + _HEIGHTS[1]))
-        last = x, y, start
-        drops.append(DropEntry(body=name, time=0.1 + interval * i, position=last))
-    return spec, drops
+    return spec
 
 
 def _landing_points(
@@ -153,20 +185,20 @@ def _landing_points(
     high = V.max(axis=0)
     points = np.empty((0, 3))
     good = np.empty(0)
-    for _ in range(_MOST_ROUNDS):
-        if (good == 3).sum() >= count or len(points) >= max(count, _TRIED):
+    for _ in range(_MAX_ROUNDS):
+        if (good == 3).sum() >= count or len(points) >= max(count, _MAX_TRIED_POINTS):
             break
-        xy = rng.uniform(low[:2], high[:2], size=(64, 2))
+        xy = rng.uniform(low[:2], high[:2], size=(_POINTS_PER_ROUND, 2))
         face, z = downward_hits(scene, xy, high[2])
         hit = face >= 0
         found = np.column_stack([xy, z])[hit]
-        (a, b, c) = np.moveaxis(V[F[face[hit]]], 1, 0)
+        a, b, c = np.moveaxis(V[F[face[hit]]], 1, 0)
         normals = np.cross(b - a, c - a)
-        upward = np.abs(normals[:, 2]) > _UPWARD * np.linalg.norm(normals, axis=1)
-        around = [
-            downward_hits(scene, found[:, :2] + step, high[2])[1] - found[:, 2]
-            for step in room * _STEPS
-        ]
+        upward = np.abs(normals[:, 2]) > _MIN_UPWARD * np.linalg.norm(normals, axis=1)
+        around = []
+        for step in room * _DIRECTIONS:
+            _, height = downward_hits(scene, found[:, :2] + step, high[2])
+            around.append(height - found[:, 2])
         roomy = (np.abs(around) < room).all(axis=0)
         rays = np.zeros_like(found) if eye is None else eye - found
         seen = scene.distances(found + np.array([0.0, 0.0, 1e-3]), rays) > 1
@@ -209,11 +241,7 @@ def randomize(spec: mujoco.MjSpec, entry: RandomEntry) -> dict[str, np.ndarray]:
         For an unknown body or shape, or an invalid range.
     """
     _check(entry)
-    free = {
-        body.name: body
-        for body in spec.bodies
-        if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in body.joints)
-    }
+    free = {body.name: body for body in spec.bodies if _is_free(body)}
     for name in entry.bodies or ():
         if name not in free:
             raise SceneError(
@@ -222,7 +250,8 @@ def randomize(spec: mujoco.MjSpec, entry: RandomEntry) -> dict[str, np.ndarray]:
             )
     rng = np.random.default_rng(entry.seed)
     shifts = {}
-    for name in entry.bodies if entry.bodies is not None else free:
+    names = free if entry.bodies is None else entry.bodies
+    for name in names:
         body = free[name]
         shifts[name] = rng.uniform(-entry.position, entry.position, 3)
         body.pos = body.pos + shifts[name]
@@ -245,6 +274,11 @@ def randomize(spec: mujoco.MjSpec, entry: RandomEntry) -> dict[str, np.ndarray]:
             else:
                 geom.density = geom.density * float(mass)
     return shifts
+
+
+def _is_free(body: mujoco.MjsBody) -> bool:
+    """Whether a body has a free joint."""
+    return any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints)
 
 
 def _check(entry: RandomEntry) -> None:

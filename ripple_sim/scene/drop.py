@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numbers
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,50 +29,75 @@ from .scene import Scene
 from .scene_file import CameraEntry, RippleEntry
 from .source import scene_path, shipped_scenes
 
+# Axes of a file that may point up.
 UP_AXES = ("y", "z")
 
-SIZE = 1.0  # the target's longest edge of its bounding box [m]
+# The target's longest edge of its bounding box [m].
+SIZE = 1.0
+
+# Of the scene [s].
 DURATION = 5.0
 
-# Depth of a typical hit, over half the usual thickness of the target, over the radius of a tube
-# that is as slender, and at most over its size, of a closed target and of one with rims, at which
-# waves are twice as high.
-_THICK = 5.6
-_SLIM = 2.8
-_DEEPEST = 0.2
-_DEEPEST_OPEN = 0.12
+# Depth of a typical hit: over half the usual thickness of the target, and over the radius of a tube
+# that is as slender.
+_DEPTH_OVER_THICKNESS = 5.6
+_DEPTH_OVER_RADIUS = 2.8
+
+# The same at most over the size, of a closed target and of one with rims, at which waves are twice
+# as high.
+_MAX_DEPTH = 0.2
+_MAX_DEPTH_OPEN = 0.12
+
+# Times in which waves cross the target and fall to a tenth, for `Material.suited` [s].
+_CROSSING_TIME = 1.5
+_DECAY_TIME = 2.5
 
 # Stiff enough for crest behind crest [1/s^2].
-_STIFFNESS = 1000.0
+_MIN_STIFFNESS = 1000.0
 
-# Tubes of this radius, over the size, get bodies of the usual size, and more slender ones smaller
-# bodies.
-_SLENDER = 0.05
-_SMALLEST = 0.5
-_FOOT = 0.02  # how high over the floor what touches it may be, over the size
+# Tubes of this radius, over the size, get bodies of the usual size; more slender ones get smaller
+# bodies, down to the second share of the usual size.
+_SLENDER_RADIUS = 0.05
+_MIN_BODY_SCALE = 0.5
 
-# thickness over size of what lies down; how high, so that waves have room below [m]
-_FLAT = 1e-6
-_LIFTED = 0.25
+# How high over the floor what touches the floor may be, over the size.
+_FOOT_HEIGHT = 0.02
 
-# Candidates of the camera: three-quarter views, first those of what faces -y, as most files have it
-# [degrees].
+# Thickness over size of a mesh that lies down.
+_FLAT_THICKNESS = 1e-6
+
+# Height of a mesh that lies down over the floor, so that waves have room below [m].
+_FLAT_CLEARANCE = 0.25
+
+# Azimuths of the camera to choose from: three-quarter views, first those of what faces -y, as most
+# files have it [degrees].
 _AZIMUTHS = (125.0, 55.0, 145.0, 35.0, 215.0, 325.0, 235.0, 305.0)
 
-# Elevation on what lies flat and on what is as high as it is wide, or higher; the lens, and the
-# orbit [degrees], [1/s].
-_FLAT_VIEW = -50.0
-_HIGH_VIEW = -26.0
+# Elevation of the camera on a target that lies flat, and on one that is as high as it is wide, or
+# higher [degrees].
+_FLAT_ELEVATION = -50.0
+_HIGH_ELEVATION = -26.0
+
+# Vertical field of view of the camera [degrees].
 _FOVY = 28.0
+
+# By which the camera circles [degrees/s].
 _ORBIT = 5.0
 
-# Of the frame: height and width that the target may fill, at an aspect of 16:9, and how far below
-# the middle it is, for the falls above it.
+# Height and width of the frame that the target may fill.
 _FILLED = (0.62, 0.8)
-_BELOW = 0.06
+
+# How far the target is below the middle of the frame, over its height, for the falls above it.
+_BELOW_MIDDLE = 0.06
+
+# Width of a frame over its height.
 _ASPECT = 16 / 9
-_SEEN_AT = 1500  # points of the surface
-_TOP = 0.4  # least upward part of the normal of what bodies fall on
+
+# Points of the surface by which views are compared.
+_VIEW_POINTS = 1500
+
+# Least upward part of the normal of what bodies fall on.
+_MIN_TOP_NORMAL = 0.4
 
 
 def usual_up(path: str | Path) -> str:
@@ -131,31 +157,12 @@ def drop_scene(
     # MuJoCo may throw boxes and cylinders aside from a sheet
     shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape not in ("box", "cylinder")]
     extent = Extent.of(mesh)
-    # a tube has as much surface a length as a strip, which is what a hit can set in motion
-    rim = sum(
-        float(np.linalg.norm(np.diff(mesh.V[[*rim, rim[0]]], axis=0), axis=1).sum())
-        for rim in mesh.rims
-    )
-    slender = extent.area / (np.pi * max(rim, 2 * extent.size) * extent.size)
-    scale = float(np.clip(slender / _SLENDER, _SMALLEST, 1.0))
-    # waves slow and high enough to watch under typical bodies of that scale, crest behind crest
-    mass, speed = TYPICAL_HIT
-    hit = (mass * scale**3, speed)
-    radius = TYPICAL_FOOTPRINT * scale
-    amplitude = min(
-        _THICK * extent.radius / extent.size,
-        _SLIM * slender,
-        _DEEPEST if mesh.closed else _DEEPEST_OPEN,
-    )
-    suited = Material.suited(SIZE, hit, radius=radius, amplitude=amplitude, crossing=1.5, decay=2.5)
-    given = {
-        name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))
-    }
-    material = MaterialEntry(**given | {"stiffness": max(_STIFFNESS, given["stiffness"])})
+    slender = _slenderness(mesh, extent)
+    scale = float(np.clip(slender / _SLENDER_RADIUS, _MIN_BODY_SCALE, 1.0))
+    material = _material(mesh, extent, slender, scale)
     rng = np.random.default_rng(seed)
-    spec, drops = drop_model(
-        V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], rng, eye, scale
-    )
+    body_shapes = [shapes[i % len(shapes)] for i in range(bodies)]
+    spec, drops = drop_model(V, mesh.F, body_shapes, rng, eye, scale)
     if not mesh.closed:
         make_collidable(spec, "target", "flex")
     paint_target(spec, mesh, mesh_path, texture)
@@ -174,6 +181,67 @@ def drop_scene(
     )
 
 
+def _slenderness(mesh: Mesh, extent: Extent) -> float:
+    """Radius over length of a tube as slender as a mesh.
+
+    A tube has as much surface a length as a strip, which is what a hit can set in motion.
+    """
+    rim_length = 0.0
+    for rim in mesh.rims:
+        around = mesh.V[[*rim, rim[0]]]
+        rim_length += float(np.linalg.norm(np.diff(around, axis=0), axis=1).sum())
+    return extent.area / (np.pi * max(rim_length, 2 * extent.size) * extent.size)
+
+
+def _material(mesh: Mesh, extent: Extent, slender: float, scale: float) -> MaterialEntry:
+    """Waves slow and high enough to watch under typical bodies of a scale, crest behind crest."""
+    mass, speed = TYPICAL_HIT
+    amplitude = min(
+        _DEPTH_OVER_THICKNESS * extent.radius / extent.size,
+        _DEPTH_OVER_RADIUS * slender,
+        _MAX_DEPTH if mesh.closed else _MAX_DEPTH_OPEN,
+    )
+    suited = Material.suited(
+        SIZE,
+        (mass * scale**3, speed),
+        radius=TYPICAL_FOOTPRINT * scale,
+        amplitude=amplitude,
+        crossing=_CROSSING_TIME,
+        decay=_DECAY_TIME,
+    )
+    coefficients = {}
+    for name in COEFFICIENTS:
+        value = getattr(suited, name)
+        if np.isfinite(value):
+            coefficients[name] = value
+    coefficients["stiffness"] = max(_MIN_STIFFNESS, coefficients["stiffness"])
+    return MaterialEntry(**coefficients)
+
+
+class _View(NamedTuple):
+    """A view of a target.
+
+    Attributes
+    ----------
+    score : float
+        How much it shows; the highest is the best.
+    azimuth : float
+        [degrees]
+    lookat : tuple of float
+        Point to look at [m].
+    distance : float
+        Of the eye from there [m].
+    eye : float64 [3]
+        [m]
+    """
+
+    score: float
+    azimuth: float
+    lookat: tuple[float, float, float]
+    distance: float
+    eye: NDArray[np.float64]
+
+
 def _camera(
     V: NDArray[np.float64], F: NDArray[np.int64], closed: bool
 ) -> tuple[CameraEntry, NDArray[np.float64]]:
@@ -185,12 +253,16 @@ def _camera(
     "Shape analysis algorithm based on information theory").
     """
     width, depth, height = np.ptp(V, axis=0)
-    elevation = _FLAT_VIEW + (_HIGH_VIEW - _FLAT_VIEW) * min(height / max(width, depth), 1.0)
+    upright = min(height / max(width, depth), 1.0)
+    elevation = _FLAT_ELEVATION + (_HIGH_ELEVATION - _FLAT_ELEVATION) * upright
     points, normals = _sampled(V, F)
-    corners = V[:: -(-len(V) // _SEEN_AT)]
+    corners = V[:: -(-len(V) // _VIEW_POINTS)]
     upper = points[points[:, 2] >= np.quantile(points[:, 2], 0.9)]
     base = points[points[:, 2] <= np.quantile(points[:, 2], 0.1)]
+    # direction of what is uppermost, or leans out, from the middle of the base
     head = (upper.mean(axis=0) - base.mean(axis=0))[:2] / SIZE
+    is_top = normals[:, 2] > _MIN_TOP_NORMAL
+    # number of the direction of each normal, in boxes of 2/3
     bins = np.rint(1.5 * normals).astype(int) @ [25, 5, 1] + 62
     scene = RayScene(V, F)
     views = []
@@ -199,29 +271,27 @@ def _camera(
         rays = eye - points
         cosine = np.einsum("ij,ij->i", rays, normals) / np.linalg.norm(rays, axis=1)
         outer = normals * np.sign(cosine)[:, None]
-        seen = (scene.distances(points + 1e-4 * SIZE * outer, rays) > 1) & (
-            (cosine > 0) | (not closed)
-        )
+        is_clear = scene.distances(points + 1e-4 * SIZE * outer, rays) > 1
+        seen = is_clear & ((cosine > 0) | (not closed))
+        # area that each point stands for in the picture
         shown = np.where(seen, np.abs(cosine), 0.0) / distance**2
         shares = np.bincount(bins, weights=shown) / max(shown.sum(), 1e-300)
         variety = -(shares * np.log(np.maximum(shares, 1e-300))).sum()
-        top = seen[normals[:, 2] > _TOP].mean() if (normals[:, 2] > _TOP).any() else 0.0
+        top = seen[is_top].mean() if is_top.any() else 0.0
         towards = (eye - lookat)[:2] / distance
         detail = (scene.distances(corners + 1e-3 * (eye - corners), eye - corners) > 1).mean()
         score = variety + top + 2 * head @ towards + np.log(max(shown.sum() * detail, 1e-300))
-        views.append(
-            (score, azimuth - _ORBIT * DURATION / 2, tuple(lookat.tolist()), distance, eye)
-        )
-    _, start, at, distance, eye = max(views, key=lambda view: view[0])
+        views.append(_View(score, azimuth, tuple(lookat.tolist()), distance, eye))
+    best = max(views, key=lambda view: view.score)
     entry = CameraEntry(
-        lookat=at,
-        distance=distance,
-        azimuth=start,
+        lookat=best.lookat,
+        distance=best.distance,
+        azimuth=best.azimuth - _ORBIT * DURATION / 2,
         elevation=float(elevation),
         fovy=_FOVY,
         orbit=_ORBIT,
     )
-    return entry, eye
+    return entry, best.eye
 
 
 def _sampled(
@@ -232,8 +302,8 @@ def _sampled(
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
     rng = np.random.default_rng(0)
-    picked = rng.choice(len(F), _SEEN_AT, p=areas / areas.sum())
-    weights = rng.dirichlet((1.0, 1.0, 1.0), _SEEN_AT)
+    picked = rng.choice(len(F), _VIEW_POINTS, p=areas / areas.sum())
+    weights = rng.dirichlet((1.0, 1.0, 1.0), _VIEW_POINTS)
     return np.einsum("ij,ijk->ik", weights, V[F[picked]]), normals[picked] / areas[picked, None]
 
 
@@ -254,10 +324,8 @@ def _fitted(
         seen = local[:, :2] / -local[:, 2:]
         low = seen.min(axis=0)
         high = seen.max(axis=0)
-        lookat = (
-            lookat
-            + pose.rotation[:, :2] @ ((low + high) / 2 + [0.0, 2 * tangent * _BELOW]) * distance
-        )
+        middle = (low + high) / 2 + [0.0, 2 * tangent * _BELOW_MIDDLE]
+        lookat = lookat + pose.rotation[:, :2] @ middle * distance
         distance *= float(((high - low) / spans).max())
     return lookat, distance, pose.position
 
@@ -269,16 +337,23 @@ def _up(mesh: Mesh, usual: str) -> str:
     usual axis, unless the mesh falls over on that one and stands on the other.
     """
     extents = np.ptp(mesh.V, axis=0)
-    if flat := [axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()]:
-        return flat[0]
-    falls = {}
-    # if the middle of the surface is not above what touches the floor, give or take
     for axis in UP_AXES:
-        V = _standing(mesh, axis)
-        below = V[V[:, 2] <= _FOOT * SIZE][:, :2] - _sampled(V, mesh.F)[0].mean(axis=0)[:2]
-        angles = np.sort(np.arctan2(below[:, 1], below[:, 0]))
-        falls[axis] = not np.diff(angles, append=angles[0] + 2 * np.pi).max() < np.pi
+        if extents["xyz".index(axis)] <= _FLAT_THICKNESS * extents.max():
+            return axis
+    falls = {axis: _falls(_standing(mesh, axis), mesh.F) for axis in UP_AXES}
     return min(UP_AXES, key=lambda axis: (falls[axis], axis != usual))
+
+
+def _falls(V: NDArray[np.float64], F: NDArray[np.int64]) -> bool:
+    """Whether a mesh that stands falls over.
+
+    It does if the middle of its surface is not above what touches the floor, give or take.
+    """
+    middle = _sampled(V, F)[0].mean(axis=0)[:2]
+    feet = V[V[:, 2] <= _FOOT_HEIGHT * SIZE][:, :2] - middle
+    angles = np.sort(np.arctan2(feet[:, 1], feet[:, 0]))
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    return not gaps.max() < np.pi
 
 
 def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:
@@ -290,7 +365,7 @@ def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:
     V = V * (SIZE / np.ptp(V, axis=0).max())
     low = V.min(axis=0)
     high = V.max(axis=0)
-    clearance = _LIFTED if high[2] - low[2] <= _FLAT * SIZE else 0.0
+    clearance = _FLAT_CLEARANCE if high[2] - low[2] <= _FLAT_THICKNESS * SIZE else 0.0
     return V - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - clearance]
 
 

@@ -20,6 +20,9 @@ from ripple_sim.errors import SceneError
 
 from .material_entry import MaterialChange, given_fields
 
+# An event is due if its time differs from the simulation's by no more [s].
+_ROUND_OFF = 1e-9
+
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
@@ -170,29 +173,15 @@ class Script:
             *events.throw,
             *events.place,
         ]
-        self._moved = [
-            (entry, *free_joint(model, entry))
-            for entry in sorted(moved, key=lambda entry: entry.time)
-        ]
+        self._moved = []
+        for entry in sorted(moved, key=lambda entry: entry.time):
+            position, velocity = free_joint(model, entry)
+            self._moved.append((entry, position, velocity))
+        # poses of bodies that are held [m], by name
         self._home: dict[str, NDArray[np.float64]] = {}
         surfaces: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
         for surface in surfaces:
-            verb = "poke" if isinstance(surface, PokeEntry) else "change"
-            check_time(verb, surface.geom, surface.time)
-            if target_name(model, find_any(model, surface.geom)) not in targets:
-                raise SceneError(
-                    f"[[{verb}]] names the geom {surface.geom!r}, which does not ripple; the "
-                    f"rippling geoms are {', '.join(map(repr, targets))}"
-                )
-            if isinstance(surface, PokeEntry) and not (
-                np.isfinite([surface.impulse, *surface.point]).all()
-                and 0 <= surface.radius < np.inf
-            ):
-                raise SceneError(
-                    f"[[poke]] of {surface.geom!r} has point {surface.point} m, impulse "
-                    f"{surface.impulse!r} N s, radius {surface.radius!r} m; valid are finite "
-                    "numbers, the radius 0 or greater"
-                )
+            _check_surface(model, surface, targets)
         controls = sorted(events.control, key=lambda entry: entry.time)
         self._actuators = {entry.actuator: _actuator(model, entry) for entry in controls}
         sudden: list[PokeEntry | ChangeEntry | ControlEntry] = [*controls, *surfaces]
@@ -206,26 +195,12 @@ class Script:
                 pose = slice(position, position + 7)
                 data.qpos[pose] = self._home.setdefault(entry.body, data.qpos[pose].copy())
                 data.qvel[velocity : velocity + 6] = 0
-            if entry.time > data.time + 1e-9:
-                continue
-            begun += 1
-            if entry.position is not None:
-                data.qpos[position : position + 3] = entry.position
-            quaternion = data.qpos[position + 3 : position + 7]
-            if entry.orientation is not None:
-                quaternion[:] = np.array(entry.orientation) / np.linalg.norm(entry.orientation)
-            data.qvel[velocity : velocity + 6] = 0
-            if not isinstance(entry, PlaceEntry):
-                data.qvel[velocity : velocity + 3] = entry.velocity
-                # a free joint keeps its angular velocity in the body's own frame
-                back = np.zeros(4)
-                mujoco.mju_negQuat(back, quaternion)
-                mujoco.mju_rotVecQuat(
-                    data.qvel[velocity + 3 : velocity + 6], np.array(entry.angular_velocity), back
-                )
+            if entry.time <= data.time + _ROUND_OFF:
+                begun += 1
+                _move(data, entry, position, velocity)
         # sorted by time: those that have begun are the first
         del self._moved[:begun]
-        while self._sudden and self._sudden[0].time <= data.time + 1e-9:
+        while self._sudden and self._sudden[0].time <= data.time + _ROUND_OFF:
             event = self._sudden.pop(0)
             if isinstance(event, ControlEntry):
                 data.ctrl[self._actuators[event.actuator]] = event.value
@@ -235,7 +210,52 @@ class Script:
                 ripples.change_material(event.geom, **given_fields(event.material))
 
 
+def _move(
+    data: mujoco.MjData, entry: DropEntry | ThrowEntry | PlaceEntry, position: int, velocity: int
+) -> None:
+    """Give a free body the pose and the velocity of an event.
+
+    `position` and `velocity` are the addresses of its joint in qpos and qvel.
+    """
+    if entry.position is not None:
+        data.qpos[position : position + 3] = entry.position
+    quaternion = data.qpos[position + 3 : position + 7]
+    if entry.orientation is not None:
+        quaternion[:] = np.array(entry.orientation) / np.linalg.norm(entry.orientation)
+    data.qvel[velocity : velocity + 6] = 0
+    if isinstance(entry, PlaceEntry):
+        return
+    data.qvel[velocity : velocity + 3] = entry.velocity
+    # a free joint keeps its angular velocity in the body's own frame
+    back = np.zeros(4)
+    mujoco.mju_negQuat(back, quaternion)
+    turning = data.qvel[velocity + 3 : velocity + 6]
+    mujoco.mju_rotVecQuat(turning, np.array(entry.angular_velocity), back)
+
+
+def _check_surface(
+    model: mujoco.MjModel, entry: PokeEntry | ChangeEntry, targets: Sequence[str]
+) -> None:
+    """Refuse an event of a surface that does not ripple, or with invalid numbers."""
+    verb = "poke" if isinstance(entry, PokeEntry) else "change"
+    check_time(verb, entry.geom, entry.time)
+    if target_name(model, find_any(model, entry.geom)) not in targets:
+        raise SceneError(
+            f"[[{verb}]] names the geom {entry.geom!r}, which does not ripple; the rippling geoms "
+            f"are {', '.join(map(repr, targets))}"
+        )
+    if not isinstance(entry, PokeEntry):
+        return
+    numbers = [entry.impulse, *entry.point]
+    if not (np.isfinite(numbers).all() and 0 <= entry.radius < np.inf):
+        raise SceneError(
+            f"[[poke]] of {entry.geom!r} has point {entry.point} m, impulse {entry.impulse!r} N s, "
+            f"radius {entry.radius!r} m; valid are finite numbers, the radius 0 or greater"
+        )
+
+
 def _actuator(model: mujoco.MjModel, entry: ControlEntry) -> int:
+    """Number of the actuator of an event."""
     check_time("control", entry.actuator, entry.time)
     actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, entry.actuator)
     if actuator < 0:

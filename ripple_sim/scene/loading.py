@@ -41,8 +41,10 @@ from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
 from .source import read_toml, scene_path
 from .target_maps import check_rim
 
-# Attributes of <compiler> that name folders, and those that name files.
+# Attributes of <compiler> that name folders.
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
+
+# Attributes of any element that name files.
 _FILES = (
     "file",
     "filename",
@@ -53,18 +55,27 @@ _FILES = (
     "filefront",
     "fileback",
 )
+
+# expat's error of a reference to a character that does not exist.
 _BAD_CHARACTER = expat.errors.codes[expat.errors.XML_ERROR_BAD_CHAR_REF]
 
 # Elements whose PNG files MuJoCo reads whole, however large.
-_IMAGES = ("texture", "hfield")
+_IMAGE_ELEMENTS = ("texture", "hfield")
 
-# Time in which MuJoCo sets up a flexcomp of so many bodies [s], one for each point of its grid: it
-# grows with about their number to the power 2.6, since each one added has it list all again. A
-# shorter silence needs no words.
-_BODIES = 15_000
-_THEIR_SECONDS = 30.0
-_GROWTH = 2.6
-_LONG = 10.0
+# MuJoCo sets up a flexcomp of so many bodies, one for each point of its grid, in this time [s]. The
+# time grows with about the number to this power, since each body added has it list all again.
+_MEASURED_BODIES = 15_000
+_MEASURED_SECONDS = 30.0
+_GROWTH_POWER = 2.6
+
+# A shorter silence of MuJoCo needs no warning [s].
+_MAX_SILENCE = 10.0
+
+# Change a model's specification in place, before it is compiled.
+Edit = Callable[[mujoco.MjSpec], None]
+
+# Change a scene file's table in place, before it is checked.
+Change = Callable[[dict[str, Any]], None]
 
 
 def check_scene(scene: Scene) -> None:
@@ -96,19 +107,25 @@ def check_scene(scene: Scene) -> None:
             f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}"
         )
     Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
-    for each in dataclasses.fields(scene.events):
-        if late := [
-            event.time for event in getattr(scene.events, each.name) if event.time >= scene.duration
-        ]:
-            warn_caller(
-                f"a [[{each.name}]] at {late[0]:g} s is not before the scene's end, "
-                f"{scene.duration:g} s; give the scene a longer duration, or the event an earlier "
-                "time"
-            )
+    _warn_of_late_events(scene)
     check_camera(scene.model, scene.camera)
 
 
+def _warn_of_late_events(scene: Scene) -> None:
+    """Warn of each kind of event of which some are not before the scene's end."""
+    for field in dataclasses.fields(scene.events):
+        times = [event.time for event in getattr(scene.events, field.name)]
+        late = [time for time in times if time >= scene.duration]
+        if late:
+            warn_caller(
+                f"a [[{field.name}]] at {late[0]:g} s is not before the scene's end, "
+                f"{scene.duration:g} s; give the scene a longer duration, or the event an earlier "
+                "time"
+            )
+
+
 def _check_sensors(scene: Scene) -> None:
+    """Refuse sensors of one name, on no target, or without one place."""
     targets = [entry.geom for entry in scene.targets]
     names = set()
     for entry in scene.sensors:
@@ -121,9 +138,8 @@ def _check_sensors(scene: Scene) -> None:
                 f"sensor {entry.name!r} is on {entry.geom!r}, which does not ripple; valid are "
                 f"{valid}"
             )
-        if [entry.site is not None, entry.point is not None, len(entry.points) > 0].count(
-            True
-        ) != 1:
+        places = [entry.site is not None, entry.point is not None, len(entry.points) > 0]
+        if places.count(True) != 1:
             raise SceneError(f"sensor {entry.name!r} needs one of site, point and points")
         if entry.site is not None:
             site_on(scene.model, find_target(scene.model, entry.geom), entry.site)
@@ -134,6 +150,7 @@ def _check_sensors(scene: Scene) -> None:
 
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
+    """Refuse a target with a wrong name, number or file."""
     from ripple_sim.render import LOOKS
 
     find_target(model, entry.geom)
@@ -157,10 +174,10 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
             f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are "
             "two numbers from 0 on, the least first"
         )
-    for coefficient, each in entry.material.maps().items():
+    for coefficient, texture in entry.material.maps().items():
         _check_image(
             f"ripple.material.{coefficient}",
-            each.map,
+            texture.map,
             "a number, or the path of an image relative to the scene file",
         )
     if entry.still_map is not None:
@@ -176,6 +193,7 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
 
 
 def _check_image(key: str, path: str, valid: str) -> None:
+    """Refuse an image that does not exist; `valid` is what the key may hold."""
     if not Path(path).is_file():
         raise SceneError(f"{key} names the image {path!r}, which does not exist; valid is {valid}")
 
@@ -207,21 +225,27 @@ def check_files(path: Path) -> None:
             continue  # MuJoCo says what is wrong
         except (OSError, ValueError, LookupError, RecursionError):
             continue  # likewise
-        folders |= {
-            path.parent / each.get(name, "") for each in root.iter("compiler") for name in _FOLDERS
-        }
+        for compiler in root.iter("compiler"):
+            folders |= {path.parent / compiler.get(name, "") for name in _FOLDERS}
         for element in root.iter():
             if element.tag == "flexcomp":
                 _warn_of_many_bodies(element)
-            for name in filter(None, map(element.get, _FILES)):
-                found = [
-                    place for folder in {*folders, xml.parent} if _exists(place := folder / name)
-                ]
+            for file in _files_of(element, {*folders, xml.parent}):
                 if element.tag == "include":
-                    waiting += found
-                elif element.tag in _IMAGES and name.lower().endswith(".png"):
-                    for place in found:
-                        open_image(SceneError, place, element.tag).close()
+                    waiting.append(file)
+                elif element.tag in _IMAGE_ELEMENTS and file.name.lower().endswith(".png"):
+                    open_image(SceneError, file, element.tag).close()
+
+
+def _files_of(element: ElementTree.Element, folders: set[Path]) -> list[Path]:
+    """Existing files that an element names, in any of the folders."""
+    files = []
+    for attribute in _FILES:
+        name = element.get(attribute)
+        if name:
+            paths = [folder / name for folder in folders]
+            files += [path for path in paths if _exists(path)]
+    return files
 
 
 def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
@@ -236,7 +260,8 @@ def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
         bodies = math.prod(int(count) for count in flex.get("count", "").split())
     except ValueError:
         return  # MuJoCo says what is wrong
-    if (seconds := _THEIR_SECONDS * (bodies / _BODIES) ** _GROWTH) > _LONG:
+    seconds = _MEASURED_SECONDS * (bodies / _MEASURED_BODIES) ** _GROWTH_POWER
+    if seconds > _MAX_SILENCE:
         warn_caller(
             f"flexcomp {flex.get('name', '')!r} has {bodies} points, each a body of its own, which "
             f'MuJoCo takes about {seconds:.0f} s to set up; dof="trilinear", or a count of at most '
@@ -245,6 +270,7 @@ def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
 
 
 def _exists(path: Path) -> bool:
+    """Whether a regular file exists; raises `SceneError` for a FIFO or a device."""
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):
@@ -255,10 +281,6 @@ def _exists(path: Path) -> bool:
             "cannot be read"
         )
     return stat.S_ISREG(mode)
-
-
-Edit = Callable[[mujoco.MjSpec], None]
-Change = Callable[[dict[str, Any]], None]
 
 
 @checked(SceneError, name_or_path=PATH, edit=FUNCTION, change=FUNCTION)
@@ -302,17 +324,16 @@ def load_scene(
             )
         random = msgspec.structs.replace(random, seed=seed)
     model, shifts = load_model(path.parent / content.model, random, edit)
-    # every geom called as everybody calls it
-    content.ripple = [
-        msgspec.structs.replace(
-            entry.located(path.parent), geom=target_name(model, find_target(model, entry.geom))
-        )
-        for entry in content.ripple
-    ]
+    targets = []
+    for entry in content.ripple:
+        # a geom may be named in several ways
+        name = target_name(model, find_target(model, entry.geom))
+        targets.append(msgspec.structs.replace(entry.located(path.parent), geom=name))
+    content.ripple = targets
     moved: list[DropEntry | ThrowEntry] = [*content.drop, *content.throw]
-    for each in moved:
-        if each.position is not None and each.body in shifts:
-            each.position = tuple(np.add(each.position, shifts[each.body]).tolist())
+    for event in moved:
+        if event.position is not None and event.body in shifts:
+            event.position = tuple(np.add(event.position, shifts[event.body]).tolist())
     return scene_of(path.stem, model, content)
 
 
@@ -323,34 +344,43 @@ def scene_of(
 
     Raises what `check_scene` raises.
     """
-    events = Events(
-        **{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)}
-    )
-    targets = []
-    for entry in content.ripple:
-        preset = entry.material.preset
-        preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
-        # what it leaves out is found from the model
-        if preset is not None and preset.name == "suited":
-            given = given_fields(preset, without="name")
-            can_ease = not content.two_way and entry.pulse == "contact"
-            if not given and can_ease and entry.material.density is None:
-                chosen = None  # all of it, as without a preset: rings that are seen
-            else:
-                if not {"size", "hit"} <= set(given):
-                    given = typical_hit(model, entry.geom) | given
-                chosen = PresetEntry(name="suited", **given)
-            entry = msgspec.structs.replace(
-                entry, material=msgspec.structs.replace(entry.material, preset=chosen)
-            )
-        targets.append(entry)
-    look = content.two_way, tuple(content.overlay), content.lighting
-    sensors = tuple(content.sensor)
+    events_by_kind = {
+        field.name: tuple(getattr(content, field.name)) for field in dataclasses.fields(Events)
+    }
     scene = Scene(
-        name, model, tuple(targets), content.camera, content.duration, events, *look, notes, sensors
+        name=name,
+        model=model,
+        targets=tuple(_with_typical_hit(model, entry, content) for entry in content.ripple),
+        camera=content.camera,
+        duration=content.duration,
+        events=Events(**events_by_kind),
+        two_way=content.two_way,
+        overlay=tuple(content.overlay),
+        lighting=content.lighting,
+        notes=notes,
+        sensors=tuple(content.sensor),
     )
     check_scene(scene)
     return scene
+
+
+def _with_typical_hit(model: mujoco.MjModel, entry: RippleEntry, content: SceneFile) -> RippleEntry:
+    """A target with what its preset "suited" leaves out found from the model."""
+    preset = entry.material.preset
+    preset = PresetEntry(name=preset) if isinstance(preset, str) else preset
+    if preset is None or preset.name != "suited":
+        return entry
+    parameters = given_fields(preset, without="name")
+    can_ease = not content.two_way and entry.pulse == "contact"
+    if not parameters and can_ease and entry.material.density is None:
+        # the model chooses all of the material, as without a preset: rings that are seen
+        preset = None
+    else:
+        if not {"size", "hit"} <= set(parameters):
+            parameters = typical_hit(model, entry.geom) | parameters
+        preset = PresetEntry(name="suited", **parameters)
+    material = msgspec.structs.replace(entry.material, preset=preset)
+    return msgspec.structs.replace(entry, material=material)
 
 
 def load_model(
@@ -368,7 +398,7 @@ def load_model(
         )
     check_files(path)
     # a NaN is told once: by the errors below, or by MuJoCo's warning where none of them sees it
-    with warnings.catch_warnings(record=True) as told, refusal_of(repr(str(path))):
+    with warnings.catch_warnings(record=True) as caught, refusal_of(repr(str(path))):
         warnings.simplefilter("always")
         spec = mujoco.MjSpec.from_file(str(path))
         # the compiler fills up what is missing
@@ -377,10 +407,10 @@ def load_model(
         if edit is not None:
             edit(spec)
         model = own_model(spec.compile())
-    for number, (name, given) in enumerate(keys):
-        if edit is None and given not in (0, model.nq):
+    for number, (name, count) in enumerate(keys):
+        if edit is None and count not in (0, model.nq):
             raise SceneError(
-                f"keyframe {name or number!r} of {str(path)!r} has {given} positions (qpos); valid "
+                f"keyframe {name or number!r} of {str(path)!r} has {count} positions (qpos); valid "
                 f"are {model.nq}, as the model has"
             )
     for key, numbers in enumerate(np.hstack([model.key_qpos, model.key_qvel])):
@@ -389,8 +419,8 @@ def load_model(
                 f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid "
                 "are finite numbers"
             )
-    for each in told:
-        warn_caller(str(each.message), each.category)
+    for warning in caught:
+        warn_caller(str(warning.message), warning.category)
     return model, shifts
 
 

@@ -180,9 +180,10 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tr
         """The same with the images' paths made relative to a folder."""
         replace = msgspec.structs.replace
         maps = self.maps()
-        return replace(
-            self, **{name: replace(each, map=str(folder / each.map)) for name, each in maps.items()}
-        )
+        located = {
+            name: replace(texture, map=str(folder / texture.map)) for name, texture in maps.items()
+        }
+        return replace(self, **located)
 
 
 class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):

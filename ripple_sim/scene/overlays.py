@@ -9,9 +9,10 @@ from collections.abc import Iterable
 
 from ripple_sim.errors import SceneError
 
+# Overlays that colour the surface, with the unit of their range.
 HEATMAPS = {"height": "m", "velocity": "m/s"}
 
-
+# Names of all overlays.
 NAMES = (*HEATMAPS, "contacts", "grid", "time", "energy", "sensors")
 
 

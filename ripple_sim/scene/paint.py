@@ -1,4 +1,4 @@
-"""What a mesh file says of its colours, on a target: an image, or a colour at each vertex."""
+"""The colours of a mesh file on a target: an image, or a colour at each vertex."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from ripple_sim.solver import Mesh
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.solver.images import read_image
 
-_SCENES = (".glb", ".gltf")
+# Endings of formats that hold several meshes, and images.
+_SCENE_SUFFIXES = (".glb", ".gltf")
 
 
 def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
@@ -35,21 +36,26 @@ def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
     uint8 [height, width, 3], top row first, or None
     """
     mesh_path = Path(mesh_path)
-    if mesh_path.suffix.lower() in _SCENES:
-        found: list[Any] = _embedded(mesh_path)
+    if mesh_path.suffix.lower() in _SCENE_SUFFIXES:
+        images: list[Any] = _embedded(mesh_path)
     else:
-        named = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
-        beside = [
-            mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}")
-            for suffix in (".png", ".jpg", ".jpeg")
-        ]
-        found = named or [path for path in beside if path.is_file()][:1]
-    if len(found) > 1:
+        images = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
+        images = images or _beside(mesh_path)
+    if len(images) > 1:
         warn_caller(
-            f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: "
+            f"{mesh_path.name} is coloured by {len(images)} images, but a mesh can show only one: "
             "none is used; join them into one image, or choose one with --texture"
         )
-    return load_image(found[0]) if len(found) == 1 else None
+    return load_image(images[0]) if len(images) == 1 else None
+
+
+def _beside(mesh_path: Path) -> list[Path]:
+    """The image beside a mesh file that its name belongs to, if there is one."""
+    for suffix in (".png", ".jpg", ".jpeg"):
+        path = mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}")
+        if path.is_file():
+            return [path]
+    return []
 
 
 def load_image(source: Any) -> NDArray[np.uint8]:
@@ -134,14 +140,15 @@ def vertex_colors(mesh_path: str | Path) -> tuple[NDArray[np.float64], NDArray[n
             found = visual.vertex_colors
         coloured |= found is not None
         points.append(trimesh.transform_points(part.vertices, transform))
-        colors.append(
-            _bytes(np.ones((len(part.vertices), 3)) if found is None else np.asarray(found)[:, :3])
-        )
+        if found is None:
+            colors.append(_bytes(np.ones((len(part.vertices), 3))))
+        else:
+            colors.append(_bytes(np.asarray(found)[:, :3]))
     if not coloured:
         return None
     together = np.concatenate(colors)
     # their colours are linear light (glTF 2.0, section 3.7.2.1)
-    if mesh_path.suffix.lower() in _SCENES:
+    if mesh_path.suffix.lower() in _SCENE_SUFFIXES:
         together = _bytes(linear_to_srgb(together / 255))
     return np.concatenate(points), together
 
@@ -159,7 +166,7 @@ def _may_be_coloured(mesh_path: Path) -> bool:
         vertices = (words for words in _statements(mesh_path, skipped="f#") if words[0] == "v")
         return len(next(vertices, ("", ""))[1].split()) >= 6
     with mesh_path.open("rb") as file:
-        return kind in _SCENES or (kind == ".ply" and b"red" in file.read(4096))
+        return kind in _SCENE_SUFFIXES or (kind == ".ply" and b"red" in file.read(4096))
 
 
 def _baked(
@@ -202,10 +209,12 @@ def paint_target(
     elif corner_uv is not None:
         pixels = mesh_image(mesh_path)
     if pixels is None or corner_uv is None:
-        if (coloured := vertex_colors(mesh_path)) is None:
+        coloured = vertex_colors(mesh_path)
+        if coloured is None:
             return
         points, colors = coloured
-        pixels, corner_uv = _baked(mesh.F, colors[cKDTree(points).query(mesh.V)[1]])
+        _, nearest = cKDTree(points).query(mesh.V)
+        pixels, corner_uv = _baked(mesh.F, colors[nearest])
     asset = spec.mesh("target")
     # MuJoCo counts v from the image's upper edge
     asset.usertexcoord = (corner_uv * [1.0, -1.0] + [0.0, 1.0]).ravel()

@@ -13,9 +13,10 @@ from ripple_sim.errors import SceneError
 from .events import Events
 from .scene_file import CameraEntry, RippleEntry, SensorEntry, check_camera, converted
 
-MAX_DURATION = 86_400  # [s], a day
+# Duration of a run, less than a day [s].
+MAX_DURATION = 86_400
 
-
+# Times by which a video is slower than the simulation.
 MAX_SLOW_MOTION = 1000
 
 

@@ -28,13 +28,17 @@ from .events import ChangeEntry, ControlEntry, DropEntry, PlaceEntry, PokeEntry,
 from .material_entry import MaterialEntry
 from .target_maps import HeightEntry, InsideEntry, moved
 
+# Most images of which a frame is the mean.
 MAX_EXPOSURES = 1024
+
+# Largest number in a file, in metres, seconds, newtons or degrees: no sensible scene has larger
+# ones, and their squares do not overflow.
+_MAX_NUMBER = 1e12
 
 Entry = typing.TypeVar("Entry")
 
-# Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not
-# overflow.
-_LARGEST = 1e12
+# sRGB, 0 to 1.
+Color = tuple[float, float, float]
 
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -72,56 +76,50 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
     """Raise `SceneError` if the model lacks what a camera names, or an optic is impossible."""
-    for name, kind, count, missing in (
-        (entry.name, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam, "camera {!r}; its cameras are"),
-        (
-            entry.track,
-            mujoco.mjtObj.mjOBJ_BODY,
-            model.nbody,
-            "body {!r} for the camera to track; its bodies are",
-        ),
-    ):
-        if name is not None and mujoco.mj_name2id(model, kind, name) < 0:
-            raise SceneError(
-                f"the model has no {missing.format(name)} {_names(model, kind, count)}"
-            )
     body = mujoco.mjtObj.mjOBJ_BODY
     geom = mujoco.mjtObj.mjOBJ_GEOM
-    if isinstance(entry.focus, str) and all(
-        mujoco.mj_name2id(model, kind, entry.focus) < 0 for kind in (body, geom)
+    if entry.name is not None and not _exists(model, mujoco.mjtObj.mjOBJ_CAMERA, entry.name):
+        cameras = _names(model, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam)
+        raise SceneError(f"the model has no camera {entry.name!r}; its cameras are {cameras}")
+    if entry.track is not None and not _exists(model, body, entry.track):
+        raise SceneError(
+            f"the model has no body {entry.track!r} for the camera to track; its bodies are "
+            f"{_names(model, body, model.nbody)}"
+        )
+    if isinstance(entry.focus, str) and not (
+        _exists(model, body, entry.focus) or _exists(model, geom, entry.focus)
     ):
         raise SceneError(
             f"the model has nothing {entry.focus!r} for the camera to focus on; its bodies are "
             f"{_names(model, body, model.nbody)}; its geoms are {_names(model, geom, model.ngeom)}"
         )
-    for name, value, valid, right in (
-        ("shutter angle", entry.shutter, "0 to 360 degrees", 0 <= entry.shutter <= 360),
-        ("aperture", entry.aperture, "0 m or more", 0 <= entry.aperture < np.inf),
-        (
-            "focus",
-            entry.focus,
-            "more than 0 m",
-            not isinstance(entry.focus, float) or 0 < entry.focus < np.inf,
-        ),
-        (
-            "number of exposures",
-            entry.exposures,
-            f"1 to {MAX_EXPOSURES}",
-            1 <= entry.exposures <= MAX_EXPOSURES,
-        ),
-    ):
-        if not right:
-            raise SceneError(f"the camera's {name} is {value!r}; valid is {valid}")
+    _check_optics(entry)
+
+
+def _check_optics(entry: CameraEntry) -> None:
+    """Refuse numbers out of range."""
+    if not 0 <= entry.shutter <= 360:
+        _refuse("shutter angle", entry.shutter, "0 to 360 degrees")
+    if not 0 <= entry.aperture < np.inf:
+        _refuse("aperture", entry.aperture, "0 m or more")
+    if isinstance(entry.focus, float) and not 0 < entry.focus < np.inf:
+        _refuse("focus", entry.focus, "more than 0 m")
+    if not 1 <= entry.exposures <= MAX_EXPOSURES:
+        _refuse("number of exposures", entry.exposures, f"1 to {MAX_EXPOSURES}")
+
+
+def _refuse(name: str, value: object, valid: str) -> typing.NoReturn:
+    raise SceneError(f"the camera's {name} is {value!r}; valid is {valid}")
+
+
+def _exists(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
+    return bool(mujoco.mj_name2id(model, kind, name) >= 0)
 
 
 def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> str:
-    return (
-        ", ".join(name for i in range(count) if (name := mujoco.mj_id2name(model, kind, i)))
-        or "none"
-    )
-
-
-Color = tuple[float, float, float]
+    """Names of all bodies, geoms or cameras of a model, for a message."""
+    names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
+    return ", ".join(filter(None, names)) or "none"
 
 
 class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -191,15 +189,10 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     def files(self) -> list[str]:
         """Paths of what it reads, files or folders; its own paths are the same texts."""
         height = self.height or HeightEntry()
-        paths = [
-            self.still_map,
-            height.map,
-            height.field,
-            *(each.mesh or each.volume for each in self.inside),
-        ]
-        return [each.map for each in self.material.maps().values()] + [
-            path for path in paths if path is not None
-        ]
+        paths = [self.still_map, height.map, height.field]
+        paths += [body.mesh or body.volume for body in self.inside]
+        textures = [texture.map for texture in self.material.maps().values()]
+        return textures + [path for path in paths if path is not None]
 
 
 class SensorEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -280,9 +273,9 @@ def converted(table: Any, schema: type[Entry], what: str) -> Entry:
     except msgspec.ValidationError as error:
         message = str(error).replace("`$.", "`")
         words = _words_at(schema, message)
-        advice = (
-            f"; it must be {', '.join(map(repr, words[:-1]))} or {words[-1]!r}" if words else ""
-        )
+        advice = ""
+        if words:
+            advice = f"; it must be {', '.join(map(repr, words[:-1]))} or {words[-1]!r}"
         raise SceneError(f"{what}: {message}{advice}") from error
 
 
@@ -291,14 +284,12 @@ def _words_at(schema: Any, message: str) -> tuple[str, ...]:
 
     The path of the field stands at the end of a message of msgspec's.
     """
-    found = re.search(r" - at `(.*)`$", message)
+    path = re.search(r" - at `(.*)`$", message)
     kind = schema
-    for name in re.findall(r"\w+", found[1] if found else ""):
+    for name in re.findall(r"\w+", path[1] if path else ""):
         table = table_of(kind)
-        fields = (
-            {field.name: field.type for field in msgspec.structs.fields(table)} if table else {}
-        )
-        kind = fields.get(name)
+        fields = msgspec.structs.fields(table) if table else ()
+        kind = {field.name: field.type for field in fields}.get(name)
     return typing.get_args(kind) if typing.get_origin(kind) is typing.Literal else ()
 
 
@@ -314,8 +305,10 @@ def _check_values(value: Any, place: str, what: str) -> None:
         "[\0\ud800-\udfff]", value
     ):  # the latter are halves of pairs
         raise SceneError(f"{what}: {place} is {shown(value)}; valid are names without a NUL")
-    elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
-        raise SceneError(f"{what}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
+    elif isinstance(value, (int, float)) and not abs(value) <= _MAX_NUMBER:
+        raise SceneError(
+            f"{what}: {place} is {shown(value)}; valid are numbers up to {_MAX_NUMBER:g}"
+        )
 
 
 def table_of(kind: Any) -> type[msgspec.Struct] | None:

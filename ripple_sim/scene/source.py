@@ -12,21 +12,25 @@ from typing import Any
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import shown
 
-# By ending: what a file is that is taken for a scene file, and what to do with it.
 _A_MESH = (
-    "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may name a "
-    "model with it"
+    "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may "
+    "name a model with it"
 )
+_A_MODEL = "a model, not a scene; give the path of a scene file (TOML) that names it as its `model`"
 
-
-_NO_SCENES = dict.fromkeys((".obj", ".ply", ".stl", ".off", ".glb", ".gltf"), _A_MESH) | {
-    ".xml": (
-        "a model, not a scene; give the path of a scene file (TOML) that names it as its `model`"
-    )
+# Kinds of files that may be taken for scene files, by ending, and what to do with them.
+_NO_SCENES = {
+    ".obj": _A_MESH,
+    ".ply": _A_MESH,
+    ".stl": _A_MESH,
+    ".off": _A_MESH,
+    ".glb": _A_MESH,
+    ".gltf": _A_MESH,
+    ".xml": _A_MODEL,
 }
 
-# Parts of one dotted key: tomllib's time grows with their square, and ours have four.
-_MOST_PARTS = 100
+# Most parts of a dotted key: tomllib's time grows with their square, and ours have four.
+_MAX_KEY_PARTS = 100
 
 
 def shipped_scenes() -> list[str]:
@@ -49,7 +53,8 @@ def scene_path(name_or_path: str | Path) -> Path:
     path = Path(name)
     with contextlib.suppress(OSError):  # a name longer than the system's
         if path.is_file():
-            if kind := _NO_SCENES.get(path.suffix.lower()):
+            kind = _NO_SCENES.get(path.suffix.lower())
+            if kind is not None:
                 raise SceneError(f"{shown(name)} is {kind}")
             return path
         if path.exists() and not path.is_dir():
@@ -83,11 +88,12 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise SceneError(f"{name} does not exist; give the path of a TOML file") from error
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{name} cannot be read: {error}") from error
-    parts = max(len(re.findall(r"[^.\s]\s*\.", line)) + 1 for line in re.split(r"[=,\n]", text))
-    if parts > _MOST_PARTS:
+    keys = re.split(r"[=,\n]", text)
+    parts = max(len(re.findall(r"[^.\s]\s*\.", key)) + 1 for key in keys)
+    if parts > _MAX_KEY_PARTS:
         raise SceneError(
             f"{name} has a key of {parts} parts with dots between them; valid are at most "
-            f"{_MOST_PARTS}"
+            f"{_MAX_KEY_PARTS}"
         )
     try:
         return tomllib.loads(text)

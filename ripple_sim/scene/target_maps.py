@@ -28,13 +28,15 @@ from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.volume import is_volume
 from ripple_sim.solver.operator.plate_rim import RIMS, Rim
 
-# name: function and how many arguments it takes
+# Functions of expressions, and how many arguments they take, by name.
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{name: (getattr(np, name), 1) for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tan")},
     "atan2": (np.arctan2, 2),
     **{name: (getattr(np, name), 2) for name in ("hypot", "minimum", "maximum")},
     "where": (np.where, 3),
 }
+
+# Operators of expressions.
 _OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -49,7 +51,9 @@ _OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
 }
-_LONGEST = 1000  # [characters]
+
+# Most characters of an expression.
+_MAX_LENGTH = 1000
 
 
 def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -60,8 +64,8 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
     `SceneError` if it holds anything else, or its value is not finite everywhere.
     """
     try:
-        if len(text) > _LONGEST:
-            raise SceneError(f"it has {len(text)} characters, valid are {_LONGEST} at most")
+        if len(text) > _MAX_LENGTH:
+            raise SceneError(f"it has {len(text)} characters, valid are {_MAX_LENGTH} at most")
         tree = ast.parse(text.strip(), mode="eval")
         with np.errstate(all="ignore"):
             value = _value(tree.body, {"pi": np.pi, **variables})
@@ -125,9 +129,8 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
 
     def located(self, folder: Path) -> HeightEntry:
         """The same with its paths made relative to a folder."""
-        image, field = (
-            None if path is None else str(folder / path) for path in (self.map, self.field)
-        )
+        image = None if self.map is None else str(folder / self.map)
+        field = None if self.field is None else str(folder / self.field)
         return msgspec.structs.replace(self, map=image, field=field)
 
     def check(self) -> None:
@@ -181,8 +184,9 @@ class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 def check_rim(rim: str | dict[str, str]) -> None:
     """Raise `SceneError` unless `rim` of a target is a name, or a table of conditions by name."""
+    valid = RIMS if isinstance(rim, str) else RIMS[:3]
     # a name alone holds everywhere
-    regions, valid = ({rim: "1"}, RIMS) if isinstance(rim, str) else (rim, RIMS[:3])
+    regions = {rim: "1"} if isinstance(rim, str) else rim
     for name in regions:
         if name not in valid:
             raise SceneError(f"rim {name!r} does not exist; valid are {', '.join(valid)}")
@@ -206,19 +210,18 @@ def rim_of(model: mujoco.MjModel, geom: str, rim: str | dict[str, str]) -> Rim:
                 "out"
             )
         places = to_body(model, find_target(model, geom), points).T
-        found = np.full(len(points), "free", dtype="<U9")
+        names = np.full(len(points), "free", dtype="<U9")
         for name, where in reversed(rim.items()):
             there = evaluate(where, dict(zip("xyz", places, strict=True))) != 0
             if not there.any():
-                low, high = (
-                    [round(float(end(axis)), 4) for axis in places] for end in (np.min, np.max)
-                )
+                low = [round(float(axis.min()), 4) for axis in places]
+                high = [round(float(axis.max()), 4) for axis in places]
                 raise SceneError(
                     f"rim {name!r} of geom {geom!r} is where {where!r}, which holds nowhere on its "
                     f"rims; they lie from {low} to {high} m in the frame of its body"
                 )
-            found[there] = name
-        return found
+            names[there] = name
+        return names
 
     return conditions
 
@@ -248,9 +251,8 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
 
     def located(self, folder: Path) -> InsideEntry:
         """The same with its path made relative to a folder."""
-        mesh, volume = (
-            None if path is None else str(folder / path) for path in (self.mesh, self.volume)
-        )
+        mesh = None if self.mesh is None else str(folder / self.mesh)
+        volume = None if self.volume is None else str(folder / self.volume)
         return msgspec.structs.replace(self, mesh=mesh, volume=volume)
 
     def check(self) -> None:

@@ -1,0 +1,256 @@
+"""Warnings of waves that are too high or too steep for the object that carries them.
+
+Heights are compared with the local radius, slopes with 1. Each target is warned of once, with a
+material that would do.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Atlas, Material, WaveSolver
+from ripple_sim.solver.errors import warn_caller
+from ripple_sim.solver.kernel import Floats32
+from ripple_sim.solver.texels.thickness import half_thickness
+
+from .model import CoupledModel
+from .suited import Extent, bearing_density
+
+# The height allowed over the local radius.
+_ALLOWED_HEIGHT = 0.25
+
+# The limit where the object is thinnest holds for this share of the texels; the rest is thinner.
+_THINNEST_SHARE = 0.99
+
+# Slopes are looked at on one row in so many.
+_ROW_STRIDE = 4
+
+# Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard
+# body is steep, but small.
+_MIN_STEEP_AREA = 0.01
+
+# Steps between two looks at the crests of all steps so far, and at the slopes, by backend. They are
+# read back from a GPU for a look, which lets it run dry.
+_LOOK_INTERVAL = {"cpu": 16, "gl": 128}
+
+# A wave that is too high is followed for so many looks, or until it falls again, so that the advice
+# is based on its crest.
+_FOLLOWED_LOOKS = 4
+
+# The density that is advised is this much more than the least for the waves that were seen.
+_DENSITY_MARGIN = 2.0
+
+# It is also enough for a wave of this share of the crest where the object is thinnest, since a wave
+# spreads.
+_SPREAD_SHARE = 0.3
+
+# Coefficients of a material that are printed; the others change no wave.
+_PRINTED_FIELDS = tuple(
+    field for field in dataclasses.fields(Material) if isinstance(field.default, float | bool)
+)
+
+
+def scales_of(atlas: Atlas) -> tuple[Floats32, float, float]:
+    """What the heights on an atlas are compared with.
+
+    Returns
+    -------
+    fields : float32 [4, C, n, n]
+        1 over the greatest height allowed [1/m]; 1 over the distance to the next texel in the next
+        row and column [1/m], 0 beyond the chart; share of the surface's area.
+    per_thinnest : float
+        1 over the greatest height allowed where the object is thinnest [1/m].
+    calm : float
+        Waves that are no higher are neither too high nor too steep anywhere [m].
+    """
+    fields = np.zeros((4, *atlas.areas.shape))
+    fields[0] = 1 / (_ALLOWED_HEIGHT * half_thickness(atlas))
+    for axis in (1, 2):
+        spacing = np.linalg.norm(np.diff(atlas.positions, axis=axis), axis=-1)
+        inner = (slice(None),) * axis + (slice(None, -1),)
+        # needles, on which a slope means little
+        fields[axis][inner] = 1 / np.maximum(spacing, 0.5 * np.median(spacing))
+    fields[3] = atlas.areas / atlas.areas.sum()
+    thinnest = float(np.quantile(fields[0], _THINNEST_SHARE))
+    # no slope can reach 1 where neighbours differ by twice this height at most
+    calm = min(1 / fields[0].max(), 1 / (8**0.5 * fields[1:3].max()))
+    return fields.astype(np.float32), thinnest, float(calm)
+
+
+def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
+    """Share of the surface that is steeper than 1, seen on every fourth row."""
+    here = np.s_[:, :-1:_ROW_STRIDE, :-1]
+    below = np.s_[:, 1::_ROW_STRIDE, :-1]
+    beside = np.s_[:, :-1:_ROW_STRIDE, 1:]
+    down = (height[below] - height[here]) * per_row[here]
+    right = (height[beside] - height[here]) * per_column[here]
+    seen = share[here].astype(np.float64)
+    return float(seen[down**2 + right**2 > 1].sum() / seen.sum())
+
+
+class AmplitudeCheck:
+    """Warns of waves that are too high or too steep.
+
+    Heights are compared with the local radius (`half_thickness`), slopes with 1.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    waves : mapping of int to WaveSolver
+        By geom; see `waves_changed`.
+    """
+
+    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
+        self._coupled = coupled
+        self._watched = {geom: _WatchedTarget(solver) for geom, solver in waves.items()}
+        self._steps = 0
+
+    def __call__(self) -> None:
+        """Look at the heights, if it is time to. Call it after each step of the waves."""
+        for geom, watch in list(self._watched.items()):
+            if self._steps % _LOOK_INTERVAL[watch.waves.backend] == 0 and watch.look():
+                self._warn(geom)
+        self._steps += 1
+
+    def ignore(self, geom: int) -> None:
+        """Give no warning of a geom."""
+        self._watched.pop(geom, None)
+
+    def watches(self, geom: int) -> bool:
+        """Whether a geom may still be warned of."""
+        return geom in self._watched
+
+    def waves_changed(self, geom: int, waves: WaveSolver) -> None:
+        """Go on with the new waves of a geom."""
+        if geom in self._watched:
+            watch = self._watched[geom]
+            watch.look()  # at the old ones, a last time
+            watch.waves = waves
+            waves.crests()
+
+    def flush(self) -> None:
+        """Look at the heights a last time, and warn of what was seen: the waves will end."""
+        for geom, watch in list(self._watched.items()):
+            watch.look()
+            if watch.excess > 1:
+                self._warn(geom)
+
+    def _warn(self, geom: int) -> None:
+        watch = self._watched.pop(geom)
+        target = self._coupled.names[geom]
+        advice = self._advice(geom, watch.waves, _DENSITY_MARGIN * watch.needed)
+        warn_caller(
+            f"the waves on geom {target!r} are {watch.what}; pictures show them limited. {advice}"
+        )
+
+    def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:
+        """A material that would do, with a density higher by at least a factor."""
+        material = waves.material
+        values = {field.name: getattr(material, field.name) for field in _PRINTED_FIELDS}
+        if any(np.ndim(value) for value in values.values()):
+            target = repr(self._coupled.names[geom])
+            density = f"{_rounded_up(factor):g} * ripples[{target}].material.density"
+            return f"This would do: ripples.change_material({target}, density={density})"
+        # the hits so far may be the first of many
+        bearing = bearing_density(self._coupled, geom, Extent.of(waves.rest.mesh), material)
+        values["density"] = _rounded_up(max(factor * values["density"], bearing))
+        pairs = []
+        for field in _PRINTED_FIELDS:
+            value = values[field.name]
+            if value != field.default or field.name == "density":
+                pairs.append((field.name, repr(float(f"{value:.4g}"))))
+        python = ", ".join(f"{name}={value}" for name, value in pairs)
+        toml = ", ".join(f"{name} = {value}" for name, value in pairs)
+        return f"This would do: Material({python}), in a scene file material = {{{toml}}}"
+
+
+class _WatchedTarget:
+    """The waves of one target, as far as they were looked at.
+
+    Attributes
+    ----------
+    waves : WaveSolver
+    excess : float
+        The most, over what is allowed, of heights and slopes.
+    needed : float
+        By how much waves would have to be lower.
+    what : str
+        What was too large, how large, and where.
+    """
+
+    def __init__(self, waves: WaveSolver) -> None:
+        self.waves = waves
+        self.excess = 0.0
+        self.needed = 0.0
+        self.what = ""
+        # looks since the waves were too high or too steep for the first time
+        self._looks = 0
+        # waves up to this height are right anywhere, or too small to matter [m]
+        self._calm = 1e-3 * float(np.ptp(waves.rest.mesh.V, axis=0).max())
+        # see `scales_of`; computed when waves are higher for the first time
+        self._scales: tuple[Floats32, float] | None = None
+
+    def look(self) -> bool:
+        """Whether the waves are too high or too steep, and it is time to say so."""
+        excess = 0.0
+        crests = self.waves.crests()
+        if float(crests.max()) > self._calm:
+            excess = self._measure(crests, self.waves.height)
+        if self.excess > 1:
+            self._looks += 1
+        return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED_LOOKS)
+
+    def _measure(self, crests: NDArray[np.float32], height: NDArray[np.float32]) -> float:
+        """Compare heights and slopes with what is allowed; return the greater excess."""
+        if self._scales is None:
+            fields, thinnest, self._calm = scales_of(self.waves.rest)
+            self._scales = fields, thinnest
+        (per_limit, per_row, per_column, share), per_thinnest = self._scales
+        # crests over the heights allowed there
+        over = (crests * per_limit).reshape(-1)
+        texel = int(over.argmax())
+        high = float(over[texel])
+        steep_share = steep_area(height, per_row, per_column, share)
+        steep = 0.0
+        if steep_share > _MIN_STEEP_AREA:
+            steep = _steepness(height, per_row, per_column, share)
+        excess = max(high, steep)
+        if excess > max(self.excess, 1.0):
+            if high == excess:
+                limit = 1 / float(per_limit.reshape(-1)[texel])
+                self.what = self._too_high(texel, float(crests.reshape(-1)[texel]), limit)
+            else:
+                self.what = f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
+        self.excess = max(self.excess, excess)
+        spread = _SPREAD_SHARE * float(crests.max()) * per_thinnest
+        self.needed = max(self.needed, excess, spread)
+        return excess
+
+    def _too_high(self, texel: int, crest: float, limit: float) -> str:
+        place = self.waves.rest.positions.reshape(-1, 3)[texel]
+        where = ", ".join(f"{x:.3g}" for x in place)
+        radius = limit / _ALLOWED_HEIGHT
+        return (
+            f"too high: {crest:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
+        )
+
+
+def _steepness(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
+    """The slope that `_MIN_STEEP_AREA` of the surface exceeds."""
+    down = np.diff(height, axis=1, append=0) * per_row
+    right = np.diff(height, axis=2, append=0) * per_column
+    slope = np.hypot(down, right).ravel()
+    order = np.argsort(-slope)
+    area = np.cumsum(share.ravel()[order])
+    return float(slope[order[np.searchsorted(area, _MIN_STEEP_AREA)]])
+
+
+def _rounded_up(value: float) -> float:
+    """To two digits."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / step - 1e-9) * step
