@@ -1,4 +1,4 @@
-"""dm_control's `Physics` ripples, though it ends its steps with the beginning of the next one."""
+"""dm_control's `Physics` ripples, though its steps end with the beginning of the next."""
 
 import importlib.util
 import warnings
@@ -106,7 +106,7 @@ def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
 @pytest.mark.parametrize(
     "option", [{"overlays": ["text"]}, {"render_flag_overrides": {"shadow": False}}]
 )
-def test_what_only_colours_have_is_refused_with_depth_and_segmentation_as_in_dm_control(
+def test_colour_only_options_are_refused_with_depth_and_segmentation_as_in_dm_control(
     make: Any, shown: str, option: dict[str, Any]
 ) -> None:
     physics = make(MODEL)

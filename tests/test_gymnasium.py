@@ -1,4 +1,4 @@
-"""Environments of Gymnasium ripple with each of their physics steps, and are seen by their own camera."""
+"""Gymnasium's environments ripple with each physics step, seen by their own camera."""
 
 import functools
 import importlib
@@ -263,7 +263,7 @@ class PaintingEnv(HoldingEnv):
         return np.zeros((48, 64, 3), np.uint8)
 
 
-def test_a_render_that_cannot_be_drawn_for_is_told_of(path: Path) -> None:
+def test_warning_about_a_render_that_draws_by_itself(path: Path) -> None:
     env = RippleWrapper(PaintingEnv(path, "rgb_array"), MATERIALS, **OPTIONS)
     env.reset()
     with pytest.warns(
@@ -456,7 +456,7 @@ def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> 
     assert frame_size(env) == (320, 200)
 
 
-def test_environments_that_do_not_say_have_defaults() -> None:
+def test_environments_without_a_size_or_camera_get_defaults() -> None:
     model, data = posed(VIEWED)
     wrapped = types.SimpleNamespace(
         model=types.SimpleNamespace(ptr=model), data=types.SimpleNamespace(ptr=data)

@@ -1,7 +1,7 @@
 """`make_collidable`: let a mesh geom collide as its true surface.
 
-A convex collider stands for a geom by convex parts of its mesh, which CoACD finds and the user's
-cache keeps; a flex collider by a rigid flex of triangles.
+A convex collider is made of the convex parts of a geom's mesh, which CoACD finds and the user's
+cache keeps. A flex collider is a rigid flex of the mesh's triangles.
 """
 
 from __future__ import annotations
@@ -123,22 +123,22 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
             f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}"
         )
     found = _find(spec, geom)
-    if found.meshname and route == "auto":
+    is_mesh = bool(found.meshname)
+    if is_mesh and route == "auto":
         model = _compiled(spec, found)
         route = "sdf" if target_mesh(model, model.geom(found.name).id).closed else "flex"
     # what can fail comes first: then nothing has been changed
-    core = flex_core(mesh_on_body(spec, found)) if found.meshname and route == "flex" else None
-    parts = (
-        convex_parts(mesh_on_body(spec, found)) if found.meshname and route == "convex" else None
-    )
-    if not found.meshname or route in ("convex", "hull"):
+    core = flex_core(mesh_on_body(spec, found)) if is_mesh and route == "flex" else None
+    parts = convex_parts(mesh_on_body(spec, found)) if is_mesh and route == "convex" else None
+    if not is_mesh or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
-    if found.meshname:
+    if is_mesh:
         _remove_colliders(spec, found)
         found.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
     if not (found.contype or found.conaffinity):
-        found.contype = found.conaffinity = 1
-    if found.meshname and route == "sdf":
+        found.contype = 1
+        found.conaffinity = 1
+    if is_mesh and route == "sdf":
         _enlarge_sdf_search(spec, found.name)
     if core is not None:
         add_flex_collider(spec, found, core)
@@ -170,7 +170,7 @@ def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
         found = body.geoms[int(index)]
         found.name = found.name or key
         return found
-    names = ", ".join(repr(each.name) for each in spec.geoms if each.name)
+    names = ", ".join(repr(other.name) for other in spec.geoms if other.name)
     raise SceneError(
         f"the specification has no geom {key!r}; its named geoms are {names or 'none'}"
     )
@@ -199,13 +199,7 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
         stored = read_arrays(path)
         mark_used(path)
         return [stored[str(i)] for i in range(len(stored))]
-    import coacd
-
-    coacd.set_log_level("error")
-    parts = [
-        np.array(V, dtype=np.float64)
-        for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)
-    ]
+    parts = _decomposed(mesh)
     # a folder that cannot be written costs the next call its time, nothing else
     with (
         contextlib.suppress(OSError),
@@ -215,6 +209,15 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
         write_arrays(file, {str(i): part for i, part in enumerate(parts)})
     make_room(path)
     return parts
+
+
+def _decomposed(mesh: Mesh) -> list[NDArray[np.float64]]:
+    """Vertices of the convex parts that CoACD finds."""
+    import coacd
+
+    coacd.set_log_level("error")
+    parts = coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)
+    return [np.array(V, dtype=np.float64) for V, _ in parts]
 
 
 def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
@@ -280,10 +283,11 @@ def add_convex_collider(
             mass=0.0,
             group=_HIDDEN_GROUP,
             margin=geom.margin,
-            **{each: getattr(geom, each) for each in _NUMBER_SETTINGS},
-            **{each: np.array(getattr(geom, each)) for each in _ARRAY_SETTINGS},
+            **{key: getattr(geom, key) for key in _NUMBER_SETTINGS},
+            **{key: np.array(getattr(geom, key)) for key in _ARRAY_SETTINGS},
         )
-    geom.contype = geom.conaffinity = 0
+    geom.contype = 0
+    geom.conaffinity = 0
 
 
 def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore) -> None:
@@ -323,7 +327,8 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore)
         **{name: getattr(geom, name) for name in _NUMBER_SETTINGS},
         **{name: np.array(getattr(geom, name)) for name in _ARRAY_SETTINGS},
     )
-    geom.contype = geom.conaffinity = 0
+    geom.contype = 0
+    geom.conaffinity = 0
 
 
 def _remove_colliders(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:

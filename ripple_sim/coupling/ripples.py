@@ -1,4 +1,4 @@
-"""`Ripples` adds rippling surfaces to anybody's MuJoCo loop: contact forces become waves."""
+"""`Ripples` adds rippling surfaces to any MuJoCo loop: contact forces become waves."""
 
 from __future__ import annotations
 
@@ -222,14 +222,13 @@ class Ripples:
             For an unknown or invalid coefficient.
         """
         names = [field.name for field in dataclasses.fields(Material)]
-        for given in coefficients:
-            if given not in names:
+        for coefficient in coefficients:
+            if coefficient not in names:
                 raise SolverError(
-                    f"a material has no coefficient {given!r}; valid are {', '.join(names)}"
+                    f"a material has no coefficient {coefficient!r}; valid are {', '.join(names)}"
                 )
-        self._change(
-            name, material=dataclasses.replace(self._surface(name).material, **coefficients)
-        )
+        material = dataclasses.replace(self._surface(name).material, **coefficients)
+        self._change(name, material=material)
         if "density" in coefficients:
             self._take_up_all(self._surface(name).geom)
 
@@ -264,15 +263,16 @@ class Ripples:
         """
         waves = self._surface(name).waves
         place = self.to_geom(name, point)
-        where = waves.add_impulse(place, impulse, radius)
-        off = float(np.linalg.norm(place - where.point))
+        hit = waves.add_impulse(place, impulse, radius)
+        distance = float(np.linalg.norm(place - hit.point))
         size = float(np.ptp(waves.atlas.mesh.V, axis=0).max())
-        if off > _MAX_POKE_DISTANCE * size:
+        if distance > _MAX_POKE_DISTANCE * size:
             warn_caller(
-                f"a poke of {name!r} is {off:.3g} m off its surface ({off / size:.0%} of its "
-                "size); the nearest point is poked. Points are in the frame of the geom's body [m]"
+                f"a poke of {name!r} is {distance:.3g} m off its surface ({distance / size:.0%} of "
+                "its size); the nearest point is poked. Points are in the frame of the geom's body "
+                "[m]"
             )
-        return where
+        return hit
 
     def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
         """Hold a disc of a geom's surface still.
@@ -289,8 +289,9 @@ class Ripples:
             Along the surface [m].
         """
         atlas = self._surface(name).waves.atlas
+        texels = footprint(atlas, self.to_geom(name, point), radius).texels
         disc = np.zeros(atlas.areas.shape)
-        disc.reshape(-1)[footprint(atlas, self.to_geom(name, point), radius).texels] = 1.0
+        disc.reshape(-1)[texels] = 1.0
         self.hold(name, disc)
 
     def hold(self, name: GeomKey, region: ArrayLike) -> None:
@@ -424,7 +425,8 @@ class Ripples:
             If `data` belongs to another model.
         """
         bodies = body_energy(own_data(self.model, data), self._scratch)
-        return Energy(bodies, sum(waves.energy() for waves in self._waves.values()))
+        wave_energy = sum(waves.energy() for waves in self._waves.values())
+        return Energy(bodies, wave_energy)
 
     def vertices(self, name: GeomKey, data: mujoco.MjData) -> NDArray[np.float64] | None:
         """Where the vertices of a target's mesh are [m], [n, 3].

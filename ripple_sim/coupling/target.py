@@ -94,8 +94,8 @@ def named_targets(
     """
     if not isinstance(materials, Mapping):
         raise SceneError(
-            f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material or "
-            "Target"
+            f"materials is {type(materials).__name__}; valid is a mapping of geom names to "
+            "Material or Target"
         )
     for key, value in materials.items():
         find_target(model, key)

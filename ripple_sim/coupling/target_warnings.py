@@ -165,13 +165,14 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
             "0), nor does another geom of its body; name the geoms that collide for it, "
             "Target(contacts=[...]), or give it a contype"
         )
-    masks = ", ".join(
-        (
-            f"{coupled.names[each]!r} has contype {model.geom_contype[each]} and conaffinity "
-            f"{model.geom_conaffinity[each]}"
+    settings = []
+    for collider in colliders:
+        contype = model.geom_contype[collider]
+        conaffinity = model.geom_conaffinity[collider]
+        settings.append(
+            f"{coupled.names[collider]!r} has contype {contype} and conaffinity {conaffinity}"
         )
-        for each in colliders
-    )
+    masks = ", ".join(settings)
     return (
         f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not "
         "welded to its own"
@@ -184,47 +185,39 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
     name = coupled.names[geom]
     meets = coupled.can_collide(geom)
     thickness = flex_thickness(model, coupled.flex_colliders[geom])
-    boxes = model.geom_type == _GEOM.mjGEOM_BOX
-    distances = model.geom_type == _GEOM.mjGEOM_SDF
-    # MuJoCo lets bodies pass through one another that are joined, or excluded by name
-    body = int(model.geom_bodyid[geom])
-    weld = model.body_weldid
-    above = weld[model.body_parentid[weld]]
-    joined = (
-        (weld != weld[body])
-        & (weld != 0)
-        & ((above == weld[body]) | (above[body] == weld))
-        & bool(weld[body])
-    )
-    joined &= not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
-    excluded = np.column_stack([model.exclude_signature >> 16, model.exclude_signature & 0xFFFF])
-    joined[excluded[(excluded == body).any(axis=1)]] = True
-    apart = joined[model.geom_bodyid] & (model.geom_bodyid != body)
-    reasons = (
-        (
-            boxes,
-            (
-                "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not "
-                "box-shaped meshes"
-            ),
+    reasons = {
+        "MuJoCo may throw boxes ({}) aside, with impulses off by a tenth, though not box-shaped "
+        "meshes": model.geom_type == _GEOM.mjGEOM_BOX,
+        f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out": (
+            model.geom_type == _GEOM.mjGEOM_SDF
         ),
-        (distances, f"SDF geoms ({{}}) sink {thickness:.2g} m into it before they are pushed out"),
-        (
-            apart,
-            (
-                "MuJoCo finds no contacts of a flex with bodies that are joined to its own or "
-                "excluded ({})"
-            ),
-        ),
-    )
-    named = [
-        ([repr(coupled.names[i]) for i in np.flatnonzero(which & meets)], why)
-        for which, why in reasons
-    ]
-    found = [why.format(", ".join(names)) for names, why in named if names]
-    if found:
+        "MuJoCo finds no contacts of a flex with bodies that are joined to its own or excluded "
+        "({})": _passing(model, int(model.geom_bodyid[geom])),
+    }
+    problems = []
+    for reason, concerned in reasons.items():
+        names = [repr(coupled.names[other]) for other in np.flatnonzero(concerned & meets)]
+        if names:
+            problems.append(reason.format(", ".join(names)))
+    if problems:
         yield (
-            f"geom {name!r} collides through a flex: {'; '.join(found)}; call "
+            f"geom {name!r} collides through a flex: {'; '.join(problems)}; call "
             f'make_collidable(spec, {name!r}, "sdf"), or choose contype and conaffinity so that '
             "they do not meet"
         )
+
+
+def _passing(model: mujoco.MjModel, body: int) -> NDArray[np.bool_]:
+    """Geoms, [ngeom], that MuJoCo lets pass through a body's flex.
+
+    Their bodies are joined to the body, or excluded by name.
+    """
+    weld = model.body_weldid
+    parent = weld[model.body_parentid[weld]]
+    joined = (parent == weld[body]) | (parent[body] == weld)
+    joined &= (weld != weld[body]) & (weld != 0) & bool(weld[body])
+    joined &= not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    # the two bodies of an exclusion are in the upper and lower half of its signature
+    excluded = np.column_stack([model.exclude_signature >> 16, model.exclude_signature & 0xFFFF])
+    joined[excluded[(excluded == body).any(axis=1)]] = True
+    return joined[model.geom_bodyid] & (model.geom_bodyid != body)

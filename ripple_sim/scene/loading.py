@@ -158,7 +158,7 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
         if name not in valid:
             raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
     check_rim(entry.rim)
-    if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
+    if entry.color is not None and not all(0 <= channel <= 1 for channel in entry.color):
         raise SceneError(
             f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 "
             "(sRGB)"

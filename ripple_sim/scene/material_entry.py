@@ -19,9 +19,11 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
 from ripple_sim.solver.operator.presets import PRESETS
 
-# Constructors of `Material`; the presets of a scene file are these and the real materials by name.
+# Constructors of `Material`. The presets of a scene file are these constructors, and the real
+# materials of `PRESETS`.
 LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water", "suited")
 
+# Advice in messages.
 _LAYER = (
     "write preset = {name = 'layer', modulus = ...} or another of a layer under [ripple.material]"
 )
@@ -201,11 +203,16 @@ class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
     poisson: float | None = None
 
 
+# Names of all coefficients.
 COEFFICIENTS = MaterialChange.__struct_fields__
 
 
 def given_fields(entry: msgspec.Struct, without: str = "") -> dict[str, Any]:
     """The fields of a struct that are not None."""
     # not `asdict`, which would turn maps into dictionaries
-    given = {name: getattr(entry, name) for name in entry.__struct_fields__ if name != without}
-    return {name: value for name, value in given.items() if value is not None}
+    fields = {}
+    for name in entry.__struct_fields__:
+        value = getattr(entry, name)
+        if name != without and value is not None:
+            fields[name] = value
+    return fields

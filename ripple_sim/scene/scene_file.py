@@ -1,7 +1,7 @@
 """The TOML file of a scene: its tables, read strictly.
 
-`[[ripple]]` makes maps of the material, the layer over what is inside, and parts without waves; of
-`[camera]` it is checked whether the model and the optics can do what it says.
+`apply_maps` gives a target of `[[ripple]]` the maps of its material, the layer over what is inside,
+and parts without waves. `check_camera` compares `[camera]` with the model.
 """
 
 from __future__ import annotations
@@ -359,14 +359,14 @@ def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
     atlas = ripples[entry.geom].atlas
     coefficients = {}
     if entry.inside:
-        bodies = [
-            moved(each.body(), functools.partial(ripples.to_geom, entry.geom))
-            for each in entry.inside
-        ]
+        to_atlas = functools.partial(ripples.to_geom, entry.geom)
+        bodies = [moved(inside.body(), to_atlas) for inside in entry.inside]
         thickness = thickness_map(atlas, bodies, entry.thickness_limits)
         coefficients.update(vars(entry.material.material(thickness)))
-    for name, each in entry.material.maps().items():
-        coefficients[name] = texture_map(atlas, each.map, each.low, each.high, each.channel)
+    for name, texture in entry.material.maps().items():
+        coefficients[name] = texture_map(
+            atlas, texture.map, texture.low, texture.high, texture.channel
+        )
     if coefficients:
         ripples.change_material(entry.geom, **coefficients)
     if entry.still_map is not None:

@@ -1,4 +1,4 @@
-"""The routes of `make_collidable` to the true surface: where flex colliders lie, and that open meshes are sheets."""
+"""The routes of `make_collidable`: where flex colliders lie, and sheets of open meshes."""
 
 import igl
 import mujoco

@@ -1,4 +1,4 @@
-"""Contacts of collision geoms load the visible surface: all of their force, once, on its nearest part in front."""
+"""Contacts of collision geoms load the nearest front part of the visible surface, once."""
 
 import re
 import warnings
@@ -123,7 +123,7 @@ def test_targets_that_share_a_geom_get_each_contact_once(x: float, expected: str
     assert run.given() == pytest.approx(lost, rel=0.01)
 
 
-def test_a_plank_across_two_targets_weighs_on_both_what_it_weighs() -> None:
+def test_a_plank_across_two_targets_presses_on_both_with_its_weight() -> None:
     plank = """<body name="ball" pos="0 0 0.605"><freejoint/>
         <geom name="plank" type="box" size="0.4 0.05 0.015" mass="0.3"/></body>"""
     run, lost = play(model_of(ARM + plank), ("left", "right"), 0.5)
@@ -183,7 +183,7 @@ def test_hull_over_a_waist_is_as_far_off_as_the_waist_is_deep() -> None:
     assert hull_gap(atlas) == pytest.approx(widest - waist, rel=0.1)
 
 
-def test_hull_that_matters_is_warned_of_by_name_and_distance() -> None:
+def test_warning_about_a_hull_names_geom_and_distance() -> None:
     model = mesh_spec(limbed(0.05), route=None).compile()
     with pytest.warns(RippleWarning, match=r"geom 'target'.*hull, up to 0\.\d+ m.*make_collidable"):
         Ripples(model, {"target": Material()}, resolution=8, backend="cpu")

@@ -1,4 +1,4 @@
-"""A mesh that collides as its convex parts: stable, in place, with all momentum, and undone without a trace."""
+"""A mesh that collides as its convex parts: stable, in place, and undone completely."""
 
 import importlib.metadata
 
@@ -102,7 +102,7 @@ def test_another_route_undoes_this_one(earlier: str, route: str) -> None:
 
 
 @pytest.mark.parametrize("joint", [None, "free"])
-def test_balls_are_felt_where_they_hit_the_visible_surface_with_what_they_lose(
+def test_balls_give_their_momentum_where_they_hit_the_visible_surface(
     joint: str | None,
 ) -> None:
     spec = mesh_spec(WAIST, joint, "convex", condim=1)
@@ -148,7 +148,7 @@ def test_balls_are_felt_where_they_hit_the_visible_surface_with_what_they_lose(
     assert np.quantile(off, 0.95) < 0.03 * np.ptp(atlas.mesh.V, axis=0).max()
 
 
-def test_boxes_stack_on_a_concave_target_and_weigh_what_they_weigh() -> None:
+def test_boxes_stack_on_a_concave_target_and_press_with_their_weight() -> None:
     spec = mujoco.MjSpec()
     V, F = ell()
     spec.add_mesh(name="ell", uservert=V.ravel(), userface=F.ravel())

@@ -1,4 +1,4 @@
-"""Contacts with flex colliders: the right place and name, and the sum of their forces along their mean normal."""
+"""Contacts with flex colliders: place, name, and the sum of forces along the mean normal."""
 
 import warnings
 from types import SimpleNamespace
@@ -27,7 +27,7 @@ ROUND = {
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("body", ROUND)
-def test_bodies_in_any_pose_give_what_they_lose_on_their_side(body: str, seed: int) -> None:
+def test_bodies_in_any_pose_give_their_momentum_on_their_side(body: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     spec = mesh_spec(limbed(0.04), "free" if seed % 2 else None, condim=1)
     V, F = peanut(0.06)
@@ -124,7 +124,9 @@ def test_two_targets_ripple_with_one_momentum(route: str) -> None:
 
 
 @pytest.mark.parametrize("targets", [["target", "body"], ["body"]])
-def test_what_hits_a_flex_and_ripples_itself_gets_as_much_as_it_loses(targets: list[str]) -> None:
+def test_a_rippling_geom_that_hits_a_flex_receives_the_momentum_it_loses(
+    targets: list[str],
+) -> None:
     spec = mesh_spec(limbed(0.04), condim=1)
     spec.option.gravity = [0, 0, 0]
     add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND["cylinder"])

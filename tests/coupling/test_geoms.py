@@ -1,4 +1,4 @@
-"""Geoms go by one name each; which of them collide for a target; arguments of `Ripples` that cannot be are named."""
+"""Names of geoms, collision geoms of targets, and messages for invalid arguments."""
 
 import copy
 import pickle
@@ -161,7 +161,7 @@ def test_a_pair_collides_whatever_its_masks_say() -> None:
         (["shell"], r"contacts is \['shell'\]; valid is a mapping"),
     ],
 )
-def test_contacts_that_cannot_be_are_named(model, contacts, message: str) -> None:
+def test_invalid_contacts_are_named(model, contacts, message: str) -> None:
     with pytest.raises(RippleError, match=message):
         Ripples(
             model,
@@ -210,7 +210,7 @@ def begun(model: mujoco.MjModel) -> Ripples:
         (lambda ripples: ripples["ball"], "'target'"),
     ],
 )
-def test_places_and_keys_that_are_none_are_named(call, message: str) -> None:
+def test_invalid_places_and_keys_are_named(call, message: str) -> None:
     with pytest.raises(RippleError, match=message):
         call(begun(model_of(SCENE)))
 
@@ -291,7 +291,7 @@ def numbers(coupled: CoupledModel, *names: str) -> list[int]:
     return [coupled.names.index(name) for name in names]
 
 
-def test_flex_speaks_for_its_geom(coupled: CoupledModel) -> None:
+def test_a_flex_collider_stands_for_its_geom(coupled: CoupledModel) -> None:
     [target] = numbers(coupled, "target")
     assert coupled.flex_colliders == {target: 0}
     np.testing.assert_array_equal(np.flatnonzero(coupled.has_flex), [target])

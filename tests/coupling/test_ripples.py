@@ -1,4 +1,4 @@
-"""From contacts to impulses: the right place, the right amount, on still and moving targets of every kind."""
+"""From contacts to impulses: the right place and amount, on still and moving targets."""
 
 from pathlib import Path
 

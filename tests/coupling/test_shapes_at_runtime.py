@@ -1,4 +1,4 @@
-"""Targets whose surfaces a program changes in the model, as for an episode's new terrain, ripple on the new ones."""
+"""Targets whose surfaces a program changes in the model ripple on the new surfaces."""
 
 import pickle
 
@@ -84,7 +84,7 @@ def test_two_way_and_copies_by_pickling_go_on():
 
 
 @pytest.mark.parametrize("what", ["held still", "texel by texel", "sensors"])
-def test_what_belongs_to_texels_of_the_old_surface_is_refused_at_the_next_step(what):
+def test_a_changed_surface_is_refused_if_something_belongs_to_its_texels(what):
     model, data, ripples = made("ball")
     if what == "sensors":
         ripples["ball"].sensor([0.0, 0.0, 0.2], kind="acceleration", rate=1000)

@@ -1,4 +1,4 @@
-"""Soft flexes load a surface as geoms do: with all of their force, vertex by vertex, under the flex's name."""
+"""Soft flexes load a surface as geoms do: whole force, by vertex, under the flex's name."""
 
 import mujoco
 import numpy as np

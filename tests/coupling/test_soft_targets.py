@@ -1,4 +1,4 @@
-"""Flexes and skins as targets: where their texels are, what contacts give them, and what the high-pass leaves of it."""
+"""Flexes and skins as targets: their texels, their contacts, and the high-pass."""
 
 import inspect
 
@@ -81,7 +81,7 @@ def test_the_balls_momentum_reaches_the_surface(xml, name, recwarn):
     assert waves.atlas.layout == {"cloth": "patches", "arm": "patches"}.get(name, "cube")
 
 
-def test_the_stiffness_that_is_left_open_suits_the_speed_that_is_given():
+def test_an_open_stiffness_suits_the_given_speed():
     model = mujoco.MjModel.from_xml_string(CLOTH)
     slow, fast = (Run(model, "cloth", material=Material(speed=c), resolution=8) for c in (0.4, 0.8))
     assert fast.ripples["cloth"].material.stiffness == pytest.approx(
@@ -159,7 +159,7 @@ def test_names_that_no_surface_has_are_refused():
         )
 
 
-def test_what_a_material_leaves_open_is_chosen_by_the_model():
+def test_open_coefficients_are_chosen_by_the_model():
     model = mujoco.MjModel.from_xml_string(JELLY)
     waves = Ripples(model, {"jelly": Material()}, resolution=8)["jelly"]
     assert waves.material.density * waves.rest.areas.sum() == pytest.approx(5.0, rel=1e-2)
@@ -194,7 +194,7 @@ def flexed(dof: str) -> tuple[mujoco.MjModel, Ripples, SoftSurface]:
 
 
 @pytest.mark.parametrize("dof", ["full", "trilinear"])
-def test_what_is_left_does_no_work_on_the_motions_of_the_flex(dof):
+def test_filtered_load_does_no_work_on_the_motions_of_the_flex(dof):
     _, ripples, surface = flexed(dof)
     waves = ripples["jelly"]
     texels = np.arange(40)
@@ -205,7 +205,7 @@ def test_what_is_left_does_no_work_on_the_motions_of_the_flex(dof):
     assert np.abs(fine.forces).max() > 0.1
 
 
-def test_a_coarse_load_is_taken_off_whole():
+def test_a_coarse_load_is_removed_completely():
     _, ripples, surface = flexed("trilinear")
     waves = ripples["jelly"]
     mass = waves.operator.mass.reshape(-1)

@@ -1,4 +1,4 @@
-"""Checks at every step warn once where impulses are going to be wrong: geoms too fast, solvers that stop early."""
+"""Warnings where impulses will be wrong: geoms too fast, solvers that stop too early."""
 
 import warnings
 
@@ -136,7 +136,7 @@ def shoot(speed: float, solref: str, timestep: float) -> tuple[bool, list[str]]:
 
 
 @pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.004 1"])
-def test_what_gets_through_was_warned_of_and_what_is_slow_was_not(solref: str) -> None:
+def test_tunnelling_geoms_get_a_warning_and_slow_geoms_none(solref: str) -> None:
     outcomes = [shoot(speed, solref, 0.002) for speed in np.geomspace(0.5, 120, 14)]
     assert all(warned for back, warned in outcomes if not back)
     first_warned = next(i for i, (_, warned) in enumerate(outcomes) if warned)
@@ -194,7 +194,7 @@ def test_moving_target_counts_with_its_own_speed() -> None:
 
 
 @pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.149 0.0335"])
-def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
+def test_geoms_stuck_in_an_sdf_got_a_warning(solref: str) -> None:
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" gravity="0 0 0" sdf_initpoints="10"/>
         <default><geom solref="{solref}" condim="1"/></default>
@@ -227,9 +227,7 @@ def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "solref"), [("sphere", "0.02 1"), ("sphere", BOUNCY), ("cylinder", BOUNCY)]
 )
-def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(
-    kind: str, solref: str
-) -> None:
+def test_geoms_that_pass_a_flex_or_are_thrown_aside_got_a_warning(kind: str, solref: str) -> None:
     slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
     V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.06)
     spec = mujoco.MjSpec.from_string(

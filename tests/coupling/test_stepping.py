@@ -1,4 +1,4 @@
-"""The time between looks, and resets, of which a mark in the data tells; MuJoCo's warnings and errors are ours."""
+"""`StepClock` sees time and resets by a mark; MuJoCo's warnings and errors become ours."""
 
 import copy
 import warnings
@@ -34,7 +34,7 @@ def test_first_look_counts_as_one_step_but_not_before_any() -> None:
     assert watch.at(DT) == Passed(DT)
 
 
-def test_whole_steps_are_exact_and_others_are_kept() -> None:
+def test_elapsed_times_are_exact_for_whole_steps() -> None:
     watch = Watch()
     watch.at(0.1)
     assert watch.at(0.1 + DT) == Passed(DT)
@@ -69,7 +69,7 @@ def crowd(memory: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, mujoco.MjData(model)
 
 
-def test_a_warning_is_given_once_though_it_tells_another_time() -> None:
+def test_a_warning_with_another_time_is_given_once() -> None:
     adopt_warnings()
     model, data = crowd("300K")
     with warnings.catch_warnings(record=True, action="always") as said:
@@ -130,7 +130,7 @@ def goes_on(clock: StepClock, model: mujoco.MjModel, data: mujoco.MjData) -> boo
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
-def test_it_stands_through_steps_and_copies(integrator: str) -> None:
+def test_mark_survives_steps_and_copies(integrator: str) -> None:
     model, data, clock = made(integrator)
     mujoco.mj_step(model, data, 50)
     mujoco.mj_forward(model, data)
@@ -138,7 +138,7 @@ def test_it_stands_through_steps_and_copies(integrator: str) -> None:
     assert goes_on(clock, model, copy.copy(data))
 
 
-def test_several_who_look_see_the_same_resets() -> None:
+def test_several_clocks_see_the_same_resets() -> None:
     model, data, first = made()
     second = StepClock()
     assert goes_on(second, model, data)
@@ -148,7 +148,7 @@ def test_several_who_look_see_the_same_resets() -> None:
         assert [goes_on(clock, model, data) for clock in order] == [True, True]
 
 
-def test_there_is_none_where_mujoco_writes_there() -> None:
+def test_no_mark_is_made_where_mujoco_writes_itself() -> None:
     model, data, clock = made(fwdinv="enable")
     mujoco.mj_step(model, data, 20)
     assert goes_on(clock, model, data)
@@ -156,7 +156,7 @@ def test_there_is_none_where_mujoco_writes_there() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:MuJoCo")
-def test_automatic_resets_are_seen_where_there_is_no_mark() -> None:
+def test_automatic_resets_are_seen_without_a_mark() -> None:
     model, data, clock = made(fwdinv="enable")
     data.qvel[:] = np.nan
     mujoco.mj_step(model, data)
@@ -176,7 +176,7 @@ TUMBLING = """<mujoco><option solver="{}" integrator="{}" noslip_iterations="{}"
 @pytest.mark.parametrize("solver", ["PGS", "CG", "Newton"])
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
 @pytest.mark.parametrize(("noslip", "sleep"), [(0, "disable"), (3, "disable"), (0, "enable")])
-def test_data_after_a_step_is_taken_as_it_is(
+def test_data_after_a_step_is_returned_unchanged(
     solver: str, integrator: str, noslip: int, sleep: str
 ) -> None:
     model = mujoco.MjModel.from_xml_string(TUMBLING.format(solver, integrator, noslip, sleep))
@@ -188,7 +188,7 @@ def test_data_after_a_step_is_taken_as_it_is(
         assert solved.of(data) == (data, None)
 
 
-def test_forces_that_are_solved_come_out_the_same() -> None:
+def test_forces_that_are_solved_already_stay_the_same() -> None:
     model = mujoco.MjModel.from_xml_string(TUMBLING.format("Newton", "Euler", 0, "disable"))
     data = mujoco.MjData(model)
     solved = SolvedForces(model)

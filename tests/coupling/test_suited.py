@@ -1,4 +1,4 @@
-"""Material and resolution that suit the target where they are left open, and waves that are too high or too steep."""
+"""Material and resolution chosen by the model, and warnings of waves too high or steep."""
 
 import math
 import re
@@ -174,7 +174,7 @@ def test_heights_stay_within_a_quarter_of_the_radius_at_every_time_step(
         assert 0 < (np.abs(ripples[name].crests()) / radii[name]).max() < 0.25
 
 
-def test_what_is_given_stays_and_a_density_says_that_all_is_given() -> None:
+def test_given_coefficients_stay_and_a_given_density_keeps_the_whole_material() -> None:
     kept = in_box(Material(speed=0.7, stiffness=3.0, viscosity=0.1))
     assert (kept.speed, kept.stiffness, kept.viscosity) == (0.7, 3.0, 0.1)
     assert kept.damping > 0 and kept.density != 1.0
@@ -182,7 +182,7 @@ def test_what_is_given_stays_and_a_density_says_that_all_is_given() -> None:
         assert in_box(whole) is whole
 
 
-def test_a_surface_that_is_made_too_heavy_to_be_moved_by_what_is_light_says_so() -> None:
+def test_warning_about_a_surface_too_heavy_for_light_bodies() -> None:
     """As torsos of robots are where surfaces push back: they bear the whole robot."""
     link = (
         BOX.format(mass=3e4)
@@ -305,7 +305,7 @@ def test_only_meshes_that_are_no_spheres_in_shape_are_intricate() -> None:
     assert not _is_intricate(Mesh.from_arrays(V, F[1:])), "few triangles"
 
 
-def test_a_resolution_that_is_given_is_the_one_that_is_taken() -> None:
+def test_a_given_resolution_is_used() -> None:
     model = mujoco.MjModel.from_xml_string(EGG.format(dt=0.002, a=0.3, b=0.5, start=1, ball=0.1))
     for given in (24, {"egg": 24}):
         assert (
@@ -409,7 +409,9 @@ def test_a_hard_hit_is_reported_once_and_the_named_material_would_do(
 @pytest.mark.parametrize(
     "material", [Material(density=1.0), Material(speed=0.3, damping=1, stiffness=300, density=5)]
 )
-def test_what_is_named_for_a_foot_holds_under_other_steps_too(material: Material) -> None:
+def test_material_advised_after_one_step_of_a_foot_suits_other_steps_too(
+    material: Material,
+) -> None:
     model = cheetah()
 
     def messages(material: Material, seed: int) -> list[str]:
@@ -428,7 +430,7 @@ def test_what_is_named_for_a_foot_holds_under_other_steps_too(material: Material
     assert all(messages(heavier, seed) == [] for seed in range(3))
 
 
-def test_what_is_named_is_whole_where_the_model_chose_the_material() -> None:
+def test_advice_names_all_coefficients_where_the_model_chose_the_material() -> None:
     data, ripples = still_ripples(Material())
     ripples.poke("target", [0, 0, 0.5], 200.0, 0.1)
     with pytest.warns(RippleWarning) as caught:
@@ -463,7 +465,7 @@ def test_a_crest_of_any_step_is_reported(before: int, after: int, end: str) -> N
             ripples.mj_step(data, nstep=40)
 
 
-def test_gl_is_looked_at_too(opengl: None) -> None:
+def test_amplitude_is_checked_on_the_gl_backend_too(opengl: None) -> None:
     [message], _ = warned(BALL, WEAK, seconds=1.0, backend="gl")
     assert "geom 'target' are too" in message
 
@@ -490,7 +492,7 @@ def test_a_target_may_have_any_height_if_that_is_wanted() -> None:
         ripples.mj_step(data, nstep=80)
 
 
-def test_of_a_map_a_factor_is_named() -> None:
+def test_advice_for_a_map_names_a_factor() -> None:
     data, ripples = still_ripples()
     ripples.change_material("target", density=np.full(ripples["target"].atlas.areas.shape, 2.0))
     ripples["target"].height = 0.4

@@ -1,4 +1,4 @@
-"""A `Target` says of one geom how it ripples; the arguments of `Ripples` hold where it leaves them open."""
+"""A `Target` says how a geom ripples; arguments of `Ripples` fill what it leaves open."""
 
 import dataclasses
 import warnings
@@ -30,7 +30,7 @@ def heights(model: mujoco.MjModel, ripples: Ripples) -> np.ndarray:
     return np.concatenate([ripples[name].height.ravel() for name in ripples])
 
 
-def test_what_a_target_leaves_open_is_as_the_arguments_say(model: mujoco.MjModel) -> None:
+def test_arguments_fill_fields_that_a_target_leaves_open(model: mujoco.MjModel) -> None:
     targets = {"egg": Target(MATERIAL), "box": Target(MATERIAL, resolution=12, layout="patches")}
     ripples = Ripples(model, targets, resolution=8, layout="cube", backend="cpu")
     assert (ripples["egg"].atlas.resolution, ripples["egg"].atlas.layout) == (8, "cube")
@@ -97,7 +97,7 @@ def test_hits_of_one_target_may_have_hertz_s_pulse(model: mujoco.MjModel) -> Non
 
 
 @pytest.mark.parametrize(("limit", "count"), [(True, 1), (False, 0)])
-def test_only_a_target_with_a_limit_is_warned_of_as_too_high(
+def test_only_targets_with_a_limit_get_warnings_of_high_waves(
     model: mujoco.MjModel, limit: bool, count: int
 ) -> None:
     light = dataclasses.replace(MATERIAL, density=0.01)
@@ -109,7 +109,7 @@ def test_only_a_target_with_a_limit_is_warned_of_as_too_high(
     assert sum("too high" in str(each.message) for each in told) == count
 
 
-def test_what_is_neither_a_material_nor_a_target_is_refused(model: mujoco.MjModel) -> None:
+def test_values_that_are_neither_material_nor_target_are_refused(model: mujoco.MjModel) -> None:
     with pytest.raises(
         SceneError, match=r"material of geom 'egg' is 0\.5; valid is a Material or a Target"
     ):

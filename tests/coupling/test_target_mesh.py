@@ -1,4 +1,4 @@
-"""Primitive geoms and height fields ripple on their own surface: its triangles lie where MuJoCo collides it."""
+"""Primitive geoms and height fields ripple on the surface with which they collide."""
 
 import mujoco
 import numpy as np

@@ -1,4 +1,4 @@
-"""The default scene of a mesh stands upright on the floor, whatever the file's axes, in the mesh's own colours."""
+"""The default scene of a mesh: upright on the floor, with the mesh's own colours."""
 
 import dataclasses
 from pathlib import Path
@@ -63,7 +63,7 @@ def test_the_tip_of_a_cone_is_a_metre_above_the_floor(
     np.testing.assert_allclose(V[V[:, 2] > 0.99], [[0, 0, 1]], atol=1e-4)
 
 
-def test_the_scene_is_one_that_a_file_could_have_described(tmp_path) -> None:
+def test_the_default_scene_passes_the_checks_of_scene_files(tmp_path) -> None:
     scene = drop_scene(cone(tmp_path, "spire.stl"), bodies=5, look="rubber")
     check_scene(scene)
     assert scene.name == "spire"
@@ -156,7 +156,7 @@ def test_the_picture_is_named_by_the_material_library(tmp_path):
     assert (tuple(picture[0, 0]), tuple(picture[-1, 0])) == (RED, BLUE)
 
 
-def test_two_images_are_not_mixed_up(tmp_path):
+def test_a_mesh_with_two_images_gets_none_and_warns(tmp_path):
     half_and_half(tmp_path / "a.png")
     half_and_half(tmp_path / "b.png")
     (tmp_path / "p.mtl").write_text("newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n")
@@ -176,7 +176,7 @@ def test_the_image_of_a_glb_is_inside_it(tmp_path):
 
 
 @pytest.mark.parametrize("how", ["named", "asked for", "p.ply", "p.glb", "p.obj"])
-def test_a_dropped_on_mesh_wears_its_image_or_the_colours_of_its_vertices(opengl, tmp_path, how):
+def test_the_target_is_drawn_with_its_image_or_its_vertex_colours(opengl, tmp_path, how):
     """Red above and blue below, in the film and in the model that MuJoCo would draw."""
     if how.startswith("p."):
         V, F = peanut()
@@ -217,7 +217,7 @@ def textured_cube(folder) -> tuple[mujoco.MjSpec, Mesh]:
     return spec, mesh
 
 
-def test_the_image_that_is_asked_for_reaches_the_model_bit_for_bit_and_the_right_way_up(
+def test_a_given_texture_reaches_the_model_bit_for_bit_and_the_right_way_up(
     tmp_path,
 ) -> None:
     """MuJoCo counts v from the upper edge of the image.
@@ -270,7 +270,7 @@ def test_without_an_image_or_without_coordinates_the_model_stays_plain(tmp_path)
         ("b.stl/a.ply", "y"),
     ],
 )
-def test_printers_files_stand_on_z_and_others_on_y(name: str, up: str) -> None:
+def test_stl_files_stand_on_z_and_other_files_on_y(name: str, up: str) -> None:
     assert usual_up(name) == usual_up(Path("there") / name) == up
     assert up in UP_AXES
 

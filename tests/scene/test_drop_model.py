@@ -1,4 +1,4 @@
-"""Bodies of a default scene, about as large as a ball, wait out of reach, drop, and vary by a seed."""
+"""Bodies of a default scene: their size, waiting, dropping, and variation by a seed."""
 
 import mujoco
 import numpy as np
@@ -68,7 +68,7 @@ def test_a_scene_with_few_bodies_or_none_compiles(bodies: int) -> None:
     assert (model.ngeom, model.nq) == (2 + bodies, 7 * bodies)
 
 
-def test_the_seed_decides_everything() -> None:
+def test_the_seed_determines_the_whole_scene() -> None:
     (one, drops) = compiled(6, 1)
     (same, same_drops) = compiled(6, 1)
     (other, _) = compiled(6, 2)
@@ -79,7 +79,7 @@ def test_the_seed_decides_everything() -> None:
 
 
 @pytest.mark.parametrize("shape", BODY_SHAPES)
-def test_bodies_of_every_shape_weigh_and_reach_about_as_a_ball_does(shape: str) -> None:
+def test_bodies_of_every_shape_have_about_the_mass_and_size_of_a_ball(shape: str) -> None:
     kind, proportions = BODY_SHAPES[shape]
     spec = mujoco.MjSpec()
     body = spec.worldbody.add_body(name="body")
@@ -143,7 +143,7 @@ def test_bodies_move_by_their_shifts_which_stay_within_the_range(seed: int) -> N
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_mass_goes_with_its_factor_and_with_the_size_only_where_a_density_is_given(
+def test_mass_scales_with_its_factor_and_with_the_size_where_a_density_is_given(
     seed: int,
 ) -> None:
     model, _ = varied(size=(0.5, 2.0), mass=(3.0, 3.0), seed=seed)
@@ -174,7 +174,7 @@ def test_orientations_cover_all_directions_even_where_the_mjcf_gives_angles() ->
     np.testing.assert_allclose(quaternions.T @ quaternions / 200, np.eye(4) / 4, atol=0.08)
 
 
-def test_only_the_bodies_that_are_named_vary() -> None:
+def test_only_named_bodies_vary() -> None:
     model, shifts = varied(bodies=["brick"], position=0.2)
     assert list(shifts) == ["brick"]
     np.testing.assert_array_equal(model.body("stone").pos, BEFORE.body("stone").pos)

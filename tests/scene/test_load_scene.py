@@ -1,4 +1,4 @@
-"""Scene files and models are found, edited, varied, or refused in one line if they are senseless or never end."""
+"""Scene files and models are found, edited, varied, or refused in one line."""
 
 import os
 import re
@@ -69,7 +69,7 @@ def test_drops_and_throws_are_shifted_with_their_bodies_and_places_stay(tmp_path
     assert scene.events.place[0].position == (7, 8, 9)
 
 
-def test_a_seed_takes_the_place_of_the_files_and_needs_something_that_varies(tmp_path) -> None:
+def test_a_given_seed_replaces_the_files_seed_and_needs_a_random_table(tmp_path) -> None:
     path = written(tmp_path, TOML + "[random]\nposition = 0.3\nseed = 5\n")
     own, same, other = (load_scene(path, seed=seed).model.body_pos for seed in (None, 5, 6))
     np.testing.assert_array_equal(own, same)
@@ -79,7 +79,7 @@ def test_a_seed_takes_the_place_of_the_files_and_needs_something_that_varies(tmp
         load_scene(path, seed=6)
 
 
-def test_an_edit_comes_after_chance_and_before_the_model_is_compiled(tmp_path) -> None:
+def test_edit_runs_after_randomisation_and_before_compilation(tmp_path) -> None:
     seen = []
 
     def edit(spec: mujoco.MjSpec) -> None:
@@ -95,15 +95,13 @@ def test_an_edit_comes_after_chance_and_before_the_model_is_compiled(tmp_path) -
 @pytest.mark.parametrize(
     ("name", "advice"), [("egg.OBJ", "`ripple-sim drop`"), ("scene.xml", "as its `model`")]
 )
-def test_a_mesh_or_a_model_in_place_of_a_scene_is_told_as_such(
-    tmp_path, name: str, advice: str
-) -> None:
+def test_message_says_that_a_mesh_or_a_model_is_no_scene(tmp_path, name: str, advice: str) -> None:
     (tmp_path / name).write_text("v 0 0 0")
     with pytest.raises(SceneError, match=f"{name}.*, not a scene; .*{advice}"):
         load_scene(tmp_path / name)
 
 
-def test_missing_scenes_and_models_are_told_apart_from_folders(tmp_path) -> None:
+def test_messages_tell_missing_scenes_and_models_from_folders(tmp_path) -> None:
     with pytest.raises(
         SceneError, match=r"there is no scene .*; shipped scenes are .*duck.*path of a TOML file"
     ):
@@ -116,7 +114,7 @@ def test_missing_scenes_and_models_are_told_apart_from_folders(tmp_path) -> None
         load_model(tmp_path)
 
 
-def test_mujocos_reason_is_told_in_one_line_and_other_errors_pass() -> None:
+def test_message_gives_mujocos_reason_in_one_line_and_other_errors_pass() -> None:
     with (
         pytest.raises(SceneError, match=r"^MuJoCo refuses 'a\.xml': first second$") as error,
         refusal_of("'a.xml'"),
@@ -191,7 +189,7 @@ def test_a_fifo_anywhere_in_a_model_is_refused(tmp_path: Path, model: str) -> No
         load_scene(ball_scene(tmp_path, model + BALL))
 
 
-def test_includes_that_go_round_and_broken_ones_are_left_to_mujoco(tmp_path: Path) -> None:
+def test_circular_and_broken_includes_are_left_to_mujoco(tmp_path: Path) -> None:
     (tmp_path / "a.xml").write_text(
         '<mujoco><include file="a.xml"/><include file="b.xml"/></mujoco>'
     )
@@ -205,7 +203,7 @@ def test_includes_that_go_round_and_broken_ones_are_left_to_mujoco(tmp_path: Pat
 @pytest.mark.parametrize(
     ("count", "seconds"), [("20 20 20", 5.7), ("24 24 24", 25), ("125 120", 32), ("30 30 30", 133)]
 )
-def test_a_flex_that_mujoco_takes_long_to_set_up_is_told_of(
+def test_warning_about_a_flex_that_mujoco_takes_long_to_set_up(
     tmp_path: Path, count: str, seconds: float
 ) -> None:
     (tmp_path / "flex.xml").write_text(
@@ -263,7 +261,7 @@ def test_a_scene_file_that_is_a_fifo_is_named_as_what_it_is(tmp_path: Path) -> N
         load_scene(tmp_path / "scene.toml")
 
 
-def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(
+def test_mujocos_warnings_become_ours_and_no_log_file_is_written(
     tmp_path, monkeypatch, capfd
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Materials in scene files: presets as in Python, strictly checked, and maps from pictures, through to the waves."""
+"""Materials in scene files: presets, checks, and maps from images."""
 
 import dataclasses
 import inspect
@@ -63,7 +63,7 @@ def material_of(table: dict) -> Material:
         ),
     ],
 )
-def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
+def test_preset_gives_coefficients_that_are_left_out(table: dict, expected: Material) -> None:
     assert dataclasses.asdict(material_of(table)) == dataclasses.asdict(expected)
 
 
@@ -102,7 +102,7 @@ def test_wrong_presets_are_refused_with_what_is_valid(table: dict, message: str)
 
 
 @pytest.mark.parametrize("name", ["tightening", "deep"])
-def test_what_is_the_same_everywhere_takes_no_map(name: str) -> None:
+def test_uniform_coefficients_take_no_map(name: str) -> None:
     with pytest.raises(
         RippleError,
         match=rf"Expected `float \| null`, got `str` - at `ripple\[0\].material.{name}`",

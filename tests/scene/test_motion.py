@@ -1,4 +1,4 @@
-"""Scripted events happen when and where the scene says, in MuJoCo's own state and on the waves."""
+"""Scripted events happen when and where the scene says, to bodies and to waves."""
 
 from pathlib import Path
 

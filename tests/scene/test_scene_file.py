@@ -1,4 +1,4 @@
-"""A scene's table: every value arrives, and what is wrong, by itself or against the model, is named with its place."""
+"""Tables of a scene file: values arrive, and mistakes are named with their place."""
 
 import dataclasses
 from pathlib import Path
@@ -105,7 +105,7 @@ MODEL = mujoco.MjModel.from_xml_string(
         {"focus": "stone"},
     ],
 )
-def test_what_the_model_has_and_the_optics_allow_is_accepted(entry: dict) -> None:
+def test_valid_cameras_are_accepted(entry: dict) -> None:
     scene.check_camera(MODEL, CameraEntry(**entry))
 
 
@@ -133,7 +133,7 @@ def test_what_the_model_has_and_the_optics_allow_is_accepted(entry: dict) -> Non
         ({"exposures": scene.MAX_EXPOSURES + 1}, "number of exposures is 1025"),
     ],
 )
-def test_what_cannot_be_is_named_with_its_value_and_what_is_valid(
+def test_invalid_cameras_are_refused_with_the_value_and_valid_values(
     entry: dict, message: str
 ) -> None:
     with pytest.raises(SceneError, match=message):
@@ -174,7 +174,7 @@ def test_a_scene_without_mistakes_passes() -> None:
     checked(still(0.01))
 
 
-def test_an_event_after_the_end_is_told_of() -> None:
+def test_warning_about_an_event_after_the_end() -> None:
     poke = scene.PokeEntry("egg", 1.0, (0, 0, 0.1), 1.0)
     with pytest.warns(
         RippleWarning, match=r"a \[\[poke\]\] at 1 s is not before the scene's end, 1 s; give"
@@ -317,7 +317,7 @@ def test_through_camera_changes_the_camera_alone_and_not_the_scene_itself() -> N
         scene.through_camera(before, "ear")
 
 
-def test_exposure_replaces_what_is_given_and_leaves_what_is_none() -> None:
+def test_exposure_replaces_given_values_and_leaves_the_others() -> None:
     before = filmed(azimuth=12.0, shutter=90.0, aperture=0.1, exposures=8)
     after = scene.with_exposure(before, shutter=180, aperture=None, focus="stone", exposures=None)
     assert after.camera == CameraEntry(
@@ -387,7 +387,7 @@ def test_request_refuses(words: list[str], said: str) -> None:
         ("a = \ud800", "cannot be read"),
     ],
 )
-def test_what_is_no_table_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_files_that_are_no_tables_are_refused(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "a.toml"
     path.write_bytes(text.encode(errors="surrogatepass"))
     with pytest.raises(SceneError, match=said):

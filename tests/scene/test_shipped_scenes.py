@@ -1,4 +1,4 @@
-"""The shipped scenes: what is to be hit is hit, ripples are seen and not absurd, and no toy gets into the duck."""
+"""The shipped scenes: targets are hit, and ripples are seen and not absurd."""
 
 import importlib.resources
 import warnings

@@ -1,4 +1,4 @@
-"""What lies inside a target of a scene file, and the shape that its surface begins with."""
+"""The body inside a target, the shape at the beginning, and rims by region."""
 
 import re
 from pathlib import Path
@@ -60,7 +60,9 @@ def folder(tmp_path: Path) -> Path:
     ],
     ids=["mesh", "volume"],
 )
-def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside: str) -> None:
+def test_thickness_of_the_layer_is_the_distance_to_the_body_inside(
+    folder: Path, inside: str
+) -> None:
     simulation = simulation_of(folder, TOML + f"[[ripple.inside]]\n{inside}\n")
     waves = simulation.ripples["egg"]
     # where the core is in the frame of the geom
@@ -75,7 +77,7 @@ def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside:
     np.testing.assert_allclose(waves.material.density, 0.665 * DENSITY * thickness)
 
 
-def test_limits_hold(folder: Path) -> None:
+def test_thickness_limits_hold(folder: Path) -> None:
     toml = TOML.replace("resolution = 24", "resolution = 24\nthickness_limits = [0.15, 0.25]")
     simulation = simulation_of(
         folder, toml + "[[ripple.inside]]\nmesh = 'core.stl'\nscale = 1e-3\n"
@@ -152,7 +154,7 @@ NAMES = {"x": X, "y": Y, "z": 0 * X}
         ("maximum(sqrt(abs(x)), log(1 + y))", np.maximum(np.sqrt(np.abs(X)), np.log(1 + Y))),
     ],
 )
-def test_they_are_what_they_say(text: str, value: np.ndarray) -> None:
+def test_values_of_expressions(text: str, value: np.ndarray) -> None:
     np.testing.assert_allclose(evaluate(text, NAMES), value, rtol=1e-14, atol=1e-16)
 
 
@@ -163,7 +165,7 @@ TOO_LONG = ["(" * 300 + "x" + ")" * 300, "-" * 990 + "x", "x+" * 600 + "x"]
 
 
 @pytest.mark.parametrize("text", [*re.split(r" \| |\n", FORBIDDEN), *TOO_LONG, "", "\0"])
-def test_anything_else_is_refused_in_one_line(text: str) -> None:
+def test_expressions_with_anything_else_are_refused_in_one_line(text: str) -> None:
     with pytest.raises(SceneError, match="the expression") as error:
         evaluate(text, NAMES)
     assert "\n" not in str(error.value)
@@ -269,7 +271,7 @@ def plate(folder: Path, rim: str) -> Simulation:
     return simulation_of(folder, 'model = "plate.xml"\n' + table)
 
 
-def test_rims_are_what_they_are_said_to_be_where_the_conditions_hold(tmp_path: Path) -> None:
+def test_rims_by_region_follow_their_conditions(tmp_path: Path) -> None:
     running = plate(tmp_path, '{clamped = "y < 1.51", supported = "where(y > 2.49, 1, y < 1.6)"}')
     waves = running.ripples["plate"]
     data = running.data
@@ -304,7 +306,7 @@ def test_rims_are_what_they_are_said_to_be_where_the_conditions_hold(tmp_path: P
         ),
     ],
 )
-def test_rims_that_cannot_be_are_refused(tmp_path: Path, rim: str, message: str) -> None:
+def test_invalid_rims_are_refused(tmp_path: Path, rim: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         plate(tmp_path, rim)
 
