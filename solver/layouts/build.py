@@ -1,4 +1,4 @@
-"""From a mesh to its atlas, by way of the cache, in one of the layouts; and atlases from files."""
+"""Builds the atlas of a mesh, or takes it from the cache; reads atlases from files."""
 
 from __future__ import annotations
 
@@ -28,14 +28,17 @@ from .patches.atlas import PatchChartMap, patch_atlas
 from .patches.pieces import Pieces
 from .sphere_map import certify, conformal_sphere_map, progressive_sphere_map
 
-# "auto" chooses between the others; see `choice`.
+# Names of the layouts; "auto" chooses between the other two, see `choice`.
 LAYOUTS = ("auto", "cube", "patches")
 
-# How long charts are laid in silence, and between two lines that tell of it [s].
-_TOLD_EVERY = 15.0
+# Time between two messages that charts are still being laid [s].
+_MESSAGE_INTERVAL = 15.0
 
+# The arrays of an atlas file, by name.
 Arrays = dict[str, NDArray]
 
+# How to make the chart map from the arrays of an atlas file, for each layout. An atlas has the
+# layout "given" if the user gave its charts.
 _CHART_MAPS: dict[str, Callable[[Arrays], ChartMap]] = {
     "cube": lambda arrays: CubeChartMap(arrays["sphere"]),
     "patches": lambda arrays: PatchChartMap(
@@ -46,6 +49,7 @@ _CHART_MAPS: dict[str, Callable[[Arrays], ChartMap]] = {
     ),
 }
 
+# The methods that map a closed mesh of genus 0, V [n, 3] and F [m, 3], onto the unit sphere.
 SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
     "progressive": progressive_sphere_map,
     "conformal": conformal_sphere_map,
@@ -69,14 +73,18 @@ def load_atlas(path: str | Path) -> Atlas:
         raise AtlasError(
             f"atlas file {str(path)!r} lacks {error} or is of another layout; {ADVICE}"
         ) from error
-    topology = glue(arrays["glued"], arrays["positions"].shape[1])
-    return (SphereAtlas if kind == SphereAtlas.__name__ else Atlas)(
+    texels = TexelMesh(
+        glue(arrays["glued"], arrays["positions"].shape[1]),
+        arrays["positions"],
+        arrays["normals"],
+        arrays["areas"],
+        arrays.get("beyond"),
+        arrays.get("detours"),
+    )
+    atlas_class = SphereAtlas if kind == SphereAtlas.__name__ else Atlas
+    return atlas_class(
         mesh=Mesh(arrays["V"], arrays["F"], arrays.get("uv"), arrays.get("corner_uv")),
-        texels=TexelMesh(
-            topology,
-            *(arrays[name] for name in ("positions", "normals", "areas")),
-            *(arrays.get(name) for name in ("beyond", "detours")),
-        ),
+        texels=texels,
         chart_map=chart_map,
         triangles=arrays["triangles"],
         barycentrics=arrays["barycentrics"],
@@ -100,8 +108,8 @@ def build_atlas(
     mesh : Mesh
         From `load_mesh` or `Mesh.from_arrays`.
     resolution : int
-        Texels along a chart's side of the cube layout, N; 6 N^2 texels in all, and about as many in
-        every layout, or more where charts would have less than 4 x 4.
+        Texels along the side of a chart of the cube layout, N. The cube layout has 6 N^2 texels,
+        and the patch layout about as many, or more if charts would have less than 4 x 4.
     method : str
         Sphere map of the cube layout: "progressive" (fold-free, spreads area evenly) or "conformal"
         (keeps angles but starves limbs; the choice of the paper).
@@ -110,46 +118,45 @@ def build_atlas(
         `cache_limit`.
     layout : str
         "cube": six charts of N x N texels, for a closed mesh of genus 0 in one part. "patches":
-        many small charts, for any mesh. "auto": the cube for round meshes, patches for all that
-        have long limbs, handles, rims or several parts. The choice depends on the mesh alone, and
-        `Atlas.notes` says why limbs get patches.
+        many small charts, for any mesh. "auto": the cube for round meshes, and patches for meshes
+        with long limbs, handles, rims or several parts. The choice depends on the mesh alone, and
+        `Atlas.notes` says why a mesh with limbs gets patches.
     sphere : float64 [vertex_count, 3], optional
-        Sphere map of the cube layout, where it is known already; `method` is not asked then, and
+        Sphere map for the cube layout, if you have one already. `method` is not used then, and
         "auto" takes the cube.
 
     Raises
     ------
     AtlasError
-        For an invalid resolution, method or layout, a mesh of which the patch layout finds no
-        charts, or an atlas that cannot fit into memory.
+        For an invalid resolution, method or layout, for a mesh on which the patch layout finds no
+        charts, or for an atlas that cannot fit into memory.
     MeshError
         For the cube layout, if the mesh is not a closed surface of genus 0 in one part.
     SphereMapError
-        For the cube layout, if no certified sphere map is found, or the given one is none of this
-        mesh.
+        For the cube layout, if no certified sphere map is found, or `sphere` is not a sphere map of
+        this mesh.
     """
     resolution = check_resolution(resolution)
-    for kind, name, valid in (
-        ("sphere map method", method, tuple(SPHERE_MAPS)),
-        ("layout", layout, LAYOUTS),
-    ):
-        if name not in valid:
-            raise AtlasError(
-                f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}"
-            )
+    _check_name("sphere map method", method, tuple(SPHERE_MAPS))
+    _check_name("layout", layout, LAYOUTS)
     check_memory(resolution)
     builder = _Builder(mesh, resolution, method, cache, sphere)
-    cube_fits = layout != "patches"
-    if cube_fits:
-        try:
-            check_genus_zero(mesh)
-        except MeshError:
-            if layout == "cube":
-                raise
-            cube_fits = False
-    if not cube_fits:
+    if layout == "patches":
         return builder.patches()
-    return builder.cube() if layout == "cube" or sphere is not None else builder.chosen()
+    try:
+        check_genus_zero(mesh)
+    except MeshError:
+        if layout == "cube":
+            raise
+        return builder.patches()
+    if layout == "cube" or sphere is not None:
+        return builder.cube()
+    return builder.chosen()
+
+
+def _check_name(kind: str, name: str, valid: tuple[str, ...]) -> None:
+    if name not in valid:
+        raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,26 +172,26 @@ class _Builder:
     def patches(self) -> Atlas:
         """Atlas of the patch layout."""
         start = time.perf_counter()
-        # charts have a resolution of their own, and a file for each of the atlas's
+        # the charts depend on the resolution, so every resolution has a file of its own
         path = self._path(f"patches {self.resolution}")
         stored = self._stored(path, start, "patches")
         if stored is not None:
             return stored
-        return self._kept(path, _patches(self.mesh, self.resolution))
+        return self._saved(path, _patches(self.mesh, self.resolution))
 
     def cube(self) -> Atlas:
-        """Atlas of the cube layout, by way of a sphere map that is known already, or by the method."""
+        """Atlas of the cube layout, from a known sphere map or from one that the method makes."""
         start = time.perf_counter()
         path = self._path(self.method) if self.sphere is None else self._path("given", self.sphere)
         stored = self._stored(path, start, "cube")
         if stored is not None:
             return self._at_resolution(stored, path, start)
-        return self._kept(path, self._six_charts(self._sphere_map(self.sphere), start))
+        return self._saved(path, self._six_charts(self._sphere_map(self.sphere), start))
 
     def chosen(self) -> Atlas:
-        """Atlas in the layout that suits a closed mesh of genus 0, as its sphere map tells."""
+        """Atlas in the layout that suits a closed mesh of genus 0; its sphere map decides."""
         start = time.perf_counter()
-        # files of their own, which say that the choice is made
+        # a file under one of these names shows that the layout was chosen already
         round_path = self._path(f"auto {self.method}")
         limbed_path = self._path(f"auto {self.method} {self.resolution}")
         stored = self._stored(round_path, start, "cube")
@@ -196,17 +203,23 @@ class _Builder:
         sphere = self._sphere_map(None)
         length = texel_length(self.mesh, sphere)
         if length > LONGEST_TEXEL:
-            return self._kept(limbed_path, self._limbed(sphere, length, start))
-        return self._kept(round_path, self._six_charts(sphere, start))
+            return self._saved(limbed_path, self._limbed(sphere, length, start))
+        return self._saved(round_path, self._six_charts(sphere, start))
 
     def _at_resolution(self, stored: Atlas, path: Path | None, start: float) -> Atlas:
-        """A stored atlas of the cube layout; of another resolution its sphere map, as rays are quick."""
+        """A stored atlas of the cube layout, cast again if it has another resolution.
+
+        Its sphere map is used again: rays are quick.
+        """
         if stored.resolution == self.resolution:
             return stored
-        return self._kept(path, self._six_charts(self._sphere_map(stored.sphere), start))
+        return self._saved(path, self._six_charts(self._sphere_map(stored.sphere), start))
 
     def _limbed(self, sphere: NDArray[np.float64], length: float, start: float) -> Atlas:
-        """Patches, or the cube where there are none, with a note: its texels are `length` times as long as wide."""
+        """Atlas of the patch layout, or of the cube layout if patches fail; a note says why.
+
+        Texels of the cube layout are up to `length` times as long as wide.
+        """
         mapped = time.perf_counter()
         try:
             atlas = _patches(self.mesh, self.resolution)
@@ -224,7 +237,7 @@ class _Builder:
         return dataclasses.replace(atlas, timings=timings, notes=(note,))
 
     def _sphere_map(self, known: NDArray[np.float64] | None) -> NDArray[np.float64]:
-        """A sphere map that is known already, checked, or one by the method."""
+        """The known sphere map after a check, or the method's if none is known."""
         if known is None:
             return SPHERE_MAPS[self.method](self.mesh.V, self.mesh.F)
         sphere = np.ascontiguousarray(known, dtype=np.float64)
@@ -235,50 +248,48 @@ class _Builder:
         ):
             raise SphereMapError(
                 f"sphere has the shape {sphere.shape} and is no fold-free sphere map of the mesh, "
-                f"which has "
-                f"{len(self.mesh.V)} vertices; leave it out to have one computed"
+                f"which has {len(self.mesh.V)} vertices; leave it out to have one computed"
             )
         return sphere
 
     def _six_charts(self, sphere: NDArray[np.float64], start: float) -> Atlas:
-        """Atlas of the cube layout with a sphere map that was begun at a time `start`."""
+        """Atlas of the cube layout; the computation of its sphere map began at time `start`."""
         mapped = time.perf_counter()
         atlas = atlas_from_sphere_map(self.mesh, sphere, self.resolution)
         atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
         return atlas
 
     def _path(self, kind: str, *arrays: NDArray) -> Path | None:
-        """Where the cache keeps an atlas of this mesh; None without a cache."""
-        return (
-            cache_path(f"{FORMAT} {kind}", (self.mesh.V, self.mesh.F, *arrays))
-            if self.cache
-            else None
-        )
+        """File of the cache for an atlas of this mesh; None without a cache."""
+        if not self.cache:
+            return None
+        return cache_path(f"{FORMAT} {kind}", (self.mesh.V, self.mesh.F, *arrays))
 
     def _stored(self, path: Path | None, start: float, *layouts: str) -> Atlas | None:
-        """The atlas of this very mesh in one of some layouts; None if there is no file, or a damaged or another one."""
+        """A stored atlas of this very mesh in one of the layouts, or None.
+
+        None if there is no file, if the file is damaged, or if it holds another atlas.
+        """
         if path is None:
             return None
         try:
             stored = load_atlas(path)
         except AtlasError:
             return None
-        same = np.array_equal(stored.mesh.V, self.mesh.V) and np.array_equal(
-            stored.mesh.F, self.mesh.F
-        )
-        if not same or stored.layout not in layouts:
+        same_vertices = np.array_equal(stored.mesh.V, self.mesh.V)
+        same_mesh = same_vertices and np.array_equal(stored.mesh.F, self.mesh.F)
+        if not same_mesh or stored.layout not in layouts:
             return None
         mark_used(path)
-        return dataclasses.replace(
-            stored, mesh=self.mesh, timings={"cache": time.perf_counter() - start}
-        )
+        timings = {"cache": time.perf_counter() - start}
+        return dataclasses.replace(stored, mesh=self.mesh, timings=timings)
 
-    def _kept(self, path: Path | None, atlas: Atlas) -> Atlas:
-        """Put an atlas into the cache."""
+    def _saved(self, path: Path | None, atlas: Atlas) -> Atlas:
+        """Put an atlas into the cache, if there is one, and return the atlas."""
         if path is not None:
-            # a folder that cannot be written costs the next call its time, nothing else
+            # if the folder cannot be written, the next call computes the atlas again
             with contextlib.suppress(AtlasError, OSError):
-                if path.is_symlink():  # whatever it leads to is not ours
+                if path.is_symlink():  # the file that it leads to is not ours
                     path.unlink()
                 atlas.save(path, overwrite=True)
                 make_room(path)
@@ -286,33 +297,32 @@ class _Builder:
 
 
 def _patches(mesh: Mesh, resolution: int) -> Atlas:
-    """Atlas of the patch layout; where that takes long, lines tell of it."""
-    with _told_if_long(mesh):
+    """Atlas of the patch layout, with messages while that takes long."""
+    with _progress_messages(mesh):
         return patch_atlas(mesh, resolution)
 
 
 @contextlib.contextmanager
-def _told_if_long(mesh: Mesh) -> Iterator[None]:
-    """Tell from time to time that charts are still being laid on a mesh."""
+def _progress_messages(mesh: Mesh) -> Iterator[None]:
+    """Log from time to time that charts are still being laid on a mesh."""
     done = threading.Event()
 
-    def tell() -> None:
-        waited = 0.0
-        while not done.wait(_TOLD_EVERY):
-            waited += _TOLD_EVERY
+    def log_until_done() -> None:
+        waited = 0.0  # [s]
+        while not done.wait(_MESSAGE_INTERVAL):
+            waited += _MESSAGE_INTERVAL
             log.warning(
                 "laying charts on a mesh of %s in %s: %.0f s so far; later runs load what is made, "
-                "and a lower "
-                "resolution takes less",
+                "and a lower resolution takes less",
                 counted(len(mesh.F), "triangle"),
                 counted(mesh.component_count, "part"),
                 waited,
             )
 
-    telling = threading.Thread(target=tell, daemon=True)
-    telling.start()
+    logger = threading.Thread(target=log_until_done, daemon=True)
+    logger.start()
     try:
         yield
     finally:
         done.set()
-        telling.join()
+        logger.join()

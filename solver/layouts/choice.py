@@ -1,4 +1,4 @@
-"""Which layout a closed mesh of genus 0 gets where none is named: the cube on round bodies, patches on limbed ones.
+"""Chooses the layout of a closed mesh of genus 0: the cube if it is round, patches if it has limbs.
 
 A sphere map has to draw a limb out of the round. At the distance l from the tip of a limb of radius
 r, a map that keeps areas makes texels 2 l / r times as long as wide, and none can avoid it. The
@@ -21,16 +21,18 @@ from ..mesh.mesh import Mesh
 from ..mesh.vectors import Vector, cross, dot, subtract
 from .cube.convention import chart_uv, split_at_edges
 
-# Times as long as wide: the longest texels with which the cube layout is as exact as patches.
+# Length over width of the longest texels with which the cube layout is as exact as patches.
 LONGEST_TEXEL = 7.0
 
 # Share of the area whose texels may be longer. A limb of less than this has too few texels round it
 # for any layout, and single slivers of a CAD mesh say nothing about its limbs.
-_NEGLIGIBLE = 0.005
+_NEGLIGIBLE_AREA = 0.005
 
 
 def texel_length(mesh: Mesh, sphere: Floats) -> float:
-    """How many times as long as wide texels of the cube layout are, at most, on all but a negligible share of the area.
+    """Length over width of the longest texels of the cube layout.
+
+    Texels on a negligible share of the area are left out.
 
     `sphere` [vertex_count, 3] is the sphere map.
     """
@@ -42,31 +44,34 @@ def texel_length(mesh: Mesh, sphere: Floats) -> float:
     areas = mesh.triangle_areas[triangle] * np.abs(np.linalg.det(barycentrics))
     order = np.argsort(lengths, kind="stable")
     covered = np.cumsum(areas[order])
-    return float(lengths[order[np.searchsorted(covered, (1 - _NEGLIGIBLE) * covered[-1])]])
+    # the shortest length that all but the negligible share of the area keeps below
+    quantile = np.searchsorted(covered, (1 - _NEGLIGIBLE_AREA) * covered[-1])
+    return float(lengths[order[quantile]])
 
 
 def elongation(corners: Floats, places: Floats) -> Floats:
-    """How many times as long as wide square texels become on triangles [m], by the ellipse that a circle becomes.
+    """Length over width of square texels mapped to triangles; a circle becomes an ellipse.
 
-    `corners` [m, 3, 3] are those of the triangles [m], and `places` [m, 3, 2] where these lie on a
-    chart. The ratio of the singular values s1 >= s2 of the map between them follows from (s1^2 +
+    `corners` [m, 3, 3] are the corners of the triangles [m], and `places` [m, 3, 2] their places on
+    a chart. The ratio of the singular values s1 >= s2 of the map between them follows from (s1^2 +
     s2^2) / 2 s1 s2, which cotangents give. A triangle without area has 1.
     """
     ab, ac, bc = _sides(corners)
     uv, uw, vw = _sides(places)
     real = np.sqrt(_square(cross(ab, ac)))
     flat = np.abs(uv[0] * uw[1] - uv[1] * uw[0])
-    # the cotangent of each corner times `real`, and the square of the side opposite to it on the
+    # sum over the corners: the cotangent times `real`, times the square of the opposite side on the
     # chart
     stretched = dot(ab, ac) * _square(vw) - dot(ab, bc) * _square(uw) + dot(ac, bc) * _square(uv)
     areas = 2 * real * flat
-    sound = areas > np.finfo(np.float64).tiny
-    ratio = np.maximum(np.divide(stretched, areas, out=np.ones_like(areas), where=sound), 1.0)
-    return ratio + np.sqrt(ratio * ratio - 1)
+    has_area = areas > np.finfo(np.float64).tiny
+    mean = np.divide(stretched, areas, out=np.ones_like(areas), where=has_area)
+    mean = np.maximum(mean, 1.0)  # (s1 / s2 + s2 / s1) / 2
+    return mean + np.sqrt(mean * mean - 1)
 
 
 def _sides(corners: Floats) -> tuple[Vector, Vector, Vector]:
-    """Sides of triangles from the first corner to the second, to the third, and from the second to the third."""
+    """Sides of triangles: from corner 0 to corner 1, from 0 to 2, and from 1 to 2."""
     a, b, c = np.pad(corners, ((0, 0), (0, 0), (0, 3 - corners.shape[-1]))).transpose(1, 2, 0)
     return subtract(b, a), subtract(c, a), subtract(c, b)
 

@@ -1,4 +1,4 @@
-"""The energy of a map of triangles onto a sphere or onto flat charts: what stretching and shearing them costs.
+"""The energy of a map of triangles onto a sphere or flat charts: the cost of stretch and shear.
 
 For the map from a reference triangle (area A) with singular values s1 >= s2, let
 
@@ -98,7 +98,7 @@ def density_derivatives(
 def projected_hessian(
     area: float, dirichlet: float, jacobian: float, density: Density
 ) -> tuple[float, Shares]:
-    """Energy of a triangle of the given area, and the shares that make up its Hessian's positive part.
+    """Energy of a triangle of the given area, and the terms of its Hessian's positive part.
 
     With a = (s1 + s2)/2 and b = (s1 - s2)/2, W is a function of a^2 = D/4 + J/2 and b^2 = D/4 -
     J/2, and its Hessian splits into a twist (slope along a over a), a flip (slope along b over b),
@@ -221,7 +221,9 @@ def star_energy(terms: Floats, degree: int, density: Density, move: Vector) -> f
 def star_slopes(
     terms: Floats, degree: int, density: Density, curvature: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Energy, gradient x, y and Hessian xx, xy, yy at rest; the energy is infinite if a triangle is folded.
+    """Energy, gradient x, y and Hessian xx, xy, yy of a star with its vertex at rest.
+
+    The energy is infinite if a triangle is folded.
 
     With a curvature of 1, on the sphere, a tangent step also falls towards the centre, and the
     Hessian loses the radial slope; charts have 0.
@@ -283,7 +285,7 @@ def newton_direction(
 
 @kernel
 def tangent_move(a: float, b: float, curvature: float) -> Vector:
-    """Move dx, dy, dz that takes p to p + a x + b y, with a curvature of 1 brought back to the sphere."""
+    """Move dx, dy, dz that takes p to p + a x + b y; a curvature of 1 keeps it on the sphere."""
     square = curvature * (a * a + b * b)
     length = np.sqrt(1.0 + square)
     return a / length, b / length, -square / (length * (1.0 + length))
@@ -293,7 +295,10 @@ def tangent_move(a: float, b: float, curvature: float) -> Vector:
 def descend(
     terms: Floats, degree: int, density: Density, curvature: float, freedom: int
 ) -> tuple[float, Vector]:
-    """How far the energy of a star falls by a Newton step of its vertex that folds nothing, and the move."""
+    """Find the Newton step of a star's vertex that folds no triangle.
+
+    Returns the fall of the energy and the move.
+    """
     stay = (0.0, 0.0, 0.0)
     energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, density, curvature)
     if not energy < np.inf:

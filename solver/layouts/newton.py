@@ -1,4 +1,6 @@
-"""Newton's method for maps of triangles: all vertices move at once, each in the two directions that its surface has.
+"""Newton's method for maps of triangles: it moves all vertices at once, on the sphere or on charts.
+
+Each vertex moves in the two directions of its surface.
 
 The Hessian of the energy (see `energy`) is made positive semidefinite triangle by triangle, the
 step comes from conjugate gradients, and it ends short of the first fold. Far from the minimum a
@@ -69,7 +71,7 @@ def descend_by_newton(
 def line_search(
     energy: float, slope: float, bound: float, energy_at: Callable[[float], float]
 ) -> tuple[float, float]:
-    """Step of at most `bound` to about the least energy, and that energy; 0 where no step lowers it.
+    """Step of at most `bound` to about the least energy, and that energy; 0 if no step lowers it.
 
     A whole step that falls further than half of what the slope promises is lengthened, another
     shortened, for as long as that helps.
@@ -89,7 +91,10 @@ def line_search(
 
 
 class System(NamedTuple):
-    """Gradient and Hessian in two directions a vertex; the rows of an edge's block belong to its first vertex."""
+    """Gradient and Hessian of the energy, in two directions a vertex.
+
+    The rows of an edge's block belong to its first vertex.
+    """
 
     gradient: Floats  # [n, 2]
     diagonal: Floats  # [n, 3]: xx, xy, yy
@@ -121,7 +126,7 @@ def add_triangle(
     reference: Reference,
     system: System,
 ) -> tuple[float, Vector]:
-    """Add triangle f to the system; return its energy, and its slopes along the three points themselves.
+    """Add triangle f to the system; return its energy, and its slopes along the three corners.
 
     `edges` are the numbers of the sides ab, bc, ca, and whether they run from an edge's first
     vertex to its second; x and y the directions in which the vertices a, b, c, at `points`, may
@@ -179,7 +184,10 @@ def _add_vertex(
     shares: Shares,
     system: System,
 ) -> Corner:
-    """Add what a triangle says about its vertex v, given the gradients of D and of J / `half` there."""
+    """Add a triangle's share of the gradient and Hessian at its vertex v.
+
+    The gradients of D and of J / `half` at that vertex are known.
+    """
     dx = dot(grad_d, x)
     dy = dot(grad_d, y)
     jx = half * dot(grad_j, x)
@@ -229,7 +237,7 @@ def _add_edge(
 
 @kernel
 def conjugate_gradients(ends: Ints32, system: System, steps: int, tolerance: float) -> Floats:
-    """Solve H x = -gradient roughly, preconditioned by the inverse diagonal blocks; x has shape [n, 2].
+    """Solve H x = -gradient roughly, preconditioned by the inverse diagonal blocks; x is [n, 2].
 
     `ends` [e, 2] are the vertices of the edges. Stops after `steps` iterations, or when the
     residual has fallen to `tolerance` of the first one.

@@ -1,4 +1,4 @@
-"""Triangle meshes: read from files, cleaned, cut to manifold sheets; on request repaired or wrapped."""
+"""Triangle meshes: read from files, cleaned, cut to manifold sheets, repaired or wrapped."""
 
 import lazy_loader
 

@@ -168,7 +168,7 @@ def _crack_targets(
 
 
 def distinct_triangles(F: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Mask of the triangles with three different vertices, the first of those with the same three."""
+    """Mask of the triangles with three different vertices; of repeated triangles only the first."""
     return ~collapsed(F) & (_first_equal(np.sort(F, axis=1)) == np.arange(len(F)))
 
 
@@ -246,7 +246,9 @@ def _without_longest_slivers(
 
 
 def oriented(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, list[str]]:
-    """Wind the triangles of each part of a manifold, orientable surface alike; notes say what turned.
+    """Wind the triangles of each part of a manifold, orientable surface alike.
+
+    Notes say which parts and triangles were turned.
 
     A closed part faces outwards afterwards, wherever it lies. An open part, and a closed one
     without volume, faces as most of its triangles did.

@@ -82,7 +82,7 @@ def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mes
 
 
 def check_mesh_file(path: Path) -> None:
-    """Raise `MeshError` unless the path is that of a file; callers ask before work that takes long."""
+    """Raise `MeshError` unless there is a file; callers check this before work that takes long."""
     try:
         if path.is_dir():
             raise MeshError(

@@ -1,4 +1,4 @@
-"""Triangle meshes: manifold and oriented surfaces of any kind, made from any triangle soup, and their normals.
+"""Triangle meshes: manifold, oriented surfaces made from any triangle soup, and their normals.
 
 The cube layout asks more of a surface: closed, one part, no handles. Refusals come with numbers and
 places.
@@ -36,26 +36,31 @@ from .topology import (
     triangles_beside,
 )
 
-# cosine between a vertex's normal and a triangle's below which another direction is looked for
-_STEEP = 0.1
-_STEPS = 300
+# Cosine between a vertex's normal and the normal of a triangle beside it, below which a better
+# direction is searched for.
+_MIN_NORMAL_COSINE = 0.1
 
-# Lengths whose squares and cubes are far from the limits of float64, in either direction.
-_SMALLEST = 1e-12
-_LARGEST = 1e12
+# Steps of that search; the error falls as one over the number of steps.
+_NORMAL_STEPS = 300
 
-# A surface that encloses less, relative to the cube of its size, has no inside.
-_FLAT = 1e-12
+# Smallest and largest size of a mesh [m]: squares and cubes of lengths between them are far from
+# the limits of float64.
+_MIN_SIZE = 1e-12
+_MAX_SIZE = 1e12
 
-# Parts beyond which a surface round all of them serves better than each by itself.
+# A surface that encloses less, in units of the cube of its size, has no inside.
+_MIN_ENCLOSED_VOLUME = 1e-12
+
+# Parts above which one surface round all of them serves better than a surface for each part.
 _MANY_PARTS = 100
 
 
 def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
     """Unit normals weighted by corner angle, shape [n, 3] (Thuermer and Wuethrich 1998).
 
-    At tips and knife edges that mean may point into a triangle. There the direction is taken that
-    is nearest to the farthest of the triangles' normals (Aubry and Loehner 2008), if it is better.
+    At tips and knife edges the weighted mean may point into a triangle. There the normal becomes
+    the direction whose largest angle to a triangle's normal is least (Aubry and Loehner 2008), if
+    it is better.
     """
     normal = triangle_normals(V, F)
     total = np.zeros_like(V)
@@ -69,7 +74,8 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     )
     vertex = F.ravel()
     triangle = np.repeat(np.arange(len(F)), 3)
-    steep = np.flatnonzero(_worst(mean, vertex, normal[triangle]) < _STEEP)
+    worst_cosine = _worst(mean, vertex, normal[triangle])
+    steep = np.flatnonzero(worst_cosine < _MIN_NORMAL_COSINE)
     if not len(steep):
         return mean
     chosen = np.isin(vertex, steep)
@@ -78,7 +84,7 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
     # middles of the smallest caps that hold the normals at each of these vertices (Badoiu and
     # Clarkson 2003)
     middle = mean[steep]
-    for i in range(1, _STEPS):
+    for i in range(1, _NORMAL_STEPS):
         order = np.lexsort((np.einsum("ij,ij->i", middle[vertex], beside), vertex))
         farthest = order[np.searchsorted(vertex[order], np.arange(len(middle)))]
         middle += (beside[farthest] - middle) / (i + 1)
@@ -91,7 +97,7 @@ def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.f
 def _worst(
     normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Least cosine between the normal of each vertex [k, 3] and those of its triangles."""
+    """Least cosine between the normal of each vertex [k, 3] and the normals of its triangles."""
     worst = np.full(len(normal), np.inf)
     np.minimum.at(worst, vertex, np.einsum("ij,ij->i", normal[vertex], beside))
     return worst
@@ -170,12 +176,15 @@ class Mesh:
 
     @functools.cached_property
     def components(self) -> NDArray[np.int64]:
-        """Part to which each triangle belongs, numbered from 0 by their first triangles, shape [triangle_count]."""
+        """Part of each triangle, [triangle_count].
+
+        Parts are numbered from 0, in the order of their first triangles.
+        """
         return labels(sides_of(self.F)[0] // 3, len(self.F))
 
     @functools.cached_property
     def beside(self) -> NDArray[np.int64]:
-        """The triangle beyond each side of every triangle, shape [triangle_count, 3]; -1 at rims."""
+        """The triangle beyond each side of every triangle, [triangle_count, 3]; -1 at rims."""
         return triangles_beside(self.F)
 
     @property
@@ -210,7 +219,10 @@ class Mesh:
 
     @functools.cached_property
     def genus(self) -> NDArray[np.int64]:
-        """Number of handles of every part, shape [component_count]; an open part has those that it has with lids."""
+        """Number of handles of every part, [component_count].
+
+        An open part has the handles that it would have with lids on its holes.
+        """
         # the part of each vertex
         count = self.component_count
         part_of = np.full(self.F.max() + 1, -1)
@@ -285,9 +297,9 @@ def _checked(
         )
     with np.errstate(over="ignore"):
         extent = np.ptp(points[used], axis=0).max()
-    if not _SMALLEST <= extent <= _LARGEST:
+    if not _MIN_SIZE <= extent <= _MAX_SIZE:
         raise MeshError(
-            f"{name}: its size is {extent:.3g} m; valid is {_SMALLEST:g} to {_LARGEST:g} m"
+            f"{name}: its size is {extent:.3g} m; valid is {_MIN_SIZE:g} to {_MAX_SIZE:g} m"
         )
     if uv is None:
         return points, triangles, None
@@ -301,7 +313,9 @@ def _checked(
 def _cleaned(
     V: NDArray[np.float64], F: NDArray[np.int64], uv: NDArray[np.float64] | None, name: str
 ) -> tuple[NDArray[np.float64], Corners, tuple[str, ...]]:
-    """Make a triangle soup a manifold, oriented surface of triangles that have an area; what was done, one line each.
+    """Make a triangle soup a manifold, oriented surface of triangles that have an area.
+
+    The notes say what was done, one line each.
 
     A surface that needs nothing stays unchanged.
     """
@@ -321,43 +335,52 @@ def _cleaned(
     points, corners, cuts = cut_apart(
         V[first_given], Corners(compact, corners.given, corners.uv), first_given
     )
-    # how many vertices became one with others, and how many came to be by cutting
-    vertices = corners.F.max() + 1
-    given = corners.given.ravel()
-    old = given >= 0
-    pairs = distinct(given[old] * vertices + corners.F.ravel()[old])
-    kept = len(distinct(pairs % vertices))
-    merges = len(pairs) - kept
-    splits = len(pairs) - len(distinct(given[old])) + int(vertices) - kept
+    merges, splits = _merges_and_splits(corners)
     turned, turns = oriented(points, corners)
-    said = {
-        f"{counted(merges - joined, 'duplicate vertex')} merged": merges > joined,
-        f"cracks closed: {counted(joined, 'boundary vertex')} joined": joined,
-        f"{counted(int(empty.sum()), 'triangle')} with a repeated vertex dropped": empty.any(),
-        f"{counted(int((~keep & ~empty).sum()), 'repeated triangle')} dropped": (
-            ~keep & ~empty
-        ).any(),
-        f"{counted(slivers, 'triangle')} without area dropped": slivers,
-    }
-    notes += [note for note, true in said.items() if true]
-    # of a surface that was cut before, equal positions are merged and cut again, which nobody needs
-    # to know
-    notes += cuts if merges or splits else []
+    repeated = ~keep & ~empty
+    if merges > joined:
+        notes.append(f"{counted(merges - joined, 'duplicate vertex')} merged")
+    if joined:
+        notes.append(f"cracks closed: {counted(joined, 'boundary vertex')} joined")
+    if empty.any():
+        notes.append(f"{counted(int(empty.sum()), 'triangle')} with a repeated vertex dropped")
+    if repeated.any():
+        notes.append(f"{counted(int(repeated.sum()), 'repeated triangle')} dropped")
+    if slivers:
+        notes.append(f"{counted(slivers, 'triangle')} without area dropped")
+    # a surface that was cut before is merged at equal positions and cut again in the same way:
+    # nobody needs to know
+    if merges or splits:
+        notes += cuts
     return points, turned, (*notes, *turns)
 
 
+def _merges_and_splits(corners: Corners) -> tuple[int, int]:
+    """How many vertices went by merging with others, and how many were added by cutting."""
+    vertex_count = corners.F.max() + 1
+    given = corners.given.ravel()
+    from_user = given >= 0
+    # pairs of a vertex in the user's arrays and a vertex of the result
+    pairs = distinct(given[from_user] * vertex_count + corners.F.ravel()[from_user])
+    results = len(distinct(pairs % vertex_count))
+    merges = len(pairs) - results
+    splits = len(pairs) - len(distinct(given[from_user])) + int(vertex_count) - results
+    return merges, splits
+
+
 def many_parts(mesh: Mesh) -> str:
-    """Advice for a mesh of very many parts; none, "", for others."""
+    """Advice for a mesh of very many parts; "" for other meshes."""
     parts = mesh.component_count
-    return (
-        f"wrap (--wrap) would put one closed surface round its {parts:,} parts"
-        if parts > _MANY_PARTS
-        else ""
-    )
+    if parts <= _MANY_PARTS:
+        return ""
+    return f"wrap (--wrap) would put one closed surface round its {parts:,} parts"
 
 
 def check_genus_zero(mesh: Mesh) -> None:
-    """Raise `MeshError`, naming every defect, unless the mesh is a closed surface of genus 0 in one part."""
+    """Raise `MeshError` unless the mesh is a closed surface of genus 0 in one part.
+
+    The message names every defect.
+    """
     defects = []
     advice = ""
     parts = mesh.component_count
@@ -385,7 +408,7 @@ def check_genus_zero(mesh: Mesh) -> None:
             f"{', and '.join(defects)}{cuts}{advice}"
         )
     extent = np.ptp(mesh.V, axis=0).max()
-    if not abs(mesh.volume) > _FLAT * extent**3:
+    if not abs(mesh.volume) > _MIN_ENCLOSED_VOLUME * extent**3:
         raise MeshError(
             f"{mesh.name} is degenerate: it encloses no volume ({mesh.volume:.3g} m^3 at a size of "
             f"{extent:.3g} m)"

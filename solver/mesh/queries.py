@@ -1,4 +1,4 @@
-"""What is asked of triangles: which of them rays meet, by Embree in float32, and their nearest points, by libigl."""
+"""Queries of triangles: ray hits by Embree (in float32), and nearest points by libigl."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from ..kernel import Floats, Floats32, Ints
 
-_FAR = 1e36  # Embree's distance of nothing is 1e37
+# Distances beyond this are misses, in lengths of a ray's direction: Embree's distance of a miss is
+# 1e37.
+_MISS_DISTANCE = 1e36
 
 
 class ClosestPoints:
@@ -29,11 +31,11 @@ class ClosestPoints:
         self._tree.init(self._V, self._F)
 
     def __call__(self, points: Floats) -> tuple[Ints, Floats]:
-        """Triangle nearest to each of some points [k, 3], [k], and the point nearest on it, [k, 3]."""
+        """Triangle nearest to each point [k, 3], [k], and the nearest point on it, [k, 3]."""
         return self._tree.squared_distance(self._V, self._F, points)[1:]
 
     def distances(self, points: Floats) -> Floats:
-        """How far those points are from the triangles, [k]."""
+        """Distance from each point [k, 3] to the triangles, [k]."""
         return np.sqrt(self._tree.squared_distance(self._V, self._F, points)[0])
 
 
@@ -55,24 +57,26 @@ class RayScene:
     def cast(
         self, origins: NDArray, directions: NDArray
     ) -> tuple[Ints, Floats32, Floats32, Floats32]:
-        """What rays from origins [k, 3] along directions [k, 3] meet first.
+        """First hits of rays from origins [k, 3] along directions [k, 3].
 
-        The triangle of each, -1 for none; the distance, in lengths of the direction, infinite for
-        none; and barycentric coordinates of the triangle's second and third corner; each [k].
+        Returns
+        -------
+        triangle : int64 [k]
+            -1 for a miss.
+        distance : float32 [k]
+            In lengths of the direction; infinite for a miss.
+        u, v : float32 [k]
+            Barycentric coordinates of the triangle's second and third corner.
         """
-        found = self._scene.run(_float32(origins), _float32(directions), output=1)
-        triangle = np.asarray(found["primID"], dtype=np.int64)
-        return (
-            triangle,
-            np.where(triangle >= 0, found["tfar"], np.float32(np.inf)),
-            found["u"],
-            found["v"],
-        )
+        hits = self._scene.run(_float32(origins), _float32(directions), output=1)
+        triangle = np.asarray(hits["primID"], dtype=np.int64)
+        distance = np.where(triangle >= 0, hits["tfar"], np.float32(np.inf))
+        return triangle, distance, hits["u"], hits["v"]
 
     def distances(self, origins: NDArray, directions: NDArray) -> Floats32:
-        """How far rays go, as `cast` says, in less time."""
-        found = self._scene.run(_float32(origins), _float32(directions), query="DISTANCE")
-        return np.where(found < _FAR, found, np.float32(np.inf))
+        """The distances of `cast` alone, in less time."""
+        distances = self._scene.run(_float32(origins), _float32(directions), query="DISTANCE")
+        return np.where(distances < _MISS_DISTANCE, distances, np.float32(np.inf))
 
 
 def _float32(vectors: NDArray) -> Floats32:
@@ -82,7 +86,9 @@ def _float32(vectors: NDArray) -> Floats32:
 def downward_hits(
     scene: RayScene, xy: NDArray[np.float64], top: float
 ) -> tuple[Ints, NDArray[np.float64]]:
-    """What vertical rays from above at xy [k, 2] first meet, each [k]: the triangle, and its height [m]; -1 and NaN.
+    """First hits of vertical rays from above at xy [k, 2].
+
+    Returns the triangle [k], -1 for none, and the height of the hit [m] [k], NaN for none.
 
     Nothing is higher than `top` [m].
     """

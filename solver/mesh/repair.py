@@ -82,7 +82,7 @@ def repaired(soup: Soup, name: str) -> Mesh:
 
 
 def _finite_mesh(soup: Soup, name: str) -> Mesh:
-    """A mesh of the triangles whose vertices are finite; a note says how many others were dropped."""
+    """A mesh of the triangles whose vertices are finite; a note counts the others."""
     finite = np.isfinite(soup.V[soup.F]).all(axis=(1, 2))
     if not finite.any():
         raise MeshError(

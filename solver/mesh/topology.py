@@ -1,4 +1,4 @@
-"""What a surface is: its edges, its parts, how its triangles are wound, cut, and folded.
+"""Topology of triangle surfaces: edges, parts, windings, cuts and folds.
 
 Side k of a triangle runs from corner k to corner k + 1; the sides of all are numbered 3 x triangle
 + k.
@@ -28,10 +28,10 @@ SPLITS = {
 }
 
 # A triangle with less than this share of its area at rest counts as crushed.
-_LEAST = 1e-3
+_MIN_AREA_SHARE = 1e-3
 
-# Two triangles lie back to back where the cosine between their normals is less than minus this.
-_BACK = 0.95
+# Two triangles lie back to back if the cosine between their normals is less than minus this.
+_BACK_TO_BACK_COSINE = 0.95
 
 
 class Edges(NamedTuple):
@@ -42,9 +42,9 @@ class Edges(NamedTuple):
     ends : int64 [e, 2]
         The lower vertex first.
     of : int64 [m, 3]
-        Of each triangle, the edges on which its sides lie.
+        The edge on which each side of each triangle lies.
     sides : int64 [e, 2]
-        Two sides that lie on each edge; -1 where there is but one.
+        The two sides that lie on each edge; -1 in the place of a second one at a rim.
     """
 
     ends: Ints
@@ -63,16 +63,20 @@ def edges_of(F: NDArray[np.int64]) -> Edges:
     head = np.roll(F, -1, axis=1).ravel()
     low = np.minimum(tail, head)
     high = np.maximum(tail, head)
-    size = int(F.max()) + 1 if len(F) else 1
-    order = counting_sort(low, counting_sort(high, np.arange(len(low)), size)[1], size)[1]
-    first = np.ones(len(order), bool)
-    first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
-    of = np.empty(len(order), np.int64)
-    of[order] = np.cumsum(first) - 1
-    sides = np.full((int(first.sum()), 2), -1)
-    sides[:, 0] = order[first]
-    sides[of[order[~first]], 1] = order[~first]
-    return Edges(np.stack([low[sides[:, 0]], high[sides[:, 0]]], axis=1), of.reshape(-1, 3), sides)
+    vertex_count = int(F.max()) + 1 if len(F) else 1
+    by_high = counting_sort(high, np.arange(len(low)), vertex_count)[1]
+    order = counting_sort(low, by_high, vertex_count)[1]
+    is_first = np.ones(len(order), bool)
+    is_first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
+    edge_of_side = np.empty(len(order), np.int64)
+    edge_of_side[order] = np.cumsum(is_first) - 1
+    first_sides = order[is_first]
+    second_sides = order[~is_first]
+    sides = np.full((len(first_sides), 2), -1)
+    sides[:, 0] = first_sides
+    sides[edge_of_side[second_sides], 1] = second_sides
+    ends = np.stack([low[first_sides], high[first_sides]], axis=1)
+    return Edges(ends, edge_of_side.reshape(-1, 3), sides)
 
 
 def triangle_areas(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
@@ -106,7 +110,9 @@ def corner_angles(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.
 
 
 def counting_sort(key: Ints, order: Ints, size: int) -> tuple[Ints, Ints]:
-    """Sort numbers [k] stably by their keys [k], below `size`: where those of each key begin [size + 1], and all [k].
+    """Sort numbers [k] stably by their keys [k], which are below `size`.
+
+    Returns where the numbers of each key begin [size + 1], and the sorted numbers [k].
 
     SciPy gathers the entries of a sparse matrix by rows in one pass, in the order in which they are
     given.
@@ -117,20 +123,31 @@ def counting_sort(key: Ints, order: Ints, size: int) -> tuple[Ints, Ints]:
 
 
 def distinct(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Different values, in ascending order: `numpy.unique`, which on a million integers takes several times as long."""
+    """Different values, in ascending order.
+
+    `numpy.unique` takes several times as long on a million integers.
+    """
     ordered = np.sort(values, axis=None)
     return ordered[np.append(True, ordered[1:] != ordered[:-1])]
 
 
 def undirected(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Number of the edge on which each side lies [3 m], and whether the side ends at the edge's higher vertex [3 m]."""
+    """Number of each side's edge [3 m], and whether the side runs to the higher vertex [3 m].
+
+    The number is (lower vertex) x (number of vertices) + (higher vertex).
+    """
     a = F.ravel()
     b = np.roll(F, -1, axis=1).ravel()
-    return np.minimum(a, b) * (F.max() + 1) + np.maximum(a, b), a < b
+    vertex_count = F.max() + 1
+    edge = np.minimum(a, b) * vertex_count + np.maximum(a, b)
+    return edge, a < b
 
 
 def sides_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Sides of a manifold mesh, numbered 3 x triangle + side: pairs that lie together [k, 2], and those on rims [j]."""
+    """Sides of a manifold mesh: pairs on one edge [k, 2], and single sides on rims [j].
+
+    Sides are numbered 3 x triangle + side.
+    """
     edges = edges_of(F)
     return edges.sides[~edges.rim], np.sort(edges.sides[edges.rim, 0])
 
@@ -144,20 +161,22 @@ def triangles_beside(F: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 class Folds:
-    """Looks for triangles F [m, 3] that are folded as they were not at rest, where the vertices are V [n, 3] [m]."""
+    """Looks for triangles F [m, 3] that are folded now, but were not at rest.
+
+    `V` [n, 3] are the vertices at rest [m].
+    """
 
     def __init__(self, V: Floats, F: Ints) -> None:
         self.F = F
         self._beside = triangles_beside(F)
         normals = _area_vectors(np.asarray(V, np.float64), F)
-        self._least = _LEAST * np.linalg.norm(normals, axis=1)
-        self._rest = _folded(normals, self._beside, self._least)
+        self._least_double_areas = _MIN_AREA_SHARE * np.linalg.norm(normals, axis=1)
+        self._folded_at_rest = _folded(normals, self._beside, self._least_double_areas)
 
     def count(self, V: Floats) -> int:
-        """How many triangles are folded back on one that they share a side with, or have next to no area."""
-        return int(
-            (_folded(_area_vectors(V, self.F), self._beside, self._least) & ~self._rest).sum()
-        )
+        """Number of triangles that lie folded back on a neighbour, or have next to no area."""
+        folded = _folded(_area_vectors(V, self.F), self._beside, self._least_double_areas)
+        return int((folded & ~self._folded_at_rest).sum())
 
     def vertex_normals(self, V: Floats) -> Floats:
         """Unit normals [n, 3], weighted by the areas of the triangles."""
@@ -186,7 +205,11 @@ def _area_vectors(V: Floats, F: Ints) -> Floats:
 
 @kernel
 def _folded(vectors: Floats, beside: Ints, least: Floats) -> Bools:
-    """Whether triangles lie flat on one beside them [m, 3], back to back, or are smaller than the least [m]."""
+    """Whether triangles lie back to back on one beside them, or have less than the least area.
+
+    `vectors` [m, 3] are normals as long as the double areas, `beside` [m, 3] the triangles beyond
+    the sides, and `least` [m] the least double areas.
+    """
     folded = np.zeros(len(vectors), np.bool_)
     for i in range(len(vectors)):
         x = vectors[i, 0]
@@ -201,15 +224,15 @@ def _folded(vectors: Floats, beside: Ints, least: Floats) -> Bools:
                 v = vectors[j, 1]
                 w = vectors[j, 2]
                 along = x * u + y * v + z * w
-                folded[i] |= along < 0 and along * along > _BACK**2 * square * (
-                    u * u + v * v + w * w
-                )
+                other_square = u * u + v * v + w * w
+                least_square = _BACK_TO_BACK_COSINE**2 * square * other_square
+                folded[i] |= along < 0 and along * along > least_square
     return folded
 
 
 @kernel
 def _vertex_normals(vectors: Floats, F: Ints, count: int) -> Floats:
-    """Unit sum of the vectors [m, 3] of the triangles at each vertex; along z where there is none."""
+    """Unit sum of the vectors [m, 3] of the triangles at each vertex; along z if the sum is 0."""
     normals = np.zeros((count, 3))
     for i in range(len(F)):
         for k in range(3):
@@ -226,7 +249,10 @@ def _vertex_normals(vectors: Floats, F: Ints, count: int) -> Floats:
 
 
 def labels(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Connected component of each of `count` nodes, numbered by first occurrence; the links are pairs [k, 2]."""
+    """Connected component of each of `count` nodes, numbered by first occurrence.
+
+    The links between nodes are pairs [k, 2].
+    """
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
@@ -239,10 +265,10 @@ def turned(
     count: int,
     cost: NDArray[np.float64] | None = None,
 ) -> NDArray[np.bool_]:
-    """Mask of the triangles to turn over, so that the windings of linked ones agree as far as possible.
+    """Mask of the triangles to turn over, so that linked ones are wound alike as far as possible.
 
-    Each component follows its first triangle, along a tree of shortest paths. Where a surface is
-    one-sided, links are left that disagree: those where paths from both sides meet.
+    Each component follows its first triangle, along a tree of shortest paths. On a one-sided
+    surface links stay that disagree, where paths from both sides meet.
 
     Parameters
     ----------
@@ -263,25 +289,27 @@ def turned(
     if not against.any():
         return result
     length = np.ones(len(pairs)) if cost is None else cost
-    # of two triangles with two common sides, one link decides; coo would add both
+    # two triangles with two common sides have two links: the shorter one decides (coo would add
+    # both)
     low = pairs.min(axis=1)
     high = pairs.max(axis=1)
     key = low * count + high
     order = np.lexsort((length, key))
-    once = order[np.append(True, np.diff(key[order]) != 0)]
-    graph = coo_array((length[once], (low[once], high[once])), shape=(count, count)).tocsr()
+    single = order[np.append(True, np.diff(key[order]) != 0)]
+    graph = coo_array((length[single], (low[single], high[single])), shape=(count, count)).tocsr()
     roots = np.unique(labels(pairs, count), return_index=True)[1]
-    _, before, _ = dijkstra(
+    _, predecessor, _ = dijkstra(
         graph, directed=False, indices=roots, return_predecessors=True, min_only=True
     )
-    rest = np.flatnonzero(before >= 0)
-    up = np.arange(count)
-    up[rest] = before[rest]
-    link = np.searchsorted(
-        key[once], np.minimum(rest, up[rest]) * count + np.maximum(rest, up[rest])
-    )
-    result[rest] = against[once][link]
-    while (up[up] != up).any():  # the sum along the path, by doubling
-        result ^= result[up]
-        up = up[up]
+    others = np.flatnonzero(predecessor >= 0)  # all triangles but the roots
+    parent = np.arange(count)
+    parent[others] = predecessor[others]
+    low_end = np.minimum(others, parent[others])
+    high_end = np.maximum(others, parent[others])
+    link = np.searchsorted(key[single], low_end * count + high_end)
+    result[others] = against[single][link]
+    # add up the turns along the path to the root, by doubling
+    while (parent[parent] != parent).any():
+        result ^= result[parent]
+        parent = parent[parent]
     return result

@@ -1,4 +1,7 @@
-"""Vectors in space as three coordinates: of one point in a kernel, where they live in registers, or whole columns."""
+"""Vectors in space as three coordinates: of a single point in a kernel, or whole columns.
+
+In a kernel the three numbers live in registers.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,8 @@ import numpy as np
 
 from ..kernel import Floats, shared
 
-Vector: TypeAlias = Any  # three floats, or three arrays
+# Three floats, or three arrays of one shape: x, y and z.
+Vector: TypeAlias = Any
 
 
 @shared
@@ -43,7 +47,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 @shared
 def unit(a: Vector) -> Vector:
-    """Return a scaled to length 1; a vector of length 0, which must be a single one, stays as it is."""
+    """Return the vector a scaled to length 1; a single vector of length 0 stays as it is."""
     length = np.sqrt(dot(a, a))
     s = 1.0 / length if length > 0.0 else 1.0
     return s * a[0], s * a[1], s * a[2]

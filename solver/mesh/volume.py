@@ -16,8 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import PATH, MeshError, checked, is_finite, shown
 from .wrap import zero_surface
 
+# Endings of files that are read as volumes.
 VOLUME_ENDINGS = (".npy", ".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm")
-_MILLIMETRE = 1e-3  # the unit of scans
+
+# The unit of scans [m].
+_MILLIMETRE = 1e-3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -45,7 +48,9 @@ class Volume:
     directions: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def surface(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Vertices [n, 3] [m] and triangles [m, 3] of the surface at the threshold, by marching cubes; often noisy.
+        """Vertices [n, 3] [m] and triangles [m, 3] of the surface at the threshold.
+
+        Marching cubes find the surface, which is often noisy.
 
         Raises
         ------
@@ -89,7 +94,7 @@ def load_volume(
     spacing: float | ArrayLike | None = None,
     origin: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Volume:
-    """Read a volume: a NIfTI or NRRD file, the folder of a DICOM series, or a .npy with its spacing.
+    """Read a volume: a NIfTI or NRRD file, the folder of a DICOM series, or a .npy file.
 
     A scan's own millimetres, places and directions are kept, in metres: x, y and z go to the
     patient's left, back and head, in DICOM, NRRD and NIfTI alike. All but .npy need the package

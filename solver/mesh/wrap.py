@@ -1,8 +1,9 @@
-"""A closed surface round an object that is no surface itself: parts that pass through each other, scans in pieces.
+"""Puts a closed surface round an object that is no surface itself.
 
-All points at a given distance from the object, by marching cubes (Lorensen and Cline 1987). What
-cannot be reached from far away without coming closer than that counts as inside, as in alpha
-wrapping (Portaneri et al. 2022). Distances on the grid are computed where they matter.
+Such objects are parts that pass through each other, or scans in pieces. The surface has all points
+at a given distance from the object; marching cubes find it (Lorensen and Cline 1987). Places that
+cannot be reached from far away without coming closer than this distance count as inside, as in
+alpha wrapping (Portaneri et al. 2022). Distances on the grid are computed only where they matter.
 """
 
 from __future__ import annotations
@@ -18,21 +19,27 @@ from .clean import counted
 from .mesh import Mesh
 from .queries import ClosestPoints
 
-_COARSEST = 16  # spacings along the side of the largest blocks
-_MARGIN = 2  # layers of nodes beyond the surface, on all sides
+# Spacings of the grid along the side of the largest blocks.
+_LARGEST_BLOCK = 16
+
+# Layers of nodes beyond the surface, on all sides.
+_MARGIN = 2
 
 # Corners of a grid cell as `igl.marching_cubes` counts them: along x, y, z.
 _CORNERS = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
 )
 
-# Below, the grid has more than some 20 million nodes; above, little of the object's shape is left.
-_SMALLEST = 0.004
-_LARGEST = 0.2
+# Offset relative to the object's size, at least: below, the grid has more than some 20 million
+# nodes.
+_MIN_OFFSET = 0.004
 
-# Nodes nearer to the surface than this share of the spacing are moved off it: they would make
-# slivers.
-_CLEAR = 0.05
+# Offset relative to the object's size, at most: above, little of the object's shape is left.
+_MAX_OFFSET = 0.2
+
+# Least distance of nodes from the surface, in spacings of the grid. Nearer nodes would make slivers
+# and are moved off the surface.
+_MIN_NODE_DISTANCE = 0.05
 
 
 def distance_grid(
@@ -59,40 +66,43 @@ def distance_grid(
     high = V.max(axis=0)
     origin = low - (1 + _MARGIN) * distance
     shape = np.ceil((high - low) / distance).astype(int) + 3 + 2 * _MARGIN
-    blocks = -(-shape // _COARSEST)
-    values = np.empty(blocks * _COARSEST)
-    corners = _COARSEST * np.indices(blocks).reshape(3, -1).T
-    size = _COARSEST
+    blocks = -(-shape // _LARGEST_BLOCK)
+    values = np.empty(blocks * _LARGEST_BLOCK)
+    corners = _LARGEST_BLOCK * np.indices(blocks).reshape(3, -1).T
+    size = _LARGEST_BLOCK
     while True:
-        # of the blocks' middles
-        found = closest_points.distances(origin + distance * (corners + (size - 1) / 2))
-        places = corners[:, None] + np.indices([size] * 3).reshape(3, -1).T
-        values[tuple(np.moveaxis(places, -1, 0))] = found[:, None]
+        # all nodes of a block get the distance of its middle
+        middles = origin + distance * (corners + (size - 1) / 2)
+        middle_distances = closest_points.distances(middles)
+        nodes = corners[:, None] + np.indices([size] * 3).reshape(3, -1).T
+        values[tuple(np.moveaxis(nodes, -1, 0))] = middle_distances[:, None]
         if size == 1:
             return values, origin
-        near = np.abs(found - distance) <= (2 + (size - 1) / 2 * np.sqrt(3)) * distance
+        # blocks near the surface are cut into eight
+        reach = 2 + (size - 1) / 2 * np.sqrt(3)  # [spacings]
+        near = np.abs(middle_distances - distance) <= reach * distance
         size //= 2
-        corners = (corners[near][:, None] + size * np.indices([2, 2, 2]).reshape(3, -1).T).reshape(
-            -1, 3
-        )
+        eighths = size * np.indices([2, 2, 2]).reshape(3, -1).T
+        corners = (corners[near][:, None] + eighths).reshape(-1, 3)
 
 
 def zero_surface(
     values: NDArray[np.float64], origin: ArrayLike, spacing: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Triangles where values on a grid [x, y, z] change their sign, from those cells alone in which they do."""
+    """Triangles where values on a grid [x, y, z] change their sign.
+
+    Only the cells in which the sign changes are handed to marching cubes.
+    """
     inside = values < 0
-    corners = [
-        inside[tuple(slice(d, n - 1 + d) for d, n in zip(c, values.shape, strict=True))]
-        for c in _CORNERS
-    ]
-    count = np.sum(corners, axis=0)
-    cells = np.argwhere((count > 0) & (count < 8))
+    nx, ny, nz = values.shape
+    corners = [inside[x : nx - 1 + x, y : ny - 1 + y, z : nz - 1 + z] for x, y, z in _CORNERS]
+    inside_count = np.sum(corners, axis=0)
+    cells = np.argwhere((inside_count > 0) & (inside_count < 8))
     nodes = (cells[:, None] + _CORNERS).reshape(-1, 3)
-    used, index = np.unique(np.ravel_multi_index(tuple(nodes.T), values.shape), return_inverse=True)
-    points = np.asarray(origin) + np.asarray(spacing) * np.stack(
-        np.unravel_index(used, values.shape), axis=1
-    )
+    flat_nodes = np.ravel_multi_index(tuple(nodes.T), values.shape)
+    used, index = np.unique(flat_nodes, return_inverse=True)
+    grid_places = np.stack(np.unravel_index(used, values.shape), axis=1)
+    points = np.asarray(origin) + np.asarray(spacing) * grid_places
     return igl.marching_cubes(values.ravel()[used], points, index.reshape(-1, 8), 0.0)[:2]
 
 
@@ -121,7 +131,10 @@ class Wrap:
     offset: float
 
     def interpolate(self, values: NDArray) -> NDArray:
-        """Values at the vertices of `mesh`, [vertex_count, ...], as the vertices of `wrapped` see them, [n, ...]."""
+        """Values [n, ...] at the vertices of `wrapped`, from values at the vertices of `mesh`.
+
+        `values` is [vertex_count, ...].
+        """
         return np.einsum("ij,ij...->i...", self.barycentrics, values[self.mesh.F[self.triangles]])
 
 
@@ -147,29 +160,29 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
     """
     from scipy.ndimage import label  # takes long to import, for what few meshes need
 
-    if not _SMALLEST <= offset <= _LARGEST:
+    if not _MIN_OFFSET <= offset <= _MAX_OFFSET:
         raise MeshError(
-            f"the offset of the wrap is {offset}; valid is {_SMALLEST} to {_LARGEST} of the "
+            f"the offset of the wrap is {offset}; valid is {_MIN_OFFSET} to {_MAX_OFFSET} of the "
             f"object's size"
         )
-    distance = float(offset * np.ptp(mesh.V, axis=0).max())
+    distance = float(offset * np.ptp(mesh.V, axis=0).max())  # [m]
     values, origin = distance_grid(mesh.V, mesh.F, distance)
     values -= distance
-    # what is positive, but shut off from the first node, is inside
+    # nodes farther off, but shut off from the first node, are inside
     region, _ = label(values > 0)
-    values = np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
-    values = np.where(
-        values < 0, np.minimum(values, -_CLEAR * distance), np.maximum(values, _CLEAR * distance)
-    )
+    shut_off = (values > 0) & (region != region[0, 0, 0])
+    values = np.where(shut_off, -values, values)
+    clearance = _MIN_NODE_DISTANCE * distance
+    values = np.where(values < 0, np.minimum(values, -clearance), np.maximum(values, clearance))
     V, F = zero_surface(values, origin, distance)
-    found = Mesh.from_arrays(V, F, name=mesh.name)
+    surface = Mesh.from_arrays(V, F, name=mesh.name)
     note = (
         f"wrapped, {distance:.3g} m off: {counted(mesh.component_count, 'part')} in "
-        f"{counted(found.component_count, 'closed surface')} with "
-        f"{counted(int(found.genus.sum()), 'handle')}, "
-        f"{counted(len(found.F), 'triangle')}"
+        f"{counted(surface.component_count, 'closed surface')} with "
+        f"{counted(int(surface.genus.sum()), 'handle')}, "
+        f"{counted(len(surface.F), 'triangle')}"
     )
-    surface = dataclasses.replace(found, notes=(*mesh.notes, note))
+    surface = dataclasses.replace(surface, notes=(*mesh.notes, note))
     triangles, nearest = ClosestPoints(surface.V, surface.F)(mesh.V)
     a, b, c = (np.ascontiguousarray(surface.V[surface.F[triangles, k]]) for k in range(3))
     return Wrap(surface, mesh, triangles, igl.barycentric_coordinates(nearest, a, b, c), distance)

@@ -1,4 +1,4 @@
-"""The equiangular cube map: where the texels of six N x N charts lie on the sphere, and how the charts are connected.
+"""The equiangular cube map: places of texels on the sphere, and how the six charts are connected.
 
 Chart order is +x, -x, +y, -y, +z, -z. A chart has a normal n and two axes u (columns) and v (rows)
 with u x v = n. Texel (chart, row, column) looks along n + tan(pi/4 a) u + tan(pi/4 b) v with a = (2
@@ -35,18 +35,21 @@ CHART_V = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 1, 0], [0, -
 MIN_RESOLUTION = 4
 MAX_RESOLUTION = 4096
 
-# Memory for each texel while an atlas is built, at least [bytes].
-_TEXEL = 200
+# Memory that building an atlas takes, at least, for each texel [bytes].
+_BYTES_PER_TEXEL = 200
 
-# Texels that are set up in silence, and what one takes [s]: measured with `Ripples` of an ellipsoid
-# at resolution 512.
-_MANY = 1e6
-_SECONDS = 5e-6
+# Texels from which on a warning says how long the atlas takes.
+_MANY_TEXELS = 1e6
 
-# Relative to a triangle: what hangs over an edge by less counts as within, and smaller pieces are
-# left out.
+# Time that a texel takes [s], measured with `Ripples` of an ellipsoid at resolution 512.
+_SECONDS_PER_TEXEL = 5e-6
+
+# Round-off in units of a triangle: a corner that hangs over an edge by less counts as within, and
+# smaller pieces are left out.
 _ROUND_OFF = 1e-12
-_MOST = 8  # places for a polygon's corners
+
+# Places for the corners of a polygon: a triangle that is cut by four planes has seven at most.
+_MAX_CORNERS = 8
 
 # The four planes through the cube's centre that bound each chart's share of space; inwards is
 # positive.
@@ -62,7 +65,7 @@ _SIDES = np.stack(
 
 
 def check_resolution(resolution: int) -> int:
-    """Return the resolution N as an int, or raise `AtlasError` if it is not a whole number in the valid range."""
+    """Return the resolution N as an int; `AtlasError` if it is not a whole number in range."""
     whole = isinstance(resolution, numbers.Real) and resolution % 1 == 0
     if not whole or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
         raise AtlasError(
@@ -73,16 +76,19 @@ def check_resolution(resolution: int) -> int:
 
 
 def check_memory(resolution: int) -> None:
-    """Raise `AtlasError` if an atlas of about 6 N^2 texels cannot fit into memory, and tell of one that takes long."""
-    what = f"an atlas of resolution {resolution}"
+    """Raise `AtlasError` if an atlas of about 6 N^2 texels cannot fit into memory.
+
+    A warning says so if the atlas takes long.
+    """
+    atlas = f"an atlas of resolution {resolution}"
     texels = 6 * resolution**2
-    require_memory(AtlasError, _TEXEL * texels, what, "take a lower resolution")
-    if texels > _MANY:
+    require_memory(AtlasError, _BYTES_PER_TEXEL * texels, atlas, "take a lower resolution")
+    if texels > _MANY_TEXELS:
         log.warning(
             "%s has about %d million texels, which take %.0f s or more",
-            what,
+            atlas,
             texels / 1e6,
-            _SECONDS * texels,
+            _SECONDS_PER_TEXEL * texels,
         )
 
 
@@ -120,7 +126,10 @@ def cube_chart_points(directions: Floats, resolution: int) -> tuple[Ints, Floats
 
 @functools.lru_cache(maxsize=8)
 def cube_topology(resolution: int) -> TexelTopology:
-    """The six charts of N x N texels, glued along the edges of the cube; at its eight corners three charts meet."""
+    """The six charts of N x N texels, glued along the edges of the cube.
+
+    At its eight corners three charts meet.
+    """
     # outward from a chart's south, east, north and west side
     outward = np.stack([-CHART_V, CHART_U, CHART_V, -CHART_U], axis=1)
     beyond = (outward[:, :, None] == CHART_NORMALS).all(axis=-1).argmax(axis=-1)
@@ -145,7 +154,10 @@ def split_at_edges(corners: Floats) -> Parts:
 
 
 def covered_areas(mesh: Mesh, sphere: Floats, resolution: int) -> Floats:
-    """Area of a mesh that each texel covers [m^2], [6, N, N], by its sphere map; see `texel_areas`."""
+    """Area of a mesh that each texel covers [m^2], [6, N, N]; see `texel_areas`.
+
+    `sphere` is the mesh's sphere map.
+    """
     directions = sphere[mesh.F]
     triangle, barycentrics, chart = split_at_edges(directions)
     axes = np.stack([CHART_U, CHART_V, CHART_NORMALS], axis=-1).astype(np.float64)
@@ -155,59 +167,72 @@ def covered_areas(mesh: Mesh, sphere: Floats, resolution: int) -> Floats:
 
 
 def chart_uv(directions: Floats, chart: Ints) -> Floats:
-    """Equiangular place in charts [k], 0 to 1, of directions [k, ..., 3] that belong to them, [k, ..., 2]."""
+    """Equiangular place [k, ..., 2], from 0 to 1, of directions [k, ..., 3] in their charts [k]."""
     depth = np.einsum("p...i,pi->p...", directions, CHART_NORMALS[chart])
     sides = np.einsum("p...i,pij->p...j", directions, np.stack([CHART_U, CHART_V], axis=-1)[chart])
     return np.clip(0.5 + np.arctan(sides / depth[..., None]) * (2 / np.pi), 0.0, 1.0)
 
 
 def _cut(corners: Floats) -> tuple[Ints, Ints, Floats]:
-    """Cut triangles [k, 3, 3] into their parts in each chart: owner, chart, and barycentrics [pieces, 3, 3]."""
+    """Cut triangles [k, 3, 3] into their parts in each chart.
+
+    Returns the triangle, the chart and the barycentrics [pieces, 3, 3] of each part.
+    """
+    # every triangle begins as a polygon in each of the six charts
     owner, chart = np.divmod(np.arange(6 * len(corners)), 6)
-    # a triangle that is cut by four planes has seven corners at most
-    polygons = np.zeros((len(owner), _MOST, 3))
+    polygons = np.zeros((len(owner), _MAX_CORNERS, 3))
     sizes = np.full(len(owner), 3)
     polygons[:, :3] = np.eye(3)
-    for s in range(4):
-        polygons, sizes = _clip(polygons, sizes, corners[owner], _SIDES[chart, s])
-        left = sizes > 0
-        owner = owner[left]
-        chart = chart[left]
-        polygons = polygons[left]
-        sizes = sizes[left]
-    fan, k = np.nonzero(np.arange(2, _MOST) < sizes[:, None])
-    pieces = np.stack([polygons[fan, 0], polygons[fan, k + 1], polygons[fan, k + 2]], axis=1)
+    for side in range(4):
+        polygons, sizes = _clip(polygons, sizes, corners[owner], _SIDES[chart, side])
+        inside = sizes > 0
+        owner = owner[inside]
+        chart = chart[inside]
+        polygons = polygons[inside]
+        sizes = sizes[inside]
+    # the polygons are cut into fans of triangles
+    polygon, k = np.nonzero(np.arange(2, _MAX_CORNERS) < sizes[:, None])
+    pieces = np.stack(
+        [polygons[polygon, 0], polygons[polygon, k + 1], polygons[polygon, k + 2]], axis=1
+    )
     a, b, c = pieces.transpose(1, 2, 0)
-    real = dot(a, cross(b, c)) > _ROUND_OFF  # their areas
-    return owner[fan[real]], chart[fan[real]], pieces[real]
+    area = dot(a, cross(b, c))  # in units of the whole triangle
+    large = area > _ROUND_OFF
+    return owner[polygon[large]], chart[polygon[large]], pieces[large]
 
 
 def _clip(polygons: Floats, sizes: Ints, corners: Floats, planes: Floats) -> tuple[Floats, Ints]:
-    """Keep the parts of convex polygons, [p, 8, 3], on the inner sides of planes (Sutherland and Hodgman 1974)."""
+    """Cut convex polygons [p, 8, 3] by planes, and keep the inner parts.
+
+    The method is that of Sutherland and Hodgman (1974).
+    """
     clipped = np.zeros_like(polygons)
     count = np.zeros_like(sizes)
-    every = np.arange(len(sizes))
-    previous = polygons[every, sizes - 1]
-    p = _distance(previous, corners, planes)
+    previous = polygons[np.arange(len(sizes)), sizes - 1]
+    previous_distance = _distance(previous, corners, planes)
     for i in range(sizes.max(initial=0)):
-        here = polygons[:, i]
-        there = i < sizes
-        q = _distance(here, corners, planes)
-        crossing = np.flatnonzero(there & ((p >= 0) != (q >= 0)))
-        before = p[crossing, None]
-        after = q[crossing, None]
-        # the same to the last bit from whichever side it is looked at
-        cuts = (before * here[crossing] - after * previous[crossing]) / (before - after)
+        corner = polygons[:, i]
+        exists = i < sizes
+        distance = _distance(corner, corners, planes)
+        changes_side = (previous_distance >= 0) != (distance >= 0)
+        crossing = np.flatnonzero(exists & changes_side)
+        before = previous_distance[crossing, None]
+        after = distance[crossing, None]
+        # the formula gives the same bits if the two corners are swapped
+        cuts = (before * corner[crossing] - after * previous[crossing]) / (before - after)
         clipped[crossing, count[crossing]] = cuts
         count[crossing] += 1
-        inside = np.flatnonzero(there & (q >= 0))
-        clipped[inside, count[inside]] = here[inside]
+        inside = np.flatnonzero(exists & (distance >= 0))
+        clipped[inside, count[inside]] = corner[inside]
         count[inside] += 1
-        previous = here
-        p = q
+        previous = corner
+        previous_distance = distance
     return clipped, count
 
 
 def _distance(weights: Floats, corners: Floats, planes: Floats) -> Floats:
-    """Distance [p] of points in triangles, by barycentrics [p, 3] and corners [p, 3, 3], from planes [p, 3]."""
+    """Distance [p] from planes [p, 3] of points in triangles.
+
+    The points are given by barycentrics [p, 3] in triangles with corners [p, 3, 3].
+    """
     return dot(weights.T, [dot(corners[:, i].T, planes.T) for i in range(3)])

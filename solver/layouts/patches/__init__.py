@@ -1,4 +1,4 @@
-"""The patch layout: any surface cut into cells, these into square charts with a fold-free map; texels on them."""
+"""The patch layout: any surface cut into square charts with a fold-free map, and texels on them."""
 
 import lazy_loader
 

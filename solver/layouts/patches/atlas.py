@@ -1,4 +1,7 @@
-"""The atlas of any mesh in the patch layout, and its chart map: pieces of triangles, on each of which it is linear."""
+"""The atlas of any mesh in the patch layout, and its chart map.
+
+The chart map is linear on pieces of the mesh's triangles.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +70,7 @@ class PatchChartMap:
         return chart.astype(np.int64), row * resolution - 0.5, column * resolution - 0.5
 
     def texels_at(self, mesh: Mesh, resolution: int, triangles: Ints, points: Floats) -> Ints:
-        """Flat indices [k] of the texels in which points [k, 3] [m] lie that are on triangles [k]."""
+        """Flat indices [k] of the texels in which points [k, 3] [m] on triangles [k] lie."""
         return _texels_on_pieces(
             mesh.V[mesh.F[triangles]], self._first, self.pieces, resolution, triangles, points
         )
@@ -87,7 +90,7 @@ class PatchChartMap:
         return np.clip(coordinates[..., 1:], 0.0, 1.0)
 
     def quality(self, mesh: Mesh) -> dict[str, float]:
-        """Flipped pieces, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
+        """Flipped pieces, stretch, and starved share of the area; see `Atlas.quality`."""
         pieces = self.pieces
         flat = signed_areas(self.pieces.places)
         # the determinant is the share of its triangle that each piece has
@@ -105,7 +108,10 @@ class PatchChartMap:
 def _find(
     first: Ints, corners: Floats, triangles: Ints, weights: Floats, piece: Ints, inside: Floats
 ) -> None:
-    """Piece in which each point lies, and its barycentrics there; given triangles [k] and barycentrics [k, 3]."""
+    """Piece in which each point lies, and the point's barycentrics in the piece.
+
+    The points are given by triangles [k] and barycentrics [k, 3].
+    """
     for i in range(len(triangles)):
         piece[i], s, t = _piece_at(first, corners, triangles[i], weights[i, 0], weights[i, 1])
         inside[i, 0] = 1 - s - t
@@ -117,7 +123,7 @@ def _find(
 def _piece_at(
     first: Ints, corners: Floats, triangle: int, x: float, y: float
 ) -> tuple[int, float, float]:
-    """The piece of a triangle in which a point lies, and its second and third barycentric coordinate in that."""
+    """The piece of a triangle in which a point lies, and the point's last two barycentrics."""
     best = -np.inf
     piece = min(first[triangle], len(corners) - 1)
     at_s = 1 / 3
@@ -168,7 +174,9 @@ def _texels_on_pieces(
 def positions_beyond(
     patches: PatchMap, topology: TexelTopology, positions: NDArray
 ) -> Floats | None:
-    """Positions with halo [C, n + 2, n + 2, 3] [m]; beyond a rim lies its point opposite to each texel.
+    """Positions with halo [C, n + 2, n + 2, 3] [m].
+
+    Beyond a rim stands, for each texel beside it, the rim's point opposite to the texel.
 
     None if there is no rim. At the end of a rim, where that turns, lies its corner.
     """
@@ -214,7 +222,7 @@ def _draw_rims(
     places: Complex,
     beyond: Floats,
 ) -> None:
-    """Put the points of sides at a rim beyond the texels opposite to them; see `places_seen_from`."""
+    """Put the points of sides at a rim beyond the texels opposite; see `places_seen_from`."""
     n = beyond.shape[1] - 2
     for side in range(len(sides)):
         f = sides[side] // 3
@@ -254,7 +262,10 @@ def _draw_rims(
 
 
 def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
-    """Atlas of about 6 N^2 texels, for a resolution N; raises `AtlasError` if the mesh cannot be laid out."""
+    """Atlas of about 6 N^2 texels, for a resolution N.
+
+    Raises `AtlasError` if the mesh cannot be laid out.
+    """
     start = time.perf_counter()
     patches = patch_map(mesh.V, mesh.F, cells_for(resolution))
     mapped = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Voronoi cells: every vertex of a surface belongs to the nearest of a few seeds, along the surface.
+"""Voronoi cells: every vertex belongs to the nearest of a few seeds, measured along the surface.
 
 How large cells may be: smaller on limbs and round their ends, where a large one would be stretched.
 Then they are cut apart, along smooth borders with corners and arcs between these.
@@ -65,7 +65,7 @@ class Metric:
         return cls(surface, distance_graph(surface), np.ones(len(surface.V)))
 
     def in_units(self, unit: Floats) -> Metric:
-        """The same distances in other units [n] [m]; a link takes the mean of both ends."""
+        """The metric in other units [n] [m]; a link takes the mean of the units at both ends."""
         row = np.repeat(np.arange(len(unit)), np.diff(self.graph.indptr))
         column = self.graph.indices
         lengths = (
@@ -90,7 +90,10 @@ class Metric:
 
 
 def distance_graph(surface: TriangleSurface) -> csr_array:
-    """Vertices linked along edges, and straight across each edge between the two vertices opposite to it [m]."""
+    """Links between near vertices with their lengths [m].
+
+    They run along edges, and straight across an edge between the two vertices opposite to it.
+    """
     edges = surface.edges
     V = surface.V
     F = surface.F
@@ -111,7 +114,7 @@ def distance_graph(surface: TriangleSurface) -> csr_array:
 
 
 def _linked(ends: Ints, lengths: Floats, count: int) -> csr_array:
-    """Graph of `count` nodes with the shortest of the links between each two, whose ends are [k, 2]."""
+    """Graph of `count` nodes, with the shortest of the links [k, 2] between each two nodes."""
     low = ends.min(axis=1)
     high = ends.max(axis=1)
     key = low * count + high
@@ -162,7 +165,7 @@ def spread_seeds(metric: Metric, reach: float) -> Ints:
 
 
 def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
-    """The vertices nearest to each seed."""
+    """Share out the vertices: each belongs to the nearest seed."""
     distance, _, source = dijkstra(
         metric.graph, indices=seeds, min_only=True, return_predecessors=True
     )
@@ -283,7 +286,10 @@ def _border_loops(surface: TriangleSurface, cell: Ints, count: int) -> list[Ints
 
 
 def _arcs(V: Floats, loop: Ints, corner: Bools, on_rim: Bools) -> list[Ints]:
-    """Cut a loop at its corners; more are put on its rim, far from the others, where it has too few."""
+    """Cut a loop into arcs at its corners.
+
+    If it has too few corners, more are put on its rim, far from the others.
+    """
     corner = corner.copy()
     length = np.linalg.norm(np.roll(V[loop], -1, axis=0) - V[loop], axis=1)
     place = np.cumsum(length) - length

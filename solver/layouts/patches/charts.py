@@ -27,7 +27,10 @@ CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 
 def corner_charts(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sides]]:
-    """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
+    """Cut a chart for each corner of each cell.
+
+    Returns the finer surface, the chart of each triangle, and the sides of all charts.
+    """
     surface = cells.surface
     # arcs of a single edge get a vertex in its middle, at which they are cut in half, and all cells
     # inner vertices
@@ -61,7 +64,9 @@ def halves_of(V: Floats, arc: Path) -> tuple[Path, Path]:
 def cut_polygons(
     surface: TriangleSurface, part: Ints, halves: list[Halves]
 ) -> tuple[TriangleSurface, list[Sides]]:
-    """Lay out the first parts as regular polygons and cut them from their middles; return the sides of the charts.
+    """Lay out the first parts as regular polygons and cut them from their middles into charts.
+
+    Returns the finer surface and the sides of the charts.
 
     Parts beyond those that have a border are left alone.
     """
@@ -175,7 +180,7 @@ def glued_sides(sides: list[Sides]) -> Ints:
 
 
 def fans_of(sides: list[Sides], glued: Ints) -> tuple[Fans, list[int]]:
-    """The three charts round each corner where three cells meet, counter-clockwise, and all other charts."""
+    """Charts round corners where three cells meet, counter-clockwise, and all other charts."""
     fans: Fans = []
     used = np.zeros(len(sides), bool)
     for a in range(len(sides)):

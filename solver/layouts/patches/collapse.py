@@ -44,7 +44,10 @@ _LEAST_SHARE = 0.01
 def _targets(
     seamless: SeamlessMap, parents: Parents, cut: Bools, at_rim: Bools
 ) -> tuple[Floats, Ints]:
-    """How good the best collapse of each vertex is, above 0 [n], and a corner 3 triangle + k: to where it goes."""
+    """How good the best collapse of each vertex is [n], above 0, and to which corner it leads.
+
+    Corner k of triangle f has the number 3 f + k.
+    """
     n = len(seamless.z)
     worth = np.zeros(n)
     target = np.full(n, -1)
@@ -73,7 +76,10 @@ def _targets(
 
 @kernel
 def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
-    """The link condition: u, whose neighbours are marked in `seen`, shares as many of these with v as triangles."""
+    """The link condition for u and v: they share as many neighbours as triangles.
+
+    The neighbours of u are marked in `seen`.
+    """
     inner = seamless.freedom[u] == FREE
     if seamless.freedom[v] == FREE and not inner:
         return False
@@ -103,7 +109,10 @@ def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
 def _worth(
     seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: int, k: int, m: int
 ) -> float:
-    """Width of the flattest triangle on the charts if u, corner k of triangle f, goes to corner m; 0 if it may not."""
+    """Width of the flattest triangle on the charts if u goes to corner m; 0 if it may not.
+
+    u is corner k of triangle f.
+    """
     v = seamless.F[f, m]
     held = seamless.freedom[v] == FIXED
     if held and at_rim[v]:
@@ -135,7 +144,10 @@ def _worth(
 
 @kernel
 def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: int) -> bool:
-    """Whether v with corners p and q of triangle g makes a triangle inside of g's parent, as it is turned."""
+    """Whether v with corners p and q of triangle g makes a triangle inside the parent of g.
+
+    The triangle must be turned as g is.
+    """
     for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
         h = seamless.star[i] // 3
         c = seamless.star[i] % 3
@@ -223,7 +235,10 @@ def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> 
 def _collapse(
     seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints
 ) -> tuple[Bools, Ints, Ints, Complex, Floats]:
-    """Which triangles are left; of all, vertices, the changes to their frames, and where in their parents these lie."""
+    """The triangles that are left, with changes of frames and the corners' places in their parents.
+
+    Of all vertices: the changes to their frames, and where in their parents they lie.
+    """
     F = seamless.F.copy()
     turn = seamless.turn.copy()
     shift = seamless.shift.copy()

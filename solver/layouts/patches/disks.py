@@ -1,4 +1,4 @@
-"""Cells made disks with three corners and more, and laid out flat in convex polygons without a fold.
+"""Cells become disks with three corners and more, laid out flat in convex polygons without a fold.
 
 Seeds are added and taken away until all cells are disks. In the plane each inner vertex is a mean
 of its neighbours with positive weights, so that the map is one to one (Tutte 1963, Floater 2003),
@@ -62,7 +62,10 @@ def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, Bordered
 
 
 def _with_corners(metric: Metric, cells: VoronoiCells, few: Ints, tried: set[int]) -> VoronoiCells:
-    """Give cells with too few corners a neighbour each, or take away their seeds where that was `tried` before."""
+    """Mend cells with too few corners: each gets a neighbour.
+
+    If that was `tried` before, they lose their seeds instead.
+    """
     new: list[int] = []
     gone: list[int] = []
     ends = metric.surface.edges.ends
@@ -81,7 +84,7 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: Ints, tried: set[int
 
 
 def _euler(surface: TriangleSurface, cells: VoronoiCells) -> Ints:
-    """Euler characteristic of the vertices of each cell with the edges and triangles between them."""
+    """Euler characteristic of each cell: its vertices, and the edges and triangles between them."""
     count = len(cells.seeds)
     label = cells.label
     ends = label[surface.edges.ends]

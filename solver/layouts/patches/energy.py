@@ -1,4 +1,6 @@
-"""The energy of a seamless map, and its relaxation: what a triangle costs that is stretched, squeezed or sheared.
+"""The energy of a seamless map, and its relaxation.
+
+A triangle that is stretched, squeezed or sheared costs energy.
 
 Areas of triangles are scaled so that a chart has area 1 on average. The energy is the mean of the
 Dirichlet energies of the map and of its inverse, each squared: 1 for an isometry, infinite at a
@@ -55,7 +57,10 @@ _CG_RANGE = 40, 200
 
 
 def reference_of(V: Floats, F: Ints, charts: int) -> Reference:
-    """The triangles F [m, 3] that a map is to resemble, their areas scaled to add up to the number of charts."""
+    """Reference for the triangles F [m, 3]: the map is to resemble them.
+
+    Their areas are scaled to add up to the number of charts.
+    """
     a, b, c = (V[F[:, k]].T for k in range(3))
     ab = subtract(b, a)
     ac = subtract(c, a)
@@ -164,7 +169,10 @@ def scratch(seamless: SeamlessMap) -> Star:
 
 @kernel
 def gather(seamless: SeamlessMap, reference: Reference, v: int, origin: complex, star: Star) -> int:
-    """Expand the star of a vertex about a place in its frame, from which its corners are seen; how many triangles."""
+    """Expand the star of a vertex about a place in its frame; return how many triangles it has.
+
+    Its corners are seen from that place.
+    """
     start = seamless.star_start[v]
     cotangent = reference.cotangent
     degree = seamless.star_start[v + 1] - start
@@ -194,7 +202,9 @@ def gather(seamless: SeamlessMap, reference: Reference, v: int, origin: complex,
 def sweep(
     seamless: SeamlessMap, reference: Reference, vertices: Ints, star: Star, follow_at_once: bool
 ) -> float:
-    """Move some vertices, one after the other, each by a Newton step inside its star; by how much the energy fell.
+    """Move some vertices, one after the other; return how far the energy falls.
+
+    Each moves by a Newton step inside its star.
 
     `star` is room for any. Each vertex is followed into its new chart at once, or left to `rehome`.
     """
@@ -212,7 +222,7 @@ def sweep(
 
 
 def sweep_all(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float:
-    """Move every vertex once, and follow them into their charts; return by how much the energy fell."""
+    """Move every vertex once, and follow it into its chart; return how far the energy falls."""
     before = seamless.z.copy()
     vertices = np.arange(len(seamless.z))[:: -1 if backwards else 1].copy()
     fall = sweep(seamless, reference, vertices, scratch(seamless), False)
@@ -221,7 +231,10 @@ def sweep_all(seamless: SeamlessMap, reference: Reference, backwards: bool) -> f
 
 
 def relax_all(seamless: SeamlessMap, reference: Reference, least_gain: float) -> None:
-    """Lower the energy of a map in place, until a step saves less than this share of it: sweeps, then Newton steps."""
+    """Lower the energy of a map in place: sweeps first, then Newton steps.
+
+    It ends when a step saves less than the given share of the energy.
+    """
     edges = edges_of(seamless.F)
     ends = edges.ends.astype(np.int32)
     for i in range(_SWEEPS):
@@ -238,7 +251,7 @@ def relax_all(seamless: SeamlessMap, reference: Reference, least_gain: float) ->
 def newton_step(
     seamless: SeamlessMap, reference: Reference, edge: Ints, ends: Ints32, cg_steps: int
 ) -> tuple[float, float]:
-    """Move the map by one Newton step in place; return by how much the energy fell, and the step's length.
+    """Move the map by one Newton step in place; return the fall of the energy and the step.
 
     Whole steps have length 1; 0 where no step lowers the energy. `edge` [m, 3] are the edges ab,
     bc, ca of the triangles, and `ends` [e, 2] their vertices.
@@ -277,7 +290,10 @@ def newton_step(
 
 @kernel
 def _time_of_first_fold(seamless: SeamlessMap, way: Complex) -> float:
-    """The first time at which a triangle has no area, if its corners go their ways [n] in a unit of time."""
+    """The first time at which a triangle has no area, if its corners move straight on.
+
+    They go their ways [n] in a unit of time.
+    """
     first = np.inf
     x = np.empty(3, np.complex128)
     d = np.empty(3, np.complex128)

@@ -52,7 +52,10 @@ _MOST_MOVES = 5  # of a tip, by an edge each
 
 
 def move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints) -> Ints:
-    """Move each of these tips to the first neighbour where the energy is lower; return where those are that moved."""
+    """Move each tip to the first neighbour where the energy is lower.
+
+    Returns where the tips that moved are.
+    """
     return _move_tips(seamless, reference, tips, scratch(seamless))
 
 
@@ -178,7 +181,10 @@ def _moved(
 def _put_into_star(
     seamless: SeamlessMap, u: int, v: int, star: Star, degree: int, density: Density
 ) -> None:
-    """Put u, in the frame that it begins with, on a way from v, where its star's energy is least and nothing folded."""
+    """Put u, in the frame that it begins with, on a way from v, where its star's energy is least.
+
+    No triangle of the star is folded there.
+    """
     start = seamless.star_start[u]
     z = left = right = middle = 0j
     for i in range(degree):
@@ -249,7 +255,10 @@ def _enter_chart(seamless: SeamlessMap, u: int) -> None:
 
 @kernel
 def _change_frames(seamless: SeamlessMap, v: int, u: int, fan: Ints) -> None:
-    """Free the tip's vertex v, and put u on the tip; fan [2, d] has the corners of both from the edge between them."""
+    """Free the tip's vertex v, and put u on the tip.
+
+    `fan` [2, d] has the corners of v and of u, from the edge between them on.
+    """
     degree = seamless.star_start[v + 1] - seamless.star_start[v]
     around = seamless.star_start[u + 1] - seamless.star_start[u]
     h = fan[0, 0]
@@ -281,7 +290,10 @@ def _change_frames(seamless: SeamlessMap, v: int, u: int, fan: Ints) -> None:
 
 @kernel
 def _change(seamless: SeamlessMap, f: int, k: int, g: int, m: int) -> Frame:
-    """From the frame of triangle f to that of g, which share a free vertex: corner k of one and m of the other."""
+    """Change from the frame of triangle f to the frame of triangle g.
+
+    They share a free vertex: corner k of f, and corner m of g.
+    """
     return after(inverse(frame_of(seamless, f, k)), frame_of(seamless, g, m))
 
 
@@ -294,7 +306,9 @@ class PatchMap:
 
 
 def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
-    """Lay a manifold, oriented mesh out on charts, without a fold; on about so many cells of four to six charts.
+    """Lay a manifold, oriented mesh out on the charts of about `cells` cells, without a fold.
+
+    A cell has four to six charts.
 
     Where the largest part allows it charts are large, one for each of some more cells. Raises
     `AtlasError` if its triangles are too thin, or no cells are found.
@@ -333,7 +347,9 @@ def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
 
 
 def relax(V: Floats, seamless: SeamlessMap) -> None:
-    """Even out areas and take away shear, in place, as far as the map's cones allow; V [n, 3] are its vertices [m].
+    """Even out areas and take away shear, in place, as far as the map's cones allow.
+
+    V [n, 3] are the vertices of the map [m].
 
     Cells are small and flat enough for that from where the quads lie; no step folds a triangle.
     """

@@ -1,4 +1,4 @@
-"""The triangles of a map onto charts, cut along the charts' borders; and cut again where texels have left their places.
+"""The triangles of a map, cut along the charts' borders, and again where texels have moved.
 
 The texel centres of a chart and its border are the nodes of a lattice of triangles. Moved nodes
 move the triangles, and each is laid out again as it was: a texel is then found at its own row and
@@ -120,7 +120,10 @@ def _cut_at_borders(
 
 @kernel
 def _fill_in(places: Floats, whole: Floats) -> None:
-    """Places of a triangle's corners, [3, 2], and their barycentrics, [3, 5] together; slices compile slowly."""
+    """Places [3, 2] and barycentrics of a triangle's corners, together [3, 5].
+
+    Slices compile slowly.
+    """
     for k in range(3):
         whole[k, 0] = places[k, 0]
         whole[k, 1] = places[k, 1]
@@ -139,7 +142,7 @@ def _area(corners: Floats, count: int) -> float:
 
 
 def warped(pieces: Pieces, offsets: Floats) -> Pieces:
-    """Pieces of a map whose texels have moved by `offsets` [C, n, n, 2] (column, row, in texels)."""
+    """Pieces of a map whose texels have moved by `offsets` [C, n, n, 2] (column, row) [texels]."""
     n = offsets.shape[1]
     moved = np.pad(offsets, ((0, 0), (1, 1), (1, 1), (0, 0)))
     # squares of the lattice of which a corner moves, [C, n + 1, n + 1]

@@ -65,7 +65,10 @@ _OTHER_COUNTS = (2, 3, 5)
 
 
 class Pairing(NamedTuple):
-    """Triangles, and a node beyond all rims where their number is odd, with the joints that are closed."""
+    """Triangles and the joints between them, of which some are closed.
+
+    Where the number of triangles is odd, there is a node more, which lies beyond all rims.
+    """
 
     start: Ints  # [t + 1], where the joints of each begin
     joint: Ints  # by triangle
@@ -86,7 +89,7 @@ def chosen_joints(
     corners: Ints,
     wanted: Floats,
 ) -> Ints | None:
-    """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
+    """Close one joint of each triangle; each cell's middle gets about as many quads as wanted.
 
     A joint is a side between triangles, over which these may be joined.
 
@@ -167,7 +170,7 @@ def _improve(pairing: Pairing, e: int) -> bool:
 
 @kernel
 def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
-    """Pair a triangle, and another one that is left, along the best path between them, if that costs less than `limit`.
+    """Pair a triangle, and another unpaired one, along the best path if it costs less than `limit`.
 
     All alternating paths that close up to `most` joints are tried, depth first.
     """
@@ -256,7 +259,7 @@ def _change(pairing: Pairing, e: int, quads: int) -> float:
 
 
 def joined(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> list[Sides] | None:
-    """Join the charts of cells [m] to larger ones: their sides, or None where that is not possible."""
+    """Join the charts of cells to larger ones: their sides, or None if that is not possible."""
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
     cell = np.unique([each[0][0] for each in sides], return_inverse=True)[1]
@@ -300,7 +303,10 @@ def joined(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> list[Si
 def _joints(
     V: Floats, sides: list[Sides], glued: Ints, fans: Fans
 ) -> tuple[Ints, Ints, Floats, Ints]:
-    """Joints as `chosen_joints` takes them, with charts for their cells, and what they are called."""
+    """Joints as `chosen_joints` takes them, with charts in the place of their cells.
+
+    The last array has the chart that calls each joint.
+    """
     fan = np.full(len(sides), -1)
     fan[np.array(fans, np.int64).reshape(-1, 3)] = np.arange(len(fans))[:, None]
     found = []
@@ -333,7 +339,10 @@ def _whole(sides: list[Sides], glued: Ints, a: int) -> Path:
 
 
 def _at_rim(sides: list[Sides], glued: Ints, rest: list[int], apart: Ints) -> list[Sides]:
-    """Charts at the rim: those round a corner are joined, but for some that stay apart, called by the second one."""
+    """Charts at the rim: the two round a corner are joined, unless they have to stay apart.
+
+    `apart` has the second charts of the corners whose two charts stay apart.
+    """
     new = []
     for b in rest:
         a = int(glued[b, 2, 0])
@@ -375,7 +384,7 @@ class Quads:
 
 
 def cut_into_quads(cells: BorderedCells) -> Quads:
-    """Cut cells into quads, as many as they have corners; even these out, and lay out each of them as a square.
+    """Cut cells into quads, one for each corner, even them out, and lay out each as a square.
 
     Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
@@ -383,7 +392,9 @@ def cut_into_quads(cells: BorderedCells) -> Quads:
 
 
 def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
-    """The same with about as many quads as cells; None if there are none, as where two cells go all round a limb.
+    """Cut cells into about as many quads as cells; None if that is not possible.
+
+    Two cells that go all round a limb have no such quads, for instance.
 
     Raises `AtlasError` if round-off folds a triangle: they are too thin.
     """
@@ -406,7 +417,9 @@ def _laid_out(cells: BorderedCells, surface: TriangleSurface, sides: list[Sides]
 
 
 def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
-    """The quads of a count of cells; large ones where they are wanted and possible, else about as many.
+    """The quads of a number of cells, large ones if wanted and possible.
+
+    Otherwise there are about as many small ones.
 
     Raises `AtlasError` if round-off folds a triangle whatever the cells.
     """
@@ -424,7 +437,10 @@ def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
 
 
 def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:
-    """About as many quads as cells, some more of these; None where the surface has none, or round-off folds one."""
+    """Large quads, about as many as cells or some more.
+
+    None if the surface has none, or round-off folds one of them.
+    """
     cells = _cells_of(part, max(count, min(round(_LARGE * count), int(_FARTHEST / _length(part)))))
     try:
         return cut_into_large_quads(cells)
@@ -433,7 +449,7 @@ def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:
 
 
 def _length(part: TriangleSurface) -> float:
-    """How long a surface is, over how wide."""
+    """Length of a surface over its width."""
     return float(np.ptp(part.V, axis=0).max()) ** 2 / part.areas.sum()
 
 

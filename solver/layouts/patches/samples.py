@@ -1,4 +1,4 @@
-"""Where texels lie on a surface: the triangles of a seamless map, drawn on the charts as on a screen.
+"""Where texels lie on a surface: triangles of a seamless map, drawn on the charts as on a screen.
 
 Then texels are moved a little where the texel mesh is folded, though the map is not. Samples of a
 fold-free map may still lie in the wrong order on the surface: astride of a knife edge, whose two
@@ -56,7 +56,10 @@ def _place(texels: Texels, chart: int, row: int, column: int) -> Floats:
 
 @kernel
 def _fault(texels: Texels, flat: int) -> float:
-    """How badly the four corners of a texel between its neighbours face outwards: 1 and more if one is folded."""
+    """How badly the four corners of a texel between its neighbours face outwards.
+
+    It is 1 or more if one of them is folded.
+    """
     n = texels.halo.shape[1] - 2
     chart = flat // (n * n)
     row = flat // n % n + 1
@@ -102,7 +105,7 @@ def folded(texels: Texels) -> Bools:
 
 
 def locate_texels(seamless: SeamlessMap, n: int) -> tuple[Ints, Floats]:
-    """Triangle [C, n, n] of each of the n x n texels of a chart, and barycentric coordinates in it, [C, n, n, 3].
+    """Triangle [C, n, n] and barycentrics [C, n, n, 3] of each of the n x n texels of all charts.
 
     Raises `AtlasError` if a texel lies in no triangle, which a map without a fold rules out.
     """
@@ -114,7 +117,10 @@ def locate_texels(seamless: SeamlessMap, n: int) -> tuple[Ints, Floats]:
 
 
 def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints, Floats]:
-    """The same in some charts [k] alone; -1 where a triangle may be missed that reaches far over other charts."""
+    """Triangles and barycentrics of the texels of some charts [k]; see `locate_texels`.
+
+    A triangle is -1 if none is found: one that reaches far over other charts may be missed.
+    """
     number = np.full(len(seamless.glued), -1)
     number[charts] = np.arange(len(charts))
     near = number >= 0
@@ -233,7 +239,9 @@ def centres(mesh: Mesh, patches: PatchMap, n: int) -> Samples:
 def untangled(
     mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: Floats | None
 ) -> tuple[Samples, Floats]:
-    """Move texels at the centres of their squares to where fewer are folded; `beyond` as in `TexelMesh`.
+    """Move texels from the centres of their squares to places where fewer are folded.
+
+    `beyond` is that of `TexelMesh`.
 
     Returns them, and the column and row by which each has moved, in texels, below 0.5, [C, n, n,
     2].
@@ -283,7 +291,7 @@ def untangled(
 
 @kernel
 def _fits(offsets: Floats, row: int, column: int) -> bool:
-    """Whether the four squares of the lattice round a texel have wide corners after its move, on its chart."""
+    """Whether the four squares round a moved texel have wide corners on its chart."""
     n = offsets.shape[0] - 2
     least = _FLATTEST * _LATTICE * _LATTICE
     x = np.empty(4)

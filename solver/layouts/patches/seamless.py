@@ -125,7 +125,10 @@ def seamless_map(quads: Quads) -> SeamlessMap:
 
 
 def stars(F: Ints, count: int) -> tuple[Ints, Ints]:
-    """Corners 3 triangle + k of the triangles F [m, 3] by vertex: where those of each begin [n + 1], and all [3 m]."""
+    """Corners 3 triangle + k of the triangles F [m, 3], sorted by vertex.
+
+    Returns where the corners of each vertex begin [n + 1], and all corners [3 m].
+    """
     return counting_sort(F.ravel(), np.arange(F.size), count)
 
 
@@ -147,14 +150,19 @@ def corner_places(seamless: SeamlessMap) -> Complex:
 
 
 def places_seen_from(seamless: SeamlessMap, triangles: Ints, corner: Ints) -> tuple[Ints, Complex]:
-    """Chart in which a corner [k] of each of some triangles [k] lies, and the places of all three in its frame."""
+    """Chart [k] in which a corner [k] of each triangle [k] lies, and all corners' places there.
+
+    The places [k, 3] are in the frame of that chart.
+    """
     offset = corner_places(seamless)[triangles] - seamless.shift[triangles, corner][:, None]
     places = _TURNS[seamless.turn[triangles, corner]].conj()[:, None] * offset
     return seamless.chart[seamless.F[triangles, corner]], places
 
 
 def places_on_charts(seamless: SeamlessMap) -> tuple[Ints, Ints, Complex]:
-    """First corner of each triangle that sits on no cone's tip: it knows in which chart it lies; see above.
+    """First corner of each triangle that is not a cone's tip, its chart, and all places there.
+
+    Such a corner knows in which chart it lies.
 
     Returns these corners [m], charts [m], and the places [m, 3] of all corners there.
     """
@@ -165,7 +173,7 @@ def places_on_charts(seamless: SeamlessMap) -> tuple[Ints, Ints, Complex]:
 
 @kernel
 def _side_of(a: complex, b: complex, glued: Ints, other: int) -> int:
-    """The side of a chart on which two places lie and beyond which lies another chart (-1: a rim)."""
+    """The side of a chart on which two places lie, with another chart beyond it (-1: a rim)."""
     for side in range(4):
         p, q = (a.imag, b.imag) if side % 2 == 0 else (a.real, b.real)
         if p == q == (1.0 if side == 1 or side == 2 else 0.0) and glued[side, 0] == other:
@@ -227,7 +235,7 @@ def _connect(seamless: SeamlessMap, twin: Ints, places: Complex) -> None:
 
 @kernel
 def rehome(seamless: SeamlessMap, before: Complex) -> None:
-    """Follow each vertex from where it was [n], straight to where it is, over the borders of charts."""
+    """Follow each vertex straight from where it was [n], over the borders of charts."""
     for v in range(len(seamless.z)):
         if seamless.freedom[v] != FIXED:
             rehome_vertex(seamless, v, before[v])
@@ -251,7 +259,10 @@ def rehome_vertex(seamless: SeamlessMap, v: int, p: complex) -> None:
 
 @kernel
 def follow(seamless: SeamlessMap, chart: int, p: complex, q: complex) -> tuple[int, Frame, complex]:
-    """Go straight from p, in a chart, to q, in its frame: the chart in which q lies, the change there, and q there."""
+    """Go straight from p, in a chart, to q, given in the frame of that chart.
+
+    Returns the chart in which q lies, the change of frames on the way, and q in that chart.
+    """
     change = _OWN
     came = -1
     for _ in range(_MOST_CHARTS):

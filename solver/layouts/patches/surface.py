@@ -148,7 +148,7 @@ class TriangleSurface:
         )
 
     def _nodes(self, triangles: Ints, middles: Ints, places: Floats) -> tuple[Ints, Floats]:
-        """Vertices [k, 7] of the named points of triangles [k], and their barycentrics [k, 7, 3]."""
+        """Vertices [k, 7] and barycentrics [k, 7, 3] of the seven named points of triangles [k]."""
         nodes = np.full((len(triangles), 7), -1)
         local = np.zeros((len(triangles), 7, 3))
         nodes[:, :3] = self.F[triangles]
@@ -167,7 +167,10 @@ class TriangleSurface:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Flat:
-    """Parts of a surface [m] laid out in the plane; `places` [m, 3, 2] are those of the triangles' corners."""
+    """Parts of a surface laid out in the plane.
+
+    `part` [m] is that of each triangle, and `places` [m, 3, 2] are those of its corners.
+    """
 
     surface: TriangleSurface
     part: Ints
@@ -244,7 +247,9 @@ def _place_of(flat: Flat, vertex: Ints) -> Floats:
 def halved_chords(
     surface: TriangleSurface, part: Ints, on_border: Bools
 ) -> tuple[TriangleSurface, Ints]:
-    """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side.
+    """Split chords: edges inside a part [m] both of whose ends lie on its border.
+
+    In a flat polygon a chord could lie on a side.
 
     Returns the finer surface, and the triangle from before in which each of its triangles lies.
     """
@@ -256,7 +261,9 @@ def halved_chords(
 
 
 def refined(surface: TriangleSurface, longest: float) -> TriangleSurface:
-    """Split edges until none is longer than `longest` [m], that of a triangle first, so that needles lose length.
+    """Split edges until none is longer than `longest` [m].
+
+    The longest edge of a triangle goes first, so that needles lose length.
 
     Where that would take too many triangles, longer ones are left.
     """

@@ -1,4 +1,4 @@
-"""The sphere map: a closed mesh of genus 0 mapped one-to-one onto the unit sphere, its area spread evenly."""
+"""The sphere map: a closed mesh of genus 0, mapped one-to-one and evenly onto the unit sphere."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Proof that a sphere map is a bijection, how evenly it spreads area, and how it is turned to lie well on the cube.
+"""Proof that a sphere map is a bijection, its stretch, and the rotation that suits the cube.
 
 A map is rotated under the cube until the atlas's narrowest texels are as wide as possible. On the
 sphere a texel is 1.09 of the mean width at the middle of a chart and 0.77, in one direction, at the
@@ -51,7 +51,10 @@ def certify(F: NDArray[np.integer], S: Floats) -> Certificate:
 
 
 def solid_angles(F: NDArray[np.integer], S: Floats) -> Floats:
-    """Signed solid angle of each spherical triangle [sr], shape [m] (van Oosterom and Strackee 1983)."""
+    """Signed solid angle of each spherical triangle [sr], [m].
+
+    The formula is that of van Oosterom and Strackee (1983).
+    """
     a, b, c = (S[F[:, j]].T for j in range(3))
     triple = dot(a, cross(subtract(b, a), subtract(c, a)))
     return 2 * np.arctan2(triple, 1 + dot(a, b) + dot(b, c) + dot(c, a))
@@ -69,7 +72,10 @@ def stretch(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
 
 
 def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
-    """Rotate a sphere map S [n, 3] of the mesh V [n, 3], F [m, 3], of area 4 pi, so that texels are not narrow."""
+    """Rotate a sphere map S [n, 3] of the mesh V [n, 3], F [m, 3] so that texels are not narrow.
+
+    The mesh has the area 4 pi.
+    """
     metric, area = _vertex_metrics(F, V, S)
     trace = metric[:, 0] + metric[:, 1] + metric[:, 2]
     squares = np.sum(metric[:, :3] ** 2, axis=1) + 2 * np.sum(metric[:, 3:] ** 2, axis=1)
@@ -93,7 +99,10 @@ def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
 
 
 def spread_rotations(count: int) -> Floats:
-    """Rotation matrices spread evenly over all, [count, 3, 3]: super-Fibonacci spirals (Alexa 2022)."""
+    """Rotation matrices [count, 3, 3] spread evenly over all, by super-Fibonacci spirals.
+
+    Alexa (2022) describes the spirals.
+    """
     s = np.arange(count) + 0.5
     inner = np.sqrt(s / count)
     outer = np.sqrt(1 - s / count)
@@ -112,7 +121,9 @@ def spread_rotations(count: int) -> Floats:
 
 
 def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Floats, Floats]:
-    """Squared real length of a sphere's tangent, xx yy zz xy xz yz [n, 6], averaged round each vertex, and area [n].
+    """Squared real length of the sphere's tangents at each vertex, and the area of each vertex [n].
+
+    It is a symmetric matrix xx yy zz xy xz yz [n, 6], averaged over the triangles at the vertex.
 
     The average lets a sliver count no more than it covers.
     """
@@ -160,7 +171,9 @@ def _aligned_product(m: Floats, a: Vector, b: Vector) -> float:
 
 @kernel
 def _narrowness(rotation: Floats, S: Floats, metric: Floats, area: Floats, limit: float) -> float:
-    """Sum over the sphere of (1 / least width of a texel)^16; the cube's axes are the rows of `rotation`.
+    """Sum over the sphere of (1 / least width of a texel)^16.
+
+    The cube's axes are the rows of `rotation`.
 
     Once it is above `limit` the rest is left out.
     """

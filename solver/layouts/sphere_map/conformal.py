@@ -64,7 +64,10 @@ def conformal_sphere_map(V: Real, F: Triangles) -> Real:
 
 
 def _harmonic_map(V: Real, F: Triangles) -> Real:
-    """Sphere map that is harmonic but for one triangle, the most regular one, which becomes the north pole's."""
+    """Sphere map that is harmonic except at one triangle, which becomes the north pole's.
+
+    It is the most regular triangle.
+    """
     sides = np.stack(
         [np.linalg.norm(V[F[:, (j + 2) % 3]] - V[F[:, (j + 1) % 3]], axis=1) for j in range(3)],
         axis=1,
@@ -124,7 +127,10 @@ def _repair_north(V: Real, F: Triangles, S: Real) -> Real:
 def _stiffness(
     e: Complex, f: Complex, xx: Real, xy: Real, yy: Real, F: Triangles, vertex_count: int
 ) -> sparse.csr_matrix:
-    """Stiffness matrix of div(A grad) with A = [xx xy; xy yy] on flat triangles with sides e, f from corner 0."""
+    """Stiffness matrix of div(A grad), with A = [xx xy; xy yy], on flat triangles.
+
+    The sides e and f of a triangle begin at its corner 0.
+    """
     area = 0.5 * np.abs(e.real * f.imag - e.imag * f.real)
     sides = np.stack([f - e, -f, e], axis=1)
     # a hat function's gradient is its opposite side turned by a quarter, over twice the area

@@ -65,7 +65,7 @@ def preceding(h: Any) -> Any:
 
 @kernel
 def gather_star(table: CornerTable, v: int, star: Ints32) -> int:
-    """Fill `star` with the half-edges that leave v, counterclockwise, and return how many there are."""
+    """Fill `star` with the half-edges that leave v, counterclockwise; return how many there are."""
     first = h = table.leaving[v]
     degree = 0
     while True:
@@ -101,7 +101,10 @@ def collapse(table: CornerTable, h: int) -> None:
 
 @kernel
 def undo_collapse(table: CornerTable, h: int) -> None:
-    """Bring back the tail of h and the two triangles beside h; only the latest collapse can be undone."""
+    """Bring back the tail of h and the two triangles beside h.
+
+    Only the latest collapse can be undone.
+    """
     tail, twin, leaving = table
     t = twin[h]
     u = tail[h]
@@ -159,7 +162,10 @@ class _Front(NamedTuple):
 
 
 def decimate(table: CornerTable, V: Floats) -> Ints32:
-    """Collapse `table` to a tetrahedron in place and return the half-edges collapsed, in order, shape [n - 4]."""
+    """Collapse `table` to a tetrahedron in place.
+
+    Returns the collapsed half-edges in order, [n - 4].
+    """
     edges = V[table.tail] - V[table.tail[table.twin]]
     blur = 1e-4 * float(np.mean(np.sum(edges * edges, axis=1)))
     n = len(V)
@@ -189,7 +195,10 @@ def decimate(table: CornerTable, V: Floats) -> Ints32:
 
 @kernel
 def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
-    """Find the cheapest legal collapse of every stale vertex (`blur`: a squared length below which all are alike)."""
+    """Find the cheapest legal collapse of every stale vertex.
+
+    Squared lengths below `blur` count as equal.
+    """
     table, V, quadrics, merged, degree, stale, cost, target = front
     neighbours = np.empty(len(V), np.int32)
     mark = np.full(len(V), -1, np.int32)
@@ -246,7 +255,10 @@ def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
 
 @kernel
 def _collapse_round(order: Ints32, quota: int, front: _Front, limit: int, log: Ints32) -> int:
-    """Collapse up to `quota` vertices in `order`, none beside another; mark removed ones by a negative cost."""
+    """Collapse up to `quota` vertices in `order`, none of them beside another.
+
+    A negative cost marks the vertices that are removed.
+    """
     table, _, quadrics, merged, degree, stale, cost, target = front
     star = np.empty(len(cost), np.int32)
     mark = np.full(len(cost), -1, np.int32)

@@ -1,4 +1,4 @@
-"""Levels of detail of a mesh, and their reference triangles: the shape and area each should have on the sphere.
+"""Levels of detail of a mesh, and the shape and area that triangles should have on the sphere.
 
 *Carried area.* A collapsed vertex hands its share of the real surface on to the vertex it merges
 with. So a limb that a coarse level no longer shows still gets its share of the sphere there, and
@@ -25,7 +25,10 @@ SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
 
 
 class Level(NamedTuple):
-    """Triangles of a level, its edges, and the star of each vertex; h is one of the level's 3 m half-edges."""
+    """Triangles and edges of a level, and the star of each vertex.
+
+    A half-edge h is one of the level's 3 m.
+    """
 
     tail: Ints32  # [3 m] vertex where a half-edge starts
     edge: Ints32  # [3 m] edge that a half-edge lies on
@@ -65,7 +68,7 @@ def build_level(
 
 
 def star_shapes(star: Ints32, reference: Reference) -> Floats:
-    """References of the triangles left of the half-edges `star`, as `expand_star` takes them, shape [3 m, 4]."""
+    """References [3 m, 4] of the triangles left of the half-edges `star`, for `expand_star`."""
     cotangent = reference.cotangent
     columns = (
         reference.area[star // 3],
@@ -95,7 +98,10 @@ class RealSurface(NamedTuple):
 
 
 def carry(removed: Ints32, kept: Ints32, carried: Floats) -> None:
-    """Hand the area of each removed vertex on to the one it merges with, in the order of the collapses."""
+    """Hand the area of each removed vertex on to the vertex that it merges with.
+
+    They follow each other in the order of the collapses.
+    """
     for u, v in zip(removed.tolist(), kept.tolist(), strict=True):
         carried[v] += carried[u]
 
@@ -108,7 +114,7 @@ def _area(a: Vector, b: Vector, c: Vector) -> float:
 
 @kernel
 def update_load(v: int, star: Ints32, degree: int, tail: Ints32, surface: RealSurface) -> None:
-    """Find the load of v: the area it carries over its share of the real area that the level still shows."""
+    """Find the load of v: its carried area over its share of the real area that the level shows."""
     V = surface.V
     shown = 0.0
     for i in range(degree):

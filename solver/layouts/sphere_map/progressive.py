@@ -1,4 +1,7 @@
-"""The progressive sphere map: collapse to a tetrahedron, put it on the sphere, bring the vertices back level by level.
+"""The progressive sphere map: collapse the mesh, then bring its vertices back on the sphere.
+
+The mesh is collapsed to a tetrahedron, which is put on the sphere. The vertices come back level by
+level.
 
 In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the
 carried area (`level`), and a triple-product barrier with Newton steps on every level (`energy`,
@@ -162,7 +165,9 @@ def tangent_frame(p: Vector) -> tuple[Vector, Vector]:
 def newton_step(
     level: Level, S: Floats, reference: Reference, cg_steps: int
 ) -> tuple[float, float]:
-    """Move S by one Newton step in place, its direction found by up to `cg_steps` steps of conjugate gradients.
+    """Move the map S by one Newton step in place.
+
+    Up to `cg_steps` steps of conjugate gradients find its direction.
 
     Returns by how much the energy fell, 0 where no step lowers it, and the step's length, 1 for a
     whole Newton step.
@@ -196,7 +201,10 @@ def newton_step(
 def assemble(
     level: Level, S: Floats, reference: Reference, x: Floats, y: Floats, system: System
 ) -> float:
-    """Fill in the tangents x, y [n, 3] of the map S, add its triangles to the system, and return its energy."""
+    """Fill in the tangents x, y [n, 3] of the map S, add its triangles to the system.
+
+    Returns the energy of the map.
+    """
     for v in range(len(S)):
         (x[v, 0], x[v, 1], x[v, 2]), (y[v, 0], y[v, 1], y[v, 2]) = tangent_frame(row(S, v))
     radial = np.zeros(len(S))
@@ -237,7 +245,9 @@ def assemble(
 
 @kernel
 def _time_of_first_fold(tail: Ints32, S: Floats, velocity: Floats) -> float:
-    """Lower bound on the first time t up to the horizon at which det(a + t a', b + t b', c + t c') is 0 for a triangle.
+    """Lower bound on the first time at which a triangle folds, up to the horizon.
+
+    At that time t the determinant det(a + t a', b + t b', c + t c') is 0.
 
     Infinite where no triangle folds by then.
     """
@@ -279,7 +289,7 @@ def _time_of_first_fold(tail: Ints32, S: Floats, velocity: Floats) -> float:
 
 @kernel
 def sweep(level: Level, S: Floats, shapes: Floats, density: Density, backwards: bool) -> float:
-    """Relax every vertex of a level once, in order or backwards; return by how much the energy fell.
+    """Relax every vertex of a level once, in order or backwards; return how far the energy falls.
 
     `shapes` [3 m, 4] comes from `level.star_shapes`.
     """
@@ -322,7 +332,7 @@ def relax_vertex(
 
 
 def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
-    """Map a closed triangle mesh of genus 0 one-to-one onto the unit sphere, its area spread evenly.
+    """Map a closed triangle mesh of genus 0 one-to-one and evenly onto the unit sphere.
 
     Parameters
     ----------

@@ -185,7 +185,7 @@ def test_charts_that_take_long_are_told_of(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     build = sys.modules[build_atlas.__module__]
-    monkeypatch.setattr(build, "_TOLD_EVERY", 0.01)
+    monkeypatch.setattr(build, "_MESSAGE_INTERVAL", 0.01)
     monkeypatch.setattr(build, "patch_atlas", lambda mesh, resolution: time.sleep(0.2))
     build._patches(Mesh.from_arrays(*icosphere(2)), 8)
     assert "laying charts on a mesh of 320 triangles in 1 part: 0 s so far" in caplog.messages[0]
