@@ -32,7 +32,7 @@ from ripple_sim.solver import (
     load_mesh,
     sphere_atlas,
 )
-from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver.backends.choice import make_backend
 from ripple_sim.solver.kernel import Floats32, kernel
 from ripple_sim.solver.operator.assembly import OPERATORS, build_operator
 from ripple_sim.solver.operator.wave_operator import WaveOperator

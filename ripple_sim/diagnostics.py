@@ -22,7 +22,8 @@ from typing import Any
 import mujoco
 
 from ripple_sim import __version__
-from ripple_sim.solver.backends.backend import auto_backend, measured
+from ripple_sim.solver.backends.backend_speed import measured
+from ripple_sim.solver.backends.choice import auto_backend
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import DRAWING_THREADS, shared_context
 

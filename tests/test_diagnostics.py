@@ -15,7 +15,7 @@ from programs import ended
 from ripple_sim import diagnostics
 from ripple_sim.cli import main as cli
 from ripple_sim.diagnostics import find_drawing_threads, find_problems
-from ripple_sim.solver.backends import backend
+from ripple_sim.solver.backends import auto_backend
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import context as gl
 from ripple_sim.video import settings
@@ -169,7 +169,7 @@ def test_info_names_versions_driver_and_the_backend_that_auto_takes(capsys):
     context = gl.shared_context()
     assert got["opengl"]["renderer"] == context.renderer
     assert got["opengl"]["software"] is context.software
-    assert got["backend"] == ("cpu" if context.software else "gl") == backend.auto_backend()
+    assert got["backend"] == ("cpu" if context.software else "gl") == auto_backend()
 
 
 def test_without_egl_info_says_what_to_install(capsys, monkeypatch):

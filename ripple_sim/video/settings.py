@@ -27,7 +27,7 @@ from ripple_sim.errors import VideoError
 from ripple_sim.overlay.operators import compared_operators
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import Scene, check_duration
-from ripple_sim.solver.backends.backend import auto_backend
+from ripple_sim.solver.backends.choice import auto_backend
 from ripple_sim.solver.gl import GLContext
 
 from .options import Backend, SceneOptions, VideoOptions

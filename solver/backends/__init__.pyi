@@ -1,9 +1,6 @@
-from .backend import (
-    Backend as Backend,
-    auto_backend as auto_backend,
-    make_backend as make_backend,
-    measured as measured,
-)
+from .backend import Backend as Backend
+from .backend_speed import measured as measured
+from .choice import auto_backend as auto_backend, make_backend as make_backend
 from .cpu import CPUBackend as CPUBackend, RowLayout as RowLayout
 from .gl_fields import (
     DeviceField as DeviceField,

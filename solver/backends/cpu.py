@@ -31,17 +31,21 @@ from .kernels import (
     Coefficient,
     Kick,
     Links,
+    ProbedSums,
+    Pulses,
     Squares,
+    State,
     Weights,
 )
 
-# Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of
-# them. On charts of 12 columns, loops that begin anew for each take four times as long.
-SMALL = 64
+# Below this resolution [texels along a side] charts lie side by side, row by row: one loop then runs
+# over a row of all charts. On charts of 12 columns, a loop for each chart takes four times as long.
+_MAX_JOINED_RESOLUTION = 64
 
-# Floats of a cache line, and of a page of memory.
-LINE = 16
-PAGE = 1024
+_LINE_FLOATS = 16  # float32 in a cache line of 64 bytes
+_PAGE_FLOATS = 1024  # float32 in a page of 4096 bytes
+
+_NO_DENT = np.zeros(0, np.float32)
 
 
 class RowLayout:
@@ -65,11 +69,11 @@ class RowLayout:
 
     def __init__(self, topology: TexelTopology) -> None:
         self._charts, self.n, _ = topology.shape
-        self._alone = self.n >= SMALL or self._charts == 1
+        self._alone = self.n >= _MAX_JOINED_RESOLUTION or self._charts == 1
         width = self.n + 2
         if self._alone:
             self.columns = self.n
-            self._pitch = -(-width // LINE) * LINE
+            self._pitch = -(-width // _LINE_FLOATS) * _LINE_FLOATS
         else:
             self.columns = self._charts * width - 2
             self._pitch = (self._charts + 1) * width
@@ -77,19 +81,26 @@ class RowLayout:
         self.addresses = self._address(texels)
         self.halo = np.stack([self._address(ghosts), self._address(sources)])
         if topology.fixed_rim and not self._alone:
-            # loops run over these: they are set to 0 again
-            beside = np.flatnonzero(topology.rim)
-            beside = self._address(beside[(beside // width % width % (width - 1)) > 0])
-            self.halo = np.append(
-                self.halo, [beside, np.full(len(beside), self._pitch - 1)], axis=1
-            )
+            # loops run over the rim's places beside the charts: they are set to 0 again
+            rim = np.flatnonzero(topology.rim)
+            row = rim // width % width
+            beside = self._address(rim[row % (width - 1) > 0])
+            always_zero = np.full(len(beside), self._pitch - 1)
+            self.halo = np.append(self.halo, [beside, always_zero], axis=1)
 
     def zeros(self, shift: int = 0) -> NDArray[np.float32]:
-        """A field with halo; its first texel, or that of every row of a chart alone, begins a cache line."""
+        """A field of zeros with halo.
+
+        The first texel begins a cache line; where charts do not lie side by side, the first texel
+        of every row does.
+        """
         return aligned((self._charts if self._alone else 1, self.n + 2, self._pitch), 1, shift)
 
     def coefficients(self, field: NDArray | np.float32) -> Any:
-        """A field [C, n, n] as loops read it beside one with halo: flat, [C n columns], 0 between; or a number."""
+        """A field [C, n, n] as loops read it beside a field with halo, or a number as it is.
+
+        It is flat, [C n columns], and 0 between the charts.
+        """
         if np.ndim(field) == 0:
             return field
         field = np.asarray(field)
@@ -111,7 +122,7 @@ class RowLayout:
         return (chart * self.n + row - 1) * self.columns + column - 1
 
     def weights(self, stencil: Stencil, rows: NDArray[np.float32]) -> Weights:
-        """A stencil laid out like a field, and its irregular links; the rows of another one are written over."""
+        """A stencil laid out like a field; `rows` of an earlier stencil are used again, if any."""
         count = self._charts
         if not rows.size:
             rows = aligned((count if self._alone else 1, 4, self.n + 1, self._pitch), 1)
@@ -121,32 +132,32 @@ class RowLayout:
             beside = rows.reshape(4, self.n + 1, count + 1, self.n + 2)
             beside[:, :, :count, : self.n + 1] = stencil.weights.transpose(1, 2, 0, 3)
         links = stencil.irregular
-        addresses = self.addresses
-        texels = links.texels
-        weights = links.weights.astype(np.float32)
         irregular = Links(
-            self.places[texels], addresses[texels], links.begins, addresses[links.others], weights
+            texels=self.places[links.texels],
+            addresses=self.addresses[links.texels],
+            begins=links.begins,
+            others=self.addresses[links.others],
+            weights=links.weights.astype(np.float32),
         )
         return Weights(rows, self.columns, irregular)
 
     def squares(self, bending: Curvatures) -> Squares:
         """Weights of curvatures laid out like coefficients, and room for their forces."""
-        by_neighbour = bending.weights.astype(np.float32).swapaxes(0, 1)
-        weights = np.stack(
-            [[self.coefficients(weight) for weight in kinds] for kinds in by_neighbour]
-        )
-        steps = np.array([row * self._pitch + column for row, column in STEPS])
-        rows = weights.shape[-1] // self.columns
-        scratch = np.zeros((4, kernels.BLOCK), np.float32)
+        weights_of_neighbours = []
+        for weights_of_kinds in bending.weights.astype(np.float32).swapaxes(0, 1):
+            weights_of_neighbours.append(
+                np.stack([self.coefficients(weight) for weight in weights_of_kinds])
+            )
+        weights = np.stack(weights_of_neighbours)
         return Squares(
-            weights,
-            steps,
-            rows,
-            self.n,
-            self.columns,
-            self._pitch,
-            self.zeros().reshape(-1),
-            scratch,
+            weights=weights,
+            steps=np.array([row * self._pitch + column for row, column in STEPS]),
+            rows=weights.shape[-1] // self.columns,
+            chart_rows=self.n,
+            columns=self.columns,
+            pitch=self._pitch,
+            force=self.zeros().reshape(-1),
+            scratch=np.zeros((4, kernels.BLOCK), np.float32),
         )
 
     def texels(self, field: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -161,7 +172,7 @@ class RowLayout:
         return self.texels(field).copy()
 
     def write(self, field: NDArray[np.float32], values: NDArray | np.float32) -> None:
-        """Replace a field's texels; all else becomes 0, also what was no number between charts."""
+        """Replace a field's texels; all other places become 0, also where they were not numbers."""
         field[:] = 0
         self.texels(field)[:] = values
 
@@ -177,17 +188,17 @@ class RowLayout:
 def aligned(
     shape: tuple[int, ...], column: int, shift: int = 0, dtype: DTypeLike = np.float32
 ) -> NDArray:
-    """Zeros, of four bytes each, whose first row has the given column `shift` of them into a page."""
+    """Zeros of four bytes each; `column` of the first row is `shift` numbers into a page."""
     size = int(np.prod(shape))
-    memory = np.zeros(size + PAGE, dtype)
-    start = (shift - column - memory.ctypes.data // memory.itemsize) % PAGE
+    memory = np.zeros(size + _PAGE_FLOATS, dtype)
+    start = (shift - column - memory.ctypes.data // memory.itemsize) % _PAGE_FLOATS
     return memory[start : start + size].reshape(shape)
 
 
 def part_runs(
     operator: WaveOperator, fields: RowLayout
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Runs of texels in coefficients that belong to one part: where each begins, [k + 1], and its part, [k]."""
+    """Runs of texels of one part in coefficients: where each begins [k + 1], and its part [k]."""
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
     beside = fields.coefficients(parts)
     begins = np.flatnonzero(np.diff(beside, prepend=-1))
@@ -197,20 +208,32 @@ def part_runs(
 def volume_balance(
     operator: WaveOperator, dt: float, conserve: bool | None, fields: RowLayout
 ) -> Balance | None:
-    """What keeps the volume over a substep of dt [s], if anything needs to; see `volume_rate`."""
+    """The balance that keeps the volume over a substep of dt [s]; see `volume_rate`.
+
+    None where nothing has to keep the volume.
+    """
     rate = volume_rate(operator, dt, conserve)
     if rate is None:
         return None
     begins, texels, heights, velocities = rate
     addresses = fields.addresses[texels]
-    follows = np.append(False, np.diff(addresses) == 1)
-    follows[begins[:-1][begins[:-1] < len(follows)]] = False
-    starts = np.flatnonzero(~follows)
-    runs = np.searchsorted(starts, begins), addresses[starts], np.append(starts, len(addresses))
-    loaded, total = np.zeros((2, len(begins) - 1), np.float32)
-    pressure = fields.coefficients(np.zeros(operator.mass.shape, np.float32))
+    continues_run = np.append(False, np.diff(addresses) == 1)
+    first_of_parts = begins[:-1]
+    continues_run[first_of_parts[first_of_parts < len(continues_run)]] = False
+    run_starts = np.flatnonzero(~continues_run)
+    part_count = len(begins) - 1
+    part_begins, parts = part_runs(operator, fields)
     return Balance(
-        *runs, heights, velocities, loaded, total, pressure, *part_runs(operator, fields)
+        begins=np.searchsorted(run_starts, begins),
+        addresses=addresses[run_starts],
+        runs=np.append(run_starts, len(addresses)),
+        heights=heights,
+        velocities=velocities,
+        loaded=np.zeros(part_count, np.float32),
+        total=np.zeros(part_count, np.float32),
+        pressure=fields.coefficients(np.zeros(operator.mass.shape, np.float32)),
+        part_begins=part_begins,
+        parts=parts,
     )
 
 
@@ -225,9 +248,10 @@ class CPUBackend(FieldBackend):
         # the processor takes a store to one field and a load from another at the same place of a
         # page for a conflict: each field begins elsewhere in its page
         self._h, self._h_next, self._v = (
-            fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3)
+            fields.zeros(i * _PAGE_FLOATS // 3 // _LINE_FLOATS * _LINE_FLOATS) for i in range(3)
         )
         self._stencil = NO_WEIGHTS
+        self._viscosity: Weights | None = None
         self._features = NO_FEATURES
         if isinstance(operator.bending, Bending):
             self._features = self._features._replace(moment=fields.zeros().reshape(-1))
@@ -237,25 +261,24 @@ class CPUBackend(FieldBackend):
             self._dent = fields.zeros()
             limit = np.full_like(self._dent, np.inf)
             fields.texels(limit)[:] = operator.yield_height
-            self._features = self._features._replace(
-                limit=limit.reshape(-1), dent=self._dent.reshape(-1)
-            )
+            self._features = self._features._replace(limit=limit.reshape(-1))
         self.move(operator)
         self._response = fields.coefficients(number_or_field(operator.response))
         self._part_runs = None if operator.parts is None else part_runs(operator, fields)
         self._part_count = 1 if operator.parts is None else int(operator.parts.max()) + 1
         self._balance: Balance | None = None
-        self._extra: Coefficient = np.float32(0)
+        self._extra: Coefficient = np.float32(0)  # forces beside those of the stencil
         self._shift: Amplitude | None = None  # of velocities, which the next drift adds
+        # step length [s] and `keeps_volume` for which the coefficients are prepared
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
     def kick(
         self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude
     ) -> None:
-        """Add velocities [m/s] to some texels (each named once), and one to all, as they respond.
+        """Add velocities [m/s] to some texels, each named once, and one to all, as they respond.
 
-        The latter is only noted: the next step adds all at once.
+        The velocity of all texels is only noted: the next step adds all that were noted at once.
         """
         self._v.reshape(-1)[self._fields.addresses[texels]] += velocities
         self._shift = everywhere if self._shift is None else self._shift + everywhere
@@ -263,7 +286,10 @@ class CPUBackend(FieldBackend):
     def load(
         self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
     ) -> None:
-        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
+        """Hold forces [N] on some texels, and an acceleration [m/s^2] on all.
+
+        Until the next call.
+        """
         self._loaded = texels
         self._load_forces = forces
         self._acceleration = everywhere
@@ -271,33 +297,38 @@ class CPUBackend(FieldBackend):
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
-        k = self._prepare(dt)
-        balance = self._balance
-        acceleration = self._pressure(self._acceleration) if balance is None else balance.pressure
-        kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
+        coefficients = self._prepare(dt)
+        acceleration = (
+            self._pressure(self._acceleration) if self._balance is None else self._balance.pressure
+        )
+        kick = Kick(
+            stencil=self._stencil,
+            gain=coefficients.gain,
+            decay=coefficients.decay,
+            spring=coefficients.spring,
+            span=coefficients.span,
+            extra=self._extra,
+            acceleration=acceleration,
+        )
         self._apply_kicks()
-        features = self._features
-        drags = self._plain and len(features.viscosity.rows) > 0
-        self._sums = np.zeros(
-            (substeps, 0 if self._probes is None else len(self._probes.heights)), np.float32
+        state = State(
+            h=self._h.reshape(-1),
+            v=self._v.reshape(-1),
+            h_next=self._h_next.reshape(-1),
+            dent=_NO_DENT if self._dent is None else self._dent.reshape(-1),
+            halo=self._fields.halo,
         )
-        fields = (field.reshape(-1) for field in (self._h, self._v, self._h_next))
-        dent = NO_WEIGHTS.irregular.weights if self._dent is None else self._dent.reshape(-1)
-        acting = (
-            features.viscosity if drags else None,
-            None if self._plain else features,
-            self._probes,
-            dent,
-        )
+        sum_count = 0 if self._probes is None else len(self._probes.heights)
+        self._sums = np.zeros((substeps, sum_count), np.float32)
         kernels.advance(
             substeps,
             np.float32(dt),
-            *fields,
-            self._fields.halo,
+            state,
             kick,
-            *self._kicks,
-            *acting,
-            self._sums,
+            self._pulses,
+            self._viscosity,
+            None if self._plain else self._features,
+            None if self._probes is None else ProbedSums(self._probes, self._sums),
         )
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
@@ -306,23 +337,23 @@ class CPUBackend(FieldBackend):
 
     def probe(self, probes: kernels.Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
-        self._probes = probes and probes._replace(texels=self._fields.addresses[probes.texels])
+        if probes is not None:
+            probes = probes._replace(texels=self._fields.addresses[probes.texels])
+        self._probes = probes
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
         self._operator = operator
         fields = self._fields
         self._stencil = fields.weights(operator.stencil, self._stencil.rows)
-        features = self._features
         if operator.viscosity_stencil is not None:
-            features = features._replace(
-                viscosity=fields.weights(operator.viscosity_stencil, features.viscosity.rows)
-            )
+            rows = NO_WEIGHTS.rows if self._viscosity is None else self._viscosity.rows
+            self._viscosity = fields.weights(operator.viscosity_stencil, rows)
         if isinstance(operator.bending, Bending):
-            rigidity = fields.coefficients(operator.bending.rigidity.astype(np.float32))
-            laplace = fields.weights(operator.bending.laplace, features.laplace.rows)
-            features = features._replace(laplace=laplace, rigidity=rigidity)
-        self._features = features
+            self._features = self._features._replace(
+                laplace=fields.weights(operator.bending.laplace, self._features.laplace.rows),
+                rigidity=fields.coefficients(operator.bending.rigidity.astype(np.float32)),
+            )
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
@@ -342,43 +373,50 @@ class CPUBackend(FieldBackend):
         self._shift = None
 
     def _pressure(self, amplitude: Amplitude) -> Coefficient:
-        """An amplitude, one for all or one for each part, as the loops take it: a number, or a flat field."""
+        """An amplitude as the loops take it: a number, or a flat field for several parts."""
         if self._part_runs is None:
             return np.float32(amplitude)
         begins, parts = self._part_runs
-        return np.repeat(
-            np.broadcast_to(np.float32(amplitude), self._part_count)[parts], np.diff(begins)
-        )
+        amplitudes = np.broadcast_to(np.float32(amplitude), self._part_count)
+        return np.repeat(amplitudes[parts], np.diff(begins))
 
     def _prepare(self, dt: float) -> StepCoefficients:
-        """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
+        """Coefficients of the kick for substeps of dt [s], and the pulses of the load.
+
+        The coefficients are computed once for each step length, the pulses also for each load.
+        """
         new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
-            self._balance = volume_balance(self._operator, dt, self.keeps_volume, self._fields)
-            self._features = self._features._replace(balance=self._balance or NO_BALANCE)
-            k = step_coefficients(self._operator, dt)
-            varied = any(np.ndim(each) for each in (k.decay, k.spring, k.span))
-            varied = varied or self._part_runs is not None or self._balance is not None
-            # beside the gain all of them are fields, or none
-            each = (k.gain, k.decay, k.spring, k.span)
-            laid_out = map(
-                self._fields.coefficients, np.broadcast_arrays(*each) if varied else each
-            )
-            self._coefficients = StepCoefficients(*laid_out)
-            features = self._features
-            self._plain = not (
-                varied or len(features.moment) or len(features.squares.force) or len(features.dent)
-            )
-            # a field where forces are added up, or the number 0
-            drags = len(features.viscosity.rows) > 0 or not self._plain
-            if drags != bool(np.ndim(self._extra)):
-                self._extra = self._fields.zeros().reshape(-1) if drags else np.float32(0)
+            self._prepare_coefficients(dt)
             self._prepared = (dt, self.keeps_volume)
-        k = self._coefficients
         if new_length or self._load_is_new:
-            kicks = k.gain[self._fields.places[self._loaded]] * self._load_forces.astype(np.float32)
-            self._kicks = self._fields.addresses[self._loaded], kicks
+            gain = self._coefficients.gain[self._fields.places[self._loaded]]
+            self._pulses = Pulses(
+                addresses=self._fields.addresses[self._loaded],
+                velocities=gain * self._load_forces.astype(np.float32),
+            )
             if self._balance is not None:
                 self._balance.loaded[:] = self._acceleration
             self._load_is_new = False
-        return k
+        return self._coefficients
+
+    def _prepare_coefficients(self, dt: float) -> None:
+        """Compute the coefficients of the kick for substeps of dt [s], and choose the loops."""
+        self._balance = volume_balance(self._operator, dt, self.keeps_volume, self._fields)
+        self._features = features = self._features._replace(balance=self._balance or NO_BALANCE)
+        k = step_coefficients(self._operator, dt)
+        values: tuple[Any, ...] = (k.gain, k.decay, k.spring, k.span)
+        # beside the gain all coefficients are fields, or none is
+        varied = any(np.ndim(value) for value in values[1:])
+        varied = varied or self._part_runs is not None or self._balance is not None
+        if varied:
+            values = np.broadcast_arrays(*values)
+        self._coefficients = StepCoefficients(
+            *(self._fields.coefficients(value) for value in values)
+        )
+        bends = len(features.moment) > 0 or len(features.squares.force) > 0
+        self._plain = not (varied or bends or len(features.limit))
+        # a field where forces are added up, or the number 0
+        needs_field = self._viscosity is not None or not self._plain
+        if needs_field != bool(np.ndim(self._extra)):
+            self._extra = self._fields.zeros().reshape(-1) if needs_field else np.float32(0)

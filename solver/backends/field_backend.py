@@ -1,4 +1,4 @@
-"""What all backends share: height and velocity as fields, to be read, replaced, and watched for their crests."""
+"""The part that all backends share: fields are read and replaced, and their crests are kept."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from .gl_fields import DeviceField
 
 
 class FieldBackend:
-    """Fields of one layout, each float32: height, velocity, and what stays of the height where anything does.
+    """Height, velocity and permanent height as float32 fields of one layout.
 
-    The layout `_fields` makes fields of zeros, and reads and writes their texels.
+    A backend says what its fields are: arrays on the CPU, buffers on the GPU. The layout `_fields`
+    makes fields of zeros, and reads and writes their texels. See `Backend` for the methods.
     """
 
     _operator: WaveOperator
-    _fields: Any
-    _h: Any
-    _v: Any
-    _dent: Any = None
-    _crests: Any = None
+    _fields: Any  # RowLayout or FieldLayout
+    _h: Any  # elastic part of the height [m]
+    _v: Any  # velocity [m/s]
+    _dent: Any = None  # permanent part of the height [m], where there is any
+    _crests: Any = None  # greatest size of the height [m], from the first call of `crests` on
     _probes: Any = None
-    _sums: NDArray[np.float32]
+    _sums: NDArray[np.float32]  # of the probes, [substeps, k]
 
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [C, n, n]."""
@@ -40,12 +41,10 @@ class FieldBackend:
         return self._fields.read(self._h)
 
     def dent(self) -> NDArray[np.float32]:
-        """The part of the height that stays [m], [C, n, n]."""
-        return (
-            np.zeros(self._operator.mass.shape, np.float32)
-            if self._dent is None
-            else self._fields.read(self._dent)
-        )
+        """Copy of the part of the height that stays [m], [C, n, n]."""
+        if self._dent is None:
+            return np.zeros(self._operator.mass.shape, np.float32)
+        return self._fields.read(self._dent)
 
     def velocity(self) -> NDArray[np.float32]:
         """Copy of the velocity [m/s], [C, n, n]."""
@@ -53,7 +52,10 @@ class FieldBackend:
         return self._fields.read(self._v)
 
     def crests(self) -> NDArray[np.float32]:
-        """Greatest size of the height after any `advance` since the last call, or now [m], [C, n, n]."""
+        """Greatest size of the height since the last call [m], [C, n, n].
+
+        It counts after every `advance`, and now.
+        """
         if self._crests is None:
             self._crests = self._fields.zeros()
         self._raise_crests()
@@ -64,10 +66,10 @@ class FieldBackend:
     def set_height(
         self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None
     ) -> None:
-        """Replace the elastic height, and the permanent one: 0 unless given."""
+        """Replace the elastic height, and the permanent height, which is 0 by default."""
         self._fields.write(self._h, height)
         if self._dent is None and dent is not None and dent.any():
-            # what another material has left, in a surface that does not yield itself
+            # dents of an earlier material, in a surface that does not yield itself
             self._dent = self._fields.zeros()
         if self._dent is not None:
             self._fields.write(self._dent, np.zeros_like(height) if dent is None else dent)
@@ -82,7 +84,7 @@ class FieldBackend:
         return self._sums
 
     def wait(self) -> None:
-        """Return when all steps are done: at once, they are."""
+        """Return at once: all steps are done."""
 
     def finite(self) -> bool:
         """Whether all heights are finite."""
@@ -90,13 +92,12 @@ class FieldBackend:
             return bool(np.isfinite(self._h.sum()))
 
     def _apply_kicks(self) -> None:
-        """Add to the velocity what kicks have only noted."""
+        """Add the velocities that kicks have only noted."""
 
     def _drop_kicks(self) -> None:
-        """Forget what kicks have noted."""
+        """Forget the velocities that kicks have noted."""
 
     def _raise_crests(self) -> None:
         """Raise the crests to the height where that is greater."""
-        self._fields.write(
-            self._crests, np.maximum(self._fields.read(self._crests), np.abs(self.height()))
-        )
+        crests = np.maximum(self._fields.read(self._crests), np.abs(self.height()))
+        self._fields.write(self._crests, crests)

@@ -33,15 +33,15 @@ from .gl_fields import (
 )
 from .kernels import Amplitude, Probes
 
-# What the law of a quad asks for
-_LAW = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "FADED", "TINY", "PER_TINY")
+# Constants of `cells` that the shader of a quad's stiffness needs
+_QUAD_CONSTANTS = ("PER_HOURGLASS", "SHARE", "EVEN", "LEAST_AREA", "FADED", "TINY", "PER_TINY")
 
 
 class DeviceStiffness:
-    """Makes stencils such as `stencil`, of one set of cells for one coefficient, wherever the vertices are.
+    """Computes stencils for one coefficient and one set of cells as the vertices move.
 
-    The quads are the GPU's; the few other cells are worked out on the CPU, and what they give is
-    uploaded. `mass` [C, n, n] is in kg.
+    `stencil` is the first one; `mass` is the mass of each texel [kg], [C, n, n]. The GPU computes
+    the quads. The CPU computes the few other cells, and their results are uploaded.
     """
 
     def __init__(
@@ -55,8 +55,10 @@ class DeviceStiffness:
         ride = stencil.places.ride
         self._width = topology.halo.shape[1]
         self._count = topology.halo.size
-        at = texels.special_places
-        self._special = ride.corners[at], ride.weights[at], np.empty((3, len(at)))
+        special = texels.special_places
+        self._special_corners = ride.corners[special]
+        self._special_weights = ride.weights[special]
+        self._special_positions = np.empty((3, len(special)))
         self._around = np.zeros((3, self._count))
         added = texels.special_links
         crossing = crossing_links(topology)
@@ -71,38 +73,29 @@ class DeviceStiffness:
             self._sides = ctx.buffer(reserve=24 * self._count)
             self._values = ctx.buffer(reserve=4 * (1 + len(added)))
             self._peak = ctx.buffer(bytes(4))
-        self._corners = to_buffer(gl, ride.corners, np.int32)
         quads = stencil.coefficient[0]
+        self._corners = to_buffer(gl, ride.corners, np.int32)
         self._weights = to_buffer(gl, np.nan_to_num(ride.weights), np.float64)
-        (
-            self._conductance,
-            self._per_area,
-            self._detours,
-            self._shares,
-            self._masses,
-            self._beside,
-        ) = (
-            to_buffer(gl, each, np.float32)
-            for each in (
-                quads.conductance,
-                quads.per_area,
-                quads.detours,
-                shares,
-                mass,
-                np.zeros(mass.size),
-            )
-        )
+        self._conductance = to_buffer(gl, quads.conductance, np.float32)
+        self._per_area = to_buffer(gl, quads.per_area, np.float32)
+        self._detours = to_buffer(gl, quads.detours, np.float32)
+        self._shares = to_buffer(gl, shares, np.float32)
+        self._masses = to_buffer(gl, mass, np.float32)
+        self._beside = to_buffer(gl, np.zeros(mass.size), np.float32)
         names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
         self._shaders = {name: fields.shader(name) for name in names}
-        law = {name: float(getattr(cells, name)) for name in _LAW}
+        law = {name: float(getattr(cells, name)) for name in _QUAD_CONSTANTS}
         self._shaders["quads"] = fields.shader("quads", **law, LEAST_RATIO=float(LEAST_RATIO))
 
     def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks:
-        """Write the nine-point stencil into a buffer of `FieldLayout.links`; return the irregular links."""
+        """Write the nine-point stencil into a buffer of `FieldLayout.links`.
+
+        Returns the irregular links.
+        """
         V = stencil.places.V
-        (quads, _) = stencil.coefficient
-        interpolate(V, *self._special)
-        self._around[:, stencil.cells.special_places] = self._special[-1]
+        quads, _ = stencil.coefficient
+        interpolate(V, self._special_corners, self._special_weights, self._special_positions)
+        self._around[:, stencil.cells.special_places] = self._special_positions
         values, of_cells = stencil.cells.special(self._around, stencil.coefficient)
         irregular = stencil.with_added(of_cells)
         with self._fields.gl:
@@ -111,35 +104,50 @@ class DeviceStiffness:
             self._run(
                 "ride", self._count, self._vertices, self._corners, self._weights, self._places
             )
-            shape = {"width": self._width, "scale": quads.scale, "power": quads.power}
-            given = self._places, self._conductance, self._per_area, self._detours
-            self._run("quads", self._count, *given, self._sides, **shape)
+            quad_buffers = (
+                self._places,
+                self._conductance,
+                self._per_area,
+                self._detours,
+                self._sides,
+            )
+            self._run(
+                "quads",
+                self._count,
+                *quad_buffers,
+                width=self._width,
+                scale=quads.scale,
+                power=quads.power,
+            )
             self._run("quad_links", self._count, self._sides, buffer, width=self._width)
             for (groups, *links), factor in ((self._missing, 0.0), (self._copies, 1.0)):
                 self._run("close_links", groups, buffer, *links, factor=factor)
-            self._run("add_links", self._added[0], buffer, self._added[1], self._values)
-            # Gershgorin's bound
-            if len(irregular.texels):
-                beside = np.zeros(self._mass.size, np.float32)
-                beside[irregular.texels] = np.add.reduceat(
-                    np.abs(irregular.weights), irregular.begins[:-1]
-                )
-                self._beside.write(beside.tobytes())
-            self._peak.write(bytes(4))
-            buffers = (
-                buffer,
-                self._peak,
-                self._fields.texel_addresses,
-                self._shares,
-                self._beside,
-                self._masses,
-            )
-            self._run("link_rates", self._mass.size, *buffers, width=self._width)
-            stencil.known_fastest = float(np.frombuffer(self._peak.read(), np.float32)[0])
+            added_count, added_places, _ = self._added
+            self._run("add_links", added_count, buffer, added_places, self._values)
+            stencil.known_fastest = self._fastest(buffer, irregular)
         return irregular
 
+    def _fastest(self, buffer: moderngl.Buffer, irregular: IrregularLinks) -> float:
+        """Gershgorin's bound of the highest rate that a stencil of irregular links gives."""
+        if len(irregular.texels):
+            beside = np.zeros(self._mass.size, np.float32)
+            sizes = np.abs(irregular.weights)
+            beside[irregular.texels] = np.add.reduceat(sizes, irregular.begins[:-1])
+            self._beside.write(beside.tobytes())
+        self._peak.write(bytes(4))
+        rate_buffers = (
+            buffer,
+            self._peak,
+            self._fields.texel_addresses,
+            self._shares,
+            self._beside,
+            self._masses,
+        )
+        self._run("link_rates", self._mass.size, *rate_buffers, width=self._width)
+        return float(np.frombuffer(self._peak.read(), np.float32)[0])
+
     def _run(self, name: str, count: int, *buffers: moderngl.Buffer, **uniforms: float) -> None:
-        """Run a shader over a list of so many entries, if there are any."""
+        """Run a shader over a list of `count` entries, if there are any."""
         shader = self._shaders[name]
         for uniform, value in uniforms.items():
             shader[uniform] = value
@@ -150,17 +158,19 @@ class DeviceStiffness:
 def _link_groups(
     gl: GLContext, topology: TexelTopology, links: Ints, begins: Ints
 ) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
-    """How many groups of links, where these lie among those of all places, and first of each group and one after.
+    """Groups of links: how many, the links, and the first and one after the last of each group.
 
-    A link is 4 times its place with halo, plus 0 to 3: east, north, north-east, or across that.
+    A link is 4 times its place with halo, plus its direction: 0 east, 1 north, 2 north-east, and 3
+    across north-east.
     """
     charts, n, _ = topology.shape
     chart, link, r, c = np.unravel_index(links, (charts, 4, n + 1, n + 1))
-    places = to_buffer(gl, 4 * ((chart * (n + 2) + r) * (n + 2) + c) + link, np.int32)
+    place = (chart * (n + 2) + r) * (n + 2) + c
+    bounds = np.stack([begins[:-1], begins[1:]], axis=1)
     return (
         len(begins) - 1,
-        places,
-        to_buffer(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32),
+        to_buffer(gl, 4 * place + link, np.int32),
+        to_buffer(gl, bounds, np.int32),
     )
 
 
@@ -174,18 +184,20 @@ class StencilBuffer:
         self._device: DeviceStiffness | None = None
 
     def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
-        """Take over another stencil of the same topology: made on the GPU where that can be, else uploaded.
+        """Take over another stencil of the same topology.
 
-        It can be where texels lie on their triangles, and none of them twice. A software driver's
-        shaders run on the processor's own cores, where the CPU's loops take a fifth of the time.
+        The GPU computes it where texels lie on their triangles, and no texel lies on two. Else it is
+        uploaded; so it is with a software driver, whose shaders run on the processor's own cores:
+        the CPU's loops take a fifth of their time.
         """
-        moved = (
-            stencil if isinstance(stencil, MovedStencil) and not self._fields.gl.software else None
-        )
-        if moved and moved.places.ride.on_triangles:
+        if (
+            isinstance(stencil, MovedStencil)
+            and not self._fields.gl.software
+            and stencil.places.ride.on_triangles
+        ):
             if self._device is None:
-                self._device = DeviceStiffness(self._fields, moved, mass)
-            self.irregular = self._device.write(moved, self.buffer)
+                self._device = DeviceStiffness(self._fields, stencil, mass)
+            self.irregular = self._device.write(stencil, self.buffer)
         else:
             with self._fields.gl:
                 self.buffer.write(self._fields.links(stencil))
@@ -324,8 +336,9 @@ class GLBackend(FieldBackend):
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = StencilBuffer(fields, operator.stencil)
         self._response = fields.upload(operator.response)
-        # a number for each part, where there are several: given at once, and held by the load
-        self._given = None if operator.parts is None else Pressure(fields, operator)
+        # velocity shifts of the kicks, a number for each part where there are several; and the
+        # accelerations that the load holds
+        self._part_shifts = None if operator.parts is None else Pressure(fields, operator)
         self._held: Pressure | None = None
         self._kicks = TexelList(self._gl)
         self._forces = TexelList(self._gl)
@@ -336,17 +349,18 @@ class GLBackend(FieldBackend):
             self._yielding = fields.texel_shader("flow")
         self._kick = fields.shader("kick")
         self._irregular_kick = fields.shader("irregular", KICK=1)
-        self._drift = fields.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
+        drift_defines = {} if self._part_shifts is None else {"PARTS": 1}
+        self._drift = fields.texel_shader("drift", **drift_defines)
         self._shift: Amplitude = 0.0
         self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
-        """Copy of the height [m], [C, n, n], on the GPU; where the driver is software, in the host's memory."""
+        """Copy of the height [m], [C, n, n], on the GPU; with a software driver, on the host."""
         if self._gl.software:
             return self.height()
-        fields = [self._h, *([] if self._dent is None else [self._dent])]
+        fields = [self._h] if self._dent is None else [self._h, self._dent]
         return DeviceField.gathered(
             self._gl, self._operator.mass.shape, self._fields.texel_addresses, *fields
         )
@@ -364,7 +378,10 @@ class GLBackend(FieldBackend):
     def load(
         self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude
     ) -> None:
-        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
+        """Hold forces [N] on some texels, and an acceleration [m/s^2] on all.
+
+        Until the next call.
+        """
         self._loaded = texels
         self._load_forces = forces
         self._acceleration = everywhere
@@ -384,18 +401,7 @@ class GLBackend(FieldBackend):
                 self._extra.gather(self._h, self._v)
                 if self._held is not None and self._held.follow is not None:
                     self._held.follow(self._h, self._v)
-                kick_drift["dt"] = drift
-                pressure = (
-                    (self._held.parts, self._held.amplitudes) if self._held is not None else ()
-                )
-                operator = self._stencil.buffer, self._coefficients, self._extra.field
-                bind_buffers(self._h, self._v, self._h_next, *operator, *pressure)
-                self._fields.run_texels(kick_drift)
-                links, *buffers = self._links
-                if links:
-                    self._irregular_kick["dt"] = drift
-                    bind_buffers(self._h, self._v, self._h_next, *buffers)
-                    self._fields.run_list(self._irregular_kick, links)
+                self._kick_and_drift(kick_drift, drift)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
                 if self._probes is not None:
@@ -403,6 +409,20 @@ class GLBackend(FieldBackend):
                 self._flow()
             if self._crests is not None:
                 self._raise_crests()
+
+    def _kick_and_drift(self, shader: moderngl.ComputeShader, drift: float) -> None:
+        """Kick the velocities by all forces, and let the heights drift for a time [s]."""
+        fields = (self._h, self._v, self._h_next)
+        operator = (self._stencil.buffer, self._coefficients, self._extra.field)
+        pressure = () if self._held is None else (self._held.parts, self._held.amplitudes)
+        shader["dt"] = drift
+        bind_buffers(*fields, *operator, *pressure)
+        self._fields.run_texels(shader)
+        link_count, *link_buffers = self._links
+        if link_count:
+            self._irregular_kick["dt"] = drift
+            bind_buffers(*fields, *link_buffers)
+            self._fields.run_list(self._irregular_kick, link_count)
 
     def probe(self, probes: Probes | None) -> None:
         """Take sums of texels after every substep from now on; None ends it."""
@@ -431,38 +451,37 @@ class GLBackend(FieldBackend):
         return True
 
     def _start(self, dt: float) -> None:
-        """Apply the kicks that wait, and drift."""
+        """Apply the kicks that wait, and drift for dt [s]."""
         if self._waiting:
-            texels, where = np.unique(
-                np.concatenate([each[0] for each in self._waiting]), return_inverse=True
-            )
-            kicks = np.bincount(where, np.concatenate([each[1] for each in self._waiting]))
+            all_texels = np.concatenate([texels for texels, _ in self._waiting])
+            all_velocities = np.concatenate([velocities for _, velocities in self._waiting])
+            texels, texel_of_kick = np.unique(all_texels, return_inverse=True)
+            kicks = np.bincount(texel_of_kick, all_velocities)
             self._kicks.set(self._fields.texels[texels], kicks)
             self._waiting = []
             self._kick_texels(self._kicks, 0.0)
         if dt or np.any(self._shift):
             self._drift["dt"] = dt
-            if self._given is None:
+            fields = (self._h, self._v, self._response)
+            if self._part_shifts is None:
                 self._drift["shift"] = self._shift
-                bind_buffers(self._h, self._v, self._response)
+                bind_buffers(*fields)
             else:
-                self._given.set(self._shift)
-                bind_buffers(
-                    self._h, self._v, self._response, self._given.parts, self._given.amplitudes
-                )
+                self._part_shifts.set(self._shift)
+                bind_buffers(*fields, self._part_shifts.parts, self._part_shifts.amplitudes)
             self._fields.run_texels(self._drift)
         self._shift = 0.0
 
     def _flow(self) -> None:
+        """Move the height beyond the yield height into the dent, where the material yields."""
         if self._dent is not None and self._yield is not None:
             bind_buffers(self._h, self._dent, self._yield)
             self._fields.run_texels(self._yielding)
 
     def _raise_crests(self) -> None:
         with self._gl:
-            shader = self._fields.texel_shader(
-                "crests", **({} if self._dent is None else {"DENT": 1})
-            )
+            defines = {} if self._dent is None else {"DENT": 1}
+            shader = self._fields.texel_shader("crests", **defines)
             bind_buffers(self._h, self._crests, self._dent)
             self._fields.run_texels(shader)
 
@@ -475,18 +494,13 @@ class GLBackend(FieldBackend):
         self._shift = 0.0
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
-        """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
+        """The shader that kicks this material's velocities, for substeps of dt [s].
+
+        Coefficients are uploaded once for each step length, the load also for each new load.
+        """
         new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
-            self._step = k = step_coefficients(self._operator, dt)
-            self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
-            self._coefficients = self._fields.upload(
-                k.gain, *((k.decay, k.spring, k.span) if self._maps else ())
-            )
-            self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
-            rate = volume_rate(self._operator, dt, self.keeps_volume)
-            several = rate is not None or self._operator.parts is not None
-            self._held = Pressure(self._fields, self._operator, rate) if several else None
+            self._prepare_coefficients(dt)
             self._prepared = (dt, self.keeps_volume)
         k = self._step
         if new_length or self._load_is_new:
@@ -495,10 +509,9 @@ class GLBackend(FieldBackend):
             if self._held is not None:
                 self._held.set(self._acceleration)
             self._load_is_new = False
-        defines = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
-        kick_drift = self._fields.texel_shader(
-            "kick_drift", **{name: 1 for name, used in defines.items() if used}
-        )
+        used_by_define = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
+        defines = {name: 1 for name, used in used_by_define.items() if used}
+        kick_drift = self._fields.texel_shader("kick_drift", **defines)
         if self._held is None:
             kick_drift["acceleration"] = self._acceleration
         if not self._maps:
@@ -506,6 +519,18 @@ class GLBackend(FieldBackend):
             kick_drift["spring"] = k.spring
             kick_drift["span"] = k.span
         return kick_drift
+
+    def _prepare_coefficients(self, dt: float) -> None:
+        """Upload the coefficients of the kick for substeps of dt [s]."""
+        self._step = k = step_coefficients(self._operator, dt)
+        uniform_or_maps = (k.decay, k.spring, k.span)
+        self._maps = any(np.ndim(value) for value in uniform_or_maps)
+        maps = uniform_or_maps if self._maps else ()
+        self._coefficients = self._fields.upload(k.gain, *maps)
+        self._links = self._fields.upload_links(self._stencil.irregular, k.gain)
+        rate = volume_rate(self._operator, dt, self.keeps_volume)
+        several = rate is not None or self._operator.parts is not None
+        self._held = Pressure(self._fields, self._operator, rate) if several else None
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:

@@ -24,33 +24,35 @@ from ..texels.stencil import IrregularLinks, Stencil
 from ..texels.topology import TexelTopology
 from .kernels import Amplitude, Probes
 
-_GROUP = 256
-_SHADERS = "ripple_sim.solver"
+# Packages below which the shaders lie.
+_SOLVER_PACKAGE = "ripple_sim.solver"
+_SHADER_PACKAGE = "ripple_sim.solver.backends.shaders"
 
-# Threads of a group that works through a list.
-_LISTED = 64
-
-# Entries of a list that one group of threads adds up.
-_CHUNK = 2048
+_FIELD_GROUP = 256  # threads of a group that makes a `DeviceField`
+_LIST_GROUP = 64  # threads of a group that works through a list
+_SUMMED_ENTRIES = 2048  # entries of a list that one group of threads adds up
 
 
 def bind_buffers(*buffers: moderngl.Buffer | None) -> None:
-    """Bind storage buffers to 0, 1, 2 ..., in the order in which a shader declares them; None leaves out a binding."""
+    """Bind storage buffers to 0, 1, 2 ..., in the order in which a shader declares them.
+
+    None leaves out a binding.
+    """
     for binding, buffer in enumerate(buffers):
         if buffer is not None:
             buffer.bind_to_storage_buffer(binding)
 
 
 def to_buffer(gl: GLContext, values: NDArray, kind: type) -> moderngl.Buffer:
-    """Numbers in a storage buffer, each of a kind; of no numbers it has eight bytes, since none can be empty."""
+    """Numbers of a type in a storage buffer; it has eight bytes for none, as none can be empty."""
     with gl as ctx:
         return ctx.buffer(np.ascontiguousarray(values, kind).tobytes() or bytes(8))
 
 
 class DeviceField:
-    """A frozen field [C, n, n] in a storage buffer, made by `gathered` or `blend`; `numpy.asarray` reads it back.
+    """A frozen field [C, n, n] in a storage buffer, made by `gathered` or `blend`.
 
-    The buffer has float32, chart by chart and row by row.
+    `numpy.asarray` reads it back. The buffer holds float32 numbers, chart by chart and row by row.
     """
 
     def __init__(
@@ -68,12 +70,12 @@ class DeviceField:
             self.buffer: moderngl.Buffer = ctx.buffer(reserve=4 * count)
             self._peak = ctx.buffer(bytes(4))
             program = gl.compute_shader(
-                _SHADERS, "backends/shaders/device_field", GROUP=_GROUP, **defines
+                _SOLVER_PACKAGE, "backends/shaders/device_field", GROUP=_FIELD_GROUP, **defines
             )
             program["count"] = count
             program["share"] = share
             bind_buffers(self.buffer, self._peak, *sources)
-            program.run(-(-count // _GROUP))
+            program.run(-(-count // _FIELD_GROUP))
             ctx.memory_barrier()
             self._fence = gl.put_fence()
 
@@ -91,14 +93,14 @@ class DeviceField:
         return cls(gl, shape, float(len(fields) - 1), first, second, addresses)
 
     def blend(self, other: DeviceField, share: float) -> DeviceField:
-        """The field a share of the way to another."""
+        """The field that lies a share of the way to another field."""
         return DeviceField(self.gl, self.shape, share, self.buffer, other.buffer, BLEND=1)
 
     @functools.cached_property
     def peak(self) -> float:
         """The largest size of a value; NaN if one is not a number.
 
-        Waits until the field is there, for nothing else.
+        Waits until the field is computed, and no longer.
         """
         self.gl.wait_for(self._fence)
         with self.gl:
@@ -115,7 +117,7 @@ class DeviceField:
 
 
 class FieldLayout:
-    """Charts with their halo, [C, n + 2, n + 2] float32, and the shaders in `shaders/` that run over them.
+    """Charts with their halo, [C, n + 2, n + 2] float32, and the shaders that run over them.
 
     Attributes
     ----------
@@ -136,9 +138,7 @@ class FieldLayout:
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
-        return self.gl.compute_shader(
-            "ripple_sim.solver.backends.shaders", name, GROUP=_LISTED, **defines
-        )
+        return self.gl.compute_shader(_SHADER_PACKAGE, name, GROUP=_LIST_GROUP, **defines)
 
     def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over all texels, see charts.glsl."""
@@ -149,14 +149,17 @@ class FieldLayout:
         self.run_list(shader, len(self.texels))
 
     def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
-        """Run a shader over a list of so many entries, of which it is told, if there are any."""
+        """Run a shader over a list of `count` entries, if there are any."""
         if count:
             shader["count"] = count
-            shader.run(-(-count // _LISTED))
+            shader.run(-(-count // _LIST_GROUP))
             self.gl.barrier()
 
     def halo_pairs(self, number: int) -> tuple[int, moderngl.Buffer]:
-        """Places in the halos of a number of fields, one after the other, and the texels that they show: how many."""
+        """Pairs of a place in the halo and the texel that it shows: how many, and the pairs.
+
+        They are the pairs of `number` fields that lie one after the other.
+        """
         starts = int(np.prod(self._places)) * np.arange(number)
         pairs = (starts[:, None, None] + self._pairs).reshape(-1, 2)
         return len(pairs), to_buffer(self.gl, pairs, np.int32)
@@ -164,7 +167,7 @@ class FieldLayout:
     def fill_halo(
         self, field: moderngl.Buffer, halo: tuple[int, moderngl.Buffer] | None = None
     ) -> None:
-        """Fill the halo of a field, or of several with the `halo_pairs` of so many."""
+        """Fill the halo of a field, or of several fields with their `halo_pairs`."""
         count, pairs = self._halo if halo is None else halo
         bind_buffers(field, pairs)
         self.run_list(self._fill_halo, count)
@@ -184,7 +187,7 @@ class FieldLayout:
             return ctx.buffer(self._with_halo(*fields))
 
     def links(self, stencil: Stencil) -> NDArray[np.float32]:
-        """The four links of a stencil that start in each place, side by side, [C, n + 2, n + 2, 4]."""
+        """The four links of a stencil that start in each place, [C, n + 2, n + 2, 4]."""
         links = np.zeros((*self._places, 4), np.float32)
         links[:, :-1, :-1] = np.moveaxis(stencil.weights, 1, -1)
         return links
@@ -194,12 +197,12 @@ class FieldLayout:
     ) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
         """The irregular links of a stencil, with the addresses of their ends, as shaders read them.
 
-        `factors` [C, n, n] are those by which the forces on each texel are multiplied.
+        The forces on each texel are multiplied by its factor; `factors` is [C, n, n].
 
         Returns
         -------
         int
-            Texels that have any.
+            Number of texels with irregular links.
         texels, links : moderngl.Buffer
             (address, first link, one after its last) of each such texel, and the address of each
             link's other end with the bits of its weight.
@@ -255,13 +258,17 @@ class TexelList:
 
 
 class Pressure:
-    """Amplitudes of the operator's response, one for each part, of which the field `parts` has the numbers.
+    """Amplitudes of the operator's response, one for each part of the surface.
 
     Attributes
     ----------
+    parts : Buffer
+        A field with the number of each texel's part.
+    amplitudes : Buffer
+        The amplitude of each part.
     follow : callable or None
-        With a `rate`: sets the amplitudes of the coming substep by its height and velocity, so that
-        the volume stays.
+        With a `rate`: computes the amplitudes of the coming substep from its height and velocity,
+        so that the volume stays.
     """
 
     def __init__(
@@ -280,28 +287,26 @@ class Pressure:
         if rate is None:
             return
         begins, texels, heights, velocities = rate
-        # the entries of each part in chunks: first and one after the last of each; where those of a
-        # part begin
-        cuts = [
-            np.append(np.arange(first, last, _CHUNK), last)
-            for first, last in itertools.pairwise(begins)
-        ]
-        chunks = np.concatenate([np.stack([each[:-1], each[1:]], axis=1) for each in cuts])
-        bounds = np.cumsum([0, *(len(each) - 1 for each in cuts)])
-        factors = np.stack(
-            [heights, velocities if len(velocities) else np.zeros_like(heights)], axis=1
+        # the entries of each part are cut into chunks: first and one after the last of each chunk,
+        # and where the chunks of each part begin
+        chunks_of_parts = []
+        for first_entry, last_entry in itertools.pairwise(begins):
+            cuts = np.append(np.arange(first_entry, last_entry, _SUMMED_ENTRIES), last_entry)
+            chunks_of_parts.append(np.stack([cuts[:-1], cuts[1:]], axis=1))
+        chunks = np.concatenate(chunks_of_parts)
+        chunk_begins = np.cumsum([0, *(len(part_chunks) for part_chunks in chunks_of_parts)])
+        velocity_factors = velocities if len(velocities) else np.zeros_like(heights)
+        factors = np.stack([heights, velocity_factors], axis=1)
+        entries = (
+            to_buffer(self._gl, fields.texels[texels], np.int32),
+            to_buffer(self._gl, factors, np.float32),
+            to_buffer(self._gl, chunks, np.int32),
         )
-        tables = (
-            (fields.texels[texels], np.int32),
-            (factors, np.float32),
-            (chunks, np.int32),
-            (bounds, np.int32),
-        )
-        *entries, first = (to_buffer(self._gl, *each) for each in tables)
+        first = to_buffer(self._gl, chunk_begins, np.int32)
         sums = to_buffer(self._gl, np.zeros(len(chunks)), np.float32)
         weigh = fields.shader("volume")
         balance = fields.shader("volume", PARTS=1)
-        # by themselves: a circle with `self` would keep buffers until Python looks for garbage
+        # local names: a cycle through `self` would keep buffers until Python collects garbage
         gl = self._gl
         asked = self._asked
         amplitudes = self.amplitudes
@@ -323,7 +328,10 @@ class Pressure:
 
 
 class DeviceProbes:
-    """The sums of `Probes`, one group of threads each; those of all substeps of a step are read back together."""
+    """The sums of `Probes`, taken on the GPU by one group of threads for each sum.
+
+    The sums of all substeps of a step are read back together.
+    """
 
     def __init__(self, fields: FieldLayout, probes: Probes) -> None:
         self._gl = fields.gl
@@ -334,12 +342,11 @@ class DeviceProbes:
         weights = probes.weights.astype(np.float32).view(np.int32)
         entries = np.stack([fields.texels[probes.texels], weights], axis=1)
         rows = np.stack([probes.begins[:-1], probes.begins[1:], probes.heights], axis=1)
-        self._rows, self._entries = (
-            to_buffer(fields.gl, each, np.int32) for each in (rows, entries)
-        )
+        self._rows = to_buffer(fields.gl, rows, np.int32)
+        self._entries = to_buffer(fields.gl, entries, np.int32)
 
     def begin(self, substeps: int) -> None:
-        """Make room for the sums of so many substeps."""
+        """Make room for the sums of a number of substeps."""
         self._steps = substeps
         if substeps > self._room:
             self._room = substeps
@@ -347,10 +354,17 @@ class DeviceProbes:
                 self._sums = ctx.buffer(reserve=4 * substeps * self._count)
 
     def take(
-        self, step: int, drifted: float, height: moderngl.Buffer, velocity: moderngl.Buffer,
+        self,
+        step: int,
+        drifted: float,
+        height: moderngl.Buffer,
+        velocity: moderngl.Buffer,
         dent: moderngl.Buffer | None,
-    ) -> None:  # fmt: skip
-        """The sums of a substep, whose heights have drifted beyond its velocities [s]."""
+    ) -> None:
+        """Take the sums of a substep.
+
+        Its heights have drifted for `drifted` [s] beyond the time of its velocities.
+        """
         shader = self._shaders[dent is not None]
         shader["first"] = step * self._count
         shader["drifted"] = drifted

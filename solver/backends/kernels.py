@@ -1,4 +1,4 @@
-"""Compiled loops of a wave step on the CPU: the nine-point stencil's force on a texel, and the step that it drives.
+"""Compiled loops of a wave step on the CPU: forces of the nine-point stencil, and the step.
 
 Nothing is contracted or reordered: every loop over texels gives the same numbers, and the two ends
 of a link see the same force, so that momentum is kept. Rows are cut out of the fields before the
@@ -23,35 +23,31 @@ from ..kernel import Floats, Floats32, Ints, kernel
 
 Coefficient: TypeAlias = Floats32 | np.float32
 
-# Texels whose curvatures are taken at once: with their weights they stay in the fastest memory.
-BLOCK = 512
-
-# Of the operator's `response`: a number, or one for each of its parts.
+# Factor of the operator's `response`: one number, or a number for each part of the surface.
 Amplitude: TypeAlias = float | Floats
+
+# Texels whose curvatures are computed together: with their weights they stay in the fastest memory.
+BLOCK = 512
 
 _NO_INTS = np.zeros(0, np.int64)
 _NO_FLOATS = np.zeros(0, np.float32)
 
 
 class Links(NamedTuple):
-    """The irregular links of a stencil; see `IrregularLinks`. Often none.
+    """The irregular links of a stencil; see `IrregularLinks`. Often there are none."""
 
-    Flat indices of the texels in coefficients, their addresses in a field with halo, where the
-    links of each begin, the addresses of their other ends, their weights.
-    """
-
-    texels: Ints
-    addresses: Ints
-    begins: Ints
-    others: Ints
-    weights: Floats32
+    texels: Ints  # flat index of each texel in a coefficient, [k]
+    addresses: Ints  # address of each texel in a field with halo, [k]
+    begins: Ints  # where the links of each texel begin, [k + 1]
+    others: Ints  # address of each link's other end, [links]
+    weights: Floats32  # weight of each link, [links]
 
 
 class Weights(NamedTuple):
-    """A stencil: its rows, [C, 4, n + 1, as wide as a field], the columns of texels, and its irregular links."""
+    """The weights of a stencil."""
 
-    rows: Floats32
-    columns: int
+    rows: Floats32  # [C, 4, n + 1, pitch]: as wide as a field
+    columns: int  # columns of texels
     irregular: Links
 
 
@@ -81,16 +77,24 @@ def _compiled_value_in(row, c):
 
 @kernel(no_cpython_wrapper=True)
 def force_at(
-    below: Floats32, row: Floats32, above: Floats32,
-    east: Floats32, north: Floats32, south: Floats32,
-    rising: Floats32, risen: Floats32, falling: Floats32, fallen: Floats32,
+    below: Floats32,
+    row: Floats32,
+    above: Floats32,
+    east: Floats32,
+    north: Floats32,
+    south: Floats32,
+    rising: Floats32,
+    risen: Floats32,
+    falling: Floats32,
+    fallen: Floats32,
     c: int,
-) -> np.float32:  # fmt: skip
+) -> np.float32:
     """Sum over the eight links of weight (h_j - h_i) at column c.
 
-    The first three are rows of the field below, at and above the texel; the others rows of its
-    links, and of those of the places below. They are arguments of their own, since tuples take
-    longer to compile.
+    `below`, `row` and `above` are rows of the field. `east`, `north`, `rising` and `falling` are
+    weights of the links that start in the texel's row; `south`, `risen` and `fallen` are weights of
+    the links that start in the row below. They are separate arguments, since tuples take longer to
+    compile.
     """
     x = row[c]
     return (
@@ -113,7 +117,7 @@ def irregular_force(links: Links, i: int, h: Floats32) -> np.float32:
 
 @kernel(no_cpython_wrapper=True)
 def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Floats32) -> None:
-    """The stencil on a field times a factor, written into `out` or added to it."""
+    """Apply the stencil to a field, times a factor; write the result into `out`, or add it."""
     w = stencil.rows
     columns = stencil.columns
     n = w.shape[2] - 1
@@ -158,93 +162,111 @@ class Kick(NamedTuple):
     acceleration: Coefficient
 
 
-class Balance(NamedTuple):
-    """What keeps the volume, see `volume_rate`: factors of texels that lie side by side in runs.
+class State(NamedTuple):
+    """The fields of a surface, flat, with halo, and their halo."""
 
-    Where the runs of each part begin, [p + 1], the address of each run, [r], and where its factors
-    begin, [r + 1]; what the load asks for and the sum, each [p]; the pressure, a coefficient, and
-    the `part_runs` of its texels.
+    h: Floats32  # height [m]
+    v: Floats32  # velocity [m/s]
+    h_next: Floats32  # room for the height of the next substep
+    dent: Floats32  # permanent part of the height [m]; empty where there is none
+    halo: Ints  # addresses of the halo's places, and of the texels that they show, [2, k]
+
+
+class Pulses(NamedTuple):
+    """Velocities that a load adds to some texels in every substep."""
+
+    addresses: Ints  # of the texels in a field with halo, [k]
+    velocities: Floats32  # [m/s], [k]
+
+
+class Balance(NamedTuple):
+    """The factors and the pressure that keep the volume, see `volume_rate`.
+
+    Texels that lie side by side are one run. There are p parts of the surface and r runs.
     """
 
-    begins: Ints
-    addresses: Ints
-    runs: Ints
-    heights: Floats32
-    velocities: Floats32
-    loaded: Floats32
-    total: Floats32
-    pressure: Floats32
-    part_begins: Ints
-    parts: Ints
+    begins: Ints  # where the runs of each part begin, [p + 1]
+    addresses: Ints  # address of each run's first texel, [r]
+    runs: Ints  # where the factors of each run begin, [r + 1]
+    heights: Floats32  # factors of the heights
+    velocities: Floats32  # factors of the velocities, or none
+    loaded: Floats32  # acceleration that the load asks for, [p]
+    total: Floats32  # that acceleration and the balance together, [p]
+    pressure: Floats32  # `total` at every texel: a coefficient
+    part_begins: Ints  # where the runs of `pressure` begin, see `part_runs`
+    parts: Ints  # the part of each of those runs
 
 
 class Squares(NamedTuple):
-    """Bending by the squares of three curvatures; see `Curvatures`.
+    """Bending by the squares of three curvatures; see `Curvatures`."""
 
-    Weights of the eight neighbours in each curvature, [8, 3, size] as coefficients; steps from an
-    address to those of the neighbours, [8]; rows of texels in all, and in a chart; their columns,
-    and addresses from one row to the next; a field for the forces, none without curvatures; room
-    for a block of texels.
-    """
-
-    weights: Floats32
-    steps: Ints
-    rows: int
-    chart_rows: int
-    columns: int
-    pitch: int
-    force: Floats32
-    scratch: Floats32
+    weights: Floats32  # of the eight neighbours in each curvature, as coefficients, [8, 3, size]
+    steps: Ints  # from an address to the address of each neighbour, [8]
+    rows: int  # rows of texels in all charts
+    chart_rows: int  # rows of texels in one chart
+    columns: int  # columns of texels
+    pitch: int  # addresses from one row to the next
+    force: Floats32  # a field for the forces; empty without curvatures
+    scratch: Floats32  # room for a block of texels, [4, BLOCK]
 
 
 class Features(NamedTuple):
-    """What few materials have, each empty where this one lacks it.
+    """Properties that few materials have; each is empty where a material lacks it.
 
-    Stencil of the viscosity; stencil of the Laplacian, rigidity, and a field for the moments of
-    bending; the squares of a plate with rims; yield height, a field that is infinite in the halo,
-    and the field of what stays; what keeps the volume. Lengths tell which are empty, not types:
-    with one of them for every set of features, dozens would be compiled.
+    Lengths tell which are empty, not types: with a type for every set of features, dozens of
+    versions would be compiled.
     """
 
-    viscosity: Weights
-    laplace: Weights
-    rigidity: Floats32
-    moment: Floats32
-    squares: Squares
-    limit: Floats32
-    dent: Floats32
-    balance: Balance
+    laplace: Weights  # bending: stencil of the Laplacian
+    rigidity: Floats32  # bending: a coefficient [N m]
+    moment: Floats32  # bending: a field for the moments [N]
+    squares: Squares  # bending of a plate with rims
+    limit: Floats32  # yield height [m], a field; infinite in the halo
+    balance: Balance  # where the density varies
 
 
-NO_WEIGHTS = Weights(
-    np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS)
+_NO_LINKS = Links(
+    texels=_NO_INTS, addresses=_NO_INTS, begins=_NO_INTS, others=_NO_INTS, weights=_NO_FLOATS
 )
+NO_WEIGHTS = Weights(rows=np.zeros((0, 4, 0, 0), np.float32), columns=0, irregular=_NO_LINKS)
 NO_BALANCE = Balance(
-    _NO_INTS,
-    _NO_INTS,
-    _NO_INTS,
-    _NO_FLOATS,
-    _NO_FLOATS,
-    _NO_FLOATS,
-    _NO_FLOATS,
-    _NO_FLOATS,
-    _NO_INTS,
-    _NO_INTS,
+    begins=_NO_INTS,
+    addresses=_NO_INTS,
+    runs=_NO_INTS,
+    heights=_NO_FLOATS,
+    velocities=_NO_FLOATS,
+    loaded=_NO_FLOATS,
+    total=_NO_FLOATS,
+    pressure=_NO_FLOATS,
+    part_begins=_NO_INTS,
+    parts=_NO_INTS,
 )
 NO_SQUARES = Squares(
-    np.zeros((0, 0, 0), np.float32), _NO_INTS, 0, 1, 0, 0, _NO_FLOATS, np.zeros((4, 0), np.float32)
+    weights=np.zeros((0, 0, 0), np.float32),
+    steps=_NO_INTS,
+    rows=0,
+    chart_rows=1,
+    columns=0,
+    pitch=0,
+    force=_NO_FLOATS,
+    scratch=np.zeros((4, 0), np.float32),
 )
 NO_FEATURES = Features(
-    NO_WEIGHTS, NO_WEIGHTS, _NO_FLOATS, _NO_FLOATS, NO_SQUARES, _NO_FLOATS, _NO_FLOATS, NO_BALANCE
+    laplace=NO_WEIGHTS,
+    rigidity=_NO_FLOATS,
+    moment=_NO_FLOATS,
+    squares=NO_SQUARES,
+    limit=_NO_FLOATS,
+    balance=NO_BALANCE,
 )
 
 
 @kernel(no_cpython_wrapper=True)
 def bend(squares: Squares, h: Floats32, halo: Ints, add: bool, out: Floats32) -> None:
-    """Force of the curvatures at each texel, written into `out` or added to it.
+    """Write the force of the curvatures at each texel into `out`, or add it.
 
-    Every curvature pulls at the texels from which it was taken, also at those that are the halo of
-    another chart: what gathers there is handed to the texel that it shows.
+    Every curvature pulls at the texels from which it was computed, also at places of the halo. A
+    force on a place of the halo is then handed to the texel that the place shows.
     """
     columns = squares.columns
     force = squares.force
@@ -276,7 +298,10 @@ def _first_of_row(squares: Squares, i: int) -> int:
 def _pull_neighbours(
     squares: Squares, first: int, at: int, count: int, h: Floats32, force: Floats32
 ) -> None:
-    """Forces of the curvatures of texels side by side: their coefficients begin at `first`, they themselves at `at`."""
+    """Add the forces of the curvatures of texels that lie side by side.
+
+    Their coefficients begin at `first`, and the texels at the address `at`.
+    """
     own = squares.scratch[0]
     uu = squares.scratch[1]
     vv = squares.scratch[2]
@@ -313,39 +338,49 @@ def _pull_neighbours(
 
 
 class Probes(NamedTuple):
-    """Weighted sums of heights or velocities that are taken after every substep: a sensor's points, or a sound.
+    """Weighted sums of heights or velocities after every substep: a sensor's points, or a sound."""
 
-    Sum i has the texels and weights from begins[i] to begins[i + 1]; those of `heights` are of
-    heights, the others of velocities. `texels` are flat indices of texels, and addresses in a field
-    where a backend holds them.
-    """
-
-    begins: Ints
-    texels: Ints
+    begins: Ints  # where the texels and weights of each sum begin, [k + 1]
+    texels: Ints  # flat indices of texels; in a backend addresses in a field
     weights: Floats32
-    heights: NDArray[np.bool_]
+    heights: NDArray[np.bool_]  # whether each sum is of heights, else of velocities, [k]
 
     @classmethod
     def together(cls, probes: Sequence[Probes]) -> Probes:
-        """The sums of several, one after the other."""
+        """The sums of several probes, one after the other."""
         counts = np.concatenate([np.diff(each.begins) for each in probes])
-        rest = (np.concatenate(each) for each in zip(*(each[1:] for each in probes), strict=True))
-        return cls(np.append(0, np.cumsum(counts)), *rest)
+        return cls(
+            begins=np.append(0, np.cumsum(counts)),
+            texels=np.concatenate([each.texels for each in probes]),
+            weights=np.concatenate([each.weights for each in probes]),
+            heights=np.concatenate([each.heights for each in probes]),
+        )
 
     def of(self, height: NDArray, velocity: NDArray) -> NDArray[np.float64]:
         """The sums [k] of fields [C, n, n]; every sum has a texel."""
-        both = (
-            np.add.reduceat(self.weights * x.reshape(-1)[self.texels], self.begins[:-1])
-            for x in (height, velocity)
-        )
-        return np.where(self.heights, *both)
+        return np.where(self.heights, self._sums(height), self._sums(velocity))
+
+    def _sums(self, field: NDArray) -> NDArray[np.float64]:
+        """The sums [k] of one field [C, n, n]."""
+        weighted = self.weights * field.reshape(-1)[self.texels]
+        return np.add.reduceat(weighted, self.begins[:-1])
+
+
+class ProbedSums(NamedTuple):
+    """Probes, and the sums that they took."""
+
+    probes: Probes
+    sums: Floats32  # [substeps, k]
 
 
 @kernel(no_cpython_wrapper=True)
 def _probe(
     probes: Probes, h: Floats32, v: Floats32, dent: Floats32, drifted: np.float32, sums: Floats32
 ) -> None:
-    """Fill in the sums [k] of a substep, whose heights have drifted beyond its velocities [s]."""
+    """Fill in the sums [k] of a substep.
+
+    Its heights have drifted for `drifted` [s] beyond the time of its velocities.
+    """
     for i in range(len(sums)):
         total = 0.0
         for j in range(probes.begins[i], probes.begins[i + 1]):
@@ -363,8 +398,8 @@ def _probe(
 def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.float32) -> None:
     """One substep: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v.
 
-    The small terms are added up first: one rounding at the size of the velocity, which else would
-    gather over many substeps.
+    The small terms are added up first: a rounding at the size of the velocity happens once a
+    substep. Such roundings would gather over many substeps.
     """
     w = kick.stencil.rows
     columns = kick.stencil.columns
@@ -416,104 +451,102 @@ def kick_drift(h: Floats32, v: Floats32, h_next: Floats32, kick: Kick, dt: np.fl
 
 @kernel
 def fill(h: Floats32, halo: Ints) -> None:
-    """Copy the texels beyond the charts' borders into the halo: addresses of its places and of the texels, [2, k]."""
+    """Copy the texels beyond the charts' borders into the halo.
+
+    `halo` [2, k] has the addresses of the halo's places, and of the texels that they show.
+    """
     for i in range(halo.shape[1]):
         h[halo[0, i]] = h[halo[1, i]]
 
 
 @kernel
 def flow(h: Floats32, limit: Floats32, dent: Floats32) -> None:
-    """Hand the part of the elastic height that is beyond the yield height over to the permanent one."""
+    """Move the part of the elastic height beyond the yield height into the permanent height."""
     for i in range(len(h)):
-        kept = min(max(h[i], -limit[i]), limit[i])
-        dent[i] += h[i] - kept
-        h[i] = kept
+        elastic = min(max(h[i], -limit[i]), limit[i])
+        dent[i] += h[i] - elastic
+        h[i] = elastic
 
 
 @kernel
 def advance(
     substeps: int,
     dt: np.float32,
-    h: Floats32,
-    v: Floats32,
-    h_next: Floats32,
-    halo: Ints,
+    state: State,
     kick: Kick,
-    addresses: Ints,
-    kicks: Floats32,
+    pulses: Pulses,
     viscosity: Weights | None,
     features: Features | None,
-    probes: Probes | None,
-    dent: Floats32,
-    sums: Floats32,
+    probed: ProbedSums | None,
 ) -> None:
-    """Substeps of dt, from the first half drift to the last, and velocities [k] that kick the texels at addresses [k].
+    """Take substeps of dt [s], from the first half drift to the last.
 
-    The height ends in `h_next` where their number is odd.
-
-    `sums` [substeps, k] are filled with those of the probes; `dent` is what stays of the height, or
-    empty.
-
-    What is None is compiled away: `features` where a material has no more than viscosity, which
-    then is `viscosity`.
+    The height ends in `state.h_next` where the number of substeps is odd. The sums of the probes
+    are filled in. Code for an argument that is None is compiled away.
     """
     half = dt / np.float32(2)
-    for i in range(len(h)):  # what that leaves in the halo is filled again
+    h = state.h
+    v = state.v
+    h_next = state.h_next
+    dent = state.dent
+    halo = state.halo
+    for i in range(len(h)):  # the halo is filled again below
         h[i] += half * v[i]
-    if features is not None and len(features.dent):
-        flow(h, features.limit, features.dent)
+    if features is not None and len(features.limit):
+        flow(h, features.limit, dent)
     for step in range(substeps):
         fill(h, halo)
         if viscosity is not None:
             fill(v, halo)
             apply(viscosity, v, np.float32(1), False, kick.extra)
         if features is not None:
-            _act(h, v, halo, features, kick.extra)
+            _bend(h, halo, features, viscosity is not None, kick.extra)
+            _keep_volume(features.balance, h, v)
         drifted = dt if step < substeps - 1 else half
         kick_drift(h, v, h_next, kick, drifted)
         h, h_next = h_next, h
-        for i in range(len(addresses)):
-            v[addresses[i]] += kicks[i]
-            h[addresses[i]] += drifted * kicks[i]
-        if probes is not None:
-            _probe(probes, h, v, dent, drifted - half, sums[step])
-        if features is not None and len(features.dent):
-            flow(h, features.limit, features.dent)
+        for i in range(len(pulses.addresses)):
+            address = pulses.addresses[i]
+            v[address] += pulses.velocities[i]
+            h[address] += drifted * pulses.velocities[i]
+        if probed is not None:
+            _probe(probed.probes, h, v, dent, drifted - half, probed.sums[step])
+        if features is not None and len(features.limit):
+            flow(h, features.limit, dent)
 
 
 @kernel(no_cpython_wrapper=True)
-def _act(h: Floats32, v: Floats32, halo: Ints, features: Features, extra: Floats32) -> None:
-    """What a material's features add to a substep: forces in `extra`, and the pressure that keeps the volume."""
-    drags = len(features.viscosity.rows) > 0
-    if drags:
-        fill(v, halo)
-        apply(features.viscosity, v, np.float32(1), False, extra)
+def _bend(h: Floats32, halo: Ints, features: Features, add: bool, extra: Floats32) -> None:
+    """Write the forces of bending into `extra`, or add them; nothing without bending."""
     if len(features.moment):
         apply(features.laplace, h, features.rigidity, False, features.moment)
         fill(features.moment, halo)
-        apply(features.laplace, features.moment, np.float32(-1), drags, extra)
+        apply(features.laplace, features.moment, np.float32(-1), add, extra)
     if len(features.squares.force):
-        bend(features.squares, h, halo, drags, extra)
-    balance = features.balance
-    # of which there are none where the density does not vary
+        bend(features.squares, h, halo, add, extra)
+
+
+@kernel(no_cpython_wrapper=True)
+def _keep_volume(balance: Balance, h: Floats32, v: Floats32) -> None:
+    """Set the pressure that keeps the volume; nothing where the density does not vary."""
     for part in range(len(balance.loaded)):
         total = 0.0
         for run in range(balance.begins[part], balance.begins[part + 1]):
             first = balance.runs[run]
             last = balance.runs[run + 1]
             address = balance.addresses[run]
-            total += _weighed(balance.heights[first:last], h[address:])
+            total += _weighted_sum(balance.heights[first:last], h[address:])
             if len(balance.velocities):
-                total += _weighed(balance.velocities[first:last], v[address:])
+                total += _weighted_sum(balance.velocities[first:last], v[address:])
         balance.total[part] = balance.loaded[part] + np.float32(total)
     for i in range(len(balance.parts)):
-        balance.pressure[balance.part_begins[i] : balance.part_begins[i + 1]] = balance.total[
-            balance.parts[i]
-        ]
+        first = balance.part_begins[i]
+        last = balance.part_begins[i + 1]
+        balance.pressure[first:last] = balance.total[balance.parts[i]]
 
 
 @kernel(fastmath={"contract", "reassoc"}, no_cpython_wrapper=True)
-def _weighed(factors: Floats32, field: Floats32) -> float:
+def _weighted_sum(factors: Floats32, field: Floats32) -> float:
     """Sum of factor times field over texels side by side."""
     total = 0.0
     for i in range(len(factors)):

@@ -1,4 +1,4 @@
-"""Waves on an atlas: heights and velocities, the loads that raise them, and the solver that steps them."""
+"""Waves on an atlas: heights and velocities, the loads that act on them, and their solver."""
 
 import lazy_loader
 

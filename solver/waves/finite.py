@@ -1,6 +1,6 @@
-"""Checks of what the waves are given, and a guard that they stay finite.
+"""Checks of the waves' input, and a guard that the waves stay finite.
 
-The guard names the source that was too much for them.
+The guard names the source that was too large.
 """
 
 from __future__ import annotations
@@ -13,20 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError, shown, whole
 
-# A step that needs more is a mistake in a unit, and would run for ever.
-_MOST = 1_000_000
+# Substeps of a step: a step that needs more is a mistake in a unit, and would run for ever.
+_MAX_SUBSTEPS = 1_000_000
 _ONE_OR_MORE = whole(1)
 
-# A look at all heights takes a fifth of a substep: one in so many substeps is less than a
-# hundredth. Nobody sees the heights in between without a look of their own.
+# Substeps between two checks of all heights. A check takes a fifth of a substep, so that the checks
+# take less than a hundredth of the time. Whoever reads the heights in between checks them as well.
 EVERY = 32
-_GREATEST = float(np.finfo(np.float32).max)
+
+_MAX_FLOAT32 = float(np.finfo(np.float32).max)
 
 
 def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """A number, or an array of the given shape, as a float32 field [C, n, n].
 
-    Raises `SolverError` if the shape is another one, or a value is not finite.
+    Raises `SolverError` if the array has another shape, or a value is not finite.
     """
     try:
         array = np.asarray(value, dtype=np.float32)
@@ -46,8 +47,8 @@ def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.
 
 def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -> None:
     """Raise `SolverError` unless a value is a finite number, of at least `least`."""
-    most = sys.float_info.max
-    if not (isinstance(value, numbers.Real) and max(least, -most) <= value <= most):
+    largest = sys.float_info.max
+    if not (isinstance(value, numbers.Real) and max(least, -largest) <= value <= largest):
         bound = "" if least == -np.inf else f", {least:g} or greater"
         raise SolverError(f"{name} is {shown(value)} {unit}; valid is a finite number{bound}")
 
@@ -68,17 +69,17 @@ def count_substeps(dt: float, stable: float, asked: int | None) -> int:
         If the step would take far too many, or fewer are asked for than stability allows.
     """
     ratio = dt / stable * (1 - 1e-12)
-    if not ratio < _MOST:
+    if not ratio < _MAX_SUBSTEPS:
         raise SolverError(
             f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {stable:.4g} s; "
-            f"valid are {_MOST} at most: take shorter steps, or a material with slower waves"
+            f"valid are {_MAX_SUBSTEPS} at most: take shorter steps, or a material with slower waves"
         )
     needed = max(1, int(np.ceil(ratio)))
     if asked is None:
         return needed
-    if not (_ONE_OR_MORE.holds(asked) and asked <= _MOST):
+    if not (_ONE_OR_MORE.holds(asked) and asked <= _MAX_SUBSTEPS):
         raise SolverError(
-            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MOST}, or None "
+            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MAX_SUBSTEPS}, or None "
             f"for the fewest"
         )
     if asked < needed:
@@ -108,13 +109,17 @@ class FiniteGuard:
         self._unseen = 0
 
     def note(self, kind: str, value: float, unit: str, time: float, speed: float) -> None:
-        """Remember a source, if it is the largest: "impulse", 2.0, "N s", when [s], and a texel's speed by it [m/s]."""
+        """Remember a source if it is the largest so far.
+
+        A source has a kind, a value with its unit, and a time [s], for instance "impulse", 2.0,
+        "N s", 0.5. It gives a texel a speed [m/s].
+        """
         if not speed <= self._fastest:
             self._fastest = speed
             self._largest = (kind, value, unit, time)
 
     def due(self, substeps: int) -> bool:
-        """Whether it is time for a look, after so many more substeps."""
+        """Whether the next check is due, after a number of further substeps."""
         self._unseen += substeps
         if self._unseen < EVERY:
             return False
@@ -122,12 +127,12 @@ class FiniteGuard:
         return True
 
     def check(self, field: NDArray[np.float32], name: str, time: float) -> None:
-        """Raise `SolverError` if a field [C, n, n] is not finite, the first time."""
+        """Raise `SolverError` if a field [C, n, n] is not finite, once."""
         if self._reported or np.isfinite(field.sum(dtype=np.float64)):
             return
         self._reported = True
         bad = ~np.isfinite(field)
-        # it spreads by a texel a substep on all sides, so it began in the middle
+        # bad values spread by a texel a substep on all sides, so they began in the middle
         places = self._positions[bad]
         middle = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
         chart, row, column = np.argwhere(bad)[middle]
@@ -135,9 +140,9 @@ class FiniteGuard:
         where = f"at chart {chart}, row {row}, column {column}, ({x:.4g}, {y:.4g}, {z:.4g}) m"
         where += f" ({bad.sum()} of {bad.size} texels)"
         cause = "no source was given: the state held it"
-        kind, value, unit, given = self._largest
+        kind, value, unit, source_time = self._largest
         if kind:
-            source = f"the {kind} of {value:.4g} {unit} at time {given:.6g} s"
+            source = f"the {kind} of {value:.4g} {unit} at time {source_time:.6g} s"
             cause = f"the largest source is {source}, too much for float32: make it smaller"
         raise SolverError(
             f"{name} is no longer finite {where}, at time {time:.6g} s; {cause}, and `reset()` the "
@@ -146,12 +151,12 @@ class FiniteGuard:
 
 
 def check_kick(velocities: NDArray[np.float64], impulse: float) -> float:
-    """The greatest of the velocities [k] that an impulse [N s] gives at once [m/s].
+    """The largest of the velocities [m/s], [k], that an impulse [N s] gives to texels.
 
-    Raises `SolverError` if it is beyond float32.
+    Raises `SolverError` if the largest velocity is beyond float32.
     """
     fastest = float(np.abs(velocities).max(initial=0.0))
-    if not fastest <= _GREATEST:
+    if not fastest <= _MAX_FLOAT32:
         raise SolverError(
             f"impulse is {impulse:.4g} N s, which would move the surface at {fastest:.4g} m/s, "
             f"beyond float32; "

@@ -1,6 +1,6 @@
-"""The footprint of a source: smooth weights on the texels within a radius, measured along the surface.
+"""The footprint of a source: smooth weights on the texels within a radius along the surface.
 
-Contacts ask for those of several sources at every step: `weigh_each` makes them in one call.
+Contacts need the footprints of several sources at every step: `weigh_each` makes them in one call.
 """
 
 from __future__ import annotations
@@ -17,18 +17,28 @@ from ..texels.distance import Scratch, clean, distance_scratch, distance_to, mar
 from ..texels.texel_mesh import TexelGrid
 from .finite import require_finite
 
-# Fewer texels across than this and the source would excite waves that the grid cannot resolve.
+# Radius of a footprint in texels, at least: a smaller source would excite waves that the grid cannot
+# resolve.
 MIN_TEXELS = 2.0
 
-# Distance along the surface over straight distance: up to the first value the surface is flat, from
-# the second on only the way along the surface counts. In between the two are blended, so that no
-# texel jumps in or out.
-_FLAT = 1.05
-_BENT = 1.5
+# Ratios of the distance along the surface to the straight distance. Up to the first ratio the surface
+# counts as flat; from the second on, only the distance along the surface counts. In between, the two
+# distances are blended, so that no texel jumps in or out.
+_FLAT_RATIO = 1.05
+_BENT_RATIO = 1.5
 
-# Rows and columns in a halo table of the four texels beside one
-_DOWN = np.array([0, 1, 1, 2])
-_RIGHT = np.array([1, 0, 2, 1])
+# A search along the surface goes as far as this share of the radius: a bit beyond, since distances
+# are blended.
+_SEARCHED_SHARE = 1.1
+
+# Texels for which `weigh_each` makes room at first, and the factor by which the room grows.
+_FIRST_ROOM = 4096
+_ROOM_GROWTH = 4
+
+# The four texels beside a texel: their rows and columns in a halo table, from the row and column of
+# the texel itself.
+_ROWS_BESIDE = np.array([0, 1, 1, 2])
+_COLUMNS_BESIDE = np.array([1, 0, 2, 1])
 
 
 def weigh_each(
@@ -39,32 +49,43 @@ def weigh_each(
     Returns
     -------
     begins : int64 [k + 1]
-        Texels and weights of footprint i are those from begins[i] to begins[i + 1].
+        Footprint i has the texels and weights from begins[i] to begins[i + 1].
     texels : int64 [m]
     weights : float64 [m]
     radii : float64 [k]
-        Those used [m].
+        The radii used [m].
     """
     begins = np.zeros(len(centers) + 1, np.int64)
     used = np.empty(len(centers))
     done = 0
-    texels = np.empty(4096, np.int64)
-    weights = np.empty(4096)
+    texels = np.empty(_FIRST_ROOM, np.int64)
+    weights = np.empty(_FIRST_ROOM)
     scratch = distance_scratch(len(grid.areas))
     while done < len(centers):
         done = _weigh(grid, centers, points, radii, scratch, done, begins, used, texels, weights)
-        if done < len(centers):  # there was no room for the next
-            texels = np.resize(texels, 4 * len(texels))
-            weights = np.resize(weights, 4 * len(weights))
+        if done < len(centers):  # there was no room for the next footprint
+            texels = np.resize(texels, _ROOM_GROWTH * len(texels))
+            weights = np.resize(weights, _ROOM_GROWTH * len(weights))
     return begins, texels[: begins[-1]], weights[: begins[-1]], used
 
 
 @kernel
 def _weigh(
-    grid: TexelGrid, centers: Ints, points: Floats, radii: Floats, scratch: Scratch, first: int,
-    begins: Ints, used: Floats, texels: Ints, weights: Floats,
-) -> int:  # fmt: skip
-    """Fill in footprints from the first on; one after the last for which there was room."""
+    grid: TexelGrid,
+    centers: Ints,
+    points: Floats,
+    radii: Floats,
+    scratch: Scratch,
+    first: int,
+    begins: Ints,
+    used: Floats,
+    texels: Ints,
+    weights: Floats,
+) -> int:
+    """Fill in the footprints from number `first` on.
+
+    Returns the number of the first footprint for which there was no room.
+    """
     distance = scratch.distance
     touched = scratch.touched
     for i in range(first, len(centers)):
@@ -79,7 +100,9 @@ def _weigh(
         flat = count > 0
         if not flat:
             count = seeded(grid.halo, grid.positions, center, point, distance, touched)
-            count, known = march(grid.halo, grid.positions, count, 1.1 * radius, scratch)
+            count, known = march(
+                grid.halo, grid.positions, count, _SEARCHED_SHARE * radius, scratch
+            )
             near = scratch.order
         if end + known > len(texels):
             clean(scratch, count)
@@ -89,7 +112,8 @@ def _weigh(
             away = distance[t]
             straight = 0.0 if flat else distance_to(grid.positions, t, point)
             if straight > 0:
-                bend = min(max((away / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
+                beyond_flat = (away / straight - _FLAT_RATIO) / (_BENT_RATIO - _FLAT_RATIO)
+                bend = min(max(beyond_flat, 0.0), 1.0)
                 bend = bend * bend * (3 - 2 * bend)
                 away = (1 - bend) * straight + bend * away
             weight = max(1 - (away / radius) ** 2, 0.0) ** 3
@@ -116,7 +140,7 @@ def _spacing(grid: TexelGrid, center: int) -> float:
     column = center % n
     greatest = 0.0
     for k in range(4):
-        t = halo[chart, row + _DOWN[k], column + _RIGHT[k]]
+        t = halo[chart, row + _ROWS_BESIDE[k], column + _COLUMNS_BESIDE[k]]
         if t >= 0:
             greatest = max(greatest, distance_to(positions, t, positions[center]))
     return greatest
@@ -126,10 +150,11 @@ def _spacing(grid: TexelGrid, center: int) -> float:
 def _nearby(
     grid: TexelGrid, center: int, point: Floats, radius: float, distance: Floats, texels: Ints
 ) -> int:
-    """Touch connected texels within a straight distance of a point; how many, or 0, and none, if they do not lie flat.
+    """Touch the connected texels within a straight distance of a point, if they lie flat.
 
-    Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph
-    over the plane there whose slope makes no way along it longer than 1.05 times the straight one.
+    Returns how many texels were touched: 0 if they do not lie flat. They lie flat if no normal is
+    farther than acos(1/1.05) from the normal in the middle. The surface is then a graph over the
+    tangent plane, and no path along it is longer than 1.05 times the straight distance.
     """
     halo = grid.halo
     positions = grid.positions
@@ -144,10 +169,10 @@ def _nearby(
         done += 1
         if distance[t] > radius:
             continue
-        along = 0.0
+        cosine = 0.0
         for k in range(3):
-            along += normals[t, k] * normals[center, k]
-        if along * _FLAT < 1:
+            cosine += normals[t, k] * normals[center, k]
+        if cosine * _FLAT_RATIO < 1:
             for i in range(count):
                 distance[texels[i]] = np.inf
             return 0
@@ -224,7 +249,10 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
 
 
 def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
-    """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
+    """The footprint round a point of the surface whose nearest texel is `center`.
+
+    See `Atlas.nearest`.
+    """
     _, texels, weights, radii = weigh_each(
         atlas.texels.grid, np.array([center]), point[None], np.array([radius])
     )
@@ -234,7 +262,10 @@ def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: 
 def spread(
     atlas: Atlas, name: str, value: float, unit: str, point: ArrayLike, radius: float
 ) -> tuple[Footprint, NDArray[np.float64]]:
-    """Footprint of a point source, and the part of its value on each texel, [k]; `name` and `unit` are for messages."""
+    """Footprint of a point source, and the share of its value on each texel, [k].
+
+    `name` and `unit` are those of the value, for messages.
+    """
     require_finite(name, value, unit)
     where = footprint(atlas, point, radius)
     return where, value * (where.weights * atlas.areas.reshape(-1)[where.texels])

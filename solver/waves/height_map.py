@@ -1,8 +1,8 @@
-"""What a renderer needs of the waves: height and surface gradient of every texel, with a halo for interpolation.
+"""Height maps for a renderer: height and surface gradient of every texel, with a halo.
 
-Heights that are drawn have a limit, so that a surface with waves too high for it does not pass
-through itself. Where they are on the GPU, the height map goes into the renderer's texture without
-leaving it.
+The halo is for interpolation. Drawn heights have a limit, so that a surface with high waves does not
+pass through itself. Where the heights are on the GPU, the height map is written into the renderer's
+texture without leaving the GPU.
 """
 
 from __future__ import annotations
@@ -28,37 +28,45 @@ from ..texels.texel_mesh import TexelMesh
 from ..texels.thickness import LEAST, medial_radius
 from ..texels.topology import TexelTopology
 
-# Of the medial radius: heights up to the first share are drawn as they are, and none beyond the
-# second.
+# Shares of the medial radius: heights up to the first share are drawn as they are, and no height is
+# drawn beyond the second share. The shaders have constants of the same names.
 FREE = 0.25
 MOST = 0.6
 
-_GROUP = 256
-_SHADERS = "ripple_sim.solver"
+# Largest height in medial radii that enters the hyperbolic tangent, which is 1 far below it: float32
+# would overflow otherwise.
+_MAX_RADII = 1e3
 
-# of the table of sources: no texel lies there; below: a texel's mirror image, -2 - its number
-_NONE = -1
+_GROUP = 256  # threads of a group of a compute shader
+_SOLVER_PACKAGE = "ripple_sim.solver"  # below which the shaders lie
 
-# Weight of the second-order terms' regularisation, relative to the squared distances that they
-# multiply.
+# An entry of the table of sources where no texel lies. Lower entries are mirror images: -2 - t is
+# the mirror image of texel t.
+_NO_TEXEL = -1
+
+# Regularisation of the second-order terms, relative to the squared distances that they multiply;
+# and of the first-order terms, relative to that of the second-order terms.
 _REGULARISATION = 1e-4
+_FIRST_ORDER_SHARE = 1e-3
 
-# Memory for each texel that is kept [bytes], and texels whose weights are fitted at a time: that
-# takes 1,400 each.
-_TEXEL = 110
-_BLOCK = 16_384
+# The tangent is perpendicular to the x axis unless the normal has at least this x component; then it
+# is perpendicular to the y axis.
+_MAX_ALONG_X = 0.6
 
-# the eight neighbours (row, column) in the order of the gradient weights
+_TEXEL_BYTES = 110  # memory that a height map keeps for each texel
+_FITTED_TEXELS = 16_384  # texels whose weights are fitted together: 1,400 bytes each
+
+# The eight neighbours (row, column) in the order of the gradient weights.
 _AROUND = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 
 
 class DisplacementLimit:
-    """Bends heights that are large beside the object's local radius, and leaves the others alone.
+    """Reduces heights that are large beside the object's local radius; leaves other heights alone.
 
     With R the medial radius at a texel (see `medial_radius`), a height h is drawn as it is up to R
     / 4. Beyond, it is drawn as R (a + (b - a) tanh((|h| / R - a) / (b - a))) with its sign, a = 1/4
     and b = 0.6: twice continuously differentiable, growing with h, and never more than 0.6 R. The
-    waves themselves know nothing of it.
+    waves themselves are not limited.
     """
 
     def __init__(self, atlas: Atlas) -> None:
@@ -67,15 +75,15 @@ class DisplacementLimit:
 
     @functools.cached_property
     def radius(self) -> NDArray[np.float32]:
-        """The medial radius R [m], [C, n, n]: it takes a while, and most waves never ask for it."""
+        """The medial radius R [m], [C, n, n]; slow to compute, and not needed by most waves."""
         return medial_radius(self._atlas)
 
     def may_bend(self, highest: float) -> bool:
-        """Whether heights of at most that size [m] may be drawn otherwise than they are."""
+        """Whether heights of at most this size [m] may be reduced."""
         return highest > self._always_free
 
     def __call__(self, height: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The heights to draw [m], float32 [C, n, n]; the same array where none is beyond the limit."""
+        """The heights to draw [m], float32 [C, n, n]; the same array if all are below the limit."""
         high, radius, beyond = self._beyond(height)
         if not len(radius):
             return height
@@ -86,7 +94,7 @@ class DisplacementLimit:
     def rate(
         self, height: NDArray[np.float32], velocity: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Rate of the heights to draw [m/s], float32 [C, n, n], where heights change with a velocity."""
+        """Rate of the heights to draw [m/s], float32 [C, n, n], of heights with a velocity."""
         high, radius, beyond = self._beyond(height)
         if not len(radius):
             return velocity
@@ -95,22 +103,27 @@ class DisplacementLimit:
         return rate
 
     def _beyond(self, height: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray, NDArray]:
-        """Texels where heights are bent, the radius at each of these [k], and the hyperbolic tangent's argument [k]."""
+        """The reduced heights: where they are, and two values for each of them.
+
+        Returns a mask [C, n, n], the medial radius [m] [k], and the argument of the hyperbolic
+        tangent [k].
+        """
         size = np.abs(height)
         if not self.may_bend(float(size.max())):
-            return (
-                np.zeros(height.shape, np.bool_),
-                np.empty(0, np.float32),
-                np.empty(0, np.float32),
-            )
-        share = size / self.radius
-        high = share > FREE
-        # the cap keeps float32 from overflowing, where tanh is 1 by far
-        return high, self.radius[high], (np.minimum(share[high], 1e3) - FREE) / (MOST - FREE)
+            nowhere = np.zeros(height.shape, np.bool_)
+            nothing = np.empty(0, np.float32)
+            return nowhere, nothing, nothing
+        radii = size / self.radius
+        high = radii > FREE
+        argument = (np.minimum(radii[high], _MAX_RADII) - FREE) / (MOST - FREE)
+        return high, self.radius[high], argument
 
 
 class HeightMapShaders:
-    """What turns heights into height maps on the GPU, see `HeightMap`; gradients have `weights` [C n^2, 8, 3]."""
+    """Turns heights into height maps on the GPU, see `HeightMap`.
+
+    `weights` [C n^2, 8, 3] are those of the gradients.
+    """
 
     def __init__(
         self,
@@ -133,14 +146,12 @@ class HeightMapShaders:
             "FREE": FREE,
             "MOST": MOST,
         }
-        shader = functools.partial(gl.compute_shader, _SHADERS, **defines)
+        shader = functools.partial(gl.compute_shader, _SOLVER_PACKAGE, **defines)
         with gl as ctx:
-            self._heights, self._limited = (
-                shader("waves/shaders/halo_heights", **each) for each in ({}, {"LIMIT": 1})
-            )
-            self._map, self._corners = (
-                shader("waves/shaders/height_map", **each) for each in ({}, {"CORNERS": 1})
-            )
+            self._heights = shader("waves/shaders/halo_heights")
+            self._limited = shader("waves/shaders/halo_heights", LIMIT=1)
+            self._map = shader("waves/shaders/height_map")
+            self._corners = shader("waves/shaders/height_map", CORNERS=1)
             self._sources = ctx.buffer(sources.tobytes())
             self._corner_places = ctx.buffer(np.concatenate([means, ends]).tobytes() or bytes(16))
             self._weights = ctx.buffer(weights.tobytes())
@@ -149,9 +160,9 @@ class HeightMapShaders:
         self._radii: moderngl.Buffer | None = None
 
     def fill(self, field: DeviceField, texture: moderngl.TextureArray, layer: int) -> float:
-        """Write the height map's page into a layer of a texture, RGBA32F; return the largest height drawn [m].
+        """Write the height map's page into a layer of a texture, RGBA32F.
 
-        Raises `SolverError` if a height is not finite.
+        Returns the largest height drawn [m]. Raises `SolverError` if a height is not finite.
         """
         highest = field.peak
         if not np.isfinite(highest):
@@ -173,11 +184,11 @@ class HeightMapShaders:
             self._map["layer"] = layer
             self._run(ctx, self._map, self._place_count)
             bind_buffers(self._corner_places)
-            self._corners["layer"], self._corners["means"], self._corners["count"] = (
-                layer,
-                *self._corner_counts,
-            )
-            self._run(ctx, self._corners, self._corner_counts[1])
+            mean_count, corner_count = self._corner_counts
+            self._corners["layer"] = layer
+            self._corners["means"] = mean_count
+            self._corners["count"] = corner_count
+            self._run(ctx, self._corners, corner_count)
             return float(np.frombuffer(self._peak.read(), np.float32)[0]) if limited else highest
 
     def _run(self, ctx: moderngl.Context, shader: moderngl.ComputeShader, count: int) -> None:
@@ -187,9 +198,9 @@ class HeightMapShaders:
 
 
 class DeviceHeightMap:
-    """The height map of a field on the GPU, not yet made; `numpy.asarray` gives it as `HeightMap` does.
+    """The height map of a field on the GPU, which is computed where it is drawn.
 
-    Its shape is (C, n + 2, n + 2, 4).
+    `numpy.asarray` gives the array that `HeightMap` gives, [C, n + 2, n + 2, 4].
     """
 
     def __init__(
@@ -206,24 +217,24 @@ class DeviceHeightMap:
         return self._shaders.fill(self._field, texture, layer)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray:
-        return self._on_host(self._field.read()).astype(
-            np.float32 if dtype is None else dtype, copy=False
-        )
+        height_map = self._on_host(self._field.read())
+        return height_map.astype(np.float32 if dtype is None else dtype, copy=False)
 
 
 def _tables(
     topology: TexelTopology,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """The texel that each place of the charts with halo shows, [C, n + 2, n + 2], and the corners that show none.
+    """The texel that each place of the charts with halo shows, and the corners that show none.
 
-    A corner is a row of its place and the three about it: first of those with their mean, then of
-    those in a fixed rim, where the four heights have a mean of 0.
+    Returns a table [C, n + 2, n + 2] and two tables of corners [k, 4]: the place of a corner, and
+    the three places round it. The corners of the first table have the mean height of these three.
+    The corners of the second lie in a fixed rim, where all four heights have a mean of 0.
     """
-    sources = np.where(topology.halo >= 0, topology.halo, _NONE)
-    mirrored = (
-        topology.rim & (topology.halo >= 0) if topology.fixed_rim else np.zeros_like(topology.rim)
-    )
-    sources[mirrored] = _NONE - 1 - topology.halo[mirrored]
+    sources = np.where(topology.halo >= 0, topology.halo, _NO_TEXEL)
+    mirrored = np.zeros_like(topology.rim)
+    if topology.fixed_rim:
+        mirrored = topology.rim & (topology.halo >= 0)
+    sources[mirrored] = _NO_TEXEL - 1 - topology.halo[mirrored]
     place = np.arange(sources.size).reshape(sources.shape)
     last = sources.shape[1] - 1
     means = []
@@ -246,15 +257,15 @@ def _tables(
 class HeightMap:
     """Turns a height field into a texture of gradient and height.
 
-    The gradient at a texel is that of the quadratic that fits the eight neighbours' heights best,
-    in the tangent plane: second-order accurate also where grid lines kink at the borders and
-    corners of charts, so that shading shows none.
+    The gradient at a texel is the gradient of the quadratic that best fits the heights of the eight
+    neighbours, in the tangent plane. It is second-order accurate also where grid lines kink, at the
+    borders and corners of charts, so that shading does not show them.
 
     Parameters
     ----------
     texels : TexelMesh
     limit : DisplacementLimit, optional
-        Of the heights; the gradient is that of the limited ones. By default there is none.
+        Limit of the heights; gradients are those of the limited heights. By default no limit.
     """
 
     def __init__(self, texels: TexelMesh, limit: DisplacementLimit | None = None) -> None:
@@ -263,7 +274,7 @@ class HeightMap:
         count = texels.positions[..., 0].size
         require_memory(
             SolverError,
-            _TEXEL * count,
+            _TEXEL_BYTES * count,
             f"the height map of {count:,} texels",
             "take a lower resolution",
         )
@@ -272,7 +283,7 @@ class HeightMap:
 
     @classmethod
     def drawn(cls, atlas: Atlas, limit: bool = True) -> HeightMap:
-        """Height map for drawing the surface of an atlas: with its `DisplacementLimit`, unless that is turned off."""
+        """Height map for drawing the surface of an atlas, by default with a `DisplacementLimit`."""
         return cls(atlas.texels, DisplacementLimit(atlas) if limit else None)
 
     @overload
@@ -289,14 +300,15 @@ class HeightMap:
         Parameters
         ----------
         height : float32 [C, n, n]
-            [m]. Or one that is on the GPU: then so is the height map, made where it is drawn.
+            [m]. Or a field on the GPU: then the height map is on the GPU as well, and is computed
+            where it is drawn.
 
         Returns
         -------
         float32 [C, n + 2, n + 2, 4]
             Gradient of the height in the frame of the mesh (tangent to the surface, dimensionless),
-            and the height [m]. For the halo see `fill_halo`; beyond a fixed rim lie the negative
-            heights, so that those drawn come to 0 at the rim.
+            and the height [m]. For the halo see `fill_halo`. Beyond a fixed rim the heights are
+            negative, so that drawn heights come to 0 at the rim.
         """
         if isinstance(height, DeviceField):
             if self._shaders is None:
@@ -315,24 +327,29 @@ class HeightMap:
     def rates(
         self, height: NDArray[np.float32], velocity: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Rate of the heights in the height map [m/s], [C, n + 2, n + 2], under a height and a velocity [C, n, n]."""
+        """Rate of the heights in the height map [m/s], [C, n + 2, n + 2].
+
+        `height` [m] and `velocity` [m/s] are [C, n, n].
+        """
+        if self._limit is not None:
+            velocity = self._limit.rate(height, velocity)
         rates = np.zeros((*self._topology.halo.shape, 4), np.float32)
-        rates[:, 1:-1, 1:-1, 3] = (
-            velocity if self._limit is None else self._limit.rate(height, velocity)
-        )
+        rates[:, 1:-1, 1:-1, 3] = velocity
         fill_around(self._topology, rates)
         return rates[..., 3]
 
 
 def fill_around(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:
-    """Fill in the halo, and beyond a fixed rim, if there is one, the texels' mirror image, with heights turned over."""
+    """Fill in the halo of a height map.
+
+    Beyond a fixed rim, the halo has the texels' mirror images, with the heights' signs changed.
+    """
     fill_halo(topology, height_map)
     if not topology.fixed_rim:
         return
-    turned = np.array([1, 1, 1, -1], np.float32)
-    height_map[topology.rim] = (
-        height_map[:, 1:-1, 1:-1].reshape(-1, 4)[topology.halo[topology.rim]] * turned
-    )
+    mirror = np.array([1, 1, 1, -1], np.float32)
+    texels = height_map[:, 1:-1, 1:-1].reshape(-1, 4)
+    height_map[topology.rim] = texels[topology.halo[topology.rim]] * mirror
     last = height_map.shape[1] - 1
     for corner, (r, c) in enumerate(((0, 0), (0, last), (last, last), (last, 0))):
         # the four places round a corner in the rim have a mean height of 0
@@ -340,23 +357,22 @@ def fill_around(topology: TexelTopology, height_map: NDArray[np.float32]) -> Non
         c_in = abs(c - 1)
         ends = topology.valence[:, corner] == 0
         heights = height_map[ends, ..., 3]
-        height_map[ends, r, c, 3] = -(
-            heights[:, r_in, c_in] + heights[:, r_in, c] + heights[:, r, c_in]
-        )
+        sum_of_others = heights[:, r_in, c_in] + heights[:, r_in, c] + heights[:, r, c_in]
+        height_map[ends, r, c, 3] = -sum_of_others
 
 
 @kept_with
 def _gradient_weights(texels: TexelMesh) -> NDArray[np.float32]:
-    """Vectors g with gradient = sum over the 8 neighbours of g (h_j - h_i), shape [C n^2, 8, 3] in [1/m]."""
+    """Vectors g [1/m] with gradient = sum over the 8 neighbours of g (h_j - h_i), [C n^2, 8, 3]."""
     around = texels.halo_positions.copy()
     if not texels.topology.fixed_rim:
-        # beyond a free rim the halo repeats heights: nothing is known there; a fixed one's own
-        # points are at 0
+        # beyond a free rim the halo repeats heights: nothing is known there; the points of a fixed
+        # rim are at height 0
         around[texels.topology.rim] = np.nan
     normals = texels.normals.reshape(-1, 3)
     weights = np.empty((len(normals), 8, 3), np.float32)
-    for first in range(0, len(normals), _BLOCK):
-        block = np.arange(first, min(first + _BLOCK, len(normals)))
+    for first in range(0, len(normals), _FITTED_TEXELS):
+        block = np.arange(first, min(first + _FITTED_TEXELS, len(normals)))
         weights[block] = _fit(around, block, normals[block])
     return weights
 
@@ -364,13 +380,15 @@ def _gradient_weights(texels: TexelMesh) -> NDArray[np.float32]:
 def _fit(
     around: NDArray[np.float64], texels: NDArray[np.int64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The same vectors of some texels [k], from all positions with halo and the texels' normals: [k, 8, 3]."""
+    """The vectors of `_gradient_weights` at some texels [k], [k, 8, 3].
+
+    `around` has all positions [m], with halo; `normal` [k, 3] the normals of the texels.
+    """
     n = around.shape[1] - 2
     f, r, c = np.unravel_index(texels, (len(around), n, n))
     center = around[f, r + 1, c + 1]
-    tangent = np.cross(
-        normal, np.where(np.abs(normal[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    )
+    not_along_x = np.abs(normal[:, :1]) < _MAX_ALONG_X
+    tangent = np.cross(normal, np.where(not_along_x, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     bitangent = np.cross(normal, tangent)
     offset = np.stack(
@@ -384,14 +402,17 @@ def _fit(
     y = np.einsum("ijk,ik->ij", offset, bitangent) / scale
     design = np.stack([x, y, x * x / 2, x * y, y * y / 2], axis=-1) * exists
     normal_matrix = np.einsum("ijk,ijl->ikl", design, design)
-    normal_matrix += _REGULARISATION * np.diag([1e-3, 1e-3, 1, 1, 1])
+    normal_matrix += _REGULARISATION * np.diag([_FIRST_ORDER_SHARE, _FIRST_ORDER_SHARE, 1, 1, 1])
     fit = np.linalg.solve(normal_matrix, np.swapaxes(design, 1, 2))[:, :2] / scale[:, :, None]
     return fit[:, 0, :, None] * tangent[:, None, :] + fit[:, 1, :, None] * bitangent[:, None, :]
 
 
 @kernel
 def _differentiate(weights: Floats32, h: Floats32, height_map: Floats32) -> None:
-    """Fill in gradient and height, [C, n + 2, n + 2, 4], of the texels of a field with halo, [C, n + 2, n + 2]."""
+    """Fill in gradient and height of the texels, but not of the halo.
+
+    `h` is a field with halo [C, n + 2, n + 2], and `height_map` [C, n + 2, n + 2, 4].
+    """
     n = h.shape[1] - 2
     for i in range(len(h) * n):
         f = i // n

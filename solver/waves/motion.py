@@ -1,4 +1,4 @@
-"""An atlas whose vertices move: the operator on it, and gradients of the height from those on the surface at rest."""
+"""An atlas whose vertices move: its operator, and the gradients of the height on it."""
 
 from __future__ import annotations
 
@@ -19,16 +19,19 @@ from ..texels.moving import MovedPlaces, SurfaceRide
 from ..texels.texel_mesh import TexelMesh, tangents
 from .height_map import fill_around
 
-# The stiffness is made anew once the square of an edge's length has changed by this share since it
-# was made.
-_CHANGED = 2e-3
+# The stiffness is computed again once the square of an edge's length has changed by this share since
+# the last time.
+_SQUARED_LENGTH_TOLERANCE = 2e-3
 
-# Folds are looked for once in so many times that the stiffness is made anew: it takes about as
-# long.
-_EVERY = 8
+# Folds are counted once in this many computations of the stiffness: both take about as long.
+_FOLD_CHECK_INTERVAL = 8
 
-# What is known of a mesh at rest, and stays.
-_OF_REST = ("components", "rims", "genus")
+# Cached properties of a mesh that do not change when its vertices move.
+_UNCHANGED_PROPERTIES = ("components", "rims", "genus")
+
+# Least area of a texel's moved parallelogram, as a share of the product of its squared sides: beside
+# a flat one gradients stay finite.
+_MIN_SQUARED_SINE = 1e-6
 
 
 class Motion:
@@ -61,9 +64,10 @@ class Motion:
         self._looks = 0
 
     def to(self, vertices: ArrayLike) -> WaveOperator | None:
-        """Move the vertices [n, 3] [m]; return the operator there, or None where lengths are as they were.
+        """Move the vertices [n, 3] [m]; return the operator there.
 
-        Raises `SolverError` if the vertices are not finite, or others than those of the mesh.
+        Returns None where all lengths are as they were. Raises `SolverError` if the vertices are
+        not finite, or have another shape than the vertices of the mesh.
         """
         self.V = self._checked(vertices)
         self.__dict__.pop("atlas", None)
@@ -74,7 +78,7 @@ class Motion:
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
         self.__dict__.pop("areas", None)
         self._looks += 1
-        if self._warned or self._looks % _EVERY != 1:
+        if self._warned or self._looks % _FOLD_CHECK_INTERVAL != 1:
             return self._now
         count = self._folds.count(self.V)
         if count:
@@ -99,9 +103,9 @@ class Motion:
         mesh = Mesh(
             V, rest.mesh.F, rest.mesh.uv, rest.mesh.corner_uv, rest.mesh.notes, rest.mesh.name
         )
-        mesh.__dict__.update(
-            {name: rest.mesh.__dict__[name] for name in _OF_REST if name in rest.mesh.__dict__}
-        )
+        for name in _UNCHANGED_PROPERTIES:
+            if name in rest.mesh.__dict__:
+                mesh.__dict__[name] = rest.mesh.__dict__[name]
         mesh.__dict__["vertex_normals"] = self._folds.vertex_normals(V)
         positions, beyond = self._ride.positions(V)
         normals = self._ride.normals(mesh.vertex_normals)
@@ -134,9 +138,9 @@ class Motion:
 
 @kernel
 def _square_lengths(V: Floats, edges: Ints, before: Floats) -> tuple[Floats, bool]:
-    """Squared lengths [k] of edges [k, 2], and whether any is another than before [k].
+    """Squared lengths [k] of edges [k, 2], and whether any differs from `before` [k].
 
-    NumPy takes as long as all else that a motion takes.
+    In NumPy this would take as long as the rest of a motion.
     """
     squares = np.empty(len(edges))
     changed = False
@@ -147,16 +151,16 @@ def _square_lengths(V: Floats, edges: Ints, before: Floats) -> tuple[Floats, boo
         for k in range(3):
             total += (V[b, k] - V[a, k]) ** 2
         squares[i] = total
-        if not abs(total - before[i]) <= _CHANGED * before[i]:
+        if not abs(total - before[i]) <= _SQUARED_LENGTH_TOLERANCE * before[i]:
             changed = True
     return squares, changed
 
 
 class MovedGradients:
-    """Turns a height map of the surface at rest into that of the moved one.
+    """Turns a height map of the surface at rest into a height map of the moved surface.
 
-    Heights stay with the texels, so that their differences along rows and columns stay, while the
-    ways there change.
+    Heights stay with the texels. So their differences along rows and columns stay, while the
+    distances change.
     """
 
     def __init__(self, rest: Atlas) -> None:
@@ -167,18 +171,21 @@ class MovedGradients:
     def __call__(
         self, height_map: NDArray[np.float32], V: NDArray[np.float64]
     ) -> NDArray[np.float32]:
-        """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [vertex_count, 3] [m]."""
+        """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [m].
+
+        V is [vertex_count, 3].
+        """
+        halo_positions = np.moveaxis(self._ride.around(V), 0, -1)
+        moved_tangents = np.stack(tangents(halo_positions), axis=3)
         moved = np.array(height_map, np.float32)
-        _carry(
-            self._rest, np.stack(tangents(np.moveaxis(self._ride.around(V), 0, -1)), axis=3), moved
-        )
+        _carry(self._rest, moved_tangents, moved)
         fill_around(self._texels.topology, moved)
         return moved
 
 
 @kernel
 def _carry(rest: Floats, moved: Floats, height_map: Floats32) -> None:
-    """Replace gradients: those of the same differences along the moved tangents."""
+    """Replace gradients at rest by gradients with the same differences along moved tangents."""
     charts, n = rest.shape[:2]
     for chart in range(charts):
         for r in range(n):
@@ -191,7 +198,7 @@ def _carry(rest: Floats, moved: Floats, height_map: Floats32) -> None:
                 uu = m[0, 0] ** 2 + m[0, 1] ** 2 + m[0, 2] ** 2
                 vv = m[1, 0] ** 2 + m[1, 1] ** 2 + m[1, 2] ** 2
                 uv = m[0, 0] * m[1, 0] + m[0, 1] * m[1, 1] + m[0, 2] * m[1, 2]
-                area = max(uu * vv - uv * uv, 1e-6 * uu * vv)
+                area = max(uu * vv - uv * uv, _MIN_SQUARED_SINE * uu * vv)
                 along = vv * a - uv * b
                 across = uu * b - uv * a
                 for k in range(3):

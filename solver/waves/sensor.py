@@ -1,8 +1,8 @@
-"""Sensors: what an accelerometer, a contact microphone or a strain gauge on a rippling surface gives, as samples.
+"""Sensors: the samples of an accelerometer, a contact microphone or a strain gauge on a surface.
 
-A sensor's points see a weighted sum of the texels round them after every substep, see `Probes`. The
-samples at its own rate come from a low-pass filter, evaluated at their exact times: those that are
-there do not depend on when they are read.
+Each point of a sensor has a weighted sum of the texels round it after every substep, see `Probes`.
+A low-pass filter gives samples at the sensor's own rate from these sums, at exact times: a sample
+does not depend on when it is read.
 """
 
 from __future__ import annotations
@@ -25,24 +25,28 @@ from ..texels.topology import TexelTopology
 UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "height": "m", "strain": "1"}
 KINDS = tuple(UNITS)
 
-# Texels along the shortest wave that a sensor is honest about.
-_TEXELS = 5.0
+_MIN_WAVE_TEXELS = 5.0  # texels along the shortest wave that a sensor measures honestly
 
-# The filter: half its length in samples, its attenuation [dB], values tabulated a sample, and where
-# it has fallen by half, over the rate. It lets through what is below _PASSED of the rate, and
-# nothing from a half of it on.
-_HALF = 16
-_ATTENUATION = 80.0
-_FINE = 512
-_CUT = 0.42
-_PASSED = 0.34
+# The filter lets through frequencies below _PASSED_SHARE of the rate, and nothing from half the rate
+# on.
+_FILTER_REACH = 16  # half the filter's length [samples]
+_ATTENUATION = 80.0  # [dB]
+_TABULATED = 512  # tabulated values of the filter for each sample
+_HALVED_SHARE = 0.42  # frequency that the filter halves, as a share of the rate
+_PASSED_SHARE = 0.34
 
-# Samples that are made together: their weights take some MB.
-_TOGETHER = 4096
+_BLOCK_SAMPLES = 4096  # samples that are computed together: their weights take some MB
+
+# Singular values of a fit below this share of the largest one count as 0.
+_FIT_CUTOFF = 1e-6
 
 
 class Listener(Protocol):
-    """Hears the sums of its `Probes` after every substep: begins with those at a time, and takes in those of a step."""
+    """Hears the sums of its `Probes` after every substep.
+
+    `begin` gets the sums at a time [s], [k]; `take` gets the sums of the substeps of dt [s] from a
+    time [s] on, [substeps, k].
+    """
 
     probes: Probes
 
@@ -61,8 +65,7 @@ class Listeners:
     all : tuple of Listener
         See `use`.
     find_points : callable or None
-        From a name to the points [k, 3] that `WaveSolver.sensor` takes for it; None: names are not
-        known.
+        Gives the points [k, 3] of a name for `WaveSolver.sensor`; None if names are not known.
     """
 
     def __init__(self, backend: Backend) -> None:
@@ -71,25 +74,27 @@ class Listeners:
         self.find_points: Callable[[str], ArrayLike] | None = None
 
     def use(self, listeners: Sequence[Listener]) -> None:
-        """Listen with these alone from now on; they go on as they are, also those of another solver of the surface."""
+        """Replace all listeners.
+
+        They continue as they are, also listeners of another solver of the surface.
+        """
         self.all = tuple(listeners)
-        self._backend.probe(
-            Probes.together([each.probes for each in listeners]) if listeners else None
-        )
+        probes = [listener.probes for listener in listeners]
+        self._backend.probe(Probes.together(probes) if probes else None)
 
     def add(self, listener: Heard, time: float) -> Heard:
-        """Listen from a time [s] on, beside those that do."""
+        """Add a listener that listens from a time [s] on."""
         self.use([*self.all, listener])
         self._begin(listener, time)
         return listener
 
     def begin(self, time: float) -> None:
-        """All begin anew."""
-        for each in self.all:
-            self._begin(each, time)
+        """Let all listeners begin anew."""
+        for listener in self.all:
+            self._begin(listener, time)
 
     def hear(self, time: float, dt: float) -> None:
-        """Hand each its own sums of the latest substeps, of dt [s] from a time on."""
+        """Give each listener its sums of the latest substeps, of dt [s] from a time [s] on."""
         sums = self._backend.probed()
         end = 0
         for listener in self.all:
@@ -111,21 +116,22 @@ class Samples(NamedTuple):
 class Sensor:
     """Measures a surface at some points from now on, along its normal; made by `WaveSolver.sensor`.
 
-    `times` and `samples` are all that have not been read yet, and `read` takes them away. The last
-    `latency` is not among them: the filter needs what comes after. A kind "strain" is that of the
-    outer face of a thin sheet that the waves bend, -thickness / 4 times the Laplacian of the
-    height: the mean over all directions, positive where longer.
+    `times` and `samples` are the samples that have not been read yet; `read` returns and removes
+    them. Samples of the last `latency` are missing: the filter needs the heights after them. The
+    kind "strain" is the strain of the outer face of a thin sheet that the waves bend: -thickness / 4
+    times the Laplacian of the height, the mean over all directions, positive where the face is
+    longer.
 
     Attributes
     ----------
     points : float64 [k, 3]
-        On the surface where it was when the sensor was made [m]; they ride along.
+        On the surface when the sensor was made [m]; they move with the surface.
     kind : str
     rate : float
         Samples a second [1/s].
     bandwidth : float
-        Highest honest frequency [Hz]: that of a wave of five texels where these are the largest, of
-        all points, but no more than a third of the rate, or of the substeps' rate.
+        Highest honest frequency [Hz]: the frequency of a wave of five texels, where the texels are
+        largest among all points, but at most a third of the rate and of the substeps' rate.
 
     Raises
     ------
@@ -137,9 +143,15 @@ class Sensor:
     """
 
     def __init__(
-        self, atlas: Atlas, material: Material, operator: WaveOperator, points: ArrayLike,
-        kind: str, rate: float, thickness: float | None,
-    ) -> None:  # fmt: skip
+        self,
+        atlas: Atlas,
+        material: Material,
+        operator: WaveOperator,
+        points: ArrayLike,
+        kind: str,
+        rate: float,
+        thickness: float | None,
+    ) -> None:
         if kind not in KINDS:
             raise SolverError(
                 f"sensor kind is {shown(kind)}; valid are {', '.join(map(repr, KINDS))}"
@@ -148,9 +160,10 @@ class Sensor:
             raise SolverError(
                 f"sensor rate is {shown(rate)}; valid is {POSITIVE.words}, in samples a second"
             )
-        if (kind == "strain") != (thickness is not None) or not (
-            thickness is None or POSITIVE.holds(thickness)
-        ):
+        needs_thickness = kind == "strain"
+        has_thickness = thickness is not None
+        valid_thickness = thickness is None or POSITIVE.holds(thickness)
+        if needs_thickness != has_thickness or not valid_thickness:
             raise SolverError(
                 f"sensor thickness is {shown(thickness)} m; valid is {POSITIVE.words} for kind "
                 f"'strain', that of the "
@@ -160,67 +173,72 @@ class Sensor:
         self.kind = kind
         self.rate = float(rate)
         laplacian = -thickness / 4 if thickness is not None else None
-        rows = (
-            _row(atlas, point, int(center), laplacian)
-            for point, center in zip(self.points, centers, strict=True)
-        )
-        texels, weights = zip(*rows, strict=True)
-        begins = np.append(0, np.cumsum([len(each) for each in texels]))
-        of_heights = np.full(len(texels), kind in ("height", "strain"))
+        texels = []
+        weights = []
+        for point, center in zip(self.points, centers, strict=True):
+            point_texels, point_weights = _row(atlas, point, int(center), laplacian)
+            texels.append(point_texels)
+            weights.append(point_weights)
         self.probes = Probes(
-            begins, np.concatenate(texels), np.concatenate(weights).astype(np.float32), of_heights
+            begins=np.append(0, np.cumsum([len(point_texels) for point_texels in texels])),
+            texels=np.concatenate(texels),
+            weights=np.concatenate(weights).astype(np.float32),
+            heights=np.full(len(texels), kind in ("height", "strain")),
         )
-        # where substeps are longer than samples there is nothing between them to filter out
+        # where substeps are longer than samples there is nothing between substeps to filter out
         self._base = min(self.rate, 1 / operator.longest_timestep)
         shortest = (_resolved(atlas, material, int(center)) for center in centers)
-        self.bandwidth = min(*shortest, _PASSED * self._base)
+        self.bandwidth = min(*shortest, _PASSED_SHARE * self._base)
         self.begin(0.0, np.zeros(len(texels)))
 
     @property
     def latency(self) -> float:
-        """Time from a sample until it is there [s]."""
-        return _HALF / self._base
+        """Time from a sample until it can be read [s]."""
+        return _FILTER_REACH / self._base
 
     def begin(self, time: float, values: NDArray) -> None:
-        """Begin anew at a time [s], with the sums of the probes then."""
+        """Begin anew at a time [s], with the sums of the probes at that time."""
         self._start = self._latest = time
         self._next = 0
         self._last = np.asarray(values, np.float64)
         self._heard: list[tuple[float, float, NDArray]] = []
-        # times, spans and values that later samples need
+        # times [s], spans [s] and values that later samples need
         self._kept = np.zeros(0), np.zeros(0), np.zeros((0, len(values)))
-        self._made = Samples(np.zeros(0), np.zeros((0, len(values)), np.float32))
+        self._unread = Samples(np.zeros(0), np.zeros((0, len(values)), np.float32))
 
     def take(self, time: float, dt: float, sums: NDArray[np.float32]) -> None:
-        """Take in the sums of substeps of dt [s] from a time on, [substeps, k]."""
+        """Take in the sums of substeps of dt [s] from a time [s] on, [substeps, k]."""
         self._heard.append((time, dt, sums))
         self._latest = time + dt * len(sums)
 
     def read(self) -> Samples:
         """The times and samples since the last `read`."""
         self._make()
-        made = self._made
-        self._made = Samples(made.times[:0], made.values[:0])
-        return made
+        unread = self._unread
+        self._unread = Samples(unread.times[:0], unread.values[:0])
+        return unread
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """Times of `samples` [s], [k]: whole periods of the rate after the sensor was made, or the waves reset."""
+        """Times of `samples` [s], [k].
+
+        They are whole periods of the rate after the sensor was made, or the waves were reset.
+        """
         self._make()
-        return self._made.times
+        return self._unread.times
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """What was measured and not read yet [m/s^2, m/s, m, or 1 for strain], float32 [k, points]."""
+        """Samples not read yet [m/s^2, m/s, m, or 1 for strain], float32 [k, points]."""
         self._make()
-        return self._made.values
+        return self._unread.values
 
     def _make(self) -> None:
-        """Make the samples whose surroundings are known, and forget what no later one needs."""
+        """Compute the samples that can be known by now, and forget what no later sample needs."""
         until = int(np.floor((self._latest - self.latency - self._start) * self.rate * (1 + 1e-12)))
         if until < self._next:
             return
-        # all that is kept and was heard: times, their spans, and values
+        # of the sums that were heard: times, spans and values
         spans = np.concatenate([np.full(len(sums), dt) for _, dt, sums in self._heard])
         times = np.concatenate(
             [time + dt * np.arange(1, len(sums) + 1) for time, dt, sums in self._heard]
@@ -229,43 +247,47 @@ class Sensor:
         self._heard.clear()
         last = self._last
         self._last = values[-1]
-        if self.kind == "acceleration":  # they lie between two substeps
+        if self.kind == "acceleration":  # accelerations lie between two substeps
             times = times - spans / 2
             values = np.diff(values, axis=0, prepend=last[None]) / spans[:, None]
         elif self._next == 0:
             times = np.append(self._start, times)
             spans = np.append(spans[:1], spans)
             values = np.concatenate([last[None], values])
-        known = zip(self._kept, (times, spans, values), strict=True)
-        times, spans, values = (np.concatenate(each) for each in known)
-        at = self._start + np.arange(self._next, until + 1) / self.rate
-        blocks = [at[i : i + _TOGETHER] for i in range(0, len(at), _TOGETHER)]
-        made = [
-            filtered(times, spans, values, block, self._base).astype(np.float32) for block in blocks
-        ]
-        self._made = Samples(
-            np.append(self._made.times, at), np.concatenate([self._made.values, *made])
-        )
+        kept_times, kept_spans, kept_values = self._kept
+        times = np.concatenate([kept_times, times])
+        spans = np.concatenate([kept_spans, spans])
+        values = np.concatenate([kept_values, values])
+        sample_times = self._start + np.arange(self._next, until + 1) / self.rate
+        samples = [self._unread.values]
+        for i in range(0, len(sample_times), _BLOCK_SAMPLES):
+            block = sample_times[i : i + _BLOCK_SAMPLES]
+            samples.append(filtered(times, spans, values, block, self._base).astype(np.float32))
+        self._unread = Samples(np.append(self._unread.times, sample_times), np.concatenate(samples))
         self._next = until + 1
-        kept = np.searchsorted(times, self._start + self._next / self.rate - self.latency)
-        self._kept = times[kept:], spans[kept:], values[kept:]
+        next_time = self._start + self._next / self.rate
+        first_kept = np.searchsorted(times, next_time - self.latency)
+        self._kept = times[first_kept:], spans[first_kept:], values[first_kept:]
 
 
 def filtered(
     times: NDArray, spans: NDArray, values: NDArray, at: NDArray, rate: float
 ) -> NDArray[np.float64]:
-    """Low-pass values [m, points], each of a span [s] round its time, at other times [k]; see `_filter`.
+    """Pass values [m, points] through the low pass of `_filter`, for other times [k].
 
-    A sum over the filter's length of values times span, over that of the filter alone: a constant
-    stays what it is, also where the length of the substeps changes.
+    Each value holds for a span [s] round its time. The result is the sum over the filter's length of
+    filter times span times value, divided by the sum of filter times span. So a constant stays the
+    same, also where the length of the substeps changes.
     """
-    reach = _HALF / rate
+    reach = _FILTER_REACH / rate
     first = np.searchsorted(times, at - reach)
     last = np.searchsorted(times, at + reach)
     places = first[:, None] + np.arange((last - first).max())
     inside = places < last[:, None]
     places = np.minimum(places, len(times) - 1)
-    ages = np.minimum(np.abs(times[places] - at[:, None]) * (rate * _FINE), _HALF * _FINE)
+    ages = np.minimum(
+        np.abs(times[places] - at[:, None]) * (rate * _TABULATED), _FILTER_REACH * _TABULATED
+    )
     whole = ages.astype(np.int64)
     taps, slopes = _filter()
     weights = (taps[whole] + slopes[whole] * (ages - whole)) * spans[places] * inside
@@ -274,12 +296,17 @@ def filtered(
 
 @functools.cache
 def _filter() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The filter's values from its middle on, `_FINE` to a sample, and from each to the next: a windowed sinc."""
-    # a third of what a program imports that has no sensor
+    """The filter's values from its middle on, `_TABULATED` a sample, and the steps between them.
+
+    The filter is a windowed sinc.
+    """
+    # imported here: it takes a third of the import time of a program that has no sensor
     from scipy.signal import firwin, kaiser_beta
 
     window = "kaiser", kaiser_beta(_ATTENUATION)
-    taps = firwin(2 * _HALF * _FINE + 1, 2 * _CUT / _FINE, window=window)[_HALF * _FINE :]
+    middle = _FILTER_REACH * _TABULATED
+    filter_values = firwin(2 * middle + 1, 2 * _HALVED_SHARE / _TABULATED, window=window)
+    taps = filter_values[middle:]
     return taps, np.append(np.diff(taps), 0.0)
 
 
@@ -295,7 +322,9 @@ def _around(topology: TexelTopology, center: int, rings: int) -> NDArray[np.int6
 
 
 class _Fit(NamedTuple):
-    """Moving least squares (Lancaster and Salkauskas 1981) in the tangent plane: near texels count most.
+    """Moving least squares (Lancaster and Salkauskas 1981) in the tangent plane.
+
+    Near texels count most.
 
     Attributes
     ----------
@@ -306,8 +335,8 @@ class _Fit(NamedTuple):
     softening, power : float
         The weight at a distance r, in texels, is 1 / (r^2 + softening)^power.
     growth : float
-        Coefficients of a term are as cheap as its power of this: where texels do not suffice for
-        all of them, as beside rims, 0.1 makes terms of a low order do what they can.
+        A term of order i has the cost growth^-i. Where there are too few texels for all terms, as
+        beside rims, 0.1 prefers terms of a low order.
     """
 
     degree: int
@@ -317,8 +346,8 @@ class _Fit(NamedTuple):
     growth: float
 
 
-# The value at a point, and second derivatives there: the symbol of a quartic's is 0.7 dB low at
-# five texels a wave, that of a cubic's 4 dB.
+# Fits of the value at a point, and of the second derivatives there. At five texels a wave the second
+# derivatives of a quartic are 0.7 dB too low, those of a cubic 4 dB.
 _VALUE = _Fit(degree=3, rings=2, softening=1e-3, power=1.0, growth=1.0)
 _CURVATURE = _Fit(degree=4, rings=3, softening=0.1, power=2.0, growth=0.1)
 
@@ -326,9 +355,10 @@ _CURVATURE = _Fit(degree=4, rings=3, softening=0.1, power=2.0, growth=0.1)
 def _row(
     atlas: Atlas, point: NDArray, center: int, laplacian: float | None
 ) -> tuple[NDArray, NDArray]:
-    """Texels round a point, and the weights that give a field there, or a factor times its Laplacian [1/m^2].
+    """Texels round a point, and the weights that give the value of a field at the point.
 
-    Those of a polynomial that fits the texels, see `_Fit`. It does not care where charts end.
+    With a factor `laplacian`, they give this factor times the field's Laplacian [1/m^2]. The weights
+    are those of a polynomial that fits the texels, see `_Fit`, also across the borders of charts.
     """
     fit = _VALUE if laplacian is None else _CURVATURE
     texels = _around(atlas.texels.topology, center, fit.rings)
@@ -344,30 +374,29 @@ def _row(
     orders = [(i, j) for i in range(fit.degree + 1) for j in range(fit.degree + 1 - i)]
     growth = np.array([fit.growth ** (i + j) for i, j in orders])
     powers = np.stack([x**i * y**j for i, j in orders], axis=1)
-    solved = growth[:, None] * np.linalg.pinv(near[:, None] * powers * growth, rcond=1e-6) * near
+    solved = (
+        growth[:, None] * np.linalg.pinv(near[:, None] * powers * growth, rcond=_FIT_CUTOFF) * near
+    )
     if laplacian is None:
         return texels, solved[0]
-    return texels, laplacian * 2 * (
-        solved[orders.index((0, 2))] + solved[orders.index((2, 0))]
-    ) / size**2
+    second_derivatives = solved[orders.index((0, 2))] + solved[orders.index((2, 0))]
+    return texels, laplacian * 2 * second_derivatives / size**2
 
 
 def _resolved(atlas: Atlas, material: Material, center: int) -> float:
-    """Frequency [Hz] of the shortest wave that the texels round one carry, of the material there."""
+    """Frequency [Hz] of the shortest wave that the texels round a texel carry."""
     texels = _around(atlas.texels.topology, center, 1)
     away = np.linalg.norm(
         atlas.positions.reshape(-1, 3)[texels] - atlas.positions.reshape(-1, 3)[center], axis=1
     )
     widest = np.sort(away)[: min(5, len(away))].max()  # the four beside it
-    return hertz(material, center, _TEXELS * widest)
+    return hertz(material, center, _MIN_WAVE_TEXELS * widest)
 
 
 def hertz(material: Material, texel: int, length: float) -> float:
-    """Frequency [Hz] of a wave of a length [m], of the material at a texel of a flat index."""
-    here = {
-        name: value
-        if np.ndim(value) == 0 or name == "wavelengths"
-        else np.asarray(value).reshape(-1)[texel]
-        for name, value in vars(material).items()
-    }
-    return frequency(Material(**here), 2 * np.pi / length) / (2 * np.pi)
+    """Frequency [Hz] of a wave of a length [m], of the material at a texel with a flat index."""
+    local = {}
+    for name, value in vars(material).items():
+        is_map = np.ndim(value) > 0 and name != "wavelengths"
+        local[name] = np.asarray(value).reshape(-1)[texel] if is_map else value
+    return frequency(Material(**local), 2 * np.pi / length) / (2 * np.pi)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..backends.backend import make_backend
+from ..backends.choice import make_backend
 from ..backends.gl_fields import DeviceField
 from ..errors import SolverError, checked, instance
 from ..memory import require_memory
@@ -24,8 +24,8 @@ from .load import HeldLoad, Load, WaveState
 from .motion import Motion
 from .sensor import Listeners, Sensor
 
-# Memory for each texel while a solver is made, at least [bytes]; half of it is kept.
-_TEXEL = 300
+# Memory that a solver takes for each texel while it is made, at least [bytes]; it keeps half of it.
+_TEXEL_BYTES = 300
 
 
 class WaveSolver:
@@ -51,24 +51,25 @@ class WaveSolver:
         Poisson's ratio were 1, which is the same at straight edges.
     conserve_volume : bool, optional
         Remove the mean of every source, so that a net push does not move the surface as a whole. By
-        default it is removed from closed surfaces, where it is the volume of an incompressible
-        body, and from open ones that nothing holds, whose mean height nothing else would stop. It
-        stays on open ones that a rim, a clamp, or stiffness anywhere holds. True and False: from
-        all surfaces or from none. Each part of a mesh, and each region that rigid texels cut off,
-        has a mean of its own, and is held or not by itself. Where the density varies, a uniform
-        pressure keeps the volume while the waves run as well, unless something holds the surface: a
-        clamp, a fixed rim, or stiffness that varies. Deep fluid always keeps its volume.
+        default the mean is removed from closed surfaces, whose mean height is the volume of an
+        incompressible body, and from open surfaces that nothing holds, whose mean height nothing
+        else would stop. The mean stays on open surfaces that a rim, a clamp, or stiffness anywhere
+        holds. True: remove the mean from all surfaces; False: from none. Each part of a mesh, and
+        each region that rigid texels cut off, has its own mean, and is held or not by itself. Where
+        the density varies, a uniform pressure also keeps the volume while the waves run, unless
+        something holds the surface: a clamp, a fixed rim, or stiffness that varies. Deep fluid
+        always keeps its volume.
 
     Attributes
     ----------
     rest : Atlas
-        Of the surface before it moved.
+        The surface before it moved.
     operator : WaveOperator
     time : float
         [s].
     substeps_taken : int
     listeners : Listeners
-        Sensors, and what else hears of every substep.
+        Sensors, and other listeners that hear of every substep.
 
     Raises
     ------
@@ -95,20 +96,21 @@ class WaveSolver:
         conserve_volume: bool | None = None,
     ) -> None:
         self.material = material if material is not None else Material()
-        what = f"a wave solver of {atlas.areas.size:,} texels"
         require_memory(
-            SolverError, _TEXEL * atlas.areas.size, what, "take an atlas of lower resolution"
+            SolverError,
+            _TEXEL_BYTES * atlas.areas.size,
+            f"a wave solver of {atlas.areas.size:,} texels",
+            "take an atlas of lower resolution",
         )
         warn_of_wavelengths(atlas, self.material)
         self._kind = operator
-        self._begin(
-            atlas, build_operator(atlas, self.material, operator, rim), backend, conserve_volume
-        )
+        wave_operator = build_operator(atlas, self.material, operator, rim)
+        self._begin(atlas, wave_operator, backend, conserve_volume)
 
     def _begin(
         self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool | None
     ) -> None:
-        """At rest, at time 0."""
+        """Begin at rest, at time 0."""
         self.rest = atlas
         self.operator = operator
         self._motion: Motion | None = None
@@ -129,7 +131,7 @@ class WaveSolver:
 
     @property
     def vertices(self) -> NDArray[np.float64] | None:
-        """Where `WaveSolver.move` put the vertices [m], [vertex_count, 3]; None as long as it did not."""
+        """Vertices as `WaveSolver.move` left them [m], [vertex_count, 3]; None before it moves."""
         return None if self._motion is None else self._motion.V
 
     @property
@@ -139,7 +141,10 @@ class WaveSolver:
 
     @property
     def stable_timestep(self) -> float:
-        """Longest substep that `step` takes of itself [s]: stable, and springs swing within 0.5 % of their rate."""
+        """Longest substep that `step` chooses [s].
+
+        It is stable, and springs oscillate within 0.5 % of their rate.
+        """
         return self.operator.longest_timestep
 
     def step(self, dt: float, substeps: int | None = None, load: Load | None = None) -> None:
@@ -169,7 +174,7 @@ class WaveSolver:
         begin = self.time
         self._substep = dt / substeps
         for count, part in [(substeps, None)] if load is None else load.parts(dt, substeps):
-            # values too large for float32 become infinite here; the next look reports them
+            # values too large for float32 become infinite here; the next check reports them
             with np.errstate(over="ignore", invalid="ignore"):
                 force = self._held.upload(part)
                 self._backend.advance(count, self._substep)
@@ -227,11 +232,11 @@ class WaveSolver:
     def move(self, V: ArrayLike) -> None:
         """Move the surface: the texels ride on their triangles, at their barycentric coordinates.
 
-        Each texel keeps its mass, so that the surface gets thinner where it stretches, and its
-        height and velocity, along the normal that it has then. Stiffness and stable time step
-        follow the lengths on the surface as soon as one changes by a part in 1,000; a motion that
-        leaves them as they are changes nothing. Speed and rates stay the material's own, but for
-        its `tightening`. The motion itself neither pushes the waves nor feels them.
+        Each texel keeps its mass, so that the surface gets thinner where it stretches. It keeps its
+        height and velocity, along its normal after the motion. Stiffness and stable time step
+        follow the lengths on the surface as soon as a length changes by a part in 1,000; a motion
+        that keeps all lengths changes nothing. Speed and rates stay those of the material, except
+        for its `tightening`. The motion itself neither pushes the waves nor feels them.
 
         Parameters
         ----------
@@ -241,8 +246,8 @@ class WaveSolver:
         Raises
         ------
         SolverError
-            If they are not finite, or not as many as the mesh has; for a baseline operator, or deep
-            fluid.
+            If the vertices are not finite, or not as many as the mesh has; for a baseline operator,
+            or deep fluid.
         """
         if self._motion is None:
             if self._kind != "fem":
@@ -257,7 +262,9 @@ class WaveSolver:
 
     @property
     def conserve_volume(self) -> bool:
-        """Whether sources are rid of their mean, on any part of the surface; may be changed while the waves run.
+        """Whether the mean of sources is removed on any part of the surface.
+
+        It may be changed while the waves run.
 
         Assign True or False for all parts, or None for the default of each.
         """
@@ -270,9 +277,10 @@ class WaveSolver:
 
     @property
     def pressure(self) -> NDArray[np.float64]:
-        """Pressure held over `step` [Pa], positive inwards, float64 [C, n, n]; assign to change it, 0 to end it.
+        """Pressure held over `step` [Pa], positive inwards, float64 [C, n, n].
 
-        A copy; it holds the forces of `add_force` as well.
+        It is a copy that includes the forces of `add_force`. Assign to change the pressure, 0 to
+        end it.
         """
         return self._held.forces() / self._areas
 
@@ -310,7 +318,7 @@ class WaveSolver:
         momentum = -impulses * self.operator.source_share.reshape(-1)[where.texels]
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
         self._guard.note("impulse", impulse, "N s", self.time, check_kick(velocities, impulse))
-        # sums too large for float32 become infinite here, and are reported later
+        # sums too large for float32 become infinite here; a later check reports them
         with np.errstate(over="ignore"):
             balance = self._held.counterpart(where.texels, momentum)
             self._backend.kick(where.texels, velocities.astype(np.float32), balance)
@@ -339,42 +347,42 @@ class WaveSolver:
         return where
 
     def add_pressure(self, pressure: ArrayLike) -> None:
-        """Add a pressure field [Pa], a number or [C, n, n], positive inwards, that is held from now on."""
-        force = (as_field(pressure, "pressure", self.operator.mass.shape) * self._areas).reshape(-1)
+        """Add a pressure [Pa] that is held from now on: a number or [C, n, n], positive inwards."""
+        field = as_field(pressure, "pressure", self.operator.mass.shape)
+        force = (field * self._areas).reshape(-1)
         texels = np.flatnonzero(force)
         self._held.add(Load(texels, force[texels]))
 
     def add_height(self, height: ArrayLike) -> None:
-        """Raise the surface by a field [m], [C, n, n]; where volume is conserved its mean over the area is removed."""
-        field = (
-            as_field(height, "height", self.operator.mass.shape).astype(np.float64)
-            * self.operator.free
-        )
-        field = self._balance.balanced_height(field, self._areas)
+        """Raise the surface by a field [m], [C, n, n].
+
+        Where volume is conserved, the field's mean over the area is removed.
+        """
+        field = as_field(height, "height", self.operator.mass.shape).astype(np.float64)
+        field = self._balance.balanced_height(field * self.operator.free, self._areas)
         self._note("height", field)
-        self._backend.set_height(
-            self._backend.elastic() + field.astype(np.float32), self._backend.dent()
-        )
+        elastic = self._backend.elastic() + field.astype(np.float32)
+        self._backend.set_height(elastic, self._backend.dent())
 
     def add_velocity(self, velocity: ArrayLike) -> None:
-        """Add a field [m/s], [C, n, n], to the velocity; where volume is conserved its volume rate is removed."""
-        field = (
-            as_field(velocity, "velocity", self.operator.mass.shape).astype(np.float64)
-            * self.operator.movable
-        )
-        field = self._balance.balanced_velocity(field)
+        """Add a field [m/s], [C, n, n], to the velocity.
+
+        Where volume is conserved, the field's volume rate is removed.
+        """
+        field = as_field(velocity, "velocity", self.operator.mass.shape).astype(np.float64)
+        field = self._balance.balanced_velocity(field * self.operator.movable)
         self._note("velocity", field)
         self._backend.set_velocity(self._backend.velocity() + field.astype(np.float32))
 
     @property
     def height(self) -> NDArray[np.float32]:
-        """Displacement along the outward normal [m], float32 [C, n, n]: a copy; assign to change it.
+        """Displacement along the outward normal [m], float32 [C, n, n].
 
-        `waves.height = field` and `waves.height += field` work, also with one number;
-        `waves.height[0] = x` changes the copy only. A height that is assigned is elastic: dents are
-        gone.
+        It is a copy; assign to change the height. `waves.height = field` and `waves.height +=
+        field` work, also with one number; `waves.height[0] = x` changes the copy only. An assigned
+        height is elastic: dents are removed.
 
-        Reading raises `SolverError` once if it is no longer finite.
+        Reading raises `SolverError` once if a height is no longer finite.
         """
         return self._finite(self._backend.height(), "height")
 
@@ -385,32 +393,32 @@ class WaveSolver:
         self._backend.set_height(height)
 
     def crests(self) -> NDArray[np.float32]:
-        """Greatest size that each height has had after any step since the last call, or has now [m], [C, n, n].
+        """Greatest size of each height since the last call [m], [C, n, n].
 
-        Kept from the first call on, where the waves are; a copy begins anew. Not finite, they raise
-        as `height` does.
+        It counts after every `step`, and now, from the first call on. A copy of the solver begins
+        anew. Raises `SolverError` as `height` does.
         """
         return self._finite(self._backend.crests(), "height")
 
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
-        """A copy of the height [m], [C, n, n], where the waves are: on hardware GL it stays on the GPU.
+        """A copy of the height [m], [C, n, n]; with hardware GL it stays on the GPU.
 
-        `numpy.asarray` gives the array; `HeightMap` takes both.
+        `numpy.asarray` gives an array; `HeightMap` takes both.
         """
         heights = self._backend.snapshot()
         return self._finite(heights, "height") if isinstance(heights, np.ndarray) else heights
 
     @property
     def dent(self) -> NDArray[np.float32]:
-        """The part of the height that stays [m], float32 [C, n, n]; 0 unless the material yields."""
+        """Permanent part of the height [m], float32 [C, n, n]; 0 unless the material yields."""
         return self._finite(self._backend.dent(), "dent")
 
     @property
     def velocity(self) -> NDArray[np.float32]:
-        """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change it, as with `height`.
+        """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change the velocity.
 
-        Reading raises `SolverError` once if it is no longer finite, which it may be before the
-        height is.
+        Reading raises `SolverError` once if a velocity is no longer finite. The velocity may be
+        infinite before the height is.
         """
         return self._finite(self._backend.velocity(), "velocity")
 
@@ -423,23 +431,25 @@ class WaveSolver:
     def energy(self) -> float:
         """Kinetic plus potential energy [J] of the discrete system.
 
-        Without damping this is what the leapfrog scheme conserves to round-off while the substep
-        stays the same: 1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all
-        elastic forces. It differs from the continuous energy by O(dt^2). Energy spent on dents is
-        not included.
+        It is 1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all elastic
+        forces. Without damping, the leapfrog scheme conserves this energy to round-off while the
+        substep stays the same. It differs from the continuous energy by O(dt^2). Energy spent on
+        dents is not included.
         """
         elastic = self._finite(self._backend.elastic(), "height")
         height = elastic.astype(np.float64)
         velocity = self.velocity.astype(np.float64)
         with np.errstate(invalid="ignore"):  # NaN says enough
             kinetic = float((self.operator.momenta(velocity) * velocity).sum()) / 2
-            of_h, of_v = (
-                -float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity)
-            )
-            return kinetic + of_h - self._substep**2 / 4 * of_v
+            potential = self._elastic_energy(height)
+            return kinetic + potential - self._substep**2 / 4 * self._elastic_energy(velocity)
+
+    def _elastic_energy(self, field: NDArray[np.float64]) -> float:
+        """1/2 x' K x of a field x [C, n, n]."""
+        return -float((field * self.operator.elastic_force(field)).sum()) / 2
 
     def volume(self) -> float:
-        """Volume that the waves add to the target, to first order: sum of area times height [m^3]."""
+        """Volume that the waves add [m^3], to first order: sum of area times height."""
         return float((self._areas * self.height.astype(np.float64)).sum())
 
     def momentum(self) -> float:
@@ -447,23 +457,24 @@ class WaveSolver:
         return float((self.operator.mass * self.velocity.astype(np.float64)).sum())
 
     def __getstate__(self) -> tuple[Any, ...]:
-        """What `copy` and `pickle` keep: a copy goes on as the original does, bit for bit."""
-        made_of = self.rest, self.material, self._kind, self.operator, copy.copy(self._motion)
-        return made_of, self.backend, self._backend.keeps_volume, self.state
+        """The state for `copy` and `pickle`: a copy continues like the original, bit for bit."""
+        surface = self.rest, self.material, self._kind, self.operator, copy.copy(self._motion)
+        return surface, self.backend, self._backend.keeps_volume, self.state
 
-    def __setstate__(self, kept: tuple[Any, ...]) -> None:
-        (atlas, self.material, self._kind, operator, motion), backend, conserve_volume, state = kept
+    def __setstate__(self, pickled: tuple[Any, ...]) -> None:
+        surface, backend, conserve_volume, state = pickled
+        atlas, self.material, self._kind, operator, motion = surface
         self._begin(atlas, operator, backend, conserve_volume)
         self._motion = motion
         self.state = state
 
     @property
     def state(self) -> WaveState:
-        """All that decides how the waves go on, but for atlas and material; assign it to another solver.
+        """Everything needed to continue the simulation, except the atlas and the material.
 
-        Assigning raises `SolverError` for a state of another resolution. Where the solver's own
-        material clamps the surface or carries no waves, it takes over dents alone, and comes to
-        rest.
+        Assign it to another solver. Assigning raises `SolverError` for a state of another
+        resolution. Where the solver's own material clamps the surface or carries no waves, only
+        dents are taken over, and the surface is at rest.
         """
         elastic = self._finite(self._backend.elastic(), "height")
         clock = self.time, self._substep, self.substeps_taken
@@ -492,12 +503,12 @@ class WaveSolver:
         return self.rest.areas if self._motion is None else self._motion.areas
 
     def _finite(self, field: NDArray[np.float32], name: str) -> NDArray[np.float32]:
-        """A field, which is looked at; see `FiniteGuard.check`."""
+        """Return a field after it was checked; see `FiniteGuard.check`."""
         self._guard.check(field, name, self.time)
         return field
 
     def _note(self, kind: str, field: NDArray) -> None:
-        """Tell the guard of a height or a velocity that is given."""
+        """Tell the guard of a height or a velocity that was assigned or added."""
         unit, time = ("m", self.operator.stable_timestep) if kind == "height" else ("m/s", 1.0)
         largest = float(np.abs(field).max())
         self._guard.note(kind, largest, unit, self.time, largest / time)

@@ -17,7 +17,7 @@ from ripple_sim.solver import (
     sphere_atlas,
     texel_atlas,
 )
-from ripple_sim.solver.backends import auto_backend, backend, make_backend
+from ripple_sim.solver.backends import auto_backend, backend_speed, make_backend
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.operator import WaveOperator, build_operator
@@ -186,18 +186,18 @@ def hardware(opengl: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> G
     """The software driver, taken for hardware of which nothing is known."""
     monkeypatch.setattr(GLContext, "software", False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(backend, "_SIZES", (8, 24))
-    backend.measured.cache_clear()
+    monkeypatch.setattr(backend_speed, "_SIZES", (8, 24))
+    backend_speed.measured.cache_clear()
     yield shared_context()
-    backend.measured.cache_clear()
+    backend_speed.measured.cache_clear()
 
 
 def test_auto_takes_what_was_measured_to_be_faster(
     hardware: GLContext, operator: WaveOperator, monkeypatch
 ):
     """A GPU that takes 1 ms for any number of texels, a processor that takes 1 ms for 4,000."""
-    known = backend.Measured((1000.0, 8000.0), (1e-3, 1e-3), (0.25e-3, 2e-3))
-    monkeypatch.setattr(backend, "measure", lambda gl: known)
+    known = backend_speed.Measured((1000.0, 8000.0), (1e-3, 1e-3), (0.25e-3, 2e-3))
+    monkeypatch.setattr(backend_speed, "measure", lambda gl: known)
     assert [auto_backend(texels) for texels in (16, 3900, 4100, 10**6)] == [
         "cpu",
         "cpu",
@@ -211,12 +211,12 @@ def test_auto_takes_what_was_measured_to_be_faster(
 
 
 def test_a_machine_is_measured_once(hardware: GLContext, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = backend.measured(hardware)
+    first = backend_speed.measured(hardware)
     assert first.texels == (384.0, 3456.0)
     assert min(first.gl + first.cpu) > 0
-    backend.measured.cache_clear()  # as another process does
-    monkeypatch.setattr(backend, "measure", lambda gl: pytest.fail("measured twice"))
-    assert backend.measured(hardware) == first
+    backend_speed.measured.cache_clear()  # as another process does
+    monkeypatch.setattr(backend_speed, "measure", lambda gl: pytest.fail("measured twice"))
+    assert backend_speed.measured(hardware) == first
     assert auto_backend(10**6) == first.faster(10**6)
 
 
