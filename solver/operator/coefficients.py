@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import POSITIVE, SolverError, shown
 
-# name: unit, whether it has to be greater than 0, whether infinity is allowed; none may be negative
+# Coefficients that are numbers: the unit of each, whether it must be greater than 0 rather than at
+# least 0, and whether it may be infinite.
 LIMITS = {
     "speed": ("m/s", False, False),
     "damping": ("1/s", False, False),
@@ -19,31 +20,33 @@ LIMITS = {
     "deep": ("1/m", False, False),
 }
 
-# Beyond any physical value, and small enough that nothing overflows on the way to the time step.
+# Greatest coefficient, in its unit; one over it is the least of those that must be greater than 0.
+# It is beyond any physical value, and small enough that nothing overflows on the way to the time
+# step.
 _HIGHEST = 1e12
 
 
 def check_numbers(name: str, value: ArrayLike) -> None:
-    """Raise `SolverError` unless a coefficient is within its limits, and one number or one value a texel."""
-    unit, strict, endless = LIMITS[name]
+    """Raise `SolverError` unless a coefficient is one number or one a texel, within its `LIMITS`."""
+    unit, must_be_positive, may_be_infinite = LIMITS[name]
     numbers = _numbers(name, value)
-    # NaN is not at least anything
-    wrong = ~(numbers >= (1 / _HIGHEST if strict else 0)) | (
-        (numbers > _HIGHEST) & ~(np.isinf(numbers) & endless)
-    )
+    least = 1 / _HIGHEST if must_be_positive else 0
+    too_low = ~(numbers >= least)  # so is NaN
+    too_high = (numbers > _HIGHEST) & ~(np.isinf(numbers) & may_be_infinite)
+    wrong = too_low | too_high
     if wrong.any():
         worst = numbers.flat[np.argmax(wrong)]
-        bound = f"greater than 0 and at least {1 / _HIGHEST:g}" if strict else "0 or greater"
+        bound = f"greater than 0 and at least {least:g}" if must_be_positive else "0 or greater"
+        infinity = ", or infinity" if may_be_infinite else ""
         raise SolverError(
             f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to "
-            f"{_HIGHEST:g}"
-            f"{', or infinity' if endless else ''}"
+            f"{_HIGHEST:g}{infinity}"
         )
     _check_shape(name, numbers)
 
 
 def check_mask(name: str, value: ArrayLike) -> None:
-    """Raise `SolverError` unless a value is one bool, or one a texel."""
+    """Raise `SolverError` unless a value is one bool, or one bool a texel."""
     mask = np.asarray(value)
     if mask.dtype != bool:
         raise SolverError(
@@ -58,8 +61,7 @@ def check_wavelengths(value: ArrayLike) -> None:
     if numbers.shape != (2,) or not 0 <= numbers[0] <= numbers[1]:
         raise SolverError(
             f"material wavelengths is {shown(value)} m; valid are two numbers: the shortest, 0 or "
-            f"greater, and the "
-            "longest"
+            "greater, and the longest"
         )
 
 
@@ -73,15 +75,19 @@ def _numbers(name: str, value: object) -> NDArray[np.float64]:
 
 
 def _check_shape(name: str, value: NDArray) -> None:
-    if value.ndim != 0 and not (value.ndim == 3 and value.shape[1] == value.shape[2]):
+    is_field = value.ndim == 3 and value.shape[1] == value.shape[2]
+    if value.ndim != 0 and not is_field:
         raise SolverError(
             f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a "
-            f"texel"
+            "texel"
         )
 
 
 def require_positive(**values: tuple[float, str]) -> None:
-    """Raise `SolverError` unless every value, given with its unit, is a finite number greater than 0."""
+    """Raise `SolverError` unless all values are finite numbers greater than 0.
+
+    Values come with their units, by name.
+    """
     for name, (value, unit) in values.items():
         if not POSITIVE.holds(value):
             raise SolverError(f"{name} is {shown(value)} {unit}; valid is {POSITIVE.words}")

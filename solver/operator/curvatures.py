@@ -1,8 +1,9 @@
-"""Bending as a sum of squares: three weighed curvatures at each texel, each a nine-point difference of the heights.
+"""Bending as a sum of squares of curvatures.
 
-Half the sum of their squares is the energy, which can therefore never be negative. With R the
-matrix of differences, the force is -R^T R h: one pass takes the curvatures, and a second one sums
-them up with the transposed weights.
+Each texel has three weighed curvatures, each a nine-point difference of the heights. Half the sum
+of their squares is the energy, which can therefore never be negative. With R the matrix of
+differences, the force is -R^T R h: a first pass takes the curvatures, and a second one sums them up
+with the transposed weights.
 """
 
 from __future__ import annotations
@@ -17,16 +18,21 @@ from scipy.sparse import csr_array
 from ..kernel import Bools, Floats, Ints
 from ..texels.topology import TexelTopology
 
-# Curvatures of a texel, and neighbours of which each is a difference.
+# Curvatures of a texel.
 KINDS = 3
+
+# Neighbours of a texel; a curvature is a difference of their heights and its own.
 NEIGHBOURS = 8
 
 # Row and column of the neighbours, from the texel.
-STEPS = tuple((r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c)
+STEPS = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
 
 
 def neighbours(topology: TexelTopology) -> Ints:
-    """Texels round each texel, in the order of `STEPS`, [8, C, n, n]; -1 where there is none, or beyond a rim."""
+    """Texels round each texel, in the order of `STEPS`, [8, C, n, n]; -1 where there is none.
+
+    Beyond a rim there is none.
+    """
     n = topology.shape[1]
     halo = np.where(topology.rim, -1, topology.halo)
     return np.stack([halo[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c] for r, c in STEPS])
@@ -39,15 +45,18 @@ def regular_texels(topology: TexelTopology) -> NDArray[np.bool_]:
     ordered = np.sort(around, axis=0)
     regular = (ordered[0] >= 0) & (np.diff(ordered, axis=0) > 0).all(axis=0)
     own = np.arange(count)
-    both = np.concatenate([own + count * each for each in around])
-    back = np.concatenate([each + count * own for each in around])
-    regular &= np.isin(back, both).reshape(NEIGHBOURS, -1).all(axis=0)
+    # pairs of a texel and a neighbour, and the same pairs seen from the neighbour
+    pairs = np.concatenate([own + count * neighbour for neighbour in around])
+    reversed_pairs = np.concatenate([neighbour + count * own for neighbour in around])
+    regular &= np.isin(reversed_pairs, pairs).reshape(NEIGHBOURS, -1).all(axis=0)
     return regular.reshape(topology.shape)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Curvatures:
-    """Bending of the texels inside a plate, by `weights`; what irregular texels and rims add to it are links.
+    """Bending of the regular texels inside a plate.
+
+    The bending of irregular texels and of those beside rims is added as links.
 
     Attributes
     ----------
@@ -80,14 +89,17 @@ class Curvatures:
 
     @functools.cached_property
     def transposed(self) -> Floats:
-        """Weights of the curvatures of each texel's neighbours, then of its own, in its force, [3, 9, C, n, n]."""
+        """Weights of curvatures in the force on each texel, [3, 9, C, n, n].
+
+        First those of its neighbours' curvatures, then those of its own.
+        """
         count = self.topology.texel_count
         around = neighbours(self.topology).reshape(NEIGHBOURS, count)
         weights = self.weights.reshape(KINDS, NEIGHBOURS, count)
         back = np.zeros((KINDS, NEIGHBOURS + 1, count))
         for step in range(NEIGHBOURS):
             for opposite in range(NEIGHBOURS):
-                # the neighbour in this step may see the texel in any other: charts are turned
+                # the neighbour in this step may see the texel in any other step: charts are turned
                 # against each other
                 other = around[step]
                 meets = (other >= 0) & (around[opposite][other] == np.arange(count))
@@ -95,7 +107,8 @@ class Curvatures:
         # a texel may see the same neighbour twice, beside an irregular vertex: it counts once
         for step in range(NEIGHBOURS):
             for earlier in range(step):
-                back[:, step, (around[step] == around[earlier]) & (around[step] >= 0)] = 0.0
+                is_same = (around[step] == around[earlier]) & (around[step] >= 0)
+                back[:, step, is_same] = 0.0
         back[:, NEIGHBOURS] = -weights.sum(axis=1)
         return back.reshape(KINDS, NEIGHBOURS + 1, *self.topology.shape)
 
@@ -114,7 +127,7 @@ class Curvatures:
 
     @functools.cached_property
     def _pulls(self) -> Floats:
-        """Sums of the sizes in each row of R^T R, or more, [T]."""
+        """Upper bounds of the sums of absolute values in the rows of R^T R, [T]."""
         size = abs(self.matrix)
         return np.asarray(size.T @ size.sum(axis=1))
 

@@ -1,7 +1,7 @@
-"""Materials: the coefficients of the wave equation, from laws, from what is seen, and as presets.
+"""Materials: the coefficients of the wave equation, from laws, from how they look, and as presets.
 
-With them theory of plane waves on a flat surface of a uniform material, and whether an atlas has
-room for the waves that a material's coefficients stand for.
+Besides: the theory of plane waves on a flat surface of a uniform material, and a warning where an
+atlas has no room for the waves for which a material's coefficients hold.
 """
 
 from __future__ import annotations
@@ -19,41 +19,49 @@ from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, 
 from .presets import PRESETS
 from .suited_law import suited_coefficients
 
-# omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the
-# lowest normal mode of an incompressible layer bonded to a rigid base: its frequency is within 3.0
-# % of the root of the mode's determinant. The group speed is not: it is 0.36 c_T instead of 0.93 at
-# q d = 1.3, 0.53 for 0.38 at 2.2, and 0.82 for 0.93 at 8.
+# A layer has omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2. This is the even fit, for 1.3 <= q d
+# <= 8, to the lowest normal mode of an incompressible layer bonded to a rigid base. Its frequency is
+# within 3.0 % of the root of the mode's determinant. Its group speed is not: it is 0.36 c_T instead
+# of 0.93 at q d = 1.3, 0.53 for 0.38 at 2.2, and 0.82 for 0.93 at 8.
 STIFF = 6.527
 FAST = 0.7668
 
-# The mode's kinetic energy is that of MASS rho d moving as the surface does: 0.56 to 0.95 in that
-# range, the least at its short end; this is the geometric mean.
+# The kinetic energy of the mode is that of a mass MASS rho d that moves as the surface does. In the
+# range of the fit the factor is 0.56 to 0.95, the least for short waves; this is the geometric mean.
 MASS = 0.665
 
 # Shortest and longest wave, over the thickness, for which the fit holds.
 SHORTEST = 2 * np.pi / 8
 LONGEST = 2 * np.pi / 1.3
 
-# The same for q d >= 5, where group speeds are even as well: phase within 2.6 %, group within 3.5
-# %. The mass is the mean for 5 <= q d <= 16, where it falls from 0.68 to 0.31.
+# The fit for short waves, q d >= 5, where group speeds are even as well: the phase speed is within
+# 2.6 %, the group speed within 3.5 %.
 _SHORT_STIFF = 4.263
 _SHORT_FAST = 0.8781
+
+# The mean for 5 <= q d <= 16, where it falls from 0.68 to 0.31.
 _SHORT_MASS = 0.517
+
+# Longest wave, over the thickness, for which the fit for short waves holds.
 _SHORT_LONGEST = 2 * np.pi / 5
 
-_MOST = 8.0  # power with which tension may follow the area
-# at -1 a sheet would resist only what changes its shape, and its rigidity be infinite
+# Greatest power with which tension may follow the area, either way.
+_MOST_TIGHTENING = 8.0
+
+# Least Poisson's ratio. At -1 a sheet would resist only changes of its shape, and its rigidity would
+# be infinite.
 _LEAST_POISSON = -0.9
 
-# A wave of fewer texels is slower than it should be by more than a twentieth.
+# Texels of the shortest wave that is solved well: a shorter one is slower than it should be by more
+# than a twentieth.
 SHORTEST_TEXELS = 6.0
 
 
 class Default(float):
-    """A coefficient that nobody gave: it counts as the number that it is, until someone who knows better replaces it.
+    """The default of a coefficient that is not given.
 
-    `WaveSolver` takes it as it stands. `Ripples` knows the model, and puts in what suits its
-    target.
+    `WaveSolver` takes the number as it stands. `Ripples` knows the model, and replaces it by one
+    that suits its target.
     """
 
     __slots__ = ()
@@ -76,9 +84,9 @@ class Material:
     speed : c [m/s]
         Wave speed of tension. Where it is 0 nothing propagates: waves reflect as from a free rim,
         and a region without tension, bending and stiffness is rigid, so that sources do not move
-        it. Where it fades below 3 % of the greatest, with the other two, so does the share of a
-        source that moves the surface; what lies below takes the rest, and loads do not sink in for
-        ever.
+        it. Where all three fade, the speed below 3 % of the greatest, the share of a source that
+        moves the surface fades as well; the body below takes the rest, and loads do not sink in
+        forever.
     damping : zeta [1/s]
         The amplitude of every wave falls as exp(-zeta t / 2).
     stiffness : k [1/s^2]
@@ -132,10 +140,10 @@ class Material:
         for name in LIMITS:
             check_numbers(name, getattr(self, name))
         check_mask("fixed", self.fixed)
-        if not (is_finite(self.tightening) and -_MOST <= self.tightening <= _MOST):
+        if not (is_finite(self.tightening) and abs(self.tightening) <= _MOST_TIGHTENING):
             raise SolverError(
-                f"material tightening is {shown(self.tightening)}; valid is from {-_MOST:g} to "
-                f"{_MOST:g}"
+                f"material tightening is {shown(self.tightening)}; valid is from "
+                f"{-_MOST_TIGHTENING:g} to {_MOST_TIGHTENING:g}"
             )
         if not (is_finite(self.poisson) and _LEAST_POISSON <= self.poisson <= 0.5):
             raise SolverError(
@@ -170,7 +178,7 @@ class Material:
 
     @classmethod
     def membrane(cls, tension: float = 1.0, density: float = 1.0, damping: float = 0.0) -> Self:
-        """Stretched skin: omega = c q with c = sqrt(tension / density), the same for all wave lengths.
+        """Stretched skin: omega = c q with c = sqrt(tension / density), for waves of any length.
 
         Parameters
         ----------
@@ -190,10 +198,10 @@ class Material:
         thickness: float | ArrayLike = 0.05,
         short: bool = False,
     ) -> Self:
-        """Soft layer bonded to a rigid core: where it is thin it is stiff and soon still, where thick soft and slow.
+        """Soft layer bonded to a rigid core; a thin layer is stiff and soon still, a thick one soft.
 
-        The waves that normal impacts drive: the lowest normal mode of an incompressible
-        Kelvin-Voigt layer on a rigid base, whose modulus is G + eta d/dt. With c_T^2 = G / rho its
+        Normal impacts drive the lowest normal mode of an incompressible Kelvin-Voigt layer on a
+        rigid base, whose modulus is G + eta d/dt. With c_T^2 = G / rho its
         frequency is, within 3.0 % for 1.3 <= q d <= 8, omega^2 = 6.527 (c_T / d)^2 + 0.7668 c_T^2
         q^2, a fit to the zeros of the mode's determinant (Achenbach 1973, chapter 6, for the waves
         in a layer); waves shorter than 0.8 d or longer than 4.8 d are outside of it. A ring, which
@@ -228,18 +236,20 @@ class Material:
         depth = _thickness(thickness)
         square = modulus / density
         kinematic = viscosity / density
-        stiff, fast, mass = (
-            (_SHORT_STIFF, _SHORT_FAST, _SHORT_MASS) if short else (STIFF, FAST, MASS)
-        )
-        least, most = (0.0, _SHORT_LONGEST) if short else (SHORTEST, LONGEST)
+        if short:
+            stiff, fast, mass = _SHORT_STIFF, _SHORT_FAST, _SHORT_MASS
+            shortest, longest = 0.0, _SHORT_LONGEST
+        else:
+            stiff, fast, mass = STIFF, FAST, MASS
+            shortest, longest = SHORTEST, LONGEST
         return cls(
             speed=(fast * square) ** 0.5,
             stiffness=stiff * square / depth**2,
             viscosity=fast * kinematic,
             damping=stiff * kinematic / depth**2,
             density=mass * density * depth,
-            # those that the fit holds for somewhere: at the thinnest and at the thickest place
-            wavelengths=(least * float(np.min(depth)), most * float(np.max(depth))),
+            # waves for which the fit holds somewhere: at the thinnest or at the thickest place
+            wavelengths=(shortest * float(np.min(depth)), longest * float(np.max(depth))),
         )
 
     @classmethod
@@ -310,7 +320,8 @@ class Material:
         require_positive(
             modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3")
         )
-        plate = cls(speed=0.0, poisson=poisson, damping=damping)  # which looks at them
+        # checks Poisson's ratio, which the rigidity needs
+        plate = cls(speed=0.0, poisson=poisson, damping=damping)
         rigidity = modulus * thickness**3 / (12 * (1 - poisson**2))
         surface_density = density * thickness
         return dataclasses.replace(
@@ -362,16 +373,15 @@ class Material:
     ) -> Self:
         """Ripples that look right on an object of any size, from a marble to a building.
 
-        The time that waves take is what the eye sees, so speed and the like follow from times, and
-        the density from how hard the object is hit:
+        The eye sees how long waves take. So most coefficients follow from times, and the density
+        from how hard the object is hit:
 
         - speed c = size / crossing;
         - density: a short hit J on a footprint of radius r makes a dent of amplitude times size at
-          most, see
-          `density_for`: sigma = 0.385 J / (c r amplitude size);
+          most, see `density_for`: sigma = 0.385 J / (c r amplitude size);
         - stiffness k = (16 c / size)^2, so that a dent is narrow, and crest follows crest; more
-          where the body of the
-          hit would otherwise sink by more than half of that amplitude when it rests;
+          where the body of the hit would otherwise sink by more than half of that amplitude when it
+          rests;
         - damping zeta = 2 ln(10) / decay: waves fall to a tenth in that time;
         - viscosity nu = 0.001 c size: ripples shorter than a tenth of the size die on their way
           across it.
@@ -436,7 +446,8 @@ class Material:
         chosen = PRESETS[name]
         law = getattr(cls, chosen.law)
         valid = inspect.signature(law).parameters
-        if unknown := [key for key in parameters if key not in valid]:
+        unknown = [key for key in parameters if key not in valid]
+        if unknown:
             raise SolverError(
                 f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {', '.join(valid)}"
             )
@@ -444,12 +455,13 @@ class Material:
 
 
 def _thickness(value: Any) -> float | NDArray[np.float64]:
-    if np.ndim(value) == 0:  # a word, too
+    """The thickness of a layer [m], a number or an array, if it is greater than 0 everywhere."""
+    if np.ndim(value) == 0:  # so is that of a string
         require_positive(thickness=(value, "m"))
         return float(value)
     depth = np.asarray(value)
-    numbers = depth.size > 0 and np.issubdtype(depth.dtype, np.number)
-    wrong = ~(np.isfinite(depth) & (depth > 0)) if numbers else np.ones(1, np.bool_)
+    holds_numbers = depth.size > 0 and np.issubdtype(depth.dtype, np.number)
+    wrong = ~(np.isfinite(depth) & (depth > 0)) if holds_numbers else np.ones(1, np.bool_)
     if wrong.any():
         worst = depth.tolist() if depth.size == 0 else depth.flat[np.argmax(wrong)].item()
         raise SolverError(
@@ -459,7 +471,10 @@ def _thickness(value: Any) -> float | NDArray[np.float64]:
 
 
 def frequency(material: Material, wave_number: float) -> float:
-    """Angular frequency of a wave [1/s], 0 where it creeps back without swinging; of a wave number [1/m]."""
+    """Angular frequency [1/s] of a wave of a wave number [1/m].
+
+    0 where the wave creeps back without swinging.
+    """
     q2 = wave_number**2
     rate = 1 / decay_time(material, wave_number)
     square = _number(material, "speed") ** 2 * q2 + _number(material, "bending") * q2**2
@@ -481,28 +496,27 @@ def decay_time(material: Material, wave_number: float) -> float:
 
 
 def _number(material: Material, name: str) -> float:
+    """A coefficient of a uniform material."""
     return float(np.asarray(getattr(material, name)))
 
 
 def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
-    """Warn where no wave that fits on an atlas is one that the material's coefficients hold for."""
+    """Warn where the coefficients of a material hold for no wave that fits on an atlas."""
     shortest, longest = np.asarray(material.wavelengths, dtype=np.float64)
     areas = atlas.areas
-    texel = float(np.sqrt(np.mean(areas)))
-    whole = float(np.sqrt(np.pi * areas.sum()))
+    texel = float(np.sqrt(np.mean(areas)))  # width of a texel [m]
+    whole = float(np.sqrt(np.pi * areas.sum()))  # way round a sphere of the same area [m]
     finest = SHORTEST_TEXELS * texel
     if longest < finest:
         resolution = int(np.ceil(np.sqrt(areas.size / 6) * finest / longest))
         message = (
             f"the material holds for waves up to {longest:.3g} m, and texels of {texel:.2g} m "
-            f"carry none "
-            f"below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer"
+            f"carry none below {finest:.3g} m; take a resolution of {resolution}, or a thicker layer"
         )
     elif shortest > whole:
         message = (
             f"the material holds for waves from {shortest:.3g} m on, and the surface is "
-            f"{whole:.3g} m round; take a "
-            "thinner layer"
+            f"{whole:.3g} m round; take a thinner layer"
         )
     else:
         return

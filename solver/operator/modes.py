@@ -1,4 +1,4 @@
-"""How a surface rings: the modes of its wave operator, with their frequencies and how fast they die."""
+"""The modes of a surface: shapes in which it swings by itself, with frequencies and decay times."""
 
 from __future__ import annotations
 
@@ -20,20 +20,26 @@ from .material import SHORTEST_TEXELS, Material, warn_of_wavelengths
 from .plate_rim import Rim
 from .wave_operator import WaveOperator
 
-# Residual of a mode, as a share of it; squared frequencies that differ by a smaller share are the
-# same.
+# Residual of a mode, over its squared frequency. Squared frequencies that differ by a smaller share
+# count as one.
 _RESIDUAL = 1e-9
 
-# Squared frequencies below this share of the mean one of all that the texels have are round-off.
-_NOTHING = 1e-13
+# Squared frequencies below this share of the mean squared frequency of all texels are round-off.
+_ROUND_OFF = 1e-13
 
-# Of the damping counts so much as stiffness, over the mean of both, where modes of one frequency
-# are told apart.
-_PART = 1e-6
+# Share of the damping that is added to the stiffness, over the mean of both, so that modes of one
+# frequency are those that the damping does not mix.
+_DAMPING_SHARE = 1e-6
+
+# A mode counts as linear in the place if a linear function misses less than this share of it.
+_LINEAR = 0.1
+
+# Pull on a mode, over that of bending on a wave of its length, below which nothing pulls it back.
+_NO_PULL = 0.01
 
 
 class Modes(NamedTuple):
-    """Modes of a surface, in ascending order of what their frequencies are without damping; see `modes`.
+    """Modes of a surface, in ascending order of their frequencies without damping; see `modes`.
 
     Attributes
     ----------
@@ -42,7 +48,7 @@ class Modes(NamedTuple):
     shapes : float64 [count, C, n, n]
         Heights, 1 where they are largest.
     decay_times : float64 [count]
-        In which they fall to 1/e [s]; infinite without damping.
+        Time in which a mode falls to 1/e [s]; infinite without damping.
     """
 
     frequencies: Floats
@@ -56,21 +62,21 @@ class Modes(NamedTuple):
     material=instance(Material, ", for instance Material(speed=1.0)"),
 )
 def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free") -> Modes:
-    """Find the lowest modes of a surface: how it swings by itself under the operator that `WaveSolver` steps with.
+    """Find the lowest modes of a surface, under the operator with which `WaveSolver` steps.
 
-    Motions that nothing pulls back, as of a free membrane or plate on the whole, are left out. A
-    solver that conserves volume does not excite modes that change it. Heights are small: there are
-    no dents. Damping that varies over the surface counts to first order. Modes of one frequency, as
-    symmetric shapes and equal parts have them, are all there.
+    Motions that nothing pulls back are left out, such as those of a free membrane or plate as a
+    whole. A solver that conserves volume does not excite modes that change it. Heights are small:
+    there are no dents. Damping that varies over the surface counts to first order. All modes of one
+    frequency are found, of which symmetric shapes and equal parts have several.
 
     Parameters
     ----------
     atlas : Atlas
     material : Material
     count : int
-        How many.
+        Number of modes.
     rim : str
-        As of `WaveSolver`.
+        See `WaveSolver`.
 
     Raises
     ------
@@ -81,7 +87,7 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
     """
     warn_of_wavelengths(atlas, material)
     operator = build_operator(atlas, material, "fem", rim)
-    # not of the operator's stiffness, which links outweigh beside the rims of a plate
+    # not from the operator's stiffness, which links outweigh beside the rims of a plate
     matrix = elastic_matrix(operator)
     weight = operator.mass.ravel()
     least = float(np.min(material.stiffness))
@@ -91,12 +97,11 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
     if not (isinstance(count, numbers.Integral) and 1 <= count <= most):
         raise SolverError(
             f"count of modes is {shown(count)}; valid is a whole number from 1 to {most}: of "
-            f"{len(moving):,} texels "
-            f"that move, further modes have waves of fewer than {SHORTEST_TEXELS:g}; take a finer "
-            f"atlas for more"
+            f"{len(moving):,} texels that move, further modes have waves of fewer than "
+            f"{SHORTEST_TEXELS:g}; take a finer atlas for more"
         )
     if isinstance(operator, FluidOperator):
-        # where all is even, water has the modes of the Laplacian, which keep its volume
+        # on an even surface water has the modes of the Laplacian, which keep its volume
         uneven = np.ptp(material.speed) or np.ptp(operator.stiffness)
         if operator.topology.fixed_rim or not operator.free.all() or uneven:
             raise SolverError(
@@ -106,22 +111,23 @@ def modes(atlas: Atlas, material: Material, count: int = 20, *, rim: Rim = "free
         matrix = stiffness_matrix(operator.geometry)
         weight = operator.areas.ravel()
         least = 0.0
-    tilts = 0 if operator.bending is None else 2
+    tilts = 0 if operator.bending is None else 2  # of a flat plate, at most
     vectors = _lowest(matrix[moving][:, moving], weight[moving], least, int(count) + tilts)
     heights = np.zeros((vectors.shape[1], operator.mass.size))
     heights[:, moving] = vectors.T
     if tilts:
-        heights = heights[~_are_tilts(atlas, material, elastic, operator.mass.ravel(), heights)][
-            : int(count)
-        ]
+        is_tilt = _are_tilts(atlas, material, elastic, operator.mass.ravel(), heights)
+        heights = heights[~is_tilt][: int(count)]
     return _ringing(operator, elastic, heights)
 
 
 def elastic_matrix(operator: WaveOperator) -> csr_array:
-    """K + L B L + M k as a matrix [T, T] [kg/s^2], whose product with a height is minus `elastic_force`."""
-    matrix = stiffness_matrix(operator.stencil) + diags_array(
-        (operator.mass * operator.stiffness).ravel()
-    )
+    """K + L B L + M k as a matrix [T, T] [kg/s^2].
+
+    Its product with a height is minus the `elastic_force` of the operator.
+    """
+    springs = diags_array((operator.mass * operator.stiffness).ravel())
+    matrix = stiffness_matrix(operator.stencil) + springs
     if operator.bending is not None:
         matrix = matrix + operator.bending.stiffness
     return csr_array(matrix)
@@ -130,63 +136,70 @@ def elastic_matrix(operator: WaveOperator) -> csr_array:
 def _are_tilts(
     atlas: Atlas, material: Material, elastic: csr_array, mass: Floats, heights: Floats
 ) -> Bools:
-    """Which of some heights [m, T] move a flat plate as if it were rigid, [m]; see `elastic_matrix`.
+    """Which of some heights [m, T] move a flat plate as if it were rigid, [m].
 
-    They are linear in the place, and pulled back by no more than a hundredth of what bends waves of
-    their length: the operator is as good as blind to them, but for its errors at rims. Membranes,
-    and plates that are curved or held, do pull back what is linear.
+    Such heights are linear in the place. They are pulled back by no more than a hundredth of the
+    pull that bending has on waves of their length, from the operator's errors at rims. Membranes,
+    and plates that are curved or held, do pull back linear heights.
+
+    `elastic` is that of `elastic_matrix`.
     """
     areas = atlas.areas.ravel()
     linear = np.column_stack([np.ones(areas.size), atlas.positions.reshape(-1, 3)])
-    left = heights.T - linear @ np.linalg.lstsq(linear, heights.T)[0]
-    squares, numbers = (
-        np.einsum("mt,tm->m", heights, matrix @ heights.T) / (heights**2 @ weight)
-        for matrix, weight in ((elastic, mass), (atlas.stiffness(), areas))
-    )
-    is_linear = np.linalg.norm(left, axis=0) < 0.1 * np.linalg.norm(heights, axis=1)
+    misfit = heights.T - linear @ np.linalg.lstsq(linear, heights.T)[0]
+    is_linear = np.linalg.norm(misfit, axis=0) < _LINEAR * np.linalg.norm(heights, axis=1)
+    squared_frequencies = _quotients(heights, elastic, mass)
+    squared_wave_numbers = _quotients(heights, atlas.stiffness(), areas)
     bending = material.texels("bending", atlas.areas.shape).mean()
-    return is_linear & (squares < 0.01 * bending * numbers**2)
+    return is_linear & (squared_frequencies < _NO_PULL * bending * squared_wave_numbers**2)
+
+
+def _quotients(heights: Floats, matrix: csr_array, weight: Floats) -> Floats:
+    """Rayleigh quotients [m] of heights [m, T], with a matrix [T, T] over a weight [T]."""
+    energies: Floats = np.einsum("mt,tm->m", heights, matrix @ heights.T)
+    return energies / (heights**2 @ weight)
 
 
 def _lowest(stiffness: csr_array, mass: Floats, least: float, count: int) -> Floats:
-    """Vectors [k, count] of the lowest modes that are not rigid; no squared frequency is below `least`.
+    """Vectors [k, count] of the lowest modes that are not rigid.
 
-    Shift-invert Lanczos (Ericsson and Ruhe 1980) sees, but for round-off, one vector of each
-    frequency. So it runs again in the complement of all that were found, until nothing lower is
-    left there: no copy is missed.
+    No squared frequency is below `least` [1/s^2].
+
+    Shift-invert Lanczos (Ericsson and Ruhe 1980) finds, except for round-off, one vector of each
+    frequency. So it runs again in the complement of all vectors that are found, until nothing lower
+    remains there: no mode of several with one frequency is missed.
     """
     size = len(mass)
     light = diags_array(1 / np.sqrt(mass))
     matrix = csr_array(light @ stiffness @ light)
     mean = float(matrix.diagonal().mean())
-    # below the lowest mode: that is about mean / size of a membrane, mean / size^2 of a plate
+    # below the lowest mode, whose square is about mean / size for a membrane, mean / size^2 for a
+    # plate
     shift = least - max((mean - least) / size**2, _RESIDUAL * mean)
     solve = factorised(matrix - shift * diags_array(np.ones(size)))
     random = np.random.default_rng(0)
-    found = np.empty((size, 0))
+    basis = np.empty((size, 0))
     squares = np.empty(0)
-    asked = count + 2
+    wanted = count + 2
 
     def inverse(x: Floats) -> Floats:
         y = solve(x)
-        return y - found @ (found.T @ y)
+        return y - basis @ (basis.T @ y)
 
     lanczos = LinearOperator((size, size), inverse, dtype=np.float64)
     while True:
         start = random.standard_normal(size)
         values, new = eigsh(
-            matrix, min(asked, size - 1), sigma=shift, OPinv=lanczos, v0=start, tol=_RESIDUAL
+            matrix, min(wanted, size - 1), sigma=shift, OPinv=lanczos, v0=start, tol=_RESIDUAL
         )
-        rigid = int((squares < _NOTHING * mean).sum())
-        if (
-            len(squares) >= rigid + count
-            and values.min() >= (1 - _RESIDUAL) * squares[rigid + count - 1]
-        ):
-            return light @ found[:, rigid : rigid + count]
-        basis = qr(np.column_stack([found, new]), mode="economic")[0]
-        squares, mixed = eigh(basis.T @ (matrix @ basis))
-        found = basis @ mixed
-        asked = 2 + count // 4
+        rigid = int((squares < _ROUND_OFF * mean).sum())
+        has_enough = len(squares) >= rigid + count
+        if has_enough and values.min() >= (1 - _RESIDUAL) * squares[rigid + count - 1]:
+            return light @ basis[:, rigid : rigid + count]
+        joined = qr(np.column_stack([basis, new]), mode="economic")[0]
+        squares, mixed = eigh(joined.T @ (matrix @ joined))
+        basis = joined @ mixed
+        wanted = 2 + count // 4
 
 
 def _ringing(operator: WaveOperator, elastic: csr_array, heights: Floats) -> Modes:
@@ -203,18 +216,21 @@ def _ringing(operator: WaveOperator, elastic: csr_array, heights: Floats) -> Mod
     pull = heights @ (elastic @ heights.T)
     inertia = momenta @ heights.T
     loss = momenta @ drag.reshape(heights.shape).T
-    # of those of one frequency the ones that the damping does not mix
-    told_apart = pull + (_PART * np.trace(pull) / np.trace(loss) * loss if loss.any() else 0.0)
+    # of modes of one frequency those that the damping does not mix
+    damping = _DAMPING_SHARE * np.trace(pull) / np.trace(loss) * loss if loss.any() else 0.0
+    told_apart = pull + damping
     mixed = eigh((told_apart + told_apart.T) / 2, (inertia + inertia.T) / 2)[1]
-    squares, rates = (np.einsum("im,ij,jm->m", mixed, each, mixed) for each in (pull, loss))
+    squares: Floats = np.einsum("im,ij,jm->m", mixed, pull, mixed)
+    rates: Floats = np.einsum("im,ij,jm->m", mixed, loss, mixed)
     order = np.argsort(squares, kind="stable")
     squares = squares[order]
     half = np.maximum(rates[order], 0.0) / 2
     heights = (mixed.T @ heights)[order]
-    # the roots of s^2 + 2 half s + square: where both are real, the slower one is what is left
+    # the roots of s^2 + 2 half s + square: where both are real, the slower one remains
     creep = np.sqrt(np.maximum(half**2 - squares, 0.0))
     with np.errstate(divide="ignore"):
         decay_times = np.where(creep > 0, (half + creep) / squares, 1 / half)
     peaks = heights[np.arange(len(heights)), np.abs(heights).argmax(axis=1)]
     shapes = (heights / peaks[:, None]).reshape(shape)
-    return Modes(np.sqrt(np.maximum(squares - half**2, 0.0)) / (2 * np.pi), shapes, decay_times)
+    frequencies = np.sqrt(np.maximum(squares - half**2, 0.0)) / (2 * np.pi)
+    return Modes(frequencies, shapes, decay_times)

@@ -1,18 +1,20 @@
-"""The bending of a plate with rims, as a sum of squares: its energy is never negative, whatever its shape and rims.
+"""The bending of a plate with rims, as a sum of squares.
+
+Its energy is never negative, whatever its shape and rims.
 
 A plate's energy is D / 2 times the integral of (1 - nu) |H|^2 + nu (tr H)^2, with the rigidity D,
 Poisson's ratio nu and the second derivatives H of its height in the surface. Where neither the
-height nor its slope is held at a rim, that alone makes the rim's natural conditions: no moment, no
-shear force. In terms of three curvatures it is a sum of squares
+height nor its slope is held at a rim, this energy alone makes the rim's natural conditions: no
+moment, no shear force. In terms of three curvatures it is a sum of squares
 
     D / 2 (1 + nu) / 2 (H_uu + H_vv)^2 + D / 2 (1 - nu) / 2 ((H_uu - H_vv)^2 + (2 H_uv)^2)
 
-for any -1 < nu < 1. Each texel has its own three: those of a quadratic fitted to the heights around
-it. Inside, a fit takes the texels that share a cell with it, and leaves heights that are linear in
-space without any energy. Beside rims that are free or supported, and round softened texels, it
-takes two rings and the supports, and a stiffness against what it misses keeps the rest from moving
-freely. Beside a clamp the Laplacian of the membrane's elements takes its place, which knows that
-the slope is 0 there.
+for any -1 < nu < 1. Each texel has three curvatures of its own, of a quadratic that is fitted to
+the heights around it. Inside, a fit takes the texels that share a cell with its texel, and leaves
+heights that are linear in space without any energy. Beside rims that are free or supported, and
+round softened texels, a fit takes two rings of texels and the supports. A stiffness against the
+misfit keeps heights that the fit does not see from moving freely. Beside a clamp the Laplacian of
+the membrane's elements takes the place of a fit: it knows that the slope is 0 there.
 """
 
 from __future__ import annotations
@@ -30,34 +32,51 @@ from ..texels.topology import TRIANGLE
 from .curvatures import KINDS, STEPS, Curvatures, neighbours, regular_texels
 from .plate_rim import CLAMPED, FREE, RimPlaces
 
-# Weights of a fit inside: of a texel beside another one, and of one across a corner. Less for the
-# latter brings H_uu close to the difference of three texels in a row, which sees the pattern + - +
-# - of a chessboard.
-_BESIDE = np.exp(-1.0)
-_ACROSS = np.exp(-2.0)
+# Weight, in a fit inside, of a texel that shares two cells with the fit's own.
+_WEIGHT_BESIDE = np.exp(-1.0)
 
-# Weight with which second derivatives are 0; all of a fit's texels have about 0.5. It decides what
-# degenerate fits leave open.
+# Weight, in a fit inside, of a texel across a corner. A lesser one brings H_uu close to the
+# difference of three texels in a row, which sees the pattern + - + - of a chessboard.
+_WEIGHT_ACROSS = np.exp(-2.0)
+
+# Weight with which second derivatives are drawn to 0, inside and beside rims; all texels of a fit
+# together weigh about 0.5. It decides what degenerate fits leave open.
 _RIDGE_INSIDE = 0.003
 _RIDGE_OUTSIDE = 0.01
 
-# The same of slopes: texels in one line tell none across it.
+# Weight with which slopes are drawn to 0: texels in one line say nothing of the slope across it.
 _RIDGE_SLOPE = 1e-7
 
-_MISFIT = 8.0  # stiffness against what a fit misses, and against leaving a clamp, in D / A
-_HEAVY = 30.0  # weight of a support in a fit; a texel's is 1 at most
-_REACH = 1.5  # spacings up to which supports count
-_TINY = 1e-9
-_BLOCK = 2**14  # fits that are solved at once
+# Stiffness against the misfit of a fit, and against leaving a clamp, in units of D / A.
+_MISFIT_STIFFNESS = 8.0
 
-# Texels whose bending is faster than that of nearly all others, by this factor of Gershgorin's
-# bound, are softened: no more than this share of the surface.
-_FASTER = 1.2
+# Weight of a support in a fit; a texel weighs 1 at most.
+_SUPPORT_WEIGHT = 30.0
+
+# Spacings of texels up to which supports count in a fit.
+_SUPPORT_REACH = 1.5
+
+# Least length of a way in the tangent plane, in spacings, that is stretched to its length in space.
+_LEAST_WAY = 1e-9
+
+# Springs below this share of the diagonal of their row are round-off.
+_SPRING_ROUND_OFF = 1e-9
+
+# Fits that are solved at once, so that their arrays stay small.
+_BLOCK = 2**14
+
+# Share of the surface that sets the rate that softening leaves alone: only texels faster than
+# nearly all others are softened.
 _BULK = 0.95
 
-# A texel whose curvatures lose more than this by ridges or for the sake of the time step, and the
-# share of the surface that such texels may have before the solver warns.
+# Rate to which texels are softened, in units of Gershgorin's bound for the bulk of the surface.
+_FASTER = 1.2
+
+# Share of its curvatures that a texel may lose, to ridges or for the sake of the time step, before
+# its bending is not to be trusted.
 _LOSS = 0.25
+
+# Share of the surface that such texels may have before the solver warns.
 _UNTRUSTED = 0.05
 
 
@@ -67,15 +86,16 @@ class Fits(NamedTuple):
     Attributes
     ----------
     texels : int64 [o]
-        In the middle of each.
+        Texel in the middle of each fit.
     columns : int64 [o, w]
         Texel of each place; -1 for supports, whose height is 0, and where there is none.
     weights : float64 [o, w]
-        With which places count; 0 where there is none.
+        Weight of each place; 0 where there is none.
     ways : float64 [o, w, 2]
-        To the places in the tangent plane, as long as they are in space, in units of `spacings`.
+        Ways to the places in the tangent plane, as long as they are in space, in units of
+        `spacings`.
     spacings : float64 [o]
-        Root of the mean area of the texels [m].
+        Root of the mean area of the texels of each fit [m].
     """
 
     texels: Ints
@@ -85,14 +105,34 @@ class Fits(NamedTuple):
     spacings: Floats
 
 
+class FitPlaces(NamedTuple):
+    """Places of fits, k of them.
+
+    Attributes
+    ----------
+    owners : int64 [k]
+        Number of the fit to which each place belongs.
+    columns : int64 [k]
+        Texel of each place; -1 for supports.
+    points : float64 [k, 3]
+        [m].
+    weights : float64 [k]
+    """
+
+    owners: Ints
+    columns: Ints
+    points: Floats
+    weights: Floats
+
+
 class Rows(NamedTuple):
-    """Rows whose squares add up to energy.
+    """Rows of a matrix; the energy is half the sum of their squared products with a height.
 
     Attributes
     ----------
     matrix : csr [r, T]
     owners : int64 [r]
-        Texel to whose bending a row belongs; -1 for what may not be softened.
+        Texel to whose bending a row belongs; -1 for a row that may not be softened.
     """
 
     matrix: csr_array
@@ -100,7 +140,7 @@ class Rows(NamedTuple):
 
     @classmethod
     def together(cls, *parts: Rows) -> Rows:
-        """The rows of several, one below the other."""
+        """The rows of all parts, one below the other."""
         matrix = csr_array(vstack([part.matrix for part in parts]))
         return cls(matrix, np.concatenate([part.owners for part in parts]))
 
@@ -124,12 +164,12 @@ def plate_bending(
     texels : TexelMesh
     places : RimPlaces
     softening : float64 [C, n, n]
-        That of `laplace`.
+        Softening of `laplace`.
     rigidity : float64 [C, n, n]
         D [N m].
     poisson : float
     laplace : Stencil
-        The membrane's Laplacian, of free rims.
+        The membrane's Laplacian, with free rims.
 
     Returns
     -------
@@ -137,7 +177,7 @@ def plate_bending(
     links : IrregularLinks
         Bending beside rims, and round irregular vertices.
     springs : float64 [T]
-        Of the same, from each texel to where it is at rest [N/m].
+        Springs of the same bending, from each texel to its place at rest [N/m].
 
     Warns
     -----
@@ -175,7 +215,7 @@ def plate_bending(
 
 
 def shared_cells(texels: TexelMesh) -> csr_array:
-    """How many cells two texels share, [T, T]; those of a texel itself count."""
+    """Number of cells that two texels share, [T, T]; on the diagonal the cells of a texel, plus 1."""
     topology = texels.topology
     count = texels.topology.texel_count
     halo = np.where(topology.rim, -1, topology.halo)
@@ -183,15 +223,17 @@ def shared_cells(texels: TexelMesh) -> csr_array:
         [halo[:, :-1, :-1], halo[:, :-1, 1:], halo[:, 1:, 1:], halo[:, 1:, :-1]], axis=-1
     )
     corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
-    # a place of theirs shows nothing
+    # one of the four places of such a corner shows nothing
     triangles = quads[:, [0, 0, -1, -1], [0, -1, -1, 0]][chart, corner]
     kinds = [quads[(quads >= 0).all(axis=-1)], triangles[triangles >= 0].reshape(-1, 3)]
-    sizes = sorted({len(each) for each in topology.polygons})
-    kinds += [np.array([each for each in topology.polygons if len(each) == size]) for size in sizes]
+    for size in sorted({len(polygon) for polygon in topology.polygons}):
+        alike = [polygon for polygon in topology.polygons if len(polygon) == size]
+        kinds.append(np.array(alike))
     shared = csr_array((count, count))
     for corners in filter(len, kinds):
-        # those across a glued side come once from each chart
-        cells = corners[np.unique(np.sort(corners, axis=1), axis=0, return_index=True)[1]]
+        # a cell across a glued side comes once from each chart
+        first = np.unique(np.sort(corners, axis=1), axis=0, return_index=True)[1]
+        cells = corners[first]
         cell = np.repeat(np.arange(len(cells)), cells.shape[1])
         has = csr_array((np.ones(cells.size), (cell, cells.ravel())), shape=(len(cells), count))
         shared = shared + has.T @ has
@@ -199,7 +241,7 @@ def shared_cells(texels: TexelMesh) -> csr_array:
 
 
 def _outer_texels(places: RimPlaces, soft: Bools, near: csr_array) -> Bools:
-    """Texels beside rims that are not clamped, and those that are softened or beside such ones, [T]."""
+    """Texels beside rims that are not clamped, and softened texels with their neighbours, [T]."""
     clamped = places.conditions == CLAMPED
     outer = np.zeros(len(soft), bool)
     outer[places.texels[~clamped]] = True
@@ -210,16 +252,20 @@ def _outer_texels(places: RimPlaces, soft: Bools, near: csr_array) -> Bools:
 def _regular_weights(
     texels: TexelMesh, regular: Bools, stiff: Floats, poisson: float
 ) -> tuple[Floats, Floats]:
-    """Weights of `Curvatures`, and what ridges keep of them, [T]: 1 but at the regular texels."""
+    """Weights of `Curvatures`, and the share of them that ridges leave, [T].
+
+    The share is 1 except at the regular texels.
+    """
     n = texels.resolution
     count = texels.topology.texel_count
     around = neighbours(texels.topology).reshape(len(STEPS), count)
     middles = texels.positions.reshape(-1, 3)
-    ends = np.stack(
-        [texels.halo_positions[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c] for r, c in STEPS]
-    )
+    halo = texels.halo_positions
+    ends = np.stack([halo[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c] for r, c in STEPS])
     ends = ends.reshape(len(STEPS), count, 3)
-    importance = np.array([_BESIDE if r == 0 or c == 0 else _ACROSS for r, c in STEPS] + [1.0])
+    is_beside = [r == 0 or c == 0 for r, c in STEPS]
+    around_weights = np.where(is_beside, _WEIGHT_BESIDE, _WEIGHT_ACROSS)
+    importance = np.append(around_weights, 1.0)  # last the texel itself
     weights = np.zeros((KINDS, len(STEPS), count))
     kept = np.ones(count)
     at = np.flatnonzero(regular)
@@ -231,7 +277,8 @@ def _regular_weights(
         ways = np.concatenate([np.moveaxis(ends[:, block], 0, 1), middles[block][:, None]], axis=1)
         ways = (ways - middles[block][:, None]) / spacings[:, None, None]
         flat = _in_tangent_plane(texels.normals.reshape(-1, 3)[block][:, None], ways)
-        fits = Fits(block, columns, np.sqrt(areas) / spacings[:, None] * importance, flat, spacings)
+        fit_weights = np.sqrt(areas) / spacings[:, None] * importance
+        fits = Fits(block, columns, fit_weights, flat, spacings)
         curved, kept[block] = _curvature_weights(fits, stiff, poisson, _RIDGE_INSIDE)
         weights[:, :, block] = np.moveaxis(curved[:, :, :-1], 0, -1)
     return weights.reshape(KINDS, len(STEPS), *texels.shape), kept
@@ -241,11 +288,13 @@ def _neighbourhood_fits(texels: TexelMesh, at: Ints, near: csr_array) -> Fits:
     """Fits to the texels that share a cell with those at [o]."""
     beside = near[at].tocoo()
     itself = beside.col == at[beside.row]
-    importance = np.where(itself, 1.0, np.where(beside.data >= 2, _BESIDE, _ACROSS))
+    neighbour_weights = np.where(beside.data >= 2, _WEIGHT_BESIDE, _WEIGHT_ACROSS)
+    importance = np.where(itself, 1.0, neighbour_weights)
     spacings = _mean_spacings(near[at], texels)
     weights = np.sqrt(texels.areas.reshape(-1)[beside.col]) / spacings[beside.row] * importance
     ends = texels.positions.reshape(-1, 3)[beside.col]
-    return _fits(texels, at, spacings, (beside.row, beside.col, ends, weights))
+    places = FitPlaces(beside.row, beside.col, ends, weights)
+    return _fits(texels, at, spacings, places)
 
 
 def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -> Fits:
@@ -261,7 +310,7 @@ def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -
     owner, column = rings.nonzero()
     distance = np.linalg.norm(points[column] - points[at[owner]], axis=1) / spacings[owner]
     weights = np.sqrt(areas[column]) / spacings[owner] * np.exp(-(distance**2) / 2)
-    texels_around = owner, column, points[column], weights
+    texels_around = FitPlaces(owner, column, points[column], weights)
 
     held = np.flatnonzero(places.conditions != FREE)
     beside = csr_array(
@@ -269,8 +318,8 @@ def _rim_fits(texels: TexelMesh, at: Ints, near: csr_array, places: RimPlaces) -
     )
     owner, place = (rings @ beside).nonzero()
     distance = np.linalg.norm(places.points[place] - points[at[owner]], axis=1) / spacings[owner]
-    weights = np.where(distance <= _REACH, _HEAVY, 0.0)
-    supports = owner, np.full(len(owner), -1), places.points[place], weights
+    weights = np.where(distance <= _SUPPORT_REACH, _SUPPORT_WEIGHT, 0.0)
+    supports = FitPlaces(owner, np.full(len(owner), -1), places.points[place], weights)
     return _fits(texels, at, spacings, texels_around, supports)
 
 
@@ -280,19 +329,17 @@ def _mean_spacings(rings: csr_array, texels: TexelMesh) -> Floats:
     return np.sqrt((members @ texels.areas.reshape(-1)) / np.maximum(members.sum(axis=1), 1))
 
 
-def _fits(
-    texels: TexelMesh, at: Ints, spacings: Floats, *groups: tuple[Ints, Ints, Floats, Floats]
-) -> Fits:
-    """Fits round texels at [o], to groups of places: the fit of each, its texel, where it is [m], and its weight."""
-    owner, column, ends, weight = (np.concatenate(each) for each in zip(*groups, strict=True))
+def _fits(texels: TexelMesh, at: Ints, spacings: Floats, *groups: FitPlaces) -> Fits:
+    """Fits round texels at [o], to groups of places."""
+    owner = np.concatenate([places.owners for places in groups])
     order = np.argsort(owner, kind="stable")
     owner = owner[order]
-    column = column[order]
-    ends = ends[order]
-    weight = weight[order]
+    column = np.concatenate([places.columns for places in groups])[order]
+    ends = np.concatenate([places.points for places in groups])[order]
+    weight = np.concatenate([places.weights for places in groups])[order]
     ways = (ends - texels.positions.reshape(-1, 3)[at[owner]]) / spacings[owner, None]
     flat = _in_tangent_plane(texels.normals.reshape(-1, 3)[at[owner]], ways)
-    # as many places for each fit as the largest has
+    # each fit gets as many places as the largest one has
     slot = np.arange(len(owner)) - np.searchsorted(owner, np.arange(len(at)))[owner]
     shape = len(at), int(slot.max(initial=0)) + 1
     fits = Fits(at, np.full(shape, -1), np.zeros(shape), np.zeros((*shape, 2)), spacings)
@@ -303,17 +350,21 @@ def _fits(
 
 
 def _in_tangent_plane(normals: Floats, ways: Floats) -> Floats:
-    """Ways [..., 3] turned into the plane across normals [..., 3] without a change of length, [..., 2]."""
+    """Ways [..., 3] turned into the plane across normals [..., 3], as long as before, [..., 2]."""
     across = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=-1)])
     first = across / np.linalg.norm(across, axis=-1, keepdims=True)
     second = np.cross(normals, first)
     flat = np.stack([(ways * first).sum(axis=-1), (ways * second).sum(axis=-1)], axis=-1)
-    shortened = np.maximum(np.linalg.norm(flat, axis=-1), _TINY)
-    return flat * (np.linalg.norm(ways, axis=-1) / shortened)[..., None]
+    shortened = np.maximum(np.linalg.norm(flat, axis=-1), _LEAST_WAY)
+    stretch = np.linalg.norm(ways, axis=-1) / shortened
+    return flat * stretch[..., None]
 
 
 def _solved(fits: Fits, ridge: float) -> tuple[Floats, Floats]:
-    """Weighted quadratics at their places [o, w, 6], and from weighted heights to coefficients [o, 6, w]."""
+    """Weighted quadratics at their places [o, w, 6], and their least-squares inverses [o, 6, w].
+
+    An inverse takes weighted heights to the coefficients of a quadratic.
+    """
     u = fits.ways[..., 0]
     v = fits.ways[..., 1]
     terms = np.stack([np.ones_like(u), u, v, u * u / 2, u * v, v * v / 2], axis=-1)
@@ -327,9 +378,10 @@ def _solved(fits: Fits, ridge: float) -> tuple[Floats, Floats]:
 def _curvature_weights(
     fits: Fits, stiff: Floats, poisson: float, ridge: float
 ) -> tuple[Floats, Floats]:
-    """Weights of places in the three curvatures [o, 3, w], and the least share that ridges leave of one, [o].
+    """Weights of places in the three curvatures [o, 3, w], and the share that ridges leave, [o].
 
-    `stiff` [T] is D A, by texels [N m^3].
+    The share is the least one of the three second derivatives. `stiff` [T] is D A of each texel
+    [N m^3].
     """
     weighed, inverse = _solved(fits, ridge)
     second = inverse[:, 3:]
@@ -345,17 +397,18 @@ def _curvature_weights(
 
 
 def _bending_rows(fits: Fits, stiff: Floats, poisson: float, ridge: float) -> tuple[Rows, Floats]:
-    """The curvatures of fits as rows, and the least share that ridges leave of one, [o]."""
+    """The curvatures of fits as rows, and the share of them that ridges leave, [o]."""
     curved, kept = _curvature_weights(fits, stiff, poisson, ridge)
-    return Rows(_row_matrix(curved, fits.columns, len(stiff)), np.repeat(fits.texels, KINDS)), kept
+    matrix = _row_matrix(curved, fits.columns, len(stiff))
+    return Rows(matrix, np.repeat(fits.texels, KINDS)), kept
 
 
 def _misfit_rows(fits: Fits, rigidity: Floats) -> Rows:
-    """What fits miss of the heights, against which there is a stiffness: else some patterns had no energy."""
+    """The misfits of fits as rows: without a stiffness against them some patterns had no energy."""
     weighed, inverse = _solved(fits, _RIDGE_OUTSIDE)
     missed = np.eye(fits.weights.shape[1]) - weighed @ inverse
     total = np.linalg.norm(np.where(fits.columns >= 0, fits.weights, 0.0), axis=1)
-    stiffness = np.sqrt(_MISFIT * rigidity[fits.texels]) / (total * fits.spacings)
+    stiffness = np.sqrt(_MISFIT_STIFFNESS * rigidity[fits.texels]) / (total * fits.spacings)
     weights = missed * fits.weights[:, None] * stiffness[:, None, None]
     matrix = _row_matrix(weights, fits.columns, len(rigidity))
     return Rows(matrix, np.full(matrix.shape[0], -1))
@@ -372,25 +425,28 @@ def _row_matrix(weights: Floats, columns: Ints, count: int) -> csr_array:
 def _clamp_rows(
     texels: TexelMesh, places: RimPlaces, rigidity: Floats, laplacian: csr_array
 ) -> Rows:
-    """Beside a clamp: the Laplacian, and springs to the height that it makes, d^2 / 2 times the second derivative."""
+    """Rows beside a clamp: the Laplacian, and springs to the height that belongs to it.
+
+    At a distance d from a clamp this height is d^2 / 2 times the second derivative.
+    """
     areas = texels.areas.reshape(-1)
     clamped = places.conditions == CLAMPED
     held = places.texels[clamped]
     away = np.linalg.norm(places.points[clamped] - texels.positions.reshape(-1, 3)[held], axis=1)
     share = np.minimum(away**2 / (2 * areas[held]), 0.5)
     heights = eye_array(len(areas), format="csr")[held]
-    leaving = diags_array(np.sqrt(_MISFIT * rigidity / areas)[held]) @ (
-        heights - diags_array(share) @ laplacian[held]
-    )
+    spring_roots = diags_array(np.sqrt(_MISFIT_STIFFNESS * rigidity / areas)[held])
+    leaving = spring_roots @ (heights - diags_array(share) @ laplacian[held])
     once = np.unique(held)  # a texel in a corner lies beside two places
     bent = diags_array(np.sqrt(rigidity / areas)[once]) @ laplacian[once]
     return Rows(csr_array(vstack([leaving, bent])), np.concatenate([held, once]))
 
 
 def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> Floats:
-    """Factors up to 1 of each texel's bending, [T]: a few tiny texels must not set the time step for all.
+    """Factors up to 1 of the bending of each texel, [T].
 
-    They may be as fast as the fastest texel of L B L, or as nearly all of the surface is.
+    A few tiny texels must not set the time step for all. A texel may be as fast as the fastest one
+    of L B L, or as nearly all of the surface.
     """
     ones = np.ones(len(areas))
     size = abs(laplacian)
@@ -401,12 +457,12 @@ def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> F
     covered = np.cumsum(areas[order])
     bulk = rate[order[np.searchsorted(covered, _BULK * covered[-1])]]
     bound = _FASTER * max(closed, bulk)
+    slowing = bound / np.maximum(rate, bound)
     entry = pull.tocoo()
     owner = rows.owners[entry.row]
+    is_owned = owner >= 0
     factors = np.ones(len(areas))
-    np.minimum.at(
-        factors, owner[owner >= 0], (bound / np.maximum(rate, bound))[entry.col[owner >= 0]]
-    )
+    np.minimum.at(factors, owner[is_owned], slowing[entry.col[is_owned]])
     return factors
 
 
@@ -416,19 +472,16 @@ def _warn_of_softened(kept: Floats, areas: Floats) -> None:
     if share > _UNTRUSTED:
         warn_caller(
             f"the plate is softer than its material on {100 * share:.0f} % of its surface, where "
-            f"texels are too narrow "
-            f"to tell its curvature; frequencies may be too low: take a mesh of evener triangles, "
-            f"or a finer resolution"
+            "texels are too narrow to tell its curvature; frequencies may be too low: take a mesh "
+            "of evener triangles, or a finer resolution"
         )
 
 
 def _links_and_springs(matrix: csr_array) -> tuple[IrregularLinks, Floats]:
-    """A symmetric stiffness matrix as links between texels, and springs from each to where it is at rest."""
+    """A symmetric stiffness matrix as links between texels, and springs to their places at rest."""
     above = triu(matrix, 1).tocoo()
     springs = matrix @ np.ones(matrix.shape[0])
     diagonal = matrix.diagonal()
-    springs[np.abs(springs) <= _TINY * diagonal] = 0.0  # sums that are round-off are no springs
-    links = IrregularLinks.of(
-        np.stack([above.row, above.col], axis=1).astype(np.int64), -above.data
-    )
-    return links, springs
+    springs[np.abs(springs) <= _SPRING_ROUND_OFF * diagonal] = 0.0
+    ends = np.stack([above.row, above.col], axis=1).astype(np.int64)
+    return IrregularLinks.of(ends, -above.data), springs

@@ -1,4 +1,4 @@
-"""Rims of an open surface: what holds them, where they lie beside texels, and how they pull at a stretched surface."""
+"""Rims of an open surface: their conditions, their places beside texels, and their pull."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from ..errors import SolverError, shown
 from ..kernel import Floats, Ints
 from ..texels.texel_mesh import TexelMesh
 
-# Waves come back upright from a free rim, inverted from one that is held. "fixed": heights and, of
-# a plate, L h are 0.
+# Names of rims. Waves come back upright from a free rim, inverted from any other. At a "fixed" rim
+# heights are 0, and for a plate L h as well.
 RIMS = ("free", "supported", "clamped", "fixed")
 
+# Conditions of places on a rim.
 FREE = 1
 SUPPORTED = 2
 CLAMPED = 3
 
-# A name for all of the rim, or a function of its points [k, 3]: a name for each, or whether it is
-# clamped, else free.
+# A name for all of the rim, or a function of its points [k, 3] that gives a name for each point, or
+# whether the point is clamped rather than free.
 Rim: TypeAlias = str | Callable[[NDArray[np.float64]], ArrayLike]
 
-# Places next to a texel, beyond each side of a chart: slices of the halo, and of the texels along
-# it.
+# The four sides of a chart: the slice of the halo that lies beyond each side, and that of the texels
+# along the side.
 _SIDES = (
     (np.s_[:, 0, 1:-1], np.s_[:, 0]),
     (np.s_[:, 1:-1, -1], np.s_[:, :, -1]),
@@ -35,7 +36,9 @@ _SIDES = (
 
 
 def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
-    """What each place beyond a rim is, [C, n + 2, n + 2]: `FREE`, `SUPPORTED` or `CLAMPED`; 0 elsewhere.
+    """Condition of each place beyond a rim, [C, n + 2, n + 2]; 0 elsewhere.
+
+    The conditions are `FREE`, `SUPPORTED` and `CLAMPED`.
 
     Raises
     ------
@@ -55,26 +58,33 @@ def rim_conditions(texels: TexelMesh, rim: Rim) -> NDArray[np.int8]:
             f"rim {shown(rim)} is no name; {valid}, or a function of points [k, 3] that gives them"
         )
     points = texels.halo_positions[at]
-    points = np.where(
-        np.isfinite(points), points, texels.positions.reshape(-1, 3)[texels.topology.halo[at]]
-    )
-    found = np.asarray(rim(points))
-    if found.shape != (len(points),) or found.dtype.kind not in "bU":
+    shown_points = texels.positions.reshape(-1, 3)[texels.topology.halo[at]]
+    names = _rim_names(rim, np.where(np.isfinite(points), points, shown_points))
+    condition_of_point = np.zeros(len(names), np.int8)
+    for condition, name in enumerate(RIMS[:3], start=FREE):
+        condition_of_point[names == name] = condition
+    conditions[at] = condition_of_point
+    return conditions
+
+
+def _rim_names(rim: Callable[[Floats], ArrayLike], points: Floats) -> NDArray[np.str_]:
+    """Names in `RIMS` that a user's function gives for points of the rim [k, 3], [k]."""
+    names = np.asarray(rim(points))
+    if names.shape != (len(points),) or names.dtype.kind not in "bU":
         raise SolverError(
-            f"the function of the rim gives {found.dtype} of shape {found.shape} for {len(points)} "
-            f"points; valid are "
-            "a name or a bool for each: 'free', 'supported' or 'clamped', or whether it is clamped"
+            f"the function of the rim gives {names.dtype} of shape {names.shape} for {len(points)} "
+            "points; valid are a name or a bool for each: 'free', 'supported' or 'clamped', or "
+            "whether it is clamped"
         )
-    if found.dtype.kind == "b":
-        found = np.where(found, "clamped", "free")
-    wrong = found[~np.isin(found, RIMS[:3])]
+    if names.dtype.kind == "b":
+        names = np.where(names, "clamped", "free")
+    wrong = names[~np.isin(names, RIMS[:3])]
     if len(wrong):
         raise SolverError(
             f"the function of the rim gives {str(wrong[0])!r}; valid are 'free', 'supported', "
-            f"'clamped'"
+            "'clamped'"
         )
-    conditions[at] = sum((k + 1) * (found == name) for k, name in enumerate(RIMS[:3]))
-    return conditions
+    return names
 
 
 class RimPlaces(NamedTuple):
@@ -83,12 +93,12 @@ class RimPlaces(NamedTuple):
     Attributes
     ----------
     texels : int64 [k]
-        Flat index of the texel beside.
+        Flat index of the texel beside each place.
     conditions : int8 [k]
     points : float64 [k, 3]
         On the rim [m]; the texel's own centre where the surface ends in it.
     lengths : float64 [k]
-        Of the rim that belongs to the place [m].
+        Length of the rim that belongs to each place [m].
     """
 
     texels: Ints
@@ -101,7 +111,7 @@ def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
     """The places where texels lie beside a rim."""
     topology = texels.topology
     around = texels.halo_positions
-    found = []
+    sides = []
     for outside, inside in _SIDES:
         at = conditions[outside] > 0
         points = np.where(np.isfinite(around[outside]), around[outside], texels.positions[inside])
@@ -109,12 +119,21 @@ def rim_places(texels: TexelMesh, conditions: NDArray[np.int8]) -> RimPlaces:
         along = np.concatenate([points[:, :1], points, points[:, -1:]], axis=1)
         lengths = np.linalg.norm(along[:, 2:] - along[:, :-2], axis=-1)
         lengths[:, 1:-1] /= 2
-        found.append((topology.halo[outside][at], conditions[outside][at], points[at], lengths[at]))
-    return RimPlaces(*(np.concatenate(each) for each in zip(*found, strict=True)))
+        texels_beside = topology.halo[outside][at]
+        sides.append(RimPlaces(texels_beside, conditions[outside][at], points[at], lengths[at]))
+    return RimPlaces(
+        np.concatenate([side.texels for side in sides]),
+        np.concatenate([side.conditions for side in sides]),
+        np.concatenate([side.points for side in sides]),
+        np.concatenate([side.lengths for side in sides]),
+    )
 
 
 def tension_springs(places: RimPlaces, texels: TexelMesh, tension: Floats) -> Floats:
-    """Springs by which a stretched surface is tied to the rims that hold it [N/m], [T]; `tension` [N/m] is [T]."""
+    """Springs that tie a stretched surface to the rims that hold it [N/m], [T].
+
+    `tension` [T] is in [N/m].
+    """
     way = np.linalg.norm(places.points - texels.positions.reshape(-1, 3)[places.texels], axis=1)
     way[(places.conditions == FREE) | (way == 0)] = np.inf
     pull = tension[places.texels] * places.lengths / way

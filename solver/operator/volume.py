@@ -1,10 +1,10 @@
-"""What keeps a surface's volume: a pressure on the whole of it, as of an incompressible interior.
+"""Volume conservation: a uniform pressure, as from an incompressible interior.
 
-It balances sources, and the forces inside a surface of uneven density. Those along links conserve
-momentum, which is not the volume where the density varies: the sum of area times velocity. The
-pressure is the Lagrange multiplier of that sum. It is linear in height and velocity, and moves the
-surface along the operator's `response`: the accelerations are projected with masses as weights, so
-that the operator stays symmetric and energy is conserved.
+The pressure balances sources, and the forces inside a surface of uneven density. Forces along links
+conserve momentum. Where the density varies, that is not the rate of the volume, the sum of area
+times velocity. The pressure is the Lagrange multiplier of this sum. It is linear in height and
+velocity, and moves the surface along the operator's `response`: the accelerations are projected
+with masses as weights, so that the operator stays symmetric and energy is conserved.
 """
 
 from __future__ import annotations
@@ -18,12 +18,15 @@ from ..kernel import Bools, Floats, Floats32, Ints
 from .step import damped_step
 from .wave_operator import WaveOperator
 
-# What is smaller than this, against the greatest, is round-off.
-_NOTHING = 1e-12
+# Coefficients below this share of the greatest one are round-off.
+_ROUND_OFF = 1e-12
 
 
 def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
-    """Whether each part of the surface keeps its volume, [p]: all, none, or, for None, those that do by themselves."""
+    """Whether each part of the surface keeps its volume, [p].
+
+    All parts or none; for None, those that do by default, see `Mobility`.
+    """
     if conserve not in (None, True, False):
         raise SolverError(
             f"conserve_volume is {shown(conserve)}; it must be True, False or None, the default"
@@ -33,17 +36,17 @@ def kept_parts(operator: WaveOperator, conserve: bool | None) -> Bools:
 
 
 class VolumeBalance:
-    """Takes the mean out of sources, one for each part of the surface that floats freely; see `WaveOperator`.
+    """Takes the mean out of sources, in each part of the surface that floats freely.
 
-    A pressure moves each texel by one over its density. Taking that much of it out of a momentum
-    leaves the sum of area times velocity unchanged, and is the orthogonal projection with masses as
-    weights: it adds no energy.
+    A pressure moves each texel by one over its density. Taking that share of it out of a momentum
+    leaves the sum of area times velocity unchanged. It is the orthogonal projection with masses as
+    weights, and adds no energy.
 
     Parameters
     ----------
     operator : WaveOperator
     conserve : bool, optional
-        Of all parts or of none; see `kept_parts`.
+        Whether all parts keep their volume, or none; see `kept_parts`.
     """
 
     def __init__(self, operator: WaveOperator, conserve: bool | None = None) -> None:
@@ -61,7 +64,7 @@ class VolumeBalance:
         weighed = self._inverse_density[texels] * momenta
         if self._parts is None:
             return -float(weighed.sum()) / float(self._least) if self._least else 0.0
-        # of no texels, bincount makes integers
+        # bincount of no texels gives integers
         sums = np.bincount(self._parts[texels], weighed, len(self._least)).astype(np.float64)
         return np.divide(-sums, self._least, out=np.zeros_like(sums), where=self._least > 0)
 
@@ -77,22 +80,23 @@ class VolumeBalance:
         return field - self._operator.movable * self._ratio(areas * field, self._sum(areas))
 
     def _sum(self, field: Floats) -> Floats:
-        """Sum over the movable texels of each part, [p]; a number where there is one. 0 where no volume is kept."""
+        """Sum over the movable texels of each part, [p]; a number where there is one part.
+
+        0 where no volume is kept.
+        """
         movable = self._operator.movable
         if self._parts is None:
             return field[movable].sum() * self._kept[0]
-        return (
-            np.bincount(self._parts, (field * movable).reshape(-1)).astype(np.float64) * self._kept
-        )
+        sums = np.bincount(self._parts, (field * movable).reshape(-1))
+        return sums.astype(np.float64) * self._kept
 
     def _ratio(self, field: Floats, total: Floats) -> Floats | float:
-        """Sum of a field over each part, over a total of that part: at every texel, [C, n, n]."""
+        """Sum of a field over each part, over a total of the part, at every texel [C, n, n]."""
         if self._parts is None:
             return float(field.sum()) / float(total) if total else 0.0
         sums = np.bincount(self._parts, field.reshape(-1))
-        return np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)[
-            self._parts
-        ].reshape(field.shape)
+        ratios = np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)
+        return ratios[self._parts].reshape(field.shape)
 
 
 # begins, texels, heights, velocities; see `volume_rate`
@@ -102,10 +106,10 @@ VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]
 def volume_rate(
     operator: WaveOperator, dt: float, conserve: bool | None = None
 ) -> VolumeRate | None:
-    """What keeps the volume over a substep of dt [s]; None where nothing changes it, or it is not kept anyway.
+    """The pressure that keeps the volume over a substep of dt [s], as weights of heights and velocities.
 
-    It is not where a clamp holds a part of the surface, or the stiffness varies: those take up
-    momentum themselves.
+    None where nothing changes the volume, or no part keeps it. A part does not keep it where a
+    clamp holds some of it, or its stiffness varies: clamps and springs take up momentum themselves.
 
     Returns
     -------
@@ -124,34 +128,47 @@ def volume_rate(
     kept = kept_parts(operator, conserve).copy()
     for part in np.flatnonzero(kept):
         own = parts == part
-        movable = own & operator.movable
-        kept[part] = (
-            movable.any()
-            and not operator.anchored[own].any()
-            and not np.ptp(operator.stiffness[movable])
-        )
+        kept[part] = _floats_freely(operator, own)
     decay, span = damped_step(operator, dt)
     weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)
-    scale = np.where(kept & (inertia > 0), -1 / np.where(inertia > 0, inertia, 1), 0)[parts]
+    inverse_inertia = -1 / np.where(inertia > 0, inertia, 1)
+    scale = np.where(kept & (inertia > 0), inverse_inertia, 0)[parts]
     moved = span * operator.inverse_density
-    # without what an even surface has as well: its mean is damped, and swings on its spring
+    # less the part that an even surface has as well: its mean is damped, and swings on its spring
     heights = operator.link_force(moved) - weight * operator.stiffness * (span - _mean(span))
     velocities = weight * (decay - _mean(decay))
     if operator.viscosity_stencil is not None:
         velocities = velocities + operator.viscosity_stencil(moved)
-    heights, velocities = ((scale * each).reshape(-1) for each in (heights, velocities))
-    for each in (heights, velocities):
-        each[np.abs(each) <= _NOTHING * np.abs(each).max(initial=0.0)] = 0.0
+    heights = _without_round_off((scale * heights).reshape(-1))
+    velocities = _without_round_off((scale * velocities).reshape(-1))
     texels = np.flatnonzero((heights != 0) | (velocities != 0))
     texels = texels[np.argsort(parts.reshape(-1)[texels], kind="stable")]
     begins = np.searchsorted(parts.reshape(-1)[texels], np.arange(count + 1))
     if not len(texels):
         return None
-    counting = velocities[texels] if velocities.any() else velocities[:0]
-    return begins, texels, heights[texels].astype(np.float32), counting.astype(np.float32)
+    heights = heights[texels]
+    velocities = velocities[texels] if velocities.any() else velocities[:0]
+    return begins, texels, heights.astype(np.float32), velocities.astype(np.float32)
+
+
+def _floats_freely(operator: WaveOperator, own: Bools) -> bool:
+    """Whether no clamp holds a part of the surface, and its springs are alike; `own` [C, n, n]."""
+    movable = own & operator.movable
+    if not movable.any():
+        return False
+    is_anchored = operator.anchored[own].any()
+    has_uneven_springs = np.ptp(operator.stiffness[movable]) > 0
+    return not is_anchored and not has_uneven_springs
+
+
+def _without_round_off(coefficients: Floats) -> Floats:
+    """The coefficients, changed in place: 0 where they are small against the greatest one."""
+    sizes = np.abs(coefficients)
+    coefficients[sizes <= _ROUND_OFF * sizes.max(initial=0.0)] = 0.0
+    return coefficients
 
 
 def _mean(field: Floats) -> float:
-    """Mean of a field; of a uniform one its value, to the last bit."""
+    """Mean of a field; for a uniform field its value, to the last bit."""
     return float(field.flat[0]) if not np.ptp(field) else float(field.mean())
