@@ -27,7 +27,7 @@ _HIGHEST = 1e12
 
 
 def check_numbers(name: str, value: ArrayLike) -> None:
-    """Raise `SolverError` unless a coefficient is one number or one a texel, within its `LIMITS`."""
+    """Raise `SolverError` unless a coefficient is a number or one a texel, within `LIMITS`."""
     unit, must_be_positive, may_be_infinite = LIMITS[name]
     numbers = _numbers(name, value)
     least = 1 / _HIGHEST if must_be_positive else 0

@@ -145,7 +145,7 @@ class FluidOperator(WaveOperator):
         return HalfLaplacian(self.geometry, self.areas)
 
     def acceleration(self, momentum: Floats) -> Floats:
-        """Acceleration by forces [N], in [m/s^2], or velocity by momenta [N s], in [m/s], [C, n, n]."""
+        """Acceleration [m/s^2] by forces [N], or velocity [m/s] by momenta [N s], [C, n, n]."""
         without_fluid = np.where(self.free, momentum / self.mass, 0.0)
         return np.where(self.free, self.root(without_fluid) / self.deep, 0.0)
 

@@ -198,7 +198,7 @@ class Material:
         thickness: float | ArrayLike = 0.05,
         short: bool = False,
     ) -> Self:
-        """Soft layer bonded to a rigid core; a thin layer is stiff and soon still, a thick one soft.
+        """Soft layer bonded to a rigid core: a thin layer is stiff and soon still.
 
         Normal impacts drive the lowest normal mode of an incompressible Kelvin-Voigt layer on a
         rigid base, whose modulus is G + eta d/dt. With c_T^2 = G / rho its

@@ -1,4 +1,4 @@
-"""Regions of an atlas that are held still, or absorb waves, by coefficients of the material there."""
+"""Regions of an atlas that are held still or absorb waves, by the material's coefficients there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The discrete wave operator: stencil weights, masses, and the largest time step that they allow."""
+"""The discrete wave operator: stencil weights, masses, and the largest time step they allow."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ class WaveOperator:
 
     @property
     def parts(self) -> Ints32 | None:
-        """Number of the part to which each texel belongs, [C, n, n]; None where there is only one."""
+        """Number of the part to which each texel belongs, [C, n, n]; None for a single part."""
         return self.mobility.parts
 
     @property
@@ -153,11 +153,11 @@ class WaveOperator:
         return self.mass * velocity
 
     def elastic_force(self, height: Floats) -> Floats:
-        """-(K + L B L + M k) h [N], float64 [C, n, n], without the forces that hold clamped texels."""
+        """-(K + L B L + M k) h [N], float64 [C, n, n], without forces that hold clamped texels."""
         return self.link_force(height) - self.mass * self.stiffness * height
 
     def link_force(self, height: Floats) -> Floats:
-        """-(K + L B L) h [N], float64 [C, n, n]: forces between neighbours, by tension and bending."""
+        """-(K + L B L) h [N], float64 [C, n, n]: tension and bending between neighbours."""
         force = self.stencil(height)
         if self.bending is not None:
             force += self.bending.force(height)

@@ -23,25 +23,41 @@ from scipy.sparse import csr_array
 from ..kernel import Bools, Floats, Ints
 from .topology import TexelTopology
 
-# Row and column of the two ends of every link from the place where it is stored, and the slices of
-# a field with halo that hold them.
+# Row and column of the two ends of every link, counted from the place where the link is stored.
 _ENDS = (((0, 0), (0, 1)), ((0, 0), (1, 0)), ((0, 0), (1, 1)), ((0, 1), (1, 0)))
-_EVERY = slice(None)
-_PARTS = (slice(None, -1), slice(1, None))
-LINK_ENDS = [[(_EVERY, _PARTS[row], _PARTS[column]) for row, column in ends] for ends in _ENDS]
 
-# Largest eigenvalue of an even grid's stencil times its spacing squared: that of the chessboard
-# pattern.
+# Slices of rows or columns with halo, at all places where a link is stored: the end of a link there,
+# and the end one further on.
+_ALL = slice(None)
+_HERE = slice(None, -1)
+_NEXT = slice(1, None)
+
+# The same of both ends of each of the four links, as indices of a field [C, n + 2, n + 2].
+LINK_ENDS = [
+    [(_ALL, _HERE, _HERE), (_ALL, _HERE, _NEXT)],
+    [(_ALL, _HERE, _HERE), (_ALL, _NEXT, _HERE)],
+    [(_ALL, _HERE, _HERE), (_ALL, _NEXT, _NEXT)],
+    [(_ALL, _HERE, _NEXT), (_ALL, _NEXT, _HERE)],
+]
+
+# Largest eigenvalue of the stencil of an even grid, times the spacing squared: the chessboard
+# pattern has it.
 EVEN_RATE = 6.4
 
-# On smaller charts Gershgorin's bound is as good.
+# Least texels along a chart's side for which Lanczos iteration is better than Gershgorin's bound.
 _LANCZOS_FROM = 6
 
-# Residual of the eigenvalue, as a share of it; Lanczos steps from one look at it to the next, and
-# at most.
+# Residual of the largest eigenvalue, as a share of it.
 _RESIDUAL = 2e-3
-_LOOK = 5
-_MOST = 1000
+
+# Share by which the estimate is raised, so that it is an upper bound.
+_MARGIN = 1.005
+
+# Lanczos steps between two looks at the eigenvalue.
+_STEPS_TO_LOOK = 5
+
+# Lanczos steps at most; then Gershgorin's bound stands.
+_MOST_STEPS = 1000
 
 
 class IrregularLinks(NamedTuple):
@@ -63,6 +79,11 @@ class IrregularLinks(NamedTuple):
     others: Ints
     weights: Floats
 
+    @property
+    def starts(self) -> Ints:
+        """The texel from which each link starts, [m]."""
+        return np.repeat(self.texels, np.diff(self.begins))
+
     @classmethod
     def of(cls, ends: Ints, weights: Floats) -> IrregularLinks:
         """Sort links [k, 2] with weights [k]."""
@@ -74,17 +95,14 @@ class IrregularLinks(NamedTuple):
 
     @classmethod
     def joined(cls, first: IrregularLinks, second: IrregularLinks) -> IrregularLinks:
-        """Those of both."""
+        """The links of both."""
         if not len(second.texels):
             return first
-        ends = np.concatenate(
-            [np.repeat(each.texels, np.diff(each.begins)) for each in (first, second)]
-        )
+        ends = np.concatenate([first.starts, second.starts])
         order = np.argsort(ends, kind="stable")
         texels, begins = np.unique(ends[order], return_index=True)
-        others, weights = (
-            np.concatenate(each)[order] for each in zip(first[2:], second[2:], strict=True)
-        )
+        others = np.concatenate([first.others, second.others])[order]
+        weights = np.concatenate([first.weights, second.weights])[order]
         return cls(texels, np.append(begins, len(ends)), others, weights)
 
 
@@ -95,10 +113,8 @@ NO_LINKS = IrregularLinks(
 
 def link_lengths(topology: TexelTopology, halo_positions: Floats) -> Floats:
     """Real-space length of every link [m], [C, 4, n + 1, n + 1]; infinite where no link exists."""
-    lengths = np.stack(
-        [np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1) for a, b in LINK_ENDS],
-        axis=1,
-    )
+    ways = [halo_positions[a] - halo_positions[b] for a, b in LINK_ENDS]
+    lengths = np.stack([np.linalg.norm(way, axis=-1) for way in ways], axis=1)
     lengths.reshape(-1)[missing_links(topology)] = np.inf
     crossing_links(topology).level(lengths)
     return lengths
@@ -113,7 +129,10 @@ def link_exists(topology: TexelTopology, link: int) -> Bools:
 
 @functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
 def rim_ties(topology: TexelTopology) -> tuple[Ints, Ints]:
-    """Flat texels [k] that links tie to a fixed rim, and the flat places [k] of these among a stencil's weights."""
+    """Texels that links tie to a fixed rim, and the places of these links among a stencil's weights.
+
+    Both are flat, [k].
+    """
     own = topology.own
     rim = topology.rim & topology.fixed_rim
     tied = np.stack([(own[a] & rim[b]) | (rim[a] & own[b]) for a, b in LINK_ENDS], axis=1)
@@ -129,10 +148,10 @@ class CrossingLinks(NamedTuple):
     Attributes
     ----------
     keys : int64 [k]
-        Of the two texels that each joins, ascending: the lesser one times the number of texels,
-        plus the other.
+        Key of each link, ascending: the lesser one of its two texels times the number of texels,
+        plus the other one.
     copies : int64 [m]
-        Flat places of the copies among a stencil's weights, those of each link together.
+        Flat places of the copies among a stencil's weights, link by link.
     begins : int64 [k + 1]
         Where the copies of each link begin.
     size : int
@@ -145,7 +164,10 @@ class CrossingLinks(NamedTuple):
     size: int
 
     def between(self, pairs: Ints) -> tuple[Ints, Ints]:
-        """Copies of the links between pairs of texels [m, 2]: the pair, and the flat place; some pairs have none."""
+        """Copies of the links between pairs of texels [m, 2]: the pair, and the flat place of each.
+
+        A pair without a link across a side has no copies.
+        """
         wanted = pairs.min(axis=1) * self.size + pairs.max(axis=1)
         link = np.searchsorted(self.keys, wanted)
         pair = np.flatnonzero(np.append(self.keys, -1)[link] == wanted)
@@ -167,10 +189,8 @@ def crossing_links(topology: TexelTopology) -> CrossingLinks:
     """The links across glued sides of a topology."""
     own = topology.own
     size = topology.texel_count
-    each = [
-        link_exists(topology, link) & (own[a] != own[b]) for link, (a, b) in enumerate(LINK_ENDS)
-    ]
-    crossing = np.stack(each, axis=1)
+    crosses = [own[a] != own[b] for a, b in LINK_ENDS]
+    crossing = np.stack([link_exists(topology, k) & crosses[k] for k in range(4)], axis=1)
     chart, link, row, column = np.nonzero(crossing)
     down, right = np.array(_ENDS)[link].T
     first, second = topology.halo[chart, row + down, column + right]
@@ -182,7 +202,7 @@ def crossing_links(topology: TexelTopology) -> CrossingLinks:
 
 @functools.lru_cache(maxsize=4)
 def missing_links(topology: TexelTopology) -> Ints:
-    """Flat places, among a stencil's weights, of what is no link."""
+    """Flat places, among a stencil's weights, that hold no link."""
     missing = ~np.stack([link_exists(topology, link) for link in range(4)], axis=1)
     missing.reshape(-1)[rim_ties(topology)[1]] = False
     return np.flatnonzero(missing)
@@ -196,24 +216,24 @@ def largest_eigenvalue(
     *,
     loose: bool = False,
 ) -> float:
-    """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
+    """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force.
 
-    Plain Lanczos, without a basis that is kept orthogonal: lost orthogonality repeats eigenvalues
-    and makes no new ones (Paige 1972), and the sums are numpy's own, since BLAS' threads wait for
-    each other where others use the cores.
+    By plain Lanczos iteration, without a basis that is kept orthogonal: lost orthogonality repeats
+    eigenvalues and makes no new ones (Paige 1972). Sums are NumPy's own: the threads of BLAS wait
+    for each other where other processes use the cores.
 
     Parameters
     ----------
     force : callable
-        Linear, from a field [C, n, n] to one.
+        Linear, from a field [C, n, n] to a field.
     mass : float64 [C, n, n]
     free : bool [C, n, n]
-        The other texels do not move.
+        Texels that move.
     bound : float
-        One that is always safe, such as Gershgorin's, caps the estimate, and stands where none is
-        found.
+        A safe upper bound, such as Gershgorin's. It caps the estimate, and stands where the
+        iteration finds none.
     loose : bool
-        Whether the bound is far too high even on small charts, as that of a sum of squares.
+        Whether the bound is far too high even on small charts, as it is for a sum of squares.
     """
     if not free.any():
         return 0.0
@@ -225,18 +245,18 @@ def largest_eigenvalue(
     vector = start / np.sqrt((start * start).sum())
     diagonal: list[float] = []
     side: list[float] = []
-    for step in range(1, _MOST + 1):
+    for step in range(1, _MOST_STEPS + 1):
         pull = -(force(vector.reshape(weight.shape) * weight) * weight).ravel()
         rest = pull - (side[-1] if side else 0.0) * before
         diagonal.append(float((vector * rest).sum()))
         rest -= diagonal[-1] * vector
         length = float(np.sqrt((rest * rest).sum()))
-        if step % _LOOK == 0 or length == 0.0:
+        if step % _STEPS_TO_LOOK == 0 or length == 0.0:
             top, vectors = eigh_tridiagonal(
                 diagonal, side, select="i", select_range=(step - 1, step - 1)
             )
             if length * abs(vectors[-1, 0]) <= _RESIDUAL * abs(top[0]):
-                return float(np.clip(1.005 * top[0], 0, bound))
+                return float(np.clip(_MARGIN * top[0], 0, bound))
         side.append(length)
         before = vector
         vector = rest / length
@@ -245,13 +265,15 @@ def largest_eigenvalue(
 
 @dataclasses.dataclass(eq=False)
 class Stencil:
-    """Link weights w of a symmetric operator: the sum over links of w (h_j - h_i) is its value at texel i.
+    """Link weights w of a symmetric operator.
+
+    The value of the operator at texel i is the sum of w (h_j - h_i) over the links of the texel.
 
     Attributes
     ----------
     topology : TexelTopology
     weights : float64 [C, 4, n + 1, n + 1]
-        Of the nine-point stencil, see the module.
+        Weights of the nine-point stencil, see the module.
     irregular : IrregularLinks
         The links beyond the nine points.
     """
@@ -276,9 +298,10 @@ class Stencil:
         return result
 
     def absolute_sums(self) -> Floats:
-        """Sum of |w| over the links that meet in each texel, half of |w| for those to a fixed rim, [C, n, n].
+        """Sum of |w| over the links that meet in each texel, [C, n, n].
 
-        Twice that is Gershgorin's bound: the other end of a link to a rim does not move.
+        Links to a fixed rim count half. Twice the sum is Gershgorin's bound: the other end of a
+        link to a rim does not move.
         """
         sums = np.zeros(self.topology.shape)
         for link, start, _ in self._links():
@@ -295,28 +318,42 @@ class Stencil:
         return float((self.absolute_sums() * 2 / mass).max())
 
     def _links(self) -> Iterator[tuple[int, tuple[slice, ...], tuple[slice, ...]]]:
-        """Of the eight links of every texel, the direction, the places where it starts, and its other ends."""
+        """The eight links of every texel: number, places where they are stored, and other ends.
+
+        The number is the link's among the four of a place; the places are among those of the
+        weights, the other ends among those of a field with halo.
+        """
         n = self.topology.shape[1]
         for link, ends in enumerate(_ENDS):
             for (r, c), (row, column) in (ends, ends[::-1]):
-                places = ((1 - r, 1 - c), (1 - r + row, 1 - c + column))
-                start, end = ((_EVERY, slice(i, n + i), slice(j, n + j)) for i, j in places)
-                yield link, start, end
+                first_row = 1 - r
+                first_column = 1 - c
+                stored = (
+                    _ALL,
+                    slice(first_row, n + first_row),
+                    slice(first_column, n + first_column),
+                )
+                end_row = first_row + row
+                end_column = first_column + column
+                end = (_ALL, slice(end_row, n + end_row), slice(end_column, n + end_column))
+                yield link, stored, end
 
 
 def stiffness_matrix(stencil: Stencil) -> csr_array:
     """A stencil as a matrix [T, T] whose product with a field is minus the stencil's value."""
     topology = stencil.topology
-    found = []
+    rows = []
+    columns = []
+    weights = []
     for link, (a, b) in enumerate(LINK_ENDS):
         for end, other in ((a, b), (b, a)):
             own = link_exists(topology, link) & topology.own[end]
-            found.append(
-                (topology.halo[end][own], topology.halo[other][own], stencil.weights[:, link][own])
-            )
-    links = stencil.irregular
-    found.append((np.repeat(links.texels, np.diff(links.begins)), links.others, links.weights))
-    row, column, weight = (np.concatenate(each) for each in zip(*found, strict=True))
+            rows.append(topology.halo[end][own])
+            columns.append(topology.halo[other][own])
+            weights.append(stencil.weights[:, link][own])
+    row = np.concatenate([*rows, stencil.irregular.starts])
+    column = np.concatenate([*columns, stencil.irregular.others])
+    weight = np.concatenate([*weights, stencil.irregular.weights])
     size = topology.texel_count
     diagonal = np.bincount(row, weight, size)
     if topology.fixed_rim:
