@@ -1,6 +1,6 @@
 """The renderer: a MuJoCo model and its rippled targets, drawn headless into frames.
 
-The passes of one frame in their order: shadow maps, floor map, reflection, G-buffer, shading,
+The passes of one frame in their order: shadow maps, floor map, G-buffer, reflection, shading,
 transparent layers.
 """
 
@@ -37,22 +37,46 @@ from .resources import Resources
 from .shown_scene import ShownScene
 from .surface_image import SurfaceBuffers, SurfaceImage
 
-_TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
-_SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow
-_MOST_GEOMS = 10_000  # of a scene, as of mujoco.Renderer
-# Memory for a pixel and for each of its samples, at least [bytes].
-_PIXEL = 8
-_SAMPLE = 20
+# Edge of a texel of the transmission maps [texels of the shadow maps].
+_TRANSMISSION_TEXEL = 4
+
+# Objects farther than this from the focus cast no shadow [distances of the focus].
+_MAX_CASTER_DISTANCE = 2.5
+
+# Greatest number of geoms of a scene, as in `mujoco.Renderer`.
+_MAX_GEOMS = 10_000
+
+# Least memory for a pixel, and for each of its samples [bytes].
+_BYTES_PER_PIXEL = 8
+_BYTES_PER_SAMPLE = 20
 
 
 class _Passes(NamedTuple):
-    """The passes of a frame that depend on what there is; those that nothing needs are None."""
+    """The passes that depend on the contents of the frame; passes that nothing needs are None."""
 
     occlusion: FloorOcclusion
     shading: DeferredShading
     transmission: TransmissionMaps | None
     layers: TransparentLayers | None
     mirror: Mirror | None
+
+
+def _check_screen_colors(targets: Mapping[int, Surface]) -> None:
+    """Raise `RippleError` if a target shows a heatmap or a grid, which linear frames cannot."""
+    for surface in targets.values():
+        if surface.heatmap_colors is not None or surface.grid:
+            raise RippleError(
+                "heatmaps and grids have the screen's colours, which linear light lacks: take "
+                "linear=False"
+            )
+
+
+def _require_memory_for_frames(size: tuple[int, int], samples: int) -> None:
+    """Raise `RippleError` if the machine's memory is too small for frames of a size."""
+    width, height = size
+    bytes_per_pixel = _BYTES_PER_PIXEL + _BYTES_PER_SAMPLE * max(samples, 1)
+    purpose = f"drawing frames of {width}x{height} pixels"
+    require_memory(RippleError, width * height * bytes_per_pixel, purpose, "take smaller frames")
 
 
 class Renderer:
@@ -65,9 +89,10 @@ class Renderer:
     targets : mapping
         Geom id to the surface that is drawn in place of the geom.
     size : (width, height)
-        Of a frame [pixels].
+        Size of a frame [pixels].
     samples : int
-        Samples a pixel for smooth edges; at most as many as the driver has. 0 or 1: none.
+        Samples a pixel for smooth edges; at most as many as the driver has. With 0 or 1 edges are
+        not smoothed.
     lighting : str
         "model": the lights and the skybox of the MJCF; "studio": a photo studio in their place;
         "auto": the studio where the MJCF has no light.
@@ -82,9 +107,9 @@ class Renderer:
     Raises
     ------
     RippleError
-        If the driver cannot make frames of this size, or memory holds none, a look or the lighting
-        is unknown, or linear frames are to show a heatmap or a grid, whose colours are the
-        screen's.
+        If the driver cannot make frames of this size, memory is too small for a frame, a look or
+        the lighting is unknown, or linear frames are to show a heatmap or a grid, whose colours are
+        the screen's.
     """
 
     def __init__(
@@ -100,65 +125,57 @@ class Renderer:
         alpha: bool = False,
         linear: bool = False,
     ) -> None:
-        if linear and any(
-            surface.heatmap_colors is not None or surface.grid for surface in targets.values()
-        ):
-            raise RippleError(
-                "heatmaps and grids have the screen's colours, which linear light lacks: take "
-                "linear=False"
-            )
+        if linear:
+            _check_screen_colors(targets)
+        if gl.software:  # frames are in the machine's memory
+            _require_memory_for_frames(size, samples)
         self._gl = gl
         self._model = model
         self._size = size
-        self._resources = resources = Resources(gl, self)
-        self._format = frame_format = FrameFormat(size, samples, alpha, linear)
-        # which takes the machine's memory; a GPU says itself that it has too little
-        if gl.software:
-            width, height = size
-            need = width * height * (_PIXEL + _SAMPLE * max(samples, 1))
-            require_memory(
-                RippleError,
-                need,
-                f"drawing frames of {width}x{height} pixels",
-                "take smaller frames",
-            )
+        self._format = FrameFormat(size, samples, alpha, linear)
+        self._resources = Resources(gl, self)
         with gl:
-            self._assets = assets = Assets(model, resources)
+            self._assets = Assets(model, self._resources)
             self._backdrop = backdrop or in_studio(model, lighting)
-            self._light = SceneLight(assets, lighting, backdrop)
+            self._light = SceneLight(self._assets, lighting, backdrop)
             plane = find_floor(model, targets)
-            self._floor = None if plane is None else Floor(assets, plane)
-            self._scene = DrawnScene(assets, targets, size)
+            self._floor = None if plane is None else Floor(self._assets, plane)
+            self._scene = DrawnScene(self._assets, targets, size)
             self._shown = ShownScene(model, targets, plane, cut_out=alpha)
-            self._own_scene = mujoco.MjvScene(model, _MOST_GEOMS)
-            self._told: set[str] = set()
-            self._frame = FrameUniforms(resources)
-            self._shadow_maps: dict[int, ShadowMaps] = {}
-            self._made_passes: dict[tuple[int, ...], _Passes] = {}
+            # the scene that is drawn unless `render` is given one
+            self._own_scene = mujoco.MjvScene(model, _MAX_GEOMS)
+            self._warned_of: set[str] = set()
+            self._frame = FrameUniforms(self._resources)
+            self._shadow_maps_by_count: dict[int, ShadowMaps] = {}
+            self._passes_by_kind: dict[tuple[int, ...], _Passes] = {}
             self._choose_passes()
             self._buffers: SurfaceBuffers | None = None
-        self._readback = Readback(resources, frame_format)
+        self._readback = Readback(self._resources, self._format)
 
     def _choose_passes(self) -> None:
-        """Take the passes for what is drawn; those that were made before are kept."""
+        """Choose the passes for the contents of the frame; passes are made once and kept."""
         floor = self._floor
-        transparent = bool(self._scene.transparent)
         options = self._light.options
-        floor_kind = floor is not None and floor.tiled, floor is not None and floor.reflects
-        kind = transparent, *floor_kind, *options.values()
-        if options["SHADOWS"] not in self._shadow_maps:
-            self._shadow_maps[options["SHADOWS"]] = ShadowMaps(
-                self._resources, options["SHADOWS"], self._size[1]
-            )
-        self._shadows = self._shadow_maps[options["SHADOWS"]]
-        if kind not in self._made_passes:
-            self._made_passes[kind] = self._make_passes(transparent)
-        self._occlusion, self._shading, self._transmission, self._layers, self._mirror = (
-            self._made_passes[kind]
-        )
+        shadow_count = options["SHADOWS"]
+        if shadow_count not in self._shadow_maps_by_count:
+            maps = ShadowMaps(self._resources, shadow_count, self._size[1])
+            self._shadow_maps_by_count[shadow_count] = maps
+        self._shadows = self._shadow_maps_by_count[shadow_count]
+        has_transparent = bool(self._scene.transparent)
+        is_tiled = floor is not None and floor.tiled
+        is_mirror = floor is not None and floor.reflects
+        kind = (has_transparent, is_tiled, is_mirror, *options.values())
+        if kind not in self._passes_by_kind:
+            self._passes_by_kind[kind] = self._make_passes(has_transparent)
+        passes = self._passes_by_kind[kind]
+        self._occlusion = passes.occlusion
+        self._shading = passes.shading
+        self._transmission = passes.transmission
+        self._layers = passes.layers
+        self._mirror = passes.mirror
 
     def _make_passes(self, transparent: bool) -> _Passes:
-        """Make the passes for what is drawn, with something transparent or without."""
+        """Make the passes for the contents of the frame, with transparent objects or without."""
         resources = self._resources
         floor = self._floor
         options = {**self._light.options, "TRANSMISSION": int(transparent)}
@@ -178,11 +195,22 @@ class Renderer:
     def _show(
         self, data: Any, scene: mujoco.MjvScene | None, pose: Pose, segmented: bool = False
     ) -> Any:
-        """Draw what a scene of MuJoCo's has, by default all that it shows of the data, with surfaces for the targets.
+        """Choose the contents of the frame: those of a scene, with surfaces for the targets.
 
-        Surfaces of targets that MuJoCo shows by default are drawn only if the scene has the target.
-        What is `segmented` has a `segid`. Planes are seen from the `pose`. What is not drawn is
-        told once. Return where geoms and sites are, as the scene has them.
+        Parameters
+        ----------
+        scene : mujoco.MjvScene, optional
+            By default the scene that MuJoCo makes of the data. A target that MuJoCo shows by
+            default is drawn only if the scene contains it.
+        pose : Pose
+            Pose of the camera. Planes look different from behind.
+        segmented : bool
+            Whether entries without a `segid` are left out.
+
+        Returns
+        -------
+        mujoco.MjData, or an object with its names
+            Poses of geoms and sites, as the scene has them.
         """
         shown = self._shown
         edited = scene is not None
@@ -199,14 +227,15 @@ class Renderer:
                 self._floor.shown = shown.floor is not None
                 if shown.floor is not None:
                     self._floor.paint(shown.floor)
-            self._warn_of(shown.left_out)
+            self._warn_of_left_out(shown.left_out)
         self._choose_passes()
         return shown.poses(data) if edited else data
 
-    def _warn_of(self, left_out: set[str]) -> None:
-        """Say what is not drawn as the scene has it, once each."""
-        if new := left_out - self._told:
-            self._told |= new
+    def _warn_of_left_out(self, left_out: set[str]) -> None:
+        """Warn once of each thing that is not drawn as the scene has it."""
+        new = left_out - self._warned_of
+        if new:
+            self._warned_of |= new
             warn_caller(f"not drawn: {', '.join(sorted(new))}; all else of the scene is")
 
     def __enter__(self) -> Renderer:
@@ -220,23 +249,26 @@ class Renderer:
         self._resources.release()
 
     def watch(self) -> None:
-        """See what a program writes into the model's textures, height fields and meshes from now on."""
+        """Check from now on whether a program changes the model's textures or shapes.
+
+        The shapes are its height fields and meshes.
+        """
         self._assets.watch()
 
     def upload(self, kind: str, index: int) -> None:
-        """Take a "texture", "hfield" or "mesh" of the model, by its id, as it is now."""
+        """Read a "texture", "hfield" or "mesh" of the model again, by its id."""
         with self._gl:
             self._assets.upload(kind, index)
 
     def set_heatmap(self, geom: int, values: NDArray[np.float32], limit: float) -> None:
-        """Set the field that a target with `heatmap_colors` shows from now on.
+        """Set the field that a target with `heatmap_colors` shows.
 
         Parameters
         ----------
         geom : int
             Geom id of the target.
         values : float32 [C, n + 2, n + 2]
-            With a halo, as a height map has it.
+            Values with a halo of one texel, as in a height map.
         limit : float
             The colours range from -limit to limit.
 
@@ -265,23 +297,24 @@ class Renderer:
             Poses of the geoms, after `mj_forward` or `mj_step`.
         height_maps : mapping
             Geom id to height map, shape [C, n + 2, n + 2, 4]: gradient of the height (xyz, in the
-            geom's frame) and height [m] (w), each face with a halo of one texel. A target without
-            one is flat. One that `HeightMap` made of a field on the GPU is written there.
+            geom's frame) and height [m] (w), each chart with a halo of one texel. A target without
+            a height map is flat. A height map that `HeightMap` made of a field on the GPU stays on
+            the GPU.
         camera : Camera, FixedCamera or ThroughLens
         exposure : int
-            Number of this exposure among those whose mean is a frame: each has another noise in its
-            shadows.
+            Number of this exposure, where a frame is the mean of several: each exposure has another
+            noise in its shadows.
         scene : mujoco.MjvScene, optional
-            What is drawn beside the targets, and which of them; by default what MuJoCo shows of the
+            The objects that are drawn, and which targets; by default those that MuJoCo shows of the
             data.
         lights : sequence of mujoco.MjvLight, optional
-            Those of the scene, where they are to replace the model's.
+            Lights of the scene, if they replace the model's.
 
         Returns
         -------
         array, shape [height, width, 3], or [height, width, 4] with alpha
-            Top row first; a new array for every frame. uint8 in sRGB, alpha straight; or, of linear
-            light, float16, with ITU-R BT.709's primaries, multiplied by alpha.
+            Top row first; a new array for every frame. sRGB frames are uint8, not multiplied by
+            alpha. Linear frames are float16, with ITU-R BT.709's primaries, multiplied by alpha.
         """
         try:
             self.submit(data, height_maps, camera, exposure, scene, lights)
@@ -299,7 +332,10 @@ class Renderer:
         scene: mujoco.MjvScene | None = None,
         lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> None:
-        """Draw one frame as `render` does without waiting for it; `fetch` returns frames in the order of submission."""
+        """Start drawing one frame as `render` does, without waiting for it.
+
+        `fetch` returns frames in the order of submission.
+        """
         with self._gl:
             self._readback.submit(self.draw(data, height_maps, camera, exposure, scene, lights))
 
@@ -322,7 +358,7 @@ class Renderer:
         -------
         moderngl.Framebuffer
             RGBA8 in sRGB, or RGBA16F of linear light; bottom row first, multiplied by alpha. The
-            next frame is drawn over it.
+            next frame overwrites it.
         """
         drawn = self._scene
         pose = camera.pose()
@@ -335,42 +371,62 @@ class Renderer:
             self._gl.flush()
             flags = RenderFlags.of(scene)
             self._update(data, poses, pose, exposure, flags, lights)
-            # what shading looks up; a software driver stops for each texture that it is still
-            # drawing to
-            ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            ctx.depth_func = "<="
-            self._shadows.draw(drawn.cast)
-            self._gl.flush()
-            self._occlusion.look_up(ctx, drawn.cast)
-            self._gl.flush()
-            self._shadows.find_blockers(ctx)
-            self._gl.flush()
-            if self._transmission is not None:
-                self._transmission.draw(self._shadows.views, drawn.cast)
-                self._transmission.bind()
-                self._gl.flush()
-            self._occlusion.shade(ctx, self._shadows)
-            self._gl.flush()
+            self._draw_maps(ctx)
             shading.begin(ctx)
             drawn.draw()
             balls = drawn.balls(poses)
             boxes = boxes_of(balls, pose, self._size)
-            # which would draw all this in the next call, holding the interpreter's lock
+            # a software driver draws in the next call otherwise, and holds the interpreter's lock
             if self._gl.software:
                 self._gl.wait()
             self._occlusion.average()
-            if self._mirror is not None and not flags.reflection and not self._backdrop:
-                self._mirror.hide()
-            elif self._mirror is not None and self._floor is not None and self._floor.shown:
-                self._mirror.draw(ctx, self._frame, pose, balls, drawn.draw, self._bind)
+            self._draw_mirror(ctx, pose, balls, flags)
             self._bind()
             shading.shade(ctx, boxes)
-            if self._layers is not None:
-                for bounds, layer in drawn.layers(poses, pose):
-                    self._layers.add(
-                        ctx, layer.numbers[0], layer.draw, boxes_of(bounds, pose, self._size)
-                    )
+            self._draw_layers(ctx, poses, pose)
         return shading.frame
+
+    def _draw_maps(self, ctx: moderngl.Context) -> None:
+        """Draw the maps that shading looks up: of shadows, transmission and the floor.
+
+        A software driver stops at each texture that it is still drawing to, so the maps are
+        flushed one by one.
+        """
+        cast = self._scene.cast
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.depth_func = "<="
+        self._shadows.draw(cast)
+        self._gl.flush()
+        self._occlusion.look_up(ctx, cast)
+        self._gl.flush()
+        self._shadows.find_blockers(ctx)
+        self._gl.flush()
+        if self._transmission is not None:
+            self._transmission.draw(self._shadows.views, cast)
+            self._transmission.bind()
+            self._gl.flush()
+        self._occlusion.shade(ctx, self._shadows)
+        self._gl.flush()
+
+    def _draw_mirror(
+        self, ctx: moderngl.Context, pose: Pose, balls: NDArray[np.float64], flags: RenderFlags
+    ) -> None:
+        """Draw the reflection in the floor, unless the scene's flags hide it."""
+        mirror = self._mirror
+        if mirror is None:
+            return
+        if not flags.reflection and not self._backdrop:
+            mirror.hide()
+        elif self._floor is not None and self._floor.shown:
+            mirror.draw(ctx, self._frame, pose, balls, self._scene.draw, self._bind)
+
+    def _draw_layers(self, ctx: moderngl.Context, poses: Any, pose: Pose) -> None:
+        """Draw the transparent objects over the frame, one after another."""
+        if self._layers is None:
+            return
+        for balls, layer in self._scene.layers(poses, pose):
+            boxes = boxes_of(balls, pose, self._size)
+            self._layers.add(ctx, layer.numbers[0], layer.draw, boxes)
 
     def surfaces(
         self,
@@ -381,12 +437,12 @@ class Renderer:
         scene: mujoco.MjvScene | None = None,
         segmented: bool = False,
     ) -> SurfaceImage:
-        """Draw what is seen at the middle of each pixel, without light: distances, normals, geoms.
+        """Draw distances, normals and geoms at the middle of each pixel, without light.
 
-        Transparent objects count as solid. Arguments are as for `render`; `size` (width, height)
-        may be another than that of the frames, of the same shape. Of a `scene` there are MuJoCo's
-        shapes: boxes and cylinders without round edges; if `segmented`, only what MuJoCo would
-        segment.
+        Transparent objects count as solid. Arguments are as for `render`. `size` (width, height)
+        may differ from the frames' size, but not its proportions. Objects of a `scene` have MuJoCo's
+        shapes: boxes and cylinders without round edges. If `segmented`, only objects that MuJoCo
+        would segment are drawn.
         """
         drawn = self._scene
         pose = camera.pose()
@@ -399,13 +455,12 @@ class Renderer:
             self._update(data, poses, pose, 0, RenderFlags())
             drawn.height_maps.bind()
 
-            def draw() -> None:
-                for each in (*drawn.opaque, *drawn.transparent):
-                    each.draw()
+            def draw_objects() -> None:
+                for drawable in (*drawn.opaque, *drawn.transparent):
+                    drawable.draw()
 
-            return self._buffers.draw(
-                ctx, draw, self._assets.objects, -1 if self._floor is None else self._floor.geom
-            )
+            floor_geom = -1 if self._floor is None else self._floor.geom
+            return self._buffers.draw(ctx, draw_objects, self._assets.objects, floor_geom)
 
     def _update(
         self,
@@ -416,13 +471,12 @@ class Renderer:
         flags: RenderFlags,
         lights: Sequence[mujoco.MjvLight] | None = None,
     ) -> None:
-        """Bring the frame's uniforms up to date; `poses` are those of geoms and sites."""
+        """Bring the frame's uniforms up to date; `poses` has the poses of geoms and sites."""
         frame = self._frame
         floor = self._floor
         frame.set_camera(pose, self._format.aspect, self._scene.balls(poses))
-        casters = within(
-            self._scene.casters(poses, pose.distance), pose.focus, _SHADOW_REACH * pose.distance
-        )
+        casters = self._scene.casters(poses, pose.distance)
+        casters = within(casters, pose.focus, _MAX_CASTER_DISTANCE * pose.distance)
         centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
         if floor is not None:
             floor.place(frame, poses, centre, radius)
@@ -433,7 +487,7 @@ class Renderer:
         else:
             shining = self._light.set(frame, data, pose, lights=lights, flags=flags)
         if lights is not None and self._light.studio:
-            self._warn_of({"lights of the scene, which the studio replaces"})
+            self._warn_of_left_out({"lights of the scene, which the studio replaces"})
         casting = self._shadows.fit(frame, shining, centre, radius)
         if floor is not None and len(casters):
             floor.shade(frame, casting, casters)
@@ -441,7 +495,7 @@ class Renderer:
         frame.bind()
 
     def _bind(self) -> None:
-        """Bind what shading needs."""
+        """Bind the maps and textures that shading looks up."""
         self._scene.height_maps.bind()
         self._shadows.bind()
         if self._transmission is not None:
