@@ -13,7 +13,7 @@ from ripple_sim.export import MovingMesh
 WIDTH = 160
 HEIGHT = 120
 MJCF = """<mujoco><option timestep="0.002" gravity="0 0 -3"/><worldbody>
-<geom name="floor" type="plane" size="3 3 .1" pos="0 0 -0.5"/>
+<geom name="floor" type="plane" size="9 9 .1" pos="0 0 -0.5"/>
 <body name="egg" pos="-0.4 0 0"><joint type="hinge" axis="0 0 1"/>
   <geom name="egg" type="ellipsoid" size="0.35 0.3 0.25" mass="1"/></body>
 <body name="ball" pos="0.6 0.1 0.4"><freejoint/><geom name="ball" size="0.25"/></body>

@@ -21,7 +21,7 @@ from ripple_sim.render import tone_mapped
 pytest.importorskip("pxr")
 
 MODEL = """<mujoco><worldbody><light pos="1 0 2" dir="-1 0 -2" diffuse="1 1 1"/>
-<geom type="plane" name="ground" size="1 1 .1" rgba="1 1 1 1"/>
+<geom type="plane" name="ground" size="9 9 .1" rgba="1 1 1 1"/>
 <geom name="egg" size="0.2" pos="0 0 0.2"/><body pos="0 0 0.6"><freejoint/><geom size="0.05"/></body>
 </worldbody></mujoco>"""
 
