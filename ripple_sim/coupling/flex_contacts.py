@@ -103,8 +103,9 @@ class FlexContacts:
         Returns
         -------
         kept : bool [k]
+            Which contacts share in the force of their pair.
         points, forces, normals
-            Of those that are kept; see `Contacts`.
+            Of the contacts that are kept; see `Contacts`.
         """
         contact = data.contact
         counts = np.diff(np.append(starts, len(contacts)))

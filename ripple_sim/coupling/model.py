@@ -112,31 +112,32 @@ def _vertex_spacing(mesh: Mesh) -> float:
 class CoupledModel:
     """The geoms of a MuJoCo model as the coupling sees them.
 
-    A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are
-    the geom's. It may collide through its convex parts, which then touch as that geom. Of any other
-    flex each vertex is a collider. Collider ids are those of the geoms, and after them one for each
-    vertex, each flex and each skin; there are c of them. A flex or a skin that ripples touches as a
-    whole, with the last ones, see `find_soft`. A target may have collision geoms, whose contacts
-    load it; see `find_collision_geoms`.
+    A mesh geom may collide through a flex, its flex collider; the flex's contact settings are then
+    the geom's. It may collide through its convex parts, which then touch as the geom. Of any other
+    flex each vertex is a collider. A target may have collision geoms, whose contacts load it; see
+    `find_collision_geoms`.
+
+    There are c collider ids. First come the ids of the geoms, then one id for each vertex of a
+    flex, then one for each flex and each skin. A flex or a skin that ripples touches as a whole,
+    under its own id, which is also its target id; see `find_soft`.
 
     Parameters
     ----------
     model : mujoco.MjModel
     targets : iterable of int
-        Geom ids, and of soft targets.
+        Target ids: of geoms, flexes and skins.
     named : mapping, optional
-        Of some targets' ids to those of their collision geoms.
+        Target id to the ids of the collision geoms that the user names.
 
     Attributes
     ----------
     model : mujoco.MjModel
     names : list of str
-        Of all geoms, see `geom_name`, and then of all flexes and skins.
+        Of all geoms, see `geom_name`, then of all flexes and skins.
     owners : int64 [c]
-        What a collider is part of, by its place among the names: a geom itself, or the flex of a
-        vertex.
+        Index among the names of the geom, flex or skin that a collider is, or is a vertex of.
     bodies : int64 [c]
-        The body of each collider, -1 for vertices between several.
+        The body of each collider; -1 for vertices between several bodies.
     flex_colliders : dict of int to int
         Geom id to the id of its flex collider.
     convex_colliders : dict of int to list of int
@@ -144,23 +145,24 @@ class CoupledModel:
     has_flex : bool [c]
         Whether a geom collides through a flex.
     extents : float64 [c]
-        Smallest half-extents [m]; infinite for planes and height fields, the spacing of a flex's
-        vertices for them.
+        Smallest half-extents [m]. They are infinite for planes and height fields; for a vertex of
+        a flex, the mean length of the flex's edges.
     collider_extents : float64 [ngeom]
-        Of the geoms alone, with the thickness of its flex where a geom has one [m].
+        Smallest half-extents of the geoms [m]; of a geom with a flex collider, the flex's
+        thickness.
     solref : float64 [ngeom, 2]
-        Of what collides, the geom or its flex.
+        Contact setting of the geom or of its flex, whichever collides.
     footprint_radii : float64 [c]
         Footprint radius of a contact with each collider [m]; of a pair the smaller one counts.
     convex : bool [c]
-        Whether what touches at two points touches between them too.
+        Whether a collider that touches at two points touches between them too.
     soft : dict of int to SoftSurface
-        The soft targets.
+        The flexes and skins among the targets, by target id.
     of_geom : int64 [ngeom]
-        Collider id of each geom: its own, or of what it collides for.
+        Id of the geom, flex or skin that a geom collides for, or its own.
     of_flex : int64 [nflex + 1]
-        Geom that a flex collides for, or itself where it is a target; -1 for none, and after the
-        last flex.
+        Id of the geom that a flex collides for, or the flex's target id if it is a target; -1 for
+        other flexes, and after the last flex.
     """
 
     def __init__(
@@ -215,7 +217,7 @@ class CoupledModel:
         self._assign_colliders()
 
     def _take_settings(self) -> None:
-        """Take the masks and settings of what collides: a geom, its flex, or its convex colliders."""
+        """Take masks and settings of each geom from its flex or its convex colliders."""
         model = self.model
         contype = model.geom_contype.copy()
         conaffinity = model.geom_conaffinity.copy()

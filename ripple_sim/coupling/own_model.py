@@ -90,9 +90,9 @@ def own_model(model: Any) -> mujoco.MjModel:
 def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco.MjData:
     """MuJoCo's data itself, also of dm_control's wrapper.
 
-    Its model is `model`, whatever was changed there since, or a copy in which bodies move and
-    collide alike. Where it is only `drawn`, they need not: shapes and places have to do. Raises
-    `SceneError` if it is something else, or belongs to another model.
+    Its model is `model`, even if that was changed since, or a copy in which bodies move and
+    collide alike. For data that is only `drawn`, equal shapes and places are enough. Raises
+    `SceneError` if `data` is something else, or belongs to another model.
     """
     found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
     if not isinstance(found, mujoco.MjData):

@@ -66,15 +66,15 @@ class Ripples:
         Or dm_control's wrapper of one; likewise the data of each step.
     materials : mapping
         Geom to its `Material`, or to a `Target`, which also says how the waves of this geom are
-        solved. A geom is given by its name, an unnamed one by "body/index" (index among the geoms
-        of its body), or by its id. Geoms of type mesh, sdf, hfield, sphere, ellipsoid, capsule,
+        solved. A geom is given by its name, by "body/index" (its index among the geoms of its
+        body), or by its id. Geoms of type mesh, sdf, hfield, sphere, ellipsoid, capsule,
         cylinder and box can ripple, and flexes and skins, by their names. MuJoCo collides a mesh
         geom as its convex hull. A geom of type="sdf" collides as the true surface, and so does a
         mesh geom with a rigid flex of the same name on the same body, which collides in its place;
-        see `make_collidable`. Impulses are exact with every integrator but RK4. Of a material
-        without a density, this and the speed, damping and stiffness that it does not give are
-        chosen by the model, see `suited_material`; they stand in `ripples[geom].material`, and
-        forces of bodies too heavy for it are eased, see `Easing`.
+        see `make_collidable`. Impulses are exact with every integrator except RK4. For a material
+        without a density, the model chooses the density, and the speed, damping and stiffness if
+        they are not given either; see `suited_material`. The chosen values are in
+        `ripples[geom].material`, and forces of bodies too heavy for them are eased, see `Easing`.
     resolution : int, optional
         Texels along an edge of the atlas's charts. None: 32 to 256, by what touches the target and
         by the time step, see `suited_resolution`. This argument and the following ones hold for all
@@ -94,9 +94,9 @@ class Ripples:
     contacts : mapping, optional
         Geom to the geoms that collide for it. Deprecated: use `Target(contacts=...)`.
     high_pass : bool
-        Whether a flex keeps to itself the coarse motion that contacts give it: its waves then get
-        what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in
-        the flex and in its waves, which take theirs from nothing.
+        Whether a flex keeps the coarse motion that contacts give it to itself. Its waves then get
+        only the part that the flex cannot follow, see `HighPass`. Otherwise the momentum of a
+        contact counts twice: in the flex and in its waves.
     pulse : str
         How long a hit takes: "contact", as MuJoCo's soft contact holds it, some
         milliseconds, or "hertz", as two elastic bodies touch, with the same impulse; see `Hits`.

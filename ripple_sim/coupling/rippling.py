@@ -31,17 +31,17 @@ class RipplingSurface:
     Attributes
     ----------
     geom : int
-        Geom id.
+        Target id: of a geom, a flex or a skin.
     material : Material
     options : mapping
         Keyword arguments of `WaveSolver`.
     waves : WaveSolver
     held : float64 [C, n, n], optional
-        Shares of the texels that are held still.
+        Shares of the texels that are held still, 0 to 1.
     layout : str
-        Of its atlas, as for `build_atlas`.
+        Layout of the atlas, as for `build_atlas`.
     shape : WatchedShape, optional
-        Its surface in the model, as the atlas has it.
+        Tells whether the surface in the model is still the atlas's.
     """
 
     geom: int

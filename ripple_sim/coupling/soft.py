@@ -26,7 +26,7 @@ def first_skin(model: mujoco.MjModel) -> int:
 
 
 def is_soft(model: mujoco.MjModel, target: int) -> bool:
-    """Whether a target is a flex or a skin, whose surface moves in the world, and not a geom."""
+    """Whether a target is a flex or a skin, and no geom."""
     return target >= model.ngeom
 
 
@@ -85,7 +85,7 @@ class SoftSurface:
     geoms : list of int
         Geoms of the bodies under a skin, whose contacts are the skin's; none for a flex.
     flex : int
-        Its id, or -1 for a skin.
+        Flex id, or -1 for a skin.
     """
 
     def __init__(self, model: mujoco.MjModel, target: int) -> None:

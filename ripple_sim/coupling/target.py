@@ -27,12 +27,12 @@ class Target:
     """A geom, flex or skin that ripples: its material, and how its waves are solved.
 
     `Ripples(model, {"egg": Target(material, resolution=96)})` takes it beside a bare `Material`.
-    What is None is as the keyword argument of the same name says for all targets.
+    A field that is None takes the value of the keyword argument of the same name.
 
     Attributes
     ----------
     material : Material
-        What it leaves unset is chosen by the model, see `suited_material`.
+        Unset coefficients are chosen by the model, see `suited_material`.
     resolution : int, optional
         Texels along an edge of the atlas's charts.
     layout : str, optional
@@ -46,10 +46,10 @@ class Target:
     modulus : float, optional
         For "hertz": E* of the two materials [Pa].
     contacts : sequence of str or int, optional
-        The geoms that collide for this one, on its body or on bodies welded to it, where it is only
-        visible. A target that neither collides nor names geoms takes the contacts of all geoms of
-        its body that collide and do not ripple. A contact loads the surface where this is nearest
-        and faces it; of several targets that share a geom, the nearest.
+        The geoms that collide for a target that is only visible. They are on its body or on bodies
+        welded to it. A target that neither collides nor names geoms takes the contacts of all geoms
+        of its body that collide and do not ripple. A contact loads the nearest part of the surface
+        that faces it; if several targets share a geom, the nearest target.
     limit : bool
         Whether to warn of waves that are too high or too steep for the object.
     conserve_volume : bool, optional
