@@ -41,24 +41,29 @@ Report = dict[str, Any]
 Advance = Callable[[int, float], object]  # takes a number of substeps of some length [s]
 Shape = tuple[NDArray[np.float64], NDArray[np.int64]]
 
-# Speed.
-SUBSTEPS = 9  # of a frame: what contestants are asked for at once
-_ROUNDS = 15
-_SECONDS_A_TURN = 0.04
+# Substeps of a frame, which each contestant takes in one call.
+SUBSTEPS = 9
+
+# turns of each contestant
+_RACE_ROUNDS = 15
+
+# [s]: length of a turn
+_TURN_SECONDS = 0.04
 
 # The bound of memory: a loop that reads and writes as many bytes as a substep, and computes next to
 # nothing. Of float32 a texel, a substep reads 4 link weights, gain, height and velocity, and writes
 # velocity and the next height.
 FIELDS = ("east", "north", "northeast", "northwest", "gain", "height", "velocity", "next height")
 
-# Floats of a page of memory. A store and a load at the same place of a page are taken for a
-# conflict: each field begins elsewhere in its page, as in the solver.
-_PAGE = 1024
+# Floats in a page of memory. Processors take a store and a load at the same place of two pages for a
+# conflict, so each field begins at another place of its page, as in the solver.
+_PAGE_FLOATS = 1024
 
-# The compiler makes vector code of short slices, as the solver's kernel has them.
-_SLICE = 1024
+# Texels of a slice. The compiler vectorises loops over short slices, as in the solver's kernel.
+_SLICE_LENGTH = 1024
 
-# Coupling: bodies rain on targets that collide as their true surface.
+# Cost of the coupling: bodies of these shapes and half sizes [m] rain on targets that collide as
+# their true surface.
 _GEOM = mujoco.mjtGeom
 _SHAPES = (
     (_GEOM.mjGEOM_SPHERE, (0.06, 0, 0)),
@@ -69,7 +74,11 @@ _SHAPES = (
 )
 BODIES = 30
 RESOLUTION = 128
-SECONDS = 1.0  # all have hit, and those that can lie still do
+
+# [s]: by then all bodies have hit the target, and those that can lie still do
+SECONDS = 1.0
+
+# runs, of which the shortest time of each step counts
 ROUNDS = 3
 
 
@@ -109,7 +118,7 @@ def measure(
 
 
 def race(
-    contestants: Mapping[str, Advance], rounds: int = _ROUNDS
+    contestants: Mapping[str, Advance], rounds: int = _RACE_ROUNDS
 ) -> dict[str, NDArray[np.float64]]:
     """Time the contestants: seconds a substep of each, [rounds].
 
@@ -121,7 +130,7 @@ def race(
         advance(SUBSTEPS, dt)
         start = time.perf_counter()
         advance(SUBSTEPS, dt)
-        frames[name] = max(1, int(_SECONDS_A_TURN / (time.perf_counter() - start)))
+        frames[name] = max(1, int(_TURN_SECONDS / (time.perf_counter() - start)))
     seconds = {name: np.empty(rounds) for name in contestants}
     for i in range(rounds):
         for name, advance in contestants.items():
@@ -190,7 +199,9 @@ def memory_fields(texels: int) -> Floats32:
     """Fields of a substep, [fields, texels or more]."""
     # filled, since untouched pages are all one page, which a cache holds
     return np.full(
-        (len(FIELDS), -(-texels // _PAGE) * _PAGE + _PAGE // len(FIELDS)), 1e-3, np.float32
+        (len(FIELDS), -(-texels // _PAGE_FLOATS) * _PAGE_FLOATS + _PAGE_FLOATS // len(FIELDS)),
+        1e-3,
+        np.float32,
     )
 
 
@@ -215,8 +226,8 @@ def memory_stream(fields: Floats32, texels: int, threads: int) -> Advance:
 def _stream(fields: Floats32, substeps: int, dt: np.float32, first: int, last: int) -> None:
     """Kick and drift the texels from `first` to `last` by the sum of their weights."""
     for _ in range(substeps):
-        for start in range(first, last, _SLICE):
-            stop = min(start + _SLICE, last)
+        for start in range(first, last, _SLICE_LENGTH):
+            stop = min(start + _SLICE_LENGTH, last)
             east = fields[0, start:stop]
             north = fields[1, start:stop]
             northeast = fields[2, start:stop]
@@ -296,7 +307,7 @@ def dish(cell: float = 0.03) -> Shape:
     return polygonise(solid, ((-0.9, -0.9, -0.1), (0.9, 0.9, 0.9)), cell)
 
 
-# bodies glance off the duck, and roll, slide and lie in the dish
+# Bodies glance off the duck, and roll, slide and lie in the dish.
 TARGETS: dict[str, Callable[[], Shape]] = {"duck": duck, "dish": dish}
 
 

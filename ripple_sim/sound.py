@@ -34,17 +34,33 @@ from ripple_sim.solver.kernel import Floats, Ints
 from ripple_sim.solver.waves.finite import count_substeps
 from ripple_sim.solver.waves.sensor import filtered, hertz
 
-# of dry air at 20 degrees Celsius [kg/m^3], [m/s]
+# of dry air at 20 degrees Celsius [kg/m^3]
 DENSITY = 1.204
-SPEED = 343.2
-RATE = 48_000  # samples a second of what is heard
 
-_PEAK = 0.9  # of full scale: codecs may overshoot a little
-_HEARD = 20.0  # [Hz], the lowest tone
-_PARTS = 5.0  # a surface over the length of the shortest wave that counts as long
-_GRAZING = 0.1  # cosine from which on a texel counts in full: none appears at once
-_NEAREST = 0.01  # [m]: nearer texels count as if they were there
-_SAME = 1e-6  # [m]: a place that moves by less stays
+# of sound in dry air at 20 degrees Celsius [m/s]
+SPEED = 343.2
+
+# samples a second of the sound file [1/s]
+RATE = 48_000
+
+# Highest level over full scale: codecs may overshoot a little.
+_PEAK_LEVEL = 0.9
+
+# [Hz]: lowest audible tone
+_LOWEST_AUDIBLE = 20.0
+
+# Size of a surface over the shortest wavelength that counts as a long wave.
+_SIZE_OVER_WAVELENGTH = 5.0
+
+# Cosine of the direction from which on a texel counts in full. Below it the weight falls to 0, so
+# that no texel appears at once.
+_FULL_WEIGHT_COSINE = 0.1
+
+# [m]: nearer texels count as if they were at this distance
+_MIN_DISTANCE = 0.01
+
+# [m]: a listener that moves by less stays in place
+_MIN_MOVE = 1e-6
 
 
 class Microphone:
@@ -72,12 +88,15 @@ class Microphone:
             atlas = ripples[name].atlas
             size = float(np.ptp(atlas.positions.reshape(-1, 3), axis=0).max())
             texels = range(0, atlas.areas.size, 97)
-            highest = max(hertz(material, texel, size / _PARTS) for texel in texels) / slow_motion
-            if highest < _HEARD:
+            highest = (
+                max(hertz(material, texel, size / _SIZE_OVER_WAVELENGTH) for texel in texels)
+                / slow_motion
+            )
+            if highest < _LOWEST_AUDIBLE:
                 ringing = 200 * size / 0.77 * slow_motion
                 warn_caller(
-                    f"{name!r} is hardly heard: waves of {size / _PARTS:.2g} m and longer sound "
-                    f"at {highest:.2g} Hz at most, below hearing ({_HEARD:g} Hz); a speed of "
+                    f"{name!r} is hardly heard: waves of {size / _SIZE_OVER_WAVELENGTH:.2g} m and longer sound "
+                    f"at {highest:.2g} Hz at most, below hearing ({_LOWEST_AUDIBLE:g} Hz); a speed of "
                     f"{ringing:.2g} m/s would ring at 200 Hz"
                 )
 
@@ -157,7 +176,7 @@ class Ear:
         """
         middle = waves.atlas.positions.reshape(-1, 3).mean(axis=0)
         way = here - middle
-        has_moved = not self._ways or bool(np.abs(way - self._ways[-1]).max() >= _SAME)
+        has_moved = not self._ways or bool(np.abs(way - self._ways[-1]).max() >= _MIN_MOVE)
         self._times.append(waves.time)
         self._ways.append(way)
         if not (has_moved or waves.vertices is not None or self._before is not None):
@@ -243,14 +262,14 @@ class Ear:
         """
         atlas = waves.atlas
         way = here - atlas.positions.reshape(-1, 3)
-        distance = np.maximum(np.linalg.norm(way, axis=1), _NEAREST)
+        distance = np.maximum(np.linalg.norm(way, axis=1), _MIN_DISTANCE)
         cosine = np.einsum("ij,ij->i", way, atlas.normals.reshape(-1, 3)) / distance
         weight = (
             DENSITY
             / (2 * np.pi)
             * atlas.areas.reshape(-1)
             / distance
-            * np.clip(cosine / _GRAZING, 0, 1)
+            * np.clip(cosine / _FULL_WEIGHT_COSINE, 0, 1)
         )
         texels = np.flatnonzero(weight * waves.operator.movable.reshape(-1))
         if not len(texels):
@@ -286,7 +305,7 @@ class Ear:
 def gain(pressure: NDArray[np.float64]) -> float:
     """By what a pressure [Pa] is multiplied so that it just does not clip."""
     peak = float(np.abs(pressure).max(initial=0.0))
-    return _PEAK / peak if peak > 0 else 1.0
+    return _PEAK_LEVEL / peak if peak > 0 else 1.0
 
 
 def write_wav(path: Path, signals: NDArray, rate: int) -> None:

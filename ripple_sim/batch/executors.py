@@ -27,8 +27,11 @@ from typing import Any
 from ripple_sim.errors import BatchError
 from ripple_sim.solver.errors import shown, user_line, work_for
 
-_PER_THREAD = 2  # tasks a thread, so that none waits for the next one
-_COUNTED = 2.0  # between looks at how many threads there are [s]
+# Two tasks for each Dask thread, so that no thread waits for its next task.
+_TASKS_PER_THREAD = 2
+
+# [s]: time between two counts of the threads of a Dask cluster
+_COUNT_INTERVAL = 2.0
 
 
 class DaskExecutor(Executor):
@@ -71,8 +74,10 @@ class DaskExecutor(Executor):
     @property
     def places(self) -> int:
         """How many tasks may be submitted at a time."""
-        if time.monotonic() - self._counted > _COUNTED:  # the scheduler takes a while to answer
-            self._places = _PER_THREAD * max(1, sum(self._client.nthreads().values()))
+        if (
+            time.monotonic() - self._counted > _COUNT_INTERVAL
+        ):  # the scheduler takes a while to answer
+            self._places = _TASKS_PER_THREAD * max(1, sum(self._client.nthreads().values()))
             self._counted = time.monotonic()
         return self._places
 

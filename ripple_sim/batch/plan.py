@@ -30,12 +30,16 @@ from ripple_sim.video.settings import check_options
 
 Numbers = float | list[float]
 
-# What a random draw may be, one of which a distribution names.
+# The kinds of distributions. A distribution has exactly one of them.
 KINDS = ("uniform", "log_uniform", "normal", "integers", "choice", "orientation", "constant")
 
-_MOST_DRAWS = 10_000  # until a normal one lies within its limits
+# Normal numbers are drawn at most so many times until they lie within their limits.
+_MAX_DRAWS = 10_000
 
-_STEP = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
+# One step of a key: a name, perhaps with something in brackets behind it.
+_STEP_PATTERN = r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?"
+
+# largest `count` of a plan
 MOST_SCENES = 10_000_000
 
 
@@ -99,7 +103,7 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
         mean, deviation = self.normal or (0.0, 0.0)
         least, greatest = self.limits or (-math.inf, math.inf)
         number = rng.normal(mean, deviation, size=self.length)
-        for _ in range(_MOST_DRAWS):
+        for _ in range(_MAX_DRAWS):
             outside = (number < least) | (number > greatest)
             if not np.any(outside):
                 return _plain(number)
@@ -178,13 +182,13 @@ Step = tuple[str, str]
 
 def parse_key(key: str) -> tuple[Step, ...]:
     """Read a key of a plan; raises `SceneError` if it is not names between dots."""
-    if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", key):
+    if not re.fullmatch(rf"{_STEP_PATTERN}(?:\.{_STEP_PATTERN})*", key):
         raise SceneError(
             f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or "
             "a pattern in brackets, such as camera.azimuth, ripple[duck].material.speed or "
             "geom[ball*].size"
         )
-    return tuple(re.findall(_STEP, key))
+    return tuple(re.findall(_STEP_PATTERN, key))
 
 
 def choose(names: Sequence[str], step: Step, where: str) -> list[int]:

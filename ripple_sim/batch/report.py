@@ -28,7 +28,7 @@ box-shadow:0 1px 3px #0003}}img{{width:100%;display:block;border-radius:3px}}.fa
 </style><h1>{name}</h1><p>{summary}</p><main>
 """
 
-_PLAIN = (
+_FACT_COLUMNS = (
     "number",
     "seed",
     "source",
@@ -40,7 +40,9 @@ _PLAIN = (
     "states",
     "hash",
 )
-_LISTED = 5  # failures
+
+# failures that the status lists
+_MAX_LISTED_FAILURES = 5
 
 
 def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
@@ -135,7 +137,7 @@ def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:
     targets = facts["targets"].values()
     return {
         "status": "finished",
-        **{name: facts[name] for name in _PLAIN},
+        **{name: facts[name] for name in _FACT_COLUMNS},
         "seconds": times["seconds"],
         "cpu_seconds": times["cpu_seconds"],
         "height_max": max(each["height_max"] for each in targets),
@@ -215,10 +217,10 @@ def status_text(path: Path) -> str:
             f"scene {number} failed {each.attempts} times: {each.error} "
             f"({batch.failed.name}/{number:06d}.log)"
         )
-        for number, each in sorted(failures.items())[:_LISTED]
+        for number, each in sorted(failures.items())[:_MAX_LISTED_FAILURES]
     ]
-    if len(failures) > _LISTED:
-        lines.append(f"and {len(failures) - _LISTED} more failed")
+    if len(failures) > _MAX_LISTED_FAILURES:
+        lines.append(f"and {len(failures) - _MAX_LISTED_FAILURES} more failed")
     if aside:
         lines.append(f"`ripple-sim batch {path} --retry-failed` tries them again")
     return "\n".join(lines)

@@ -31,11 +31,20 @@ from .report import parquet, row, write_index
 from .variation import Variation
 from .worker import Outcome, make_scene
 
-_PATIENCE = 1.0  # between looks at scenes that another process makes [s]
-_INDEXED = 30.0  # between versions of the index while scenes are made [s]
-_REST = 20.0  # or so many times as long as the last one took to write
-_TRIED = 3  # scenes whose values are drawn before the batch begins
-_SHOWN = 3  # scenes whose values are told
+# [s]: time between two checks of scenes that other processes make
+_POLL_INTERVAL = 1.0
+
+# [s]: least time between two versions of the index while scenes are made
+_INDEX_INTERVAL = 30.0
+
+# Least time between two versions of the index, over the time to write one.
+_INDEX_REST = 20.0
+
+# scenes whose values are drawn, as a check, before the batch begins
+_CHECKED_SCENES = 3
+
+# scenes whose values a trial prints
+_SHOWN_SCENES = 3
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -114,14 +123,14 @@ class BatchRun:
     ) -> None:
         """Have all scenes made."""
         start = indexed = time.monotonic()
-        pause = _INDEXED
+        pause = _INDEX_INTERVAL
         if self._tar_size:  # those that were not packed before a kill
             for number in {number // self._tar_size for number in self.batch.loose() & self._share}:
                 self._pack(number)
         while self.pending or self._running or self._later:
             self._submit(executor)
             with contextlib.suppress(queue.Empty):
-                number, future = self._done.get(timeout=_PATIENCE)
+                number, future = self._done.get(timeout=_POLL_INTERVAL)
                 self._running.remove(number)
                 try:
                     outcome = future.result()
@@ -131,7 +140,7 @@ class BatchRun:
                     )
                 self._take(number, outcome)
             if not self.pending and not self._running and self._later and self.full is None:
-                time.sleep(_PATIENCE)
+                time.sleep(_POLL_INTERVAL)
                 self.pending = deque(self._later)
                 self._later = []
             self.progress.seconds = time.monotonic() - start
@@ -141,7 +150,7 @@ class BatchRun:
                 before = time.monotonic()
                 write_index(self.batch, self.rows)
                 indexed = time.monotonic()
-                pause = max(_INDEXED, _REST * (indexed - before))
+                pause = max(_INDEX_INTERVAL, _INDEX_REST * (indexed - before))
 
     def _submit(self, executor: LocalExecutor | DaskExecutor) -> None:
         """Give out scenes while there is a place for one, and room on the disk."""
@@ -251,7 +260,7 @@ def run_batch(
     if plan is None:
         batch.check()
         plan = load_stored(batch.plan).plan
-    for number in range(min(len(plan.sources), plan.count, _TRIED)):
+    for number in range(min(len(plan.sources), plan.count, _CHECKED_SCENES)):
         Variation(plan, number).load()  # a key that fits nothing is told before anything is made
     try:
         keep_plan(batch, stored(plan))
@@ -302,7 +311,7 @@ def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     if plan is None:
         plan = load_stored(BatchFolder(folder).plan).plan
     lines = []
-    for number in range(min(_SHOWN, plan.count)):
+    for number in range(min(_SHOWN_SCENES, plan.count)):
         variation = Variation(plan, number)
         values = (
             ", ".join(f"{key} = {value}" for key, value in variation.load()[1].items())

@@ -26,15 +26,20 @@ from .plan import Distribution, MeshesEntry, Plan, Step, choose, parse_key
 # The stream of random numbers of a key.
 Stream = Callable[[str], np.random.Generator]
 
-_NAMES = ("geom", "body", "actuator")  # what an entry of a list goes by
+# Keys by which an entry of a list is named, in this order.
+_NAME_KEYS = ("geom", "body", "actuator")
 
-# Elements of an MJCF by their tags, and where a specification lists them.
+# Tags of elements in an MJCF, and the attribute of `MjSpec` that lists them.
 ELEMENTS = {
     "body": "bodies", "geom": "geoms", "joint": "joints", "site": "sites", "camera": "cameras", "light": "lights",
     "material": "materials", "texture": "textures", "mesh": "meshes", "tendon": "tendons", "actuator": "actuators",
 }  # fmt: skip
-_GROUPS = ("option", "visual")
-_SEED_BITS = 29  # so that `ripple-sim render --seed` takes it: nine digits
+
+# parts of a specification that have attributes but no elements
+_MODEL_GROUPS = ("option", "visual")
+
+# A seed of 29 bits has nine digits at most, as `ripple-sim render --seed` takes them.
+_SEED_BITS = 29
 
 
 def vary_table(
@@ -89,7 +94,9 @@ def _places(
     if inner is None and not chosen:
         inner = table[key] = {}
     if isinstance(inner, list) and all(isinstance(item, dict) for item in inner):
-        names = [next((str(item[name]) for name in _NAMES if name in item), "") for item in inner]
+        names = [
+            next((str(item[name]) for name in _NAME_KEYS if name in item), "") for item in inner
+        ]
         for number in choose(names, steps[0], "the scene"):
             item = f"{here}[{names[number] or number}]"
             if not rest:
@@ -148,12 +155,12 @@ def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int |
     """
     first, *steps = parse_key(key)
     kind, _ = first
-    if not steps or kind not in (*ELEMENTS, *_GROUPS):
+    if not steps or kind not in (*ELEMENTS, *_MODEL_GROUPS):
         raise SceneError(
             f"plan: {key!r} is no attribute of a model; valid are an element and its attribute, "
-            f"such as geom[ball].size, of {', '.join((*ELEMENTS, *_GROUPS))}"
+            f"such as geom[ball].size, of {', '.join((*ELEMENTS, *_MODEL_GROUPS))}"
         )
-    if kind in _GROUPS:
+    if kind in _MODEL_GROUPS:
         found = [(getattr(spec, kind), kind)]
     else:
         elements = getattr(spec, ELEMENTS[kind])

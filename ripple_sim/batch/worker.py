@@ -42,10 +42,16 @@ from .folder import BatchFolder, clear, load_stored
 from .plan import Plan, StoreEntry, options_of, video_name
 from .variation import Variation
 
-_SIZE = 160  # its longer edge [pixels]
+# [pixels]: longer edge of a thumbnail
+_THUMBNAIL_SIZE = 160
 
-# the time of every file in the zip file: the same heights, the same bytes
-_ALWAYS = (1980, 1, 1, 0, 0, 0)
+# Time of every file in the zip file of heights. It is fixed, so that the same heights give the same
+# bytes.
+_ZIP_TIME = (1980, 1, 1, 0, 0, 0)
+
+
+# The renderer's context belongs to one scene at a time, also if an executor has threads.
+_one_at_a_time = threading.Lock()
 
 
 def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
@@ -59,7 +65,7 @@ def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
             pass
     if middle is not None:
         image = Image.fromarray(middle)
-        image.thumbnail((_SIZE, _SIZE))
+        image.thumbnail((_THUMBNAIL_SIZE, _THUMBNAIL_SIZE))
         with atomic_write(output) as path:
             image.save(path, format="JPEG", quality=80)
 
@@ -69,7 +75,7 @@ class FrameRecord:
 
     Call it with the simulation at the time of each frame.
 
-    There will be a number of `frames`, `rate` of them in a second of the scene's time.
+    `frames` is the number of frames, and `rate` is how many are in a second of the scene [1/s].
     """
 
     def __init__(self, folder: Path, store: StoreEntry, frames: int, rate: float) -> None:
@@ -133,7 +139,7 @@ class FrameRecord:
             with zipfile.ZipFile(self._folder / HEIGHTS, "w") as archive:
                 for path in sorted(path for path in folder.rglob("*") if path.is_file()):
                     archive.writestr(
-                        zipfile.ZipInfo(path.relative_to(folder).as_posix(), _ALWAYS),
+                        zipfile.ZipInfo(path.relative_to(folder).as_posix(), _ZIP_TIME),
                         path.read_bytes(),
                     )
             shutil.rmtree(folder)
@@ -160,10 +166,6 @@ class FrameRecord:
             },
             "states": self._digest.hexdigest(),
         }
-
-
-# The renderer's context belongs to one scene at a time, also where an executor has threads.
-_one_at_a_time = threading.Lock()
 
 
 class Outcome(msgspec.Struct, frozen=True):

@@ -15,7 +15,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-_SCATTER = 0.02  # how far light gets under a translucent surface, in distances of the focus
+# How far light travels under a translucent surface, over the distance of the focus.
+_SCATTER = 0.02
 
 
 def main(settings):

@@ -53,19 +53,28 @@ from ripple_sim.video.render_video import Progress, open_video
 from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
 
 PYTHON = "RIPPLE_SIM_BPY_PYTHON"
-OLDEST = (5, 0)  # bpy before it has other names for what the importer of USD is told
-_LAST = 300  # characters of what a process said last
+
+# Oldest version of bpy: before it, options of the USD importer have other names.
+OLDEST = (5, 0)
+
+# [characters]: length of the last line of a process in a message
+_MAX_REASON_LENGTH = 300
+
 _ADVICE = (
     "on Python 3.13 install it with: pip install 'ripple-sim[cycles]'; otherwise give it an "
     "environment of its own (python3.11 -m venv blender; blender/bin/pip install 'bpy>=5.0') and "
     f"set {PYTHON}=blender/bin/python"
 )
 
-# what the renderer's soft boxes give to diffuse surfaces, over what lights of their size and
-# radiance would
+# Light that the renderer's soft boxes give to diffuse surfaces, over that of lights of their size and
+# radiance.
 _DIFFUSE_SHARE = 0.13 * np.pi / 4
+
+# paths per pixel
 SAMPLES = 64
-_OURS_ALONE = ("sound", "compare", "overlay", "passes", "resume", "transparent")
+
+# options of a video that Cycles does not have
+_OPENGL_ONLY = ("sound", "compare", "overlay", "passes", "resume", "transparent")
 
 
 def python_with_bpy() -> str:
@@ -99,7 +108,7 @@ def _version_of_bpy(python: str) -> tuple[int, ...]:
     try:
         return tuple(map(int, last[0].split()))
     except (IndexError, ValueError):
-        reason = "".join(last)[:_LAST] or f"status {asked.returncode}"
+        reason = "".join(last)[:_MAX_REASON_LENGTH] or f"status {asked.returncode}"
         raise VideoError(f"{python} cannot import bpy: {reason}; {_ADVICE}") from None
 
 
@@ -155,7 +164,7 @@ def _wait_for(number: int, process: subprocess.Popen, errors: Path) -> None:
             return
         last = text or last
     said = errors.read_text(errors="replace").strip().splitlines()
-    reason = (said[-1] if said else last)[:_LAST] or "without a word"
+    reason = (said[-1] if said else last)[:_MAX_REASON_LENGTH] or "without a word"
     raise VideoError(f"Blender ended before frame {number} with status {process.wait()}: {reason}")
 
 
@@ -281,7 +290,7 @@ def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) ->
 
     Raises `RippleError`.
     """
-    for name in _OURS_ALONE:
+    for name in _OPENGL_ONLY:
         if getattr(options, name):
             raise VideoError(
                 f"the renderer cycles has no --{name}; leave it out, or render with --renderer gl"

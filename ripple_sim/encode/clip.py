@@ -15,11 +15,18 @@ from numpy.typing import NDArray
 
 from .replace import MARK
 
-# fixed, since x264's output depends on it; small, since the renderer needs the processor too
+# Threads of a codec: a fixed number, since x264's output depends on it, and a small one, since the
+# renderer needs the processor too.
 THREADS = 2
-SOUND_RATE = 48_000  # samples a second
-_AUDIO = {"mp4": "aac", "webm": "libopus"}  # by the container; 192 kbit/s
-_BLOCK = 960  # samples that are encoded together, 20 ms
+
+# samples a second of the sound [1/s]
+SOUND_RATE = 48_000
+
+# codec of the sound by container; it gets 192 kbit/s
+_AUDIO_CODECS = {"mp4": "aac", "webm": "libopus"}
+
+# samples that are encoded together, 20 ms
+_BLOCK_SAMPLES = 960
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -134,13 +141,13 @@ class _Track:
         self._sound = sound.astype(np.float32)
         self._done = 0
         self._stream = container.add_stream(
-            _AUDIO[name], rate=SOUND_RATE, layout="mono", bit_rate=192_000
+            _AUDIO_CODECS[name], rate=SOUND_RATE, layout="mono", bit_rate=192_000
         )
 
     def encode(self, time: float) -> None:
         """Encode all up to a time [s]."""
         while self._done < min(time * SOUND_RATE, len(self._sound)):
-            block = self._sound[None, self._done : self._done + _BLOCK]
+            block = self._sound[None, self._done : self._done + _BLOCK_SAMPLES]
             frame = av.AudioFrame.from_ndarray(
                 np.ascontiguousarray(block), format="fltp", layout="mono"
             )
@@ -148,7 +155,7 @@ class _Track:
             frame.pts = self._done
             frame.time_base = Fraction(1, SOUND_RATE)
             self._container.mux(self._stream.encode(frame))
-            self._done += _BLOCK
+            self._done += _BLOCK_SAMPLES
 
     def finish(self) -> None:
         """Encode the rest."""

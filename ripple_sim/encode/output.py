@@ -25,17 +25,22 @@ from .gif import join_gif
 from .replace import MARK, is_plain, made_here, png_mark
 from .webp import join_webp
 
-# as many may be lost when a render is killed; each clip begins with a key frame
+# Frames in a clip, which begins with a key frame. A killed render loses so many frames at most.
 FRAMES_IN_CLIP = 48
 
 Segments = Sequence[tuple[Path, int]]
 
+# shortest and longest side of a frame [pixels]
 MIN_SIZE = 16
 MAX_SIZE = 8192
-MAX_FPS = 240
-_H264_BLOCKS = 139_264
 
-# browsers slow a GIF down to 10 frames per second if a frame lasts less than 0.02 s
+# [frames/s]
+MAX_FPS = 240
+
+# Blocks of 16x16 pixels in a frame of H.264's highest level, 6.2.
+_MAX_H264_BLOCKS = 139_264
+
+# [frames/s]: browsers slow a GIF to 10 frames/s if a frame lasts less than 0.02 s
 MAX_GIF_FPS = 50
 ENDINGS = (".mp4", ".webm", ".gif", ".webp")
 FRAME_FORMATS = ("png", "exr")
@@ -200,10 +205,10 @@ def check_output(
         if transparent and form not in _WITH_OPACITY:
             raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
         check_size(width, height)
-        if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
+        if form == ".mp4" and -(-width // 16) * -(-height // 16) > _MAX_H264_BLOCKS:
             raise VideoError(
                 f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends "
-                f"at {_H264_BLOCKS} blocks of 16x16, such as 8192x4352: make it smaller, or write "
+                f"at {_MAX_H264_BLOCKS} blocks of 16x16, such as 8192x4352: make it smaller, or write "
                 ".webm, .gif, .webp or a folder of frames"
             )
         if form in _SUBSAMPLED and (width % 2 or height % 2):

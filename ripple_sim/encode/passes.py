@@ -18,18 +18,14 @@ from .exr import _write_channels, check_exr
 from .replace import MARK, check_folder, made_here, read_object
 
 PASSES = ("depth", "normal", "segmentation", "flow", "position", "height")
-
-
 PASS_FORMATS = ("npz", "exr")
 
-
+# file that says whose passes a folder holds, and what the numbers of the segmentation mean
 _CONTENTS = "segmentation.json"
-
 
 _NAME = re.compile(rf"passes_\d{{5,}}\.({'|'.join(PASS_FORMATS)})|{re.escape(_CONTENTS)}")
 
-
-# of an EXR; one channel has the pass's own name
+# Channels of a pass in an EXR file. A pass with one channel gives it its own name.
 _CHANNELS = {"normal": "XYZ", "position": "XYZ", "flow": "XY"}
 
 

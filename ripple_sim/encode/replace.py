@@ -13,11 +13,12 @@ from PIL.PngImagePlugin import PngInfo
 
 MARK = "made by ripple-sim"
 
-# Where the mark is in a file [bytes]. An MP4 has it behind its index, which grows with the length
-# of the video.
-_HEAD = 1 << 16
-_INDEX = 1 << 24
-_TAIL = 1 << 10
+# [bytes]: the mark is in this much of a file's beginning, or in this much of its end
+_HEAD_SIZE = 1 << 16
+_TAIL_SIZE = 1 << 10
+
+# [bytes]: likewise of an MP4, which has it behind its index; the index grows with the video
+_MP4_HEAD_SIZE = 1 << 24
 
 
 def made_here(path: Path) -> bool:
@@ -28,8 +29,8 @@ def made_here(path: Path) -> bool:
     if found.st_size == 0:
         return True
     with path.open("rb") as file:
-        head = file.read(_INDEX if path.suffix.lower() == ".mp4" else _HEAD)
-        file.seek(max(0, found.st_size - _TAIL), os.SEEK_SET)
+        head = file.read(_MP4_HEAD_SIZE if path.suffix.lower() == ".mp4" else _HEAD_SIZE)
+        file.seek(max(0, found.st_size - _TAIL_SIZE), os.SEEK_SET)
         return MARK.encode() in head + file.read()
 
 

@@ -14,11 +14,12 @@ from pathlib import Path
 from .clip import Stream
 from .replace import MARK
 
+# flags of the VP8X chunk
 _ANIMATION = 0x02
 _METADATA = 0x04
 _OPACITY = 0x10
 
-
+# flag of an ANMF chunk: the frame replaces the one before
 _DO_NOT_BLEND = 0x02
 
 

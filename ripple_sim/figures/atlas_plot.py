@@ -27,11 +27,15 @@ from ripple_sim.solver.files import atomic_write, final_path
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 from ripple_sim.solver.mesh.queries import RayScene
 
-OVERSAMPLING = 2  # finer pixels along each side of a pixel
-# to the right, up, to the eye
+# samples along each side of a pixel
+OVERSAMPLING = 2
+
+# Direction to the light: to the right, up, to the eye.
 _LIGHT = np.array([-0.45, 0.55, 0.7]) / np.linalg.norm([-0.45, 0.55, 0.7])
 
-_GRID_CELLS = 39  # along the side of a square that holds all charts
+# cells of the grid along the side of a square with the area of all charts
+_GRID_CELLS = 39
+
 _INK = np.array([0.10, 0.13, 0.20])
 
 # The belt of four charts from left to right, the second in the middle of the cross, and those above
@@ -39,20 +43,25 @@ _INK = np.array([0.10, 0.13, 0.20])
 BELT = (1, 3, 0, 2)
 ABOVE = 4
 BELOW = 5
-_GAP = 0.12  # between squares, of their side
+
+# Gap between the squares of charts, over their side.
+_SQUARE_GAP = 0.12
+
 _ENDINGS = (".png", ".jpg", ".pdf", ".svg")
 _DPI = 120
 
-# Finer than an even spread is blue, coarser is red; the ends stand for a factor of 2.
+# Texels finer than in an even spread are blue, coarser ones are red. The ends are a factor of 2.
 STRETCH_COLORS = LinearSegmentedColormap.from_list(
     "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
 )
 STRETCH_RANGE = 2.0
 _HUES = 12
 
-# Thin is dark, as bone near the skin is in a scan that is looked through.
-_COLORS = colormaps["viridis"]
-_SHOWN = (0.005, 0.97)  # shares of the area between which the colours run
+# A thin layer is dark, like bone near the skin in a scan.
+_THICKNESS_COLORS = colormaps["viridis"]
+
+# quantiles of the thickness, by area, at the ends of the colours
+_SHOWN_QUANTILES = (0.005, 0.97)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -277,7 +286,7 @@ def squares(
     columns = max(range(1, count + 1), key=lambda k: min(width / k, height / -(-count // k)))
     rows = -(-count // columns)
     pitch = max(int(min(width / columns, height / rows)), 2)
-    size = max(round(pitch * (1 - _GAP)), 1)
+    size = max(round(pitch * (1 - _SQUARE_GAP)), 1)
     image = np.zeros((rows * pitch, columns * pitch, 4))
     for chart in range(count):
         i, k = divmod(chart, columns)
@@ -516,9 +525,9 @@ def plot_thickness(
     Otherwise it is like `plot_atlas`.
     """
     check_plot_path(path)
-    low, high = np.quantile(thickness, _SHOWN)
+    low, high = np.quantile(thickness, _SHOWN_QUANTILES)
     shade = np.clip((thickness - low) / max(high - low, 1e-9 * high), 0, 1)
-    painter = AtlasPainter(atlas, _COLORS(shade)[..., :3], with_grid=False)
+    painter = AtlasPainter(atlas, _THICKNESS_COLORS(shade)[..., :3], with_grid=False)
     figure = dressed(title, subtitle)
     show(figure, (0.03, 0.17, 0.45, 0.70), painter.mesh(View(up=up), 800))
     show(
@@ -531,7 +540,7 @@ def plot_thickness(
     axes = figure.add_axes((0.3, 0.075, 0.38, 0.07))
     bins = np.linspace(low, high, 101)
     share, _ = np.histogram(thickness.clip(low, high), bins, weights=atlas.areas)
-    colors = _COLORS((bins[:-1] - bins[0]) / (bins[-1] - bins[0]))
+    colors = _THICKNESS_COLORS((bins[:-1] - bins[0]) / (bins[-1] - bins[0]))
     axes.bar(
         bins[:-1] * 1e3,
         share / share.max(),

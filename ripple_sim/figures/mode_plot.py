@@ -23,21 +23,31 @@ from .atlas_plot import (
     show,
 )
 
-# Height of a mode where it is largest, at most: of the radius of a sheet, or of a body, which must
-# not pass through itself, and of the mode's wave length.
-_SHEET = 0.3
-_BODY = 0.05
-_OF_WAVE = 0.12
+# Greatest height of a mode over the radius of a sheet.
+_MAX_SHEET_HEIGHT = 0.3
 
-# Thickness over size of what is a sheet, which is looked at from higher up.
-_FLAT = 0.2
-_HIGH = 32.0
+# Greatest height of a mode over the radius of a body, which must not pass through itself.
+_MAX_BODY_HEIGHT = 0.05
 
-# Place of all pictures, left, bottom, width and height in shares of the figure; how much of the
-# width they fill; the height of a caption, and the largest picture [pixels].
+# Greatest height of a mode over its wavelength.
+_MAX_WAVE_HEIGHT = 0.12
+
+# Greatest thickness of a sheet over its size.
+_MAX_SHEET_THICKNESS = 0.2
+
+# [degrees]: sheets are shown from higher up than bodies
+_SHEET_ELEVATION = 32.0
+
+# Place of all pictures: left, bottom, width and height, as shares of the figure.
 _PLACE = (0.03, 0.02, 0.94, 0.85)
+
+# Share of the width that the pictures fill.
 _FILLED = 0.92
+
+# [pixels]: height of a caption
 _CAPTION = 54
+
+# [pixels]: largest picture
 _LARGEST = 640
 
 
@@ -58,7 +68,7 @@ class ModePainter(AtlasPainter):
         self._radius = np.linalg.norm(np.ptp(fine.mesh.V, axis=0)) / np.linalg.norm(
             np.ptp(self._rest, axis=0)
         )
-        self._highest = _SHEET if _is_sheet(atlas) else _BODY
+        self._highest = _MAX_SHEET_HEIGHT if _is_sheet(atlas) else _MAX_BODY_HEIGHT
         self._shape = np.zeros(atlas.areas.size)
 
     def mode(self, shape: NDArray[np.float64], view: View, size: int) -> NDArray[np.float64]:
@@ -68,7 +78,7 @@ class ModePainter(AtlasPainter):
             flat @ (self._wave_matrix @ flat) / (flat @ (self._atlas.areas.ravel() * flat))
         )
         wave = 2 * np.pi / max(wave_number * self._radius, 1e-9)
-        height = min(self._highest, _OF_WAVE * wave) * (self._at_vertices @ flat)
+        height = min(self._highest, _MAX_WAVE_HEIGHT * wave) * (self._at_vertices @ flat)
         self._vertices = self._rest + height[:, None] * self._normals
         F = self._atlas.mesh.F
         self._scene = RayScene(self._vertices, F)
@@ -106,7 +116,11 @@ def plot_modes(
     """
     check_plot_path(path)
     thin = "xyz"[np.ptp(atlas.mesh.V, axis=0).argmin()]
-    view = View(up=thin, elevation=_HIGH) if _is_sheet(atlas) and thin != "x" else View(up=up)
+    view = (
+        View(up=thin, elevation=_SHEET_ELEVATION)
+        if _is_sheet(atlas) and thin != "x"
+        else View(up=up)
+    )
     painter = ModePainter(atlas)
     figure = dressed(title, subtitle)
     left, bottom, width, height = _PLACE
@@ -153,4 +167,4 @@ def plot_modes(
 
 def _is_sheet(atlas: Atlas) -> bool:
     extents = np.ptp(atlas.mesh.V, axis=0)
-    return bool(extents.min() < _FLAT * extents.max())
+    return bool(extents.min() < _MAX_SHEET_THICKNESS * extents.max())

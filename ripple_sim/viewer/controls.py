@@ -36,18 +36,21 @@ CONTROLS = (
 
 MOUSE = (("click", "poke"), ("drag", "orbit"), ("shift + drag", "pan"), ("wheel", "zoom"))
 
-# Highest elevation, up or down [degrees].
-_STEEPEST = 88.0
-_POKE = {"poke": "N s"}
+# [degrees]: largest elevation of the camera, up or down
+_MAX_ELEVATION = 88.0
 
-# Left end, distance, width and height in the window, in shares of its size.
-_LEFT = 0.03
-_APART = 0.24
-_WIDTH = 0.2
-_HEIGHT = 0.07
+# name and unit of the first slider
+_POKE_SLIDER = {"poke": "N s"}
 
-# A knob starts at this share of its track; one at 0 has a track from 0 to 1.
-_START = 1 / 3
+# Left end of the first slider, distance between sliders, width of a slider, and its height above the
+# lower edge, as shares of the window's size.
+_SLIDER_LEFT = 0.03
+_SLIDER_SPACING = 0.24
+_SLIDER_WIDTH = 0.2
+_SLIDER_HEIGHT = 0.07
+
+# A knob starts at this share of its track. The track of a value of 0 goes from 0 to 1.
+_KNOB_START = 1 / 3
 
 
 def help_text() -> str:
@@ -64,7 +67,7 @@ def level(camera: pv.Camera) -> None:
         up = np.array(camera.up[:2])
         x, y = -1e-9 * z * (up if up.any() else np.array([0.0, 1.0]))
     across = math.hypot(x, y)
-    most = math.tan(math.radians(_STEEPEST))
+    most = math.tan(math.radians(_MAX_ELEVATION))
     if across > 0 and abs(z) > most * across:
         distance = math.hypot(across, z)
         slant = math.hypot(1.0, most)
@@ -182,16 +185,16 @@ def add_sliders(plotter: pv.Plotter, session: Session) -> list[Any]:
     """Add them, "poke" first and then those of `SLIDERS`; they act when a knob is released."""
     return [
         _add(plotter, session, number, name, unit)
-        for number, (name, unit) in enumerate((_POKE | SLIDERS).items())
+        for number, (name, unit) in enumerate((_POKE_SLIDER | SLIDERS).items())
     ]
 
 
 def _add(plotter: pv.Plotter, session: Session, number: int, name: str, unit: str) -> Any:
     value = session.poke_impulse if name == "poke" else session.material(name)
-    left = _LEFT + _APART * number
+    left = _SLIDER_LEFT + _SLIDER_SPACING * number
     slider = plotter.add_slider_widget(
-        None, (0.0, value / _START or 1.0), value=value, title=f"{name} [{unit}]",
-        pointa=(left, _HEIGHT), pointb=(left + _WIDTH, _HEIGHT),
+        None, (0.0, value / _KNOB_START or 1.0), value=value, title=f"{name} [{unit}]",
+        pointa=(left, _SLIDER_HEIGHT), pointb=(left + _SLIDER_WIDTH, _SLIDER_HEIGHT),
         color="black", title_height=0.02, fmt="%.4g", slider_width=0.02, tube_width=0.005,
     )  # fmt: skip
     look = slider.GetRepresentation()

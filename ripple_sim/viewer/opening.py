@@ -25,33 +25,41 @@ from ripple_sim.scene.loading import load_scene
 from ripple_sim.scene.scene import Scene
 from ripple_sim.solver import Material
 
-_NAME = "thrown ball {}"
-# Parked this many radii above the origin, and this many apart, so that they do not touch.
-_AWAY = 2000.0
-_APART = 4.0
+_BALL_NAME = "thrown ball {}"
 
+# Height of parked balls above the origin, in radii: outside every view.
+_PARKING_HEIGHT = 2000.0
+
+# Distance between parked balls, in radii: they do not touch.
+_PARKING_SPACING = 4.0
+
+# balls that a scene has to throw
 BALLS = 6
 
-# Relative to a surface's size: a ball's radius, a poke's radius, and a poke's depth.
-_BALL = 0.06
-_POKE = 0.06
-_DEPTH = 0.025
+# over the size of the surface
+_BALL_RADIUS = 0.06
+_POKE_RADIUS = 0.06
+_POKE_DEPTH = 0.025
 
-# Time of flight of a thrown ball [s], and the distance it covers, in sizes of the surface.
+# [s]: time of flight of a thrown ball
 FLIGHT = 0.5
-_THROW = 3.0
-SWINGING = ("speed", "stiffness", "density")  # coefficients by which what is pressed in swings back
+
+# Distance that a thrown ball covers, over the size of the surface.
+_THROW_DISTANCE = 3.0
+
+# Coefficients of the material that determine how fast a dent swings back.
+SWINGING = ("speed", "stiffness", "density")
 
 
 def add_balls(spec: mujoco.MjSpec, count: int, radius: float, mass: float) -> None:
     """Add balls of a radius [m] and a mass [kg] each to a specification, parked above the scene."""
     poses = []
     for i in range(count):
-        place = [0.0, 0.0, (_AWAY + _APART * i) * radius]
-        body = spec.worldbody.add_body(name=_NAME.format(i), pos=place)
+        place = [0.0, 0.0, (_PARKING_HEIGHT + _PARKING_SPACING * i) * radius]
+        body = spec.worldbody.add_body(name=_BALL_NAME.format(i), pos=place)
         body.add_freejoint()
         body.add_geom(
-            name=_NAME.format(i),
+            name=_BALL_NAME.format(i),
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[radius, 0, 0],
             mass=mass,
@@ -75,7 +83,9 @@ class Balls:
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        bodies = [i for i in range(model.nbody) if model.body(i).name.startswith(_NAME.format(""))]
+        bodies = [
+            i for i in range(model.nbody) if model.body(i).name.startswith(_BALL_NAME.format(""))
+        ]
         joints = model.body_jntadr[bodies]
         self.geoms: list[int] = [int(model.body_geomadr[i]) for i in bodies]
         self._positions = model.jnt_qposadr[joints]
@@ -135,11 +145,11 @@ def poke_strength(material: Material, size: float) -> tuple[float, float]:
     The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle
     moving at 4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
     """
-    radius = _POKE * size
+    radius = _POKE_RADIUS * size
     speed, stiffness, density = (float(np.max(getattr(material, name))) for name in SWINGING)
     omega = np.hypot(2 * speed / radius, np.sqrt(stiffness))
     # nothing pulls a surface without stiffness back: it then gets a second
-    return radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0)
+    return radius, _POKE_DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0)
 
 
 def open_scene(
@@ -178,13 +188,13 @@ def open_scene(
     suited = suited_targets(scene.model, {first.geom: first.material.material()}, {first.geom: 1})
     _, impulse = poke_strength(suited.materials[first.geom], size)
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
-    mass = impulse / (1.5 * _THROW * size / FLIGHT)
+    mass = impulse / (1.5 * _THROW_DISTANCE * size / FLIGHT)
 
     def edit(spec: mujoco.MjSpec) -> None:
         # parked balls must not widen the camera's view
         spec.stat.extent = scene.model.stat.extent
         spec.stat.center = scene.model.stat.center
-        add_balls(spec, BALLS, _BALL * size, mass)
+        add_balls(spec, BALLS, _BALL_RADIUS * size, mass)
 
     return load(edit=edit)
 

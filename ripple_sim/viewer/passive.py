@@ -19,18 +19,23 @@ from ripple_sim.solver import WaveSolver
 
 from .opening import SWINGING, display_problem
 
-# Of all targets together: MuJoCo takes them one by one, a thousand in 2 ms.
-_TRIANGLES = 5000
-# Opacity of what is drawn of the still surface: nothing is seen, and the mouse finds it.
-_UNSEEN = 1e-3
-# and its size then, so that troughs do not lie in its shadow
-_WITHIN = 0.8
-# Radius on which the mouse presses over the size of the target.
-_FINGER = 0.05
-# MuJoCo's colour of a geom that has none of its own
-_NO_COLOR = (0.5, 0.5, 0.5, 1.0)
-# to close the window in [s]
-_PATIENCE = 5.0
+# Triangles of all targets together: MuJoCo takes them one by one, a thousand in 2 ms.
+_MAX_TRIANGLES = 5000
+
+# Opacity of the still surface: it cannot be seen, but the mouse finds it.
+_HIDDEN_OPACITY = 1e-3
+
+# Scale of the still surface, so that troughs do not lie in its shadow.
+_HIDDEN_SCALE = 0.8
+
+# Radius on which the mouse presses, over the size of the target.
+_FINGER_RADIUS = 0.05
+
+# MuJoCo's colour of a geom without a colour of its own
+_DEFAULT_COLOR = (0.5, 0.5, 0.5, 1.0)
+
+# [s]: how long `close` waits for the window
+_CLOSING_TIME = 5.0
 
 
 def launch_passive(
@@ -113,7 +118,9 @@ class RippleViewer:
         self._data = data
         self._ripples = ripples
         self._time = data.time
-        self._skins = {name: _Skin(ripples[name], _TRIANGLES // len(ripples)) for name in ripples}
+        self._skins = {
+            name: _Skin(ripples[name], _MAX_TRIANGLES // len(ripples)) for name in ripples
+        }
         self.sync()
 
     def __getattr__(self, name: str) -> Any:
@@ -141,7 +148,7 @@ class RippleViewer:
                 materials, colors = _look(model, target)
                 material = materials[0]
                 rgba = colors.copy()
-                if material >= 0 and tuple(rgba) == _NO_COLOR:
+                if material >= 0 and tuple(rgba) == _DEFAULT_COLOR:
                     rgba = model.mat_rgba[material]
                 triangles = self._skins[name].triangles(self._ripples, name, self._data)
                 first = scene.ngeom
@@ -157,11 +164,11 @@ class RippleViewer:
                 kept += [(array, array.copy()) for array in hidden]
                 # The mouse does not find what has no material and no opacity; with some it casts
                 # shadows, but within.
-                colors[:] = [*rgba[:3], 0.0 if model.nmat else _UNSEEN]
+                colors[:] = [*rgba[:3], 0.0 if model.nmat else _HIDDEN_OPACITY]
                 if model.nmat:
                     materials[:] = max(material, 0)
                 elif len(hidden) == 3:
-                    hidden[2][:] *= _WITHIN
+                    hidden[2][:] *= _HIDDEN_SCALE
             self._handle.sync(state_only)
         finally:
             scene.ngeom = users
@@ -175,7 +182,7 @@ class RippleViewer:
         """
         self._handle.close()
         for thread in self._threads - {threading.current_thread()}:
-            thread.join(_PATIENCE)
+            thread.join(_CLOSING_TIME)
 
     def _press(self) -> None:
         """Let the surface follow the mouse.
@@ -201,7 +208,7 @@ class RippleViewer:
             drag = (pull.refselpos - point) @ rotation
             texel = np.linalg.norm(waves.atlas.positions.reshape(-1, 3) - local, axis=1).argmin()
             inwards = -float(drag @ waves.atlas.normals.reshape(-1, 3)[texel])
-            radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
+            radius = _FINGER_RADIUS * float(np.ptp(waves.rest.mesh.V, axis=0).max())
             speed, stiffness, density = (
                 float(np.max(getattr(waves.material, name))) for name in SWINGING
             )

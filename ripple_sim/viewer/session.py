@@ -27,14 +27,14 @@ OPERATORS = ("fem", "uncorrected", "paper")
 # Coefficients of the material that the user can change, with their units.
 SLIDERS = {"speed": "m/s", "damping": "1/s", "stiffness": "1/s²"}
 
-# The range of the colours follows the waves: at once as they grow, by this factor per frame as they
-# fade.
-_FADE = 0.96
-# Colours end at this share of the greatest height: at a contact the surface is higher than its
-# waves.
-_FULL = 0.25
-# Least range of the colours over the surface's size, so that rounding noise is not shown.
-_FAINT = 1e-4
+# The range of the colours grows with the waves at once, and shrinks by this factor per frame at
+# most.
+_RANGE_DECAY = 0.96
+# End of the colours over the greatest height: at a contact the surface is deeper than its waves are
+# high.
+_RANGE_SHARE = 0.25
+# Least range of the colours over the surface's size, so that rounding errors are not visible.
+_MIN_RANGE = 1e-4
 
 
 class Session:
@@ -137,12 +137,12 @@ class Session:
     def refresh(self) -> None:
         """Bring the skins and the range of the colours up to date."""
         ripples = self.simulation.ripples
-        wanted = _FAINT * self.size
+        wanted = _MIN_RANGE * self.size
         for name, mesh in self.meshes.items():
             V = ripples.vertices(name, self.simulation.data)
             self.skins[name] = shape = mesh.shape(ripples[name].height, ripples[name].velocity, V)
-            wanted = max(wanted, _FULL * float(np.abs(shape.height).max()))
-        self.color_range = max(wanted, _FADE * self.color_range)
+            wanted = max(wanted, _RANGE_SHARE * float(np.abs(shape.height).max()))
+        self.color_range = max(wanted, _RANGE_DECAY * self.color_range)
 
     def reset(self) -> None:
         """Restart from the beginning; the chosen material and operator stay."""

@@ -25,16 +25,23 @@ from .session import Session
 
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 BACKGROUND = (0.74, 0.77, 0.81)
-_LEVEL = 0.999  # how far up a floor faces that shadows are on, which fall straight down
+
+# Least vertical part of a floor's normal: shadows fall straight down, so they need a level floor.
+_MIN_LEVEL_COSINE = 0.999
+
+# rings and sides of the disc that is drawn for an infinite floor
 _FADE_RINGS = 24
 _FADE_SIDES = 72
 
 HEIGHT = "height [mm]"
 _PER_METRE = 1000.0
 
-# times a power of ten end the colours, so that these do not change with every frame
+# The range of the colours is one of these times a power of ten, so that it changes rarely.
 _STEPS = (1.0, 2.0, 5.0)
-_SEGMENTS = 8  # of a geom, per right angle
+
+# segments of a round geom per right angle
+_GEOM_SEGMENTS = 8
+
 _SHADING: dict[str, Any] = {
     "ambient": 0.32,
     "diffuse": 0.75,
@@ -42,20 +49,23 @@ _SHADING: dict[str, Any] = {
     "specular_power": 30.0,
 }
 
-# Darkness under a geom that touches the floor, and the height above the floor, in radii, from which
-# it casts none.
-_DARKEST = 0.42
-_HIGHEST = 6.0
+# Darkness of the shadow of a geom that touches the floor, from 0 to 1.
+_MAX_DARKNESS = 0.42
 
-# Radius of a shadow over that of the geom's bounding ball, and its height above the floor, in
-# radii.
-_WIDER = 1.15
-_ABOVE = 0.01
-_RINGS = 8
-_SIDES = 32
+# Height above the floor from which a geom casts no shadow, in radii of its bounding ball.
+_MAX_SHADOW_HEIGHT = 6.0
 
-# Bodies farther away than this many distances of the first camera wait for their turn, and are
-# hidden.
+# Radius of a shadow, in radii of the geom's bounding ball.
+_SHADOW_WIDTH = 1.15
+
+# Height of a shadow's disc above the floor, in radii of the geom's bounding ball.
+_SHADOW_LIFT = 0.01
+
+# rings and sides of a shadow's disc
+_SHADOW_RINGS = 8
+_SHADOW_SIDES = 32
+
+# Bodies farther away than this, in distances of the first camera, wait for their turn and are hidden.
 _REACH = 4.0
 
 
@@ -185,7 +195,7 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
     visual = geom_visual(model, geom)
     if (found := shape_of(model, visual)) is None:
         return None
-    shape = found[1](_SEGMENTS)
+    shape = found[1](_GEOM_SEGMENTS)
     mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, visual)), shape.faces)
     mesh.point_data.active_normals = shape.normals
     return mesh
@@ -204,7 +214,9 @@ class Shadows:
     def __init__(self, plotter: pv.Plotter, session: Session, geoms: list[int], floor: int) -> None:
         self._session = session
         self._floor = floor
-        disc = pv.Disc(inner=0.0, outer=1.0, normal=(0, 0, 1), r_res=_RINGS, c_res=_SIDES)
+        disc = pv.Disc(
+            inner=0.0, outer=1.0, normal=(0, 0, 1), r_res=_SHADOW_RINGS, c_res=_SHADOW_SIDES
+        )
         dark = np.clip(1 - np.linalg.norm(disc.points, axis=1), 0, 1)
         shade = np.zeros((disc.n_points, 4), np.uint8)
         shade[:, 3] = np.rint(255 * dark * dark * (3 - 2 * dark))
@@ -225,11 +237,13 @@ class Shadows:
             half = float(np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_aabb[geom, 3:])
             radius = float(model.geom_rbound[geom])
             above = z - half - ground
-            dark = _DARKEST * max(0.0, 1 - above / (_HIGHEST * radius))
+            dark = _MAX_DARKNESS * max(0.0, 1 - above / (_MAX_SHADOW_HEIGHT * radius))
             actor.SetVisibility(dark > 0 and above > -half and geom not in parked)
             actor.prop.opacity = dark
-            wide = _WIDER * radius * (1 + 0.1 * max(0.0, above) / radius)
-            _place(actor, np.array([x, y, ground + _ABOVE * radius]), np.diag([wide, wide, 1.0]))
+            wide = _SHADOW_WIDTH * radius * (1 + 0.1 * max(0.0, above) / radius)
+            _place(
+                actor, np.array([x, y, ground + _SHADOW_LIFT * radius]), np.diag([wide, wide, 1.0])
+            )
 
 
 class Stage:
@@ -283,7 +297,7 @@ class Stage:
             if not is_soft(simulation.model, geom)
         ]
         self.shadows: Shadows | None = None
-        if floor is not None and simulation.data.geom_xmat[floor, 8] > _LEVEL:
+        if floor is not None and simulation.data.geom_xmat[floor, 8] > _MIN_LEVEL_COSINE:
             self.shadows = Shadows(plotter, session, [*rigid, *self._bodies.solid], floor)
         first = next(iter(self.skins.values()))
         self._bar = plotter.add_scalar_bar(

@@ -32,16 +32,19 @@ from ripple_sim.errors import DisplayError
 from .controls import CONTROLS
 from .window import Window
 
-# Of a message from the browser [bytes]: it sends keys and movements of the pointer.
+# [bytes]: largest message from the browser, which sends keys and movements of the pointer
 LARGEST_MESSAGE = 64 * 1024
 
 _HEADERS = {"Content-Security-Policy": "frame-ancestors 'none'", "Referrer-Policy": "no-referrer"}
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
-# Without an answer for this long [s] the browser may have been closed, or reopened.
-_PATIENCE = 1.0
-_QUALITY = 85  # of the JPEG frames, per cent
+# [s]: without an answer for this long, the browser may have been closed or reopened
+_BROWSER_TIMEOUT = 1.0
+
+# quality of the JPEG frames [per cent]
+_JPEG_QUALITY = 85
+
 _STYLE = """
 body { margin: 0; font: 14px sans-serif; background: #bdc4cf; color: #111; }
 main { outline: none; margin: 0 auto; padding: 12px 0; box-sizing: border-box; height: 100vh;
@@ -267,7 +270,7 @@ class _Page:
                     self._view = vtk.VtkRemoteView(
                         window.plotter.render_window,
                         interactive_ratio=1,
-                        interactive_quality=_QUALITY,
+                        interactive_quality=_JPEG_QUALITY,
                     )
                 html.Output("{{ status }}", id="status")
         # while an animation runs, this only marks the frame as changed
@@ -283,12 +286,14 @@ class _Page:
         await self._server.ready
         await self._opened.wait()
         window = self._window
-        self._view.start_animation(fps=window.session.fps, quality=_QUALITY)
+        self._view.start_animation(fps=window.session.fps, quality=_JPEG_QUALITY)
         frame = 1 / window.session.fps
         due = time.perf_counter()
         while not window.closed:
             now = time.perf_counter()
-            if window.tick(draw=self._received == self._sent or now - self._heard > _PATIENCE):
+            if window.tick(
+                draw=self._received == self._sent or now - self._heard > _BROWSER_TIMEOUT
+            ):
                 self._sent = self._sent + 1
                 self._heard = now
             with self._server.state as state:

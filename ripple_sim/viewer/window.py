@@ -27,12 +27,14 @@ from .opening import display_problem
 from .session import OPERATORS, Session
 from .stage import Stage
 
-# A click that moves the pointer farther than this turns the camera and pokes nothing [pixels].
-_STILL = 4
+# [pixels]: a click that moves the pointer farther turns the camera and pokes nothing
+_MAX_CLICK_MOVE = 4
 
+# samples a pixel for anti-aliasing, with a GPU
 _MULTISAMPLES = 8
-# The status line is rewritten this often [s]: text is slow to draw.
-_STATUS_EVERY = 0.25
+
+# [s]: time between two changes of the status line, since text is slow to draw
+_STATUS_INTERVAL = 0.25
 
 
 class Window:
@@ -247,7 +249,7 @@ class Window:
         """Draw the frame, and add it to a video that is being recorded."""
         now = time.perf_counter()
         self._updates += 1
-        if now - self._since > _STATUS_EVERY:
+        if now - self._since > _STATUS_INTERVAL:
             self._rate = self._updates / (now - self._since)
             self._updates = 0
             self._since = now
@@ -329,7 +331,7 @@ class Window:
         pressed = self._pressed
         self._pressed = None
         x, y = self.plotter.iren.get_event_position()
-        if pressed is not None and max(abs(x - pressed[0]), abs(y - pressed[1])) <= _STILL:
+        if pressed is not None and max(abs(x - pressed[0]), abs(y - pressed[1])) <= _MAX_CLICK_MOVE:
             self.poke_at(x, y)
 
     def key(self, name: str) -> None:

@@ -33,7 +33,7 @@ DATA = 'video = "none"\nheights = true\n'
 @pytest.fixture
 def here(monkeypatch):
     monkeypatch.setattr(run, "LocalExecutor", Here)
-    monkeypatch.setattr(run, "_PATIENCE", 0.01)
+    monkeypatch.setattr(run, "_POLL_INTERVAL", 0.01)
 
 
 def same_scenes(batch, reference, numbers=range(5)):
