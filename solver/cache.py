@@ -1,9 +1,9 @@
-"""What took long to make, kept: in the user's cache folder, and in memory.
+"""Caches of results that take long to compute: in the user's cache folder, and in memory.
 
-A file in the folder lies under a hash of what it was made from. The folder is kept under a limit:
-what was used longest ago goes first. Several processes may use it at once: a file appears whole,
-and whoever misses one makes it again. In memory, results are for the next one who asks for the
-same: the next scene of a batch, or the next target.
+The name of a file in the folder is a hash of the input of the result. The folder has a size limit:
+the least recently used file is deleted first. Several processes may use the folder at once: a file
+appears whole, and a process that misses a file computes the result again. In memory, results are
+kept for the next caller with the same input: the next scene of a batch, or the next target.
 """
 
 from __future__ import annotations
@@ -29,16 +29,18 @@ from numpy.typing import NDArray
 
 from .errors import RippleError, warn_caller
 
-LIMIT = "RIPPLE_SIM_CACHE_LIMIT"  # the environment variable, in megabytes
-_USUAL_LIMIT = 500
-_MEGABYTE = 1_000_000
+LIMIT = "RIPPLE_SIM_CACHE_LIMIT"  # the environment variable of the size limit [MB]
+_DEFAULT_LIMIT = 500  # [MB]
+_MEGABYTE = 1_000_000  # [bytes]
 
-# what is ours: files of `cache_path`, and those that a killed process left unfinished
-_OURS = re.compile(r"[0-9a-f]{32}\.npz|\.[0-9a-f]{32}\.npz\.[0-9]+\.part")
+_KEY_DIGITS = 32  # hexadecimal digits of a `content_key`
+
+# Names of this package's files: files of `cache_path`, and unfinished files of killed processes.
+_CACHE_FILE = re.compile(r"[0-9a-f]{32}\.npz|\.[0-9a-f]{32}\.npz\.[0-9]+\.part")
 
 
 def cache_folder() -> Path:
-    """Where the cache is. Without a home that can be written it is private and temporary."""
+    """The cache folder; private and temporary where the home folder cannot be written."""
     try:
         folder = Path(platformdirs.user_cache_dir("ripple-sim"))
         if not folder.is_absolute():  # "~/.cache": no HOME, and no such user
@@ -51,7 +53,7 @@ def cache_folder() -> Path:
 
 @functools.cache
 def _private_folder(reason: str) -> Path:
-    """A folder for temporary files that only this user can read, and a warning, once a process."""
+    """A temporary folder that only this user can read; its first use gives a warning."""
     folder = Path(tempfile.gettempdir()) / f"ripple-sim-{os.getuid()}"
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -63,7 +65,7 @@ def _private_folder(reason: str) -> Path:
         )
     except OSError:
         safe = False
-    if not safe:  # somebody else's
+    if not safe:  # another user may have made the folder
         folder = Path(tempfile.mkdtemp(prefix="ripple-sim-"))
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
     warn_caller(
@@ -74,8 +76,11 @@ def _private_folder(reason: str) -> Path:
 
 
 def cache_path(name: str, arrays: Iterable[NDArray]) -> Path:
-    """Place in the cache of what is made from arrays by the method `name`; raises `RippleError` as `cache_limit`."""
-    cache_limit()  # a mistake is told before anything that takes time
+    """Path in the cache of the result of a method `name` from arrays.
+
+    Raises `RippleError` as `cache_limit` does.
+    """
+    cache_limit()  # a wrong limit is reported before any work that takes time
     return cache_folder() / f"{content_key(name, arrays)}.npz"
 
 
@@ -85,39 +90,36 @@ def content_key(name: str, arrays: Iterable[NDArray]) -> str:
     key = hashlib.sha256(" ".join([name, *(str(array.shape) for array in contents)]).encode())
     for array in contents:
         key.update(array.data)
-    return key.hexdigest()[:32]
+    return key.hexdigest()[:_KEY_DIGITS]
 
 
 def cache_limit() -> int:
-    """How large the cache may grow [bytes]: RIPPLE_SIM_CACHE_LIMIT megabytes, or 500.
+    """The size limit of the cache [bytes]: RIPPLE_SIM_CACHE_LIMIT megabytes, or 500.
 
     Raises `RippleError` if the variable is not a number, or negative.
     """
-    given = os.environ.get(LIMIT, "").strip()
+    text = os.environ.get(LIMIT, "").strip()
     try:
-        limit = float(given) if given else _USUAL_LIMIT
+        limit = float(text) if text else _DEFAULT_LIMIT
         if not 0 <= limit < np.inf:
             raise ValueError
     except ValueError:
         raise RippleError(
-            f"{LIMIT} is {given!r}; valid is a number of megabytes, 0 or more"
+            f"{LIMIT} is {text!r}; valid is a number of megabytes, 0 or more"
         ) from None
     return int(limit * _MEGABYTE)
 
 
 def cached_files() -> dict[Path, int]:
-    """Sizes [bytes] of the files in the cache that are ours, the one used longest ago first."""
-    files = {}
+    """Sizes [bytes] of this package's files in the cache, the least recently used file first."""
+    files = []
     with contextlib.suppress(OSError):  # no folder, or one that cannot be read
         for path in cache_folder().iterdir():
             with contextlib.suppress(OSError):  # another process has removed it
-                if _OURS.fullmatch(path.name) and path.is_file():
+                if _CACHE_FILE.fullmatch(path.name) and path.is_file():
                     status = path.stat()
-                    files[path] = status.st_mtime, status.st_size
-    return {
-        path: size
-        for path, (_, size) in sorted(files.items(), key=lambda file: (file[1][0], file[0].name))
-    }
+                    files.append((status.st_mtime, path.name, path, status.st_size))
+    return {path: size for _, _, path, size in sorted(files)}
 
 
 def mark_used(path: Path) -> None:
@@ -127,7 +129,10 @@ def mark_used(path: Path) -> None:
 
 
 def make_room(newest: Path) -> None:
-    """Remove what was used longest ago until the cache is under its limit; the newest file stays, unless that is 0."""
+    """Remove the least recently used files until the cache is under its limit.
+
+    The newest file stays, unless the limit is 0.
+    """
     files = cached_files()
     limit = cache_limit()
     total = sum(files.values())
@@ -153,7 +158,7 @@ Result = TypeVar("Result")
 class ResultCache(Generic[Result]):
     """The latest `count` results by their keys, as far as they are `small` enough to be kept.
 
-    They are shared by all who ask, and not to be changed.
+    All callers share the results, and must not change them.
     """
 
     def __init__(self, count: int, small: Callable[[Result], bool]) -> None:
@@ -162,7 +167,7 @@ class ResultCache(Generic[Result]):
         self._results: OrderedDict[str, Result] = OrderedDict()
 
     def get(self, key: str, make: Callable[[], Result]) -> Result:
-        """The result of a key, made if it is not there."""
+        """The result of a key; `make` computes it if it is not in the cache."""
         result = self._results.pop(key, None)
         if result is None:
             result = make()
@@ -174,7 +179,10 @@ class ResultCache(Generic[Result]):
 
 
 def kept_with(make: Callable[[Owner], Result]) -> Callable[[Owner], Result]:
-    """Decorate what is made from one object, compared by identity: made once, and kept as long as the object lives."""
+    """Decorate a function of one object: its result is kept as long as the object lives.
+
+    Objects are compared by identity.
+    """
     results: WeakKeyDictionary[Owner, Result] = WeakKeyDictionary()
 
     @functools.wraps(make)

@@ -1,6 +1,7 @@
-"""The errors a caller may catch, every one of them a `RippleError`, and checks of arguments that raise them.
+"""The errors that a caller may catch, all of them `RippleError`, and checks that raise them.
 
-`checked` names the argument of a public function, its value and what is valid.
+`checked` checks the arguments of a public function; its message names the argument, its value and
+the valid values. Warnings name the line of the user's program that called into this package.
 """
 
 from __future__ import annotations
@@ -20,14 +21,13 @@ from typing import Any, ParamSpec, TypeVar
 
 import msgspec
 
-# Of a value in a message [characters].
-_LONGEST = 120
+_MAX_SHOWN_CHARACTERS = 120  # of a value in a message
 
-# Packages whose frames are never the user's: this one, and what runs its context managers, threads
-# and processes.
-_NOT_THE_USERS = ("ripple_sim", "contextlib", "threading", "concurrent", "multiprocessing")
+# Packages whose frames are not the user's: this package, and packages that run its context managers,
+# threads and processes.
+_INTERNAL_PACKAGES = ("ripple_sim", "contextlib", "threading", "concurrent", "multiprocessing")
 
-# What a warning names where no thread said for whom it works.
+# File and line that a warning names where no line of the user is known.
 _NO_LINE = ("ripple_sim", 0)
 
 
@@ -59,14 +59,16 @@ class GLError(RippleError, RuntimeError):
 
 
 class RippleWarning(UserWarning):
-    """Something runs, but not as expected: a hull off its surface, a body too fast for the time step."""
+    """Something runs, but not as expected, for instance a body too fast for the time step."""
 
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
-# `user_line`: the line that this thread works for.
+
+# Its attribute `user_line` is the line of the user's program for which the thread works.
 _thread = threading.local()
-# Which warnings without a frame of the user's were shown, as Python keeps it for each module.
+
+# Warnings without a frame of the user that were shown, as Python keeps them for each module.
 _shown_warnings: dict[Any, Any] = {}
 
 
@@ -117,9 +119,10 @@ def instance(kind: type, hint: str = "", *, optional: bool = False) -> Valid:
 
 
 def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
-    """Check the fields of a dataclass by their annotations, and those of these names, where they are not None, by more.
+    """Check the fields of a dataclass by their annotations, and some fields by further conditions.
 
-    Raises `RippleError` of the given kind, for the first that is not valid.
+    The conditions `valid` are by field name, and hold for values that are not None. Raises `error`
+    for the first field that is not valid.
     """
     for name, hint in typing.get_type_hints(type(record)).items():
         value = getattr(record, name)
@@ -134,7 +137,7 @@ def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
 
 
 def _words(hint: Any) -> str:
-    """What an annotation allows, as a message says it: "int or None"."""
+    """The values that an annotation allows, in the words of a message: "int or None"."""
     kind = typing.get_origin(hint)
     inner = typing.get_args(hint)
     if kind is typing.Literal:
@@ -143,22 +146,20 @@ def _words(hint: Any) -> str:
         return f"({', '.join(map(_words, inner))})"
     if kind is Sequence:
         return f"a list of {_words(inner[0])}"
-    return (
-        "None"
-        if hint is type(None)
-        else " or ".join(map(_words, inner))
-        if inner
-        else hint.__name__
-    )
+    if hint is type(None):
+        return "None"
+    if inner:
+        return " or ".join(map(_words, inner))
+    return hint.__name__
 
 
 def shown(value: object) -> str:
-    """A value as messages show it, not at any length."""
+    """A value as messages show it, cut off if it is long."""
     try:
         text = repr(value)
-    except Exception:  # of the value's own, or an int of too many digits
+    except Exception:  # raised by the value's own method, or by an int of too many digits
         text = f"a value of type {type(value).__name__}"
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+    return text if len(text) <= _MAX_SHOWN_CHARACTERS else f"{text[:_MAX_SHOWN_CHARACTERS]} ..."
 
 
 def user_line() -> tuple[str, int]:
@@ -170,7 +171,10 @@ def user_line() -> tuple[str, int]:
 
 
 def work_for(line: tuple[str, int]) -> None:
-    """Let warnings of this thread name a line of another thread or process: that of the call which gave it the work."""
+    """Let warnings of this thread name a line of the user's program.
+
+    It is the line of the call that gave this thread or process its work.
+    """
     _thread.user_line = line
 
 
@@ -184,26 +188,30 @@ def warn_caller(message: str, category: type[Warning] = RippleWarning) -> None:
 
 
 def _user_frame() -> tuple[FrameType | None, int]:
-    """The innermost frame of the user's on this stack, and how many frames above the caller's it is; or None."""
+    """The innermost frame of the user on this stack, and its number of frames above the caller's.
+
+    The frame is None if there is no frame of the user.
+    """
     frame = inspect.currentframe()
     level = 0
-    while frame and frame.f_globals.get("__name__", "").split(".")[0] in _NOT_THE_USERS:
+    while frame and frame.f_globals.get("__name__", "").split(".")[0] in _INTERNAL_PACKAGES:
         frame = frame.f_back
         level += 1
     return frame, level
 
 
 def deprecated(old: str, instead: str, goes: str) -> None:
-    """Warn, from what the user calls, that it is deprecated: it still works, and goes with the version `goes`."""
+    """Warn at the user's line that `old` is deprecated: it works until the version `goes`."""
     warn_caller(f"{old} is deprecated and goes with {goes}; use {instead}", DeprecationWarning)
 
 
 def checked(
     error: type[RippleError], **valid: Valid
 ) -> Callable[[Callable[Parameters, Result]], Callable[Parameters, Result]]:
-    """Decorate a function so that arguments of these names are checked before it runs; `error` is what is raised.
+    """Decorate a function so that arguments are checked before it runs.
 
-    A wrong number of arguments, or a wrong name, stays Python's TypeError.
+    `valid` has conditions by the name of the argument. An argument that is not valid raises `error`.
+    A wrong number of arguments, or a wrong name, is Python's TypeError.
     """
 
     def decorate(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
@@ -211,11 +219,12 @@ def checked(
 
         @functools.wraps(function)
         def checking(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
-            given = signature.bind(*args, **kwargs).arguments
-            for name, each in valid.items():
-                if name in given and not each.holds(given[name]):
+            arguments = signature.bind(*args, **kwargs).arguments
+            for name, condition in valid.items():
+                if name in arguments and not condition.holds(arguments[name]):
                     raise error(
-                        f"{name.replace('_', ' ')} is {shown(given[name])}; valid is {each.words}"
+                        f"{name.replace('_', ' ')} is {shown(arguments[name])}; "
+                        f"valid is {condition.words}"
                     )
             return function(*args, **kwargs)
 

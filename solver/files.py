@@ -8,13 +8,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-try:
-    import resource
-except ImportError:  # on Windows
-    resource = None  # type: ignore[assignment]
-
-
-# Errors of the system that another name would have avoided.
+# Errors of the system that come from the name of a file: another name would avoid them.
 OF_THE_NAME = (
     errno.ENAMETOOLONG,
     errno.ENOENT,
@@ -24,24 +18,21 @@ OF_THE_NAME = (
     errno.ELOOP,
 )
 
-
-# Those of them that hold in every folder.
+# Errors of a name that hold in every folder.
 NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
 
-
-# Errors of the disk, which no other input would have avoided.
+# Errors of the disk: no other input would avoid them.
 OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
-
-# What is written beside a file before it takes its name has a longer one.
+# The longest suffix of an unfinished file, which is written beside the final file.
 _LONGEST_SUFFIX = ".0123456789.part"
 
 
 def final_path(path: Path) -> Path:
-    """Where a path to be written leads, its symbolic links followed.
+    """The path to which a path to be written leads, after its symbolic links.
 
-    Raises `OSError` if links lead in a circle, or the name is too long for the system, or too long
-    to be written beside first.
+    Raises `OSError` if links lead in a circle, or if the name is too long for the system, also with
+    the suffix of an unfinished file.
     """
     final = Path(os.path.realpath(path))
     if final.is_symlink():
@@ -56,10 +47,11 @@ def final_path(path: Path) -> Path:
 
 @contextlib.contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside `path` to write to, renamed to `path` at the end, removed after an exception.
+    """Give a temporary path beside `path` to write to.
 
-    Symbolic links are followed, missing folders made. Raises `OSError` if the path exists and is
-    not a regular file (renaming would destroy a device, say), or cannot be written.
+    The file is renamed to `path` at the end, or removed after an exception. Symbolic links are
+    followed, and missing folders are made. Raises `OSError` if the path exists and is not a regular
+    file (renaming would destroy a device, for instance), or if it cannot be written.
     """
     path = final_path(path)
     if path.exists() and not path.is_file():

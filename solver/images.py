@@ -1,4 +1,4 @@
-"""Images to be read, with pillow's limit against decompression bombs."""
+"""Reading of images, with pillow's limit against decompression bombs."""
 
 from __future__ import annotations
 
@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.JpegImagePlugin import JpegImageFile
 
-try:
-    import resource
-except ImportError:  # on Windows
-    resource = None  # type: ignore[assignment]
-
 from .errors import RippleError, shown
 from .memory import require_memory
 
-# Of a pixel while an image is decoded, converted and uploaded [bytes].
-_PIXEL = 12
+# Memory that a pixel takes while an image is decoded, converted and uploaded [bytes].
+_PIXEL_BYTES = 12
+
+# Reductions at which JPEG is decoded.
+_JPEG_REDUCTIONS = (2, 4, 8)
 
 
 def read_image(
@@ -34,12 +32,12 @@ def read_image(
     Parameters
     ----------
     error : type
-        What is raised.
+        The class of the error that is raised.
     source : path or PIL.Image.Image
     what : str
         What the image is, for messages.
     mode : callable
-        From the file's mode, as pillow names it, to the one that is wanted.
+        Gives the wanted mode for the file's mode, as pillow names modes.
 
     Returns
     -------
@@ -48,8 +46,8 @@ def read_image(
     Raises
     ------
     RippleError
-        If the file cannot be read, has more pixels than pillow allows, or these do not fit into
-        memory.
+        If the file cannot be read, has more pixels than pillow allows, or its pixels do not fit
+        into memory.
     """
     image = open_image(error, source, what)
     try:
@@ -61,11 +59,11 @@ def read_image(
 def open_image(
     error: type[RippleError], source: str | Path | Image.Image, what: str
 ) -> Image.Image:
-    """The image of a file, as pillow opens it: nothing but its head is read; see `read_image`."""
+    """The image of a file, as pillow opens it: only its header is read; see `read_image`."""
     name = f"{what} {shown(str(source))}"
     try:
         with warnings.catch_warnings():
-            # that half of the limit is reached
+            # pillow warns from half of its limit on
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = source if isinstance(source, Image.Image) else _opened(source)
     except Image.DecompressionBombError as bomb:
@@ -76,28 +74,27 @@ def open_image(
         raise error(f"{name} cannot be read: {problem}") from problem
     width, height = image.size
     require_memory(
-        error, _PIXEL * width * height, f"{name} of {width}x{height} pixels", "scale it down"
+        error, _PIXEL_BYTES * width * height, f"{name} of {width}x{height} pixels", "scale it down"
     )
     return image
 
 
 def _opened(path: str | Path) -> Image.Image:
-    """An image file; a JPEG beyond pillow's limit at the half, quarter or eighth of its size at which it is below.
+    """Open an image file; a JPEG beyond pillow's limit is reduced until it is below the limit.
 
-    It is decoded at that size, row by row. A progressive one, or a PNG, would be held whole
-    meanwhile.
+    It is reduced to a half, a quarter or an eighth, while it is decoded row by row. A progressive
+    JPEG, or a PNG, would be held in memory as a whole meanwhile, and is not reduced.
     """
     try:
         return Image.open(path)
     except Image.DecompressionBombError as bomb:
         try:
             image = JpegImageFile(path)
-        except SyntaxError:  # it is no JPEG
+        except SyntaxError:  # the file is not a JPEG
             raise bomb from None
         width, height = image.size
-        scales = [
-            k for k in (2, 4, 8) if width * height <= k * k * 2 * (Image.MAX_IMAGE_PIXELS or 0)
-        ]
+        allowed = 2 * (Image.MAX_IMAGE_PIXELS or 0)
+        scales = [k for k in _JPEG_REDUCTIONS if width * height <= k * k * allowed]
         if not scales or image.info.get("progressive"):
             image.close()
             raise

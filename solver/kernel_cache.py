@@ -71,7 +71,7 @@ _SMALL_INTEGERS = (numba.types.int8, numba.types.int16, numba.types.int32)
 
 
 def keep_on_disk(compiled: Any, function: Callable) -> None:
-    """Let a dispatcher of numba load the versions of a function from the disk, and save them there."""
+    """Let a dispatcher of numba load versions of a function from disk, and save them there."""
     compiled._cache = _KernelCache(function)
 
 

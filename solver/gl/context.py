@@ -1,9 +1,9 @@
 """The OpenGL context: created here, entered here, checked here, and nowhere else.
 
-`shared_context` gives the one context of a device that all in the process share. Beside it:
-software drivers, to which EGL falls back without saying so; fences, which moderngl lacks, to wait
-for the GPU without blocking other Python threads; and a pool of programs that nobody uses at the
-time, for compiling one takes as long as a frame.
+`shared_context` gives the context of a device that the whole process shares. This module also finds
+out whether the driver is software, to which EGL falls back silently; it has fences, which moderngl
+lacks, to wait for the GPU without blocking other Python threads; and it keeps a pool of idle
+programs, since compiling a program takes as long as a frame.
 
 `load_shader` reads GLSL sources from packages, resolves their includes, and defines the constants
 that Python gives.
@@ -33,40 +33,48 @@ import moderngl
 from ..errors import GLError
 from .current import EGLCurrent, Restore, current_kept, leave_current, load_egl, release_current
 
-# The number that a shader gives to a sampler or uniform block, and its name; and what is to be left
-# out of it.
+# The binding that a shader gives to a sampler or uniform block, and the name of the latter.
 _BOUND = re.compile(r"layout\((?:std140, )?binding = (\w+)\) uniform (?:\w+ )?(\w+)")
+
+# The part of such a declaration that GLSL before 4.2 does not have.
 _BINDING = re.compile(r"layout\(binding = \w+\) |, binding = \w+")
+
+# Words in GL_RENDERER that name a driver which renders on the processor.
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
 
-# The plain sonames first; the versioned ones are what runtime packages without -dev symlinks
-# install.
+# Names of the libraries that moderngl loads: its own names first, which packages with -dev symlinks
+# install; then the names that runtime packages install.
 _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
 
-# Versions of OpenGL that compute shaders need, and that rendering needs.
-COMPUTE = 430
-RENDERING = 410
+# Versions of OpenGL, times 100.
+COMPUTE = 430  # compute shaders need it
+RENDERING = 410  # rendering needs it
+_REPORTED = 330  # a driver with this version is named in the error that asks for a later one
 
-# Environment variable: how many threads Mesa's llvmpipe draws with; 0: none.
+# Environment variable: the number of threads with which Mesa's llvmpipe draws; 0: none.
 DRAWING_THREADS = "LP_NUM_THREADS"
 
-# Environment variable of MuJoCo's: number of the EGL device to draw on, where the program names
-# none.
+# Environment variable of MuJoCo: number of the EGL device to draw on, where the program names none.
 _MUJOCO_DEVICE = "MUJOCO_EGL_DEVICE_ID"
 
-# What Mesa's shader cache may come to need while a process runs [bytes].
-_SHADER_CACHE = 64e6
+# EGL devices that are tried where nobody names one. A machine with more GPUs than this names one.
+_TRIED_DEVICES = 8
+
+_SHADER_CACHE_BYTES = 64e6  # room that Mesa's shader cache may need while a process runs
+
+# Constants of OpenGL for fences.
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
-_TIMEOUT_EXPIRED = 0x911B
-_FAILED = 0x911D
-_MOST = 64  # idle programs at a time
+_TIMEOUT_EXPIRED = 0x911B  # GL_TIMEOUT_EXPIRED
+_FAILED = 0x911D  # GL_WAIT_FAILED
 
-# How long a thread waits for another to leave the context [s]: longer than any frame takes.
+_MAX_IDLE_PROGRAMS = 64
+
+# Time that a thread waits for another thread to leave the context [s]: longer than any frame takes.
 _PATIENCE = 120.0
 
-# How long a thread that waits for the driver keeps others from the context [s], and how long it
-# leaves it to them: a lock that is let go and taken at once is not handed on.
+# A thread that waits for the driver holds the context for a turn [s], and then leaves it to other
+# threads for a pause [s]: a lock that is released and taken at once is not handed on.
 _TURN = 1e-3
 _PAUSE = 1e-4
 
@@ -77,18 +85,18 @@ def load_shader(package: str, name: str, stage: str = "", **defines: object) -> 
     Parameters
     ----------
     package : str
-        The package below which the shader and whatever it includes lie.
+        The package below which the shader and its included files lie.
     name : str
         Path of the file below the package, without `.glsl`: "passes/classify". A line `#include
         "glsl/frame.glsl"` is replaced by that file, its path likewise relative to the package; a
         file that was included before is not included again.
     stage : str
         Which of the shaders in the file, if there are several: lines behind `#stage vertex` belong
-        to the stage "vertex" alone, up to the next such line; those before the first belong to all.
-        So it is in files included.
+        to the stage "vertex" only, up to the next such line. Lines before the first `#stage` belong
+        to all stages. The same holds for included files.
     **defines
-        Constants, written as `#define NAME value` where the text has the name. GROUP is how many
-        threads a group of a compute shader has, which is declared too.
+        Constants, written as `#define NAME value` where the text has the name. GROUP is the number
+        of threads in a group of a compute shader; the group's layout is declared as well.
 
     Raises
     ------
@@ -99,15 +107,22 @@ def load_shader(package: str, name: str, stage: str = "", **defines: object) -> 
     head, _, body = text.partition("\n")
     if not head.startswith("#version"):
         raise GLError(f"shader {name}.glsl of {package} must start with #version, found {head!r}")
-    # only those that it knows: shaders that do not differ in them are the same, and compiled once
-    known = set(re.findall(r"\w+", " ".join([body, *map(str, defines.values())])))
-    lines = "".join(f"#define {key} {value}\n" for key, value in defines.items() if key in known)
+    # only names that occur: shaders that differ in other names alone have the same text, which is
+    # compiled once
+    used_names = set(re.findall(r"\w+", " ".join([body, *map(str, defines.values())])))
+    lines = ""
+    for key, value in defines.items():
+        if key in used_names:
+            lines += f"#define {key} {value}\n"
     layout = f"layout(local_size_x = {defines['GROUP']}) in;\n" if "GROUP" in defines else ""
     return f"{head}\n{lines}{layout}{body}"
 
 
 def _read(folder: Traversable, path: str, stage: str, seen: set[str]) -> str:
-    """Text of a file with what it includes, as far as it belongs to a stage, unless it has been seen."""
+    """Text of a file and its included files, as far as it belongs to a stage.
+
+    The text of a file that was `seen` before is empty.
+    """
     if path in seen:
         return ""
     seen.add(path)
@@ -119,12 +134,10 @@ def _read(folder: Traversable, path: str, stage: str, seen: set[str]) -> str:
     for line in _lines(file):  # type: ignore[arg-type]  # a path can be hashed
         if line.startswith("#stage"):
             belongs = line.split()[1] == stage
+        elif belongs and line.startswith("#include"):
+            lines.append(_read(folder, line.split('"')[1], stage, seen))
         elif belongs:
-            lines.append(
-                _read(folder, line.split('"')[1], stage, seen)
-                if line.startswith("#include")
-                else line
-            )
+            lines.append(line)
     return "\n".join(lines) + "\n"
 
 
@@ -141,22 +154,24 @@ def is_software(renderer: str) -> bool:
 def _spare_full_disks() -> None:
     """Switch Mesa's shader cache off where its disk is nearly full, or its folder cannot be made.
 
-    It is mapped, and a page without room kills; of a folder Mesa complains on standard error.
+    The cache is mapped into memory: a page without room on the disk kills the process. A folder that
+    cannot be made makes Mesa complain on standard error.
     """
     names = ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
     folder = Path(next((os.environ[name] for name in names if os.environ.get(name)), "/"))
     with contextlib.suppress(OSError):
-        there = next(each for each in (folder, *folder.parents) if each.exists())
-        if shutil.disk_usage(there).free < _SHADER_CACHE or not os.access(there, os.W_OK):
+        existing = next(path for path in (folder, *folder.parents) if path.exists())
+        is_full = shutil.disk_usage(existing).free < _SHADER_CACHE_BYTES
+        if is_full or not os.access(existing, os.W_OK):
             os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
 
 
 def _draw_without_threads() -> None:
-    """Have Mesa's llvmpipe draw in the thread that calls it, unless the user has said how many threads it is to have.
+    """Have Mesa's llvmpipe draw in the calling thread, unless the user set the number of threads.
 
-    It reads the variable when its first context is made. One of its threads may still unlock a
-    fence that another has freed: it writes into the program's memory, and glibc ends the program
-    ("corrupted unsorted chunks"). See docs/stability.md. Other drivers know no such variable.
+    llvmpipe reads the variable when its first context is made. One of its threads may unlock a fence
+    that another thread has freed: this writes into the program's memory, and glibc ends the program
+    ("corrupted unsorted chunks"). See docs/stability.md. Other drivers ignore the variable.
     """
     os.environ.setdefault(DRAWING_THREADS, "0")
 
@@ -164,10 +179,11 @@ def _draw_without_threads() -> None:
 def create_context(device: int | None) -> moderngl.Context:
     """Create a headless context: OpenGL 4.3, or else 4.1; raises GLError.
 
-    What is current in this thread stays so.
+    The context that is current in this thread stays current.
 
-    Without a `device` it is on the one that the environment variable MUJOCO_EGL_DEVICE_ID names, as
-    MuJoCo's own renderer is, and where that is not set either on the first that yields a context.
+    Without a `device`, the new context is on the device that the environment variable
+    MUJOCO_EGL_DEVICE_ID names, like MuJoCo's own renderer. Without the variable, it is on the first
+    device that yields a context.
     """
     if not sys.platform.startswith("linux"):
         raise GLError(
@@ -193,7 +209,7 @@ def _device_of_environment() -> int | None:
 
 
 def _create_current(device: int | None) -> moderngl.Context:
-    """Create a context as `create_context` does, and leave it current."""
+    """Create a context like `create_context`, and leave it current."""
     _spare_full_disks()
     _draw_without_threads()
     place = f"EGL device {device}"
@@ -201,9 +217,10 @@ def _create_current(device: int | None) -> moderngl.Context:
         place = f"EGL device {device}, which {_MUJOCO_DEVICE} names"
     if device is not None and device < 0:
         raise GLError(f"there is no {place}; devices are counted from 0")
-    devices = range(8) if device is None else [device]
+    devices = range(_TRIED_DEVICES) if device is None else [device]
     reason = "no device"
-    for version in (COMPUTE, RENDERING, 330):  # drivers may give the very version that is asked for
+    # a driver may give exactly the version that is asked for: the highest is asked for first
+    for version in (COMPUTE, RENDERING, _REPORTED):
         for libraries in _LIBRARIES:
             for index in devices:
                 # not in its hints
@@ -233,20 +250,20 @@ def _create_current(device: int | None) -> moderngl.Context:
 class GLContext:
     """One headless OpenGL context on EGL, shared by the GPU wave solver and the renderer.
 
-    Use it as a context manager: entering makes the context current, frees the objects that nobody
-    needs any more, and returns the `moderngl.Context`; leaving the outermost block restores what
-    the program had current, and raises `GLError` if the driver recorded an error meanwhile. Any
-    thread may enter: one at a time, the others wait.
+    Use it as a context manager. Entering makes the context current, frees discarded objects, and
+    returns the `moderngl.Context`. Leaving the outermost block makes the program's own context
+    current again, and raises `GLError` if the driver recorded an error meanwhile. Any thread may
+    enter: one at a time, other threads wait.
 
-    Python collects objects at any time, in any thread, also in the middle of somebody's frame. So
-    finalizers call no OpenGL: they `discard` objects, which are freed when the context is next
-    entered from outside.
+    Python collects objects at any time, in any thread, also in the middle of a frame. So finalizers
+    do not call OpenGL: they `discard` objects, which are freed when the context is next entered from
+    outside.
 
     Parameters
     ----------
     device : int, optional
-        EGL device index. By default that of the environment variable MUJOCO_EGL_DEVICE_ID, or the
-        first device that yields a context.
+        EGL device index. By default the index in the environment variable MUJOCO_EGL_DEVICE_ID, or
+        the first device that yields a context.
 
     Raises
     ------
@@ -258,24 +275,24 @@ class GLContext:
     def __init__(self, device: int | None = None) -> None:
         self._process = os.getpid()
         self._lock = threading.RLock()
-        self._owner = ""  # name of the thread that is in
-        self._depth = 0  # of its `with` blocks
+        self._owner = ""  # name of the thread that has entered
+        self._depth = 0  # number of its nested `with` blocks
         self._restore: Restore = release_current
-        self._collects = True  # whether Python looked for garbage before
+        self._collected_before = True  # whether Python's garbage collector was on before entering
         # batches of objects to free
         self._discarded: deque[list[Any]] = deque()
         self._shaders: dict[str, moderngl.ComputeShader] = {}
-        # programs that nobody uses, by their number in OpenGL, the longest idle first; of all, the
-        # sources and the uniforms that they began with
+        # idle programs by their number in OpenGL, the longest idle first
         self._idle: dict[int, Any] = {}
-        self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
+        # of all programs: the sources, and the uniforms after compilation
+        self._programs: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
         with current_kept():
             self._ctx = create_context(device)
             self._ctx.__enter__()
             self._find_driver()
 
     def _find_driver(self) -> None:
-        """Take in what the new context, which is current, says of itself."""
+        """Read the properties of the new context, which is current."""
         own = EGLCurrent.of_thread()
         if own is None:
             raise GLError(
@@ -304,7 +321,7 @@ class GLContext:
 
     @property
     def software(self) -> bool:
-        """Whether the driver renders on the CPU. EGL falls back to that without saying so."""
+        """Whether the driver renders on the CPU. EGL falls back to such a driver silently."""
         return is_software(self.renderer)
 
     def __enter__(self) -> moderngl.Context:
@@ -361,7 +378,7 @@ class GLContext:
             self._lock.release()
 
     def check_process(self) -> None:
-        """Raise `GLError` in a process that was forked: a context does not survive that."""
+        """Raise `GLError` in a process that was forked: a context does not survive a fork."""
         if os.getpid() != self._process:
             raise GLError(
                 f"the OpenGL context belongs to process {self._process}, of which this one "
@@ -370,14 +387,14 @@ class GLContext:
             )
 
     def _take(self) -> None:
-        """Make the context current, and free what nobody needs any more."""
+        """Make the context current, and free discarded objects."""
         self._owner = threading.current_thread().name
-        if self._current.is_current():  # left so by Ctrl-C: other threads could not enter
+        if self._current.is_current():  # Ctrl-C left it current: other threads could not enter
             release_current()
         self._restore = leave_current()
-        # finalizers of others leave the context under our feet, in any line: MuJoCo's call
+        # finalizers of other libraries would leave the context at any line: those of MuJoCo call
         # eglReleaseThread
-        self._collects = gc.isenabled()
+        self._collected_before = gc.isenabled()
         gc.disable()
         try:
             if not self._current.make_current():
@@ -393,27 +410,28 @@ class GLContext:
             raise
 
     def _leave(self) -> None:
+        """Make the program's own context current again."""
         try:
             self._restore()
         finally:
-            if self._collects:
+            if self._collected_before:
                 gc.enable()
 
     def discard(self, objects: list[Any]) -> None:
-        """Have objects of moderngl's freed when the context is next entered from outside.
+        """Have objects of moderngl freed when the context is next entered from outside.
 
-        It calls no OpenGL and waits for nobody: finalizers may call it, in any thread and in the
+        It does not call OpenGL and does not wait: finalizers may call it, in any thread and in the
         middle of a frame.
         """
         self._discarded.append(objects)
 
     def free(self) -> None:
-        """Free what was discarded at once, unless somebody is using the context; then it is freed later."""
+        """Free discarded objects now, or later if a thread uses the context."""
         if os.getpid() != self._process or not self._lock.acquire(blocking=False):
             return
         try:
             if self._depth == 0:
-                with contextlib.suppress(GLError), self:  # nothing is left of a lost context
+                with contextlib.suppress(GLError), self:  # a lost context has no objects
                     pass
         finally:
             self._lock.release()
@@ -432,15 +450,15 @@ class GLContext:
                 last.release()
 
     def barrier(self) -> None:
-        """Make what compute shaders have written visible to later commands."""
+        """Make the results of compute shaders visible to later commands."""
         with self as ctx:
             ctx.memory_barrier()
 
     def flush(self) -> None:
-        """Have a software driver draw all commands so far, here and now, without blocking other Python threads.
+        """Have a software driver draw all commands so far, without blocking other Python threads.
 
-        Else it draws a pass when another one begins, in a call of moderngl's, which holds the
-        interpreter's lock. Other drivers begin when they like.
+        Otherwise a software driver draws a pass when the next pass begins, in a call of moderngl that
+        holds the interpreter's lock. Other drivers begin on their own.
         """
         if self.software:
             self._flush()
@@ -454,15 +472,18 @@ class GLContext:
         self.wait_for(self.put_fence())
 
     def put_fence(self) -> int:
-        """Put a fence behind all commands so far, and return its handle; wait for each fence once."""
+        """Put a fence behind all commands so far, and return its handle.
+
+        Wait for each fence once.
+        """
         with self:
             return self._create_fence(_COMMANDS_COMPLETE, 0)
 
     def wait_for(self, fence: int) -> None:
-        """Wait until the driver has reached a fence, as `wait` does for all commands; the fence is then deleted.
+        """Wait until the driver has reached a fence, and delete the fence.
 
-        Outside of the context's `with` block other threads may enter meanwhile. Raises `GLError` if
-        the driver reports a failure.
+        Other threads may enter the context meanwhile, unless this thread is in its `with` block.
+        Raises `GLError` if the driver reports a failure.
         """
         while True:
             with self:
@@ -481,7 +502,10 @@ class GLContext:
     def compute_shader(
         self, package: str, name: str, stage: str = "compute", /, **defines: object
     ) -> moderngl.ComputeShader:
-        """Compile a stage of `{name}.glsl` below `package` once and share it: set all uniforms before each use."""
+        """Compile a stage of `{name}.glsl` below `package`, once for all callers.
+
+        Set all uniforms before each use.
+        """
         if not self.computes:
             raise GLError(
                 f"{self.renderer} has OpenGL {self.version.split()[0]}; backend 'gl' needs 4.3: "
@@ -496,68 +520,82 @@ class GLContext:
     def program(
         self, package: str, name: str, *captured: str, **defines: object
     ) -> moderngl.Program:
-        """Compile and link the stages "vertex" and "fragment" of `{name}.glsl` below `package`; see `load_shader`.
+        """Compile and link the stages "vertex" and "fragment" of `{name}.glsl` below `package`.
 
-        An idle program of the same text is taken instead, its uniforms as after compilation.
+        See `load_shader`. An idle program of the same text is taken instead, with its uniforms as
+        after compilation.
 
-        `VARYING` is what the one hands to the other: `out` and `in`. With `captured`, names of
-        outputs of the vertex stage, there is no other, and transform feedback captures these. A
-        shader may say `binding = N` of its samplers and uniform blocks, each by a name of its own:
-        GLSL has that from 4.2 on, and here it is done.
+        `VARYING` declares a value that the vertex stage passes to the fragment stage: it is `out` in
+        the one and `in` in the other. With `captured`, names of outputs of the vertex stage, there is
+        no fragment stage, and transform feedback captures these outputs. A shader may give `binding =
+        N` to its samplers and uniform blocks, each of which has a name of its own. GLSL knows
+        bindings from 4.2 on; here they are set for older versions.
         """
         stages = {"vertex": "out"} if captured else {"vertex": "out", "fragment": "in"}
         texts = [
             load_shader(package, name, stage, VARYING=way, **defines)
             for stage, way in stages.items()
         ]
-        found = [each for text in texts for each in _BOUND.findall(text)]
-        bindings = {bound: int(str(defines.get(number, number))) for number, bound in found}
+        bindings: dict[str, int] = {}
+        for text in texts:
+            for number, bound in _BOUND.findall(text):
+                bindings[bound] = int(str(defines.get(number, number)))
         vertex, *fragment = (_BINDING.sub("", text) for text in texts)
-
-        def linked() -> moderngl.Program:
-            program = ctx.program(
-                vertex_shader=vertex, fragment_shader=next(iter(fragment), None), varyings=captured
-            )
-            for each in bindings.keys() & set(program):
-                member = program[each]
-                setattr(
-                    member,
-                    "value" if isinstance(member, moderngl.Uniform) else "binding",
-                    bindings[each],
-                )
-            return program
-
         sources = vertex, *fragment, *captured
         with self as ctx:
-            number = next(
-                (each for each in reversed(self._idle) if self._begun[each][0] == sources), None
-            )
-            if number is None:
-                program = _compiled(name, linked)
-                uniforms = [each for each in program if isinstance(program[each], moderngl.Uniform)]
-                self._begun[program.glo] = (
-                    sources,
-                    {each: program[each].read() for each in uniforms},
+            idle = self._take_idle(sources)
+            if idle is not None:
+                return idle
+
+            def link() -> moderngl.Program:
+                return ctx.program(
+                    vertex_shader=vertex,
+                    fragment_shader=next(iter(fragment), None),
+                    varyings=captured,
                 )
+
+            program = _compiled(name, link)
+            _bind(program, bindings)
+            uniforms = {}
+            for member in program:
+                if isinstance(program[member], moderngl.Uniform):
+                    uniforms[member] = program[member].read()
+            self._programs[program.glo] = sources, uniforms
+            return program
+
+    def _take_idle(self, sources: tuple[str, ...]) -> moderngl.Program | None:
+        """The latest idle program of these sources, with its first uniforms, or None."""
+        for number in reversed(self._idle):
+            program_sources, uniforms = self._programs[number]
+            if program_sources == sources:
+                program = self._idle.pop(number)
+                for uniform, value in uniforms.items():
+                    program[uniform].write(value)
                 return program
-            for each, value in self._begun[number][1].items():
-                self._idle[number][each].write(value)
-            return self._idle.pop(number)
+        return None
 
     def release(self, created: Any) -> None:
-        """Release an object; programs are kept for whoever asks for the same ones next, up to a number."""
+        """Release an object; a number of idle programs is kept for the next caller of `program`."""
         with self:
             self._release(created)
 
     def _release(self, created: Any) -> None:
-        if isinstance(created, moderngl.Program) and created.glo in self._begun:
+        if isinstance(created, moderngl.Program) and created.glo in self._programs:
             self._idle[created.glo] = created
-            if len(self._idle) <= _MOST:
+            if len(self._idle) <= _MAX_IDLE_PROGRAMS:
                 return
             oldest = next(iter(self._idle))
-            del self._begun[oldest]
+            del self._programs[oldest]
             created = self._idle.pop(oldest)
         created.release()
+
+
+def _bind(program: moderngl.Program, bindings: dict[str, int]) -> None:
+    """Give samplers and uniform blocks their bindings, by name."""
+    for name in bindings.keys() & set(program):
+        member = program[name]
+        attribute = "value" if isinstance(member, moderngl.Uniform) else "binding"
+        setattr(member, attribute, bindings[name])
 
 
 def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
@@ -573,7 +611,7 @@ _lock = threading.Lock()
 
 
 def _begin_fork() -> None:
-    """Leave a fork no lock that another thread held, which does not exist there."""
+    """Give a fork a new lock: a thread that held the lock does not exist in the fork."""
     global _lock
     _lock = threading.Lock()
 

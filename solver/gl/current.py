@@ -1,8 +1,8 @@
-"""What is current in a thread: a program's own OpenGL context is left for ours, and made current again afterwards.
+"""The current OpenGL context of a thread: the program's own context comes back after ours.
 
 OpenGL draws with the one context that is current in a thread, whichever window system made it: EGL,
-GLX (windows on X11), or OSMesa (pictures in memory). Programs make theirs current once and rely on
-that, as robosuite and Gymnasium do.
+GLX (windows on X11), or OSMesa (pictures in memory). Programs such as robosuite and Gymnasium make
+their context current once and rely on it.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from ..errors import GLError
 
 Restore: TypeAlias = Callable[[], object]
 
-# Names that runtime packages install, and moderngl loads. A name that loads another file would hide
-# a damaged library.
+# Names of the libraries that runtime packages install, and that moderngl loads. Another name could
+# load another file, and hide that the library is damaged.
 _EGL_LIBRARY = "libEGL.so.1"
 _GLX_LIBRARY = "libGL.so.1"
 _OSMESA_LIBRARIES = "libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6"
 
-_EGL_DRAW = 0x3059
-_EGL_READ = 0x305A
-_OSMESA_TYPE = 0x23
+_EGL_DRAW = 0x3059  # EGL_DRAW: the surface that a context draws to
+_EGL_READ = 0x305A  # EGL_READ: the surface that a context reads from
+_OSMESA_TYPE = 0x23  # OSMESA_TYPE: the type of a picture's numbers
 
 _pointer = ctypes.c_void_p
 
@@ -51,7 +51,7 @@ def load_egl() -> ctypes.CDLL:
 
 
 class EGLCurrent(NamedTuple):
-    """A context of EGL with its display, and the surfaces that it draws to and reads from; 0 where there is none."""
+    """A context of EGL, its display, and the surfaces that it draws to and reads from, or 0."""
 
     display: int
     draw: int
@@ -60,7 +60,7 @@ class EGLCurrent(NamedTuple):
 
     @classmethod
     def of_thread(cls) -> EGLCurrent | None:
-        """What is current in this thread, or None."""
+        """The context that is current in this thread, or None."""
         egl = load_egl()
         context = egl.eglGetCurrentContext()
         if not context:
@@ -69,11 +69,11 @@ class EGLCurrent(NamedTuple):
         return cls(egl.eglGetCurrentDisplay(), draw, read, context)
 
     def make_current(self) -> bool:
-        """Make it current in this thread, and return whether that worked."""
+        """Make the context current in this thread; return whether it is."""
         return bool(load_egl().eglMakeCurrent(*self)) and self.is_current()
 
     def is_current(self) -> bool:
-        """Whether it is the one that is current in this thread."""
+        """Whether the context is current in this thread."""
         return current_context() == self.context
 
 
@@ -89,9 +89,10 @@ def release_current() -> None:
 
 
 def leave_current() -> Restore:
-    """Leave whatever is current in this thread, so that an EGL context can be made current.
+    """Leave the context that is current in this thread, so that an EGL context can be made current.
 
-    What is returned makes it current again, in place of whatever EGL context is current by then.
+    The returned function makes the context current again, in place of the EGL context that is then
+    current.
     """
     previous = EGLCurrent.of_thread()
     if previous is None:
@@ -106,10 +107,10 @@ def leave_current() -> Restore:
 
 @contextlib.contextmanager
 def current_kept() -> Iterator[None]:
-    """What is current in this thread when the block begins is so again at its end, whatever the block makes current."""
+    """Make the context that is current when the block begins current again at the end."""
     try:
         egl = load_egl()
-    except GLError:  # without the library no context can be made
+    except GLError:  # without the library no EGL context can be made
         yield
         return
     api = egl.eglQueryAPI()

@@ -18,7 +18,7 @@ from ripple_sim.solver import (
     texel_atlas,
 )
 from ripple_sim.solver.backends import auto_backend, backend_speed, make_backend
-from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.gl import GLContext, context, shared_context
 from ripple_sim.solver.layouts import build_atlas
 from ripple_sim.solver.operator import WaveOperator, build_operator
 
@@ -226,8 +226,10 @@ def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(
     def fail(device: int | None) -> None:
         raise GLError("no OpenGL 4.3 context")
 
-    monkeypatch.setattr("ripple_sim.solver.gl.context.create_context", fail)
-    monkeypatch.setattr("ripple_sim.solver.gl.context._shared", {})
+    # contexts of earlier tests, and a device that an earlier test selected, must not count
+    monkeypatch.setattr(context, "create_context", fail)
+    monkeypatch.setattr(context, "_shared", {})
+    monkeypatch.setattr(context, "_selected", None)
     assert make_backend("auto", operator).name == "cpu"
     with pytest.raises(GLError, match=r"no OpenGL 4\.3"):
         make_backend("gl", operator)
