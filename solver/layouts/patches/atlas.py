@@ -28,12 +28,14 @@ from .quads import CELLS
 from .samples import centres, untangled
 from .seamless import Complex, SeamlessMap, follow, places_seen_from
 
-_LEAST_TEXELS = 4  # along a chart's side
+# Texels along the side of a chart, at least.
+_MIN_CHART_TEXELS = 4
 
-# Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells, but
-# not below the least.
-_TEXELS_OF_CELL = 245
-_LEAST_CELLS = 24
+# Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells.
+_TEXELS_PER_CELL = 245
+
+# Least number of cells of an atlas.
+_MIN_CELLS = 24
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -276,13 +278,13 @@ def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
 
 def cells_for(resolution: int) -> int:
     """How many cells a mesh is cut into."""
-    return int(np.clip(6 * resolution**2 / _TEXELS_OF_CELL, _LEAST_CELLS, CELLS))
+    return int(np.clip(6 * resolution**2 / _TEXELS_PER_CELL, _MIN_CELLS, CELLS))
 
 
 def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atlas:
     """Put texels on a mesh that is laid out on charts."""
     glued = patches.seamless.glued
-    n = max(round(resolution * np.sqrt(6 / len(glued))), _LEAST_TEXELS)
+    n = max(round(resolution * np.sqrt(6 / len(glued))), _MIN_CHART_TEXELS)
     samples = centres(mesh, patches, n)
     topology = glue(glued, n)
     beyond = positions_beyond(patches, topology, samples.positions)

@@ -17,12 +17,16 @@ from ...kernel import Bools, Floats, Ints
 from ...mesh.topology import SPLITS
 from .surface import AB, BC, CA, MIDDLE, A, B, C, Patterns, TriangleSurface
 
-_LEAST = 1e-12  # of the longest link: graphs know no links of length 0
+# Length of a link over the longest link, at least: graphs know no links of length 0.
+_MIN_LINK_LENGTH = 1e-12
 
+# Steps in which seeds move to the middles of their cells.
 _LLOYD_STEPS = 8
-_MOST_PASSES = 50
 
-# Triangles between two cells, the one vertex on its side of the border; and between three.
+# Passes that give stray vertices to the cell of a neighbour.
+_MAX_STRAY_PASSES = 50
+
+# How to cut triangles between two cells, of which one has a single vertex, and between three cells.
 _CUTS: Patterns = {
     **{number: SPLITS[number] for number in (3, 6, 5)},
     7: (
@@ -34,12 +38,24 @@ _CUTS: Patterns = {
         (CA, A, MIDDLE),
     ),
 }
-_LEAST_SHARE = 0.1  # of an edge on either side of a border
-_SHARP = np.radians(125)  # angles at the rim that get a corner
-_SAMPLES = 500
-_FULL = 0.5  # share of the area of a flat disk that a geodesic disk must have
-_FEWEST = 12  # samples in a disk before it is judged
-_GROWTH = 0.5  # of the size of cells along the surface
+
+# Share of an edge on either side of a border, at least.
+_MIN_EDGE_SHARE = 0.1
+
+# Angle at the rim below which a cell gets a corner there [rad].
+_MAX_CORNER_ANGLE = np.radians(125)
+
+# Places on a surface at which the size of cells is judged.
+_SIZE_SAMPLES = 500
+
+# Area of a geodesic disk over the area of a flat one, below which the disk counts as wrapped.
+_MIN_DISK_AREA = 0.5
+
+# Samples that a disk must hold before it is judged.
+_MIN_DISK_SAMPLES = 12
+
+# Growth of the size of cells along the surface [m/m].
+_SIZE_GROWTH = 0.5
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,7 +126,7 @@ def distance_graph(surface: TriangleSurface) -> csr_array:
     straight = (crossing > 0) & (crossing < length) & (p != q)
     ends = np.concatenate([edges.ends, np.stack([p, q], axis=1)[straight]])
     lengths = np.concatenate([surface.edge_lengths, np.hypot(xp - xq, yp + yq)[straight]])
-    return _linked(ends, np.maximum(lengths, _LEAST * lengths.max()), len(V))
+    return _linked(ends, np.maximum(lengths, _MIN_LINK_LENGTH * lengths.max()), len(V))
 
 
 def _linked(ends: Ints, lengths: Floats, count: int) -> csr_array:
@@ -174,7 +190,7 @@ def voronoi_cells(metric: Metric, seeds: Ints) -> VoronoiCells:
     label = number[source]
     ends = metric.surface.edges.ends
     # vertices that hang on their cell by no edge are given to a neighbour's
-    for _ in range(_MOST_PASSES):
+    for _ in range(_MAX_STRAY_PASSES):
         inner = label[ends[:, 0]] == label[ends[:, 1]]
         links = coo_array((np.ones(inner.sum()), tuple(ends[inner].T)), shape=metric.graph.shape)
         part = connected_components(links, directed=False)[1]
@@ -242,8 +258,8 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     between = label[:, 0] != label[:, 1]
     place = np.clip(
         0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths),
-        _LEAST_SHARE,
-        1 - _LEAST_SHARE,
+        _MIN_EDGE_SHARE,
+        1 - _MIN_EDGE_SHARE,
     )
     cut = surface.subdivided(np.where(between, place, np.nan), _CUTS)[0]
     # each triangle has a vertex of the surface before, and all of those are of its cell
@@ -253,7 +269,7 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     count = len(cells.seeds)
     meeting = np.bincount(np.unique(cut.F * count + cell[:, None]) // count, minlength=len(cut.V))
     angle = np.bincount(cut.F.ravel(), cut.angles.ravel(), len(cut.V))
-    corner = np.where(cut.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
+    corner = np.where(cut.at_rim, (meeting >= 2) | (angle < _MAX_CORNER_ANGLE), meeting >= 3)
     # the vertex that follows each along the rim, counter-clockwise about the surface
     following = np.full(len(cut.V), -1)
     triangle, side = np.divmod(cut.edges.sides[cut.edges.rim, 0], 3)
@@ -279,8 +295,10 @@ def _border_loops(surface: TriangleSurface, cell: Ints, count: int) -> list[Ints
     loops = []
     for step in following:
         loop = [min(step)]
-        while (v := step[loop[-1]]) != loop[0]:
-            loop.append(v)
+        vertex = step[loop[0]]
+        while vertex != loop[0]:
+            loop.append(vertex)
+            vertex = step[vertex]
         loops.append(np.array(loop))
     return loops
 
@@ -319,7 +337,7 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> Fl
     girth) or over its end. The metric must be in metres.
     """
     total = np.cumsum(metric.masses)
-    count = min(_SAMPLES, len(total))
+    count = min(_SIZE_SAMPLES, len(total))
     seeds = np.unique(np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1]))
     cells = voronoi_cells(metric, np.minimum(seeds, len(total) - 1))
     # from seed to seed, by the shortest way along an edge between neighbouring cells
@@ -330,8 +348,8 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> Fl
     order = np.argsort(distance, axis=1, kind="stable")
     radius = np.take_along_axis(distance, order, axis=1)
     area = np.cumsum(np.bincount(cells.label, metric.masses, len(seeds))[order], axis=1)
-    full = area >= _FULL * np.pi * radius**2
-    full[:, :_FEWEST] = True
+    full = area >= _MIN_DISK_AREA * np.pi * radius**2
+    full[:, :_MIN_DISK_SAMPLES] = True
     wrapped = np.where(full.all(axis=1), np.inf, radius[np.arange(len(seeds)), full.argmin(axis=1)])
     size = np.clip(reach * wrapped, *between)
-    return (size + _GROWTH * distance).min(axis=1)[cells.label]
+    return (size + _SIZE_GROWTH * distance).min(axis=1)[cells.label]

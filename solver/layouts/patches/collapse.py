@@ -29,15 +29,20 @@ from .seamless import (
 )
 from .surface import TriangleSurface
 
-_FLATTEST = 0.05  # double area over squared length of a triangle on the charts after a collapse
-_LEAST_INSIDE = 1e-9  # double area of a triangle in its parent, in barycentric coordinates
+# Double area over squared length of a triangle on the charts after a collapse, at least.
+_MIN_FLATNESS = 0.05
+
+# Double area of a triangle in its parent, in barycentric coordinates, at least.
+_MIN_AREA_IN_PARENT = 1e-9
 
 # Where the triangles lie on the mesh: parent [m], and barycentrics in it of their corners [m, 3, 3]
 Parents = tuple[Ints, Floats]
 
-# of the vertices in question, in a round that is worth another
-_MOST_ROUNDS = 20
-_LEAST_SHARE = 0.01
+# Rounds of collapses, at most.
+_MAX_ROUNDS = 20
+
+# Share of the vertices in question that a round must remove for another round to follow.
+_MIN_COLLAPSED_SHARE = 0.01
 
 
 @kernel
@@ -139,7 +144,7 @@ def _worth(
         to_b = turned(corner_place(seamless, g, q), turn) + shift - goal
         longest = max(square(to_a), square(to_b), square(to_a - to_b))
         flattest = min(flattest, wedge(to_a, to_b) / longest)
-    return flattest if flattest > _FLATTEST else 0.0
+    return flattest if flattest > _MIN_FLATNESS else 0.0
 
 
 @kernel
@@ -159,7 +164,7 @@ def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: 
             uy = a[2] - o[2]
             vx = b[1] - o[1]
             vy = b[2] - o[2]
-            return ux * vy - uy * vx > _LEAST_INSIDE
+            return ux * vy - uy * vx > _MIN_AREA_IN_PARENT
     return False
 
 
@@ -168,10 +173,10 @@ def without_cuts(
 ) -> tuple[TriangleSurface, SeamlessMap]:
     """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
     parents = surface.parent, np.ascontiguousarray(surface.inside)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         worth, target = _targets(seamless, parents, cut, surface.at_rim)
         chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
-        if chosen.sum() <= _LEAST_SHARE * cut.sum():
+        if chosen.sum() <= _MIN_COLLAPSED_SHARE * cut.sum():
             break
         left, F, turn, shift, inside = _collapse(seamless, parents, chosen, target)
         F = F[left]

@@ -17,12 +17,16 @@ from ...kernel import Floats, Ints
 from .cells import BorderedCells, Metric, VoronoiCells, centred_cells, cut_borders, voronoi_cells
 from .surface import TriangleSurface
 
-_MOST_ROUNDS = 200
-_FEWEST = 4  # cells of a closed surface
+# Rounds that mend cells.
+_MAX_MENDING_ROUNDS = 200
 
-# half-angle tangents; beyond them triangles are so bad that round-off would fold them
-_LEAST = 1e-3
-_MOST = 1e3
+# Least number of cells of a closed surface.
+_MIN_CELLS_CLOSED = 4
+
+# Bounds of the tangent of half an angle: beyond them triangles are so bad that round-off would fold
+# them.
+_MIN_HALF_TANGENT = 1e-3
+_MAX_HALF_TANGENT = 1e3
 
 
 def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
@@ -42,7 +46,7 @@ def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
 def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, BorderedCells]:
     surface = metric.surface
     tried = set[int]()
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_MENDING_ROUNDS):
         bad = np.flatnonzero(_euler(surface, cells) != 1)
         if len(bad):
             new = np.setdiff1d([_far_side(surface, cells, int(cell)) for cell in bad], cells.seeds)
@@ -50,7 +54,7 @@ def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, Bordered
                 break
             cells = voronoi_cells(metric, np.concatenate([cells.seeds, new]))
             continue
-        if len(cells.seeds) < _FEWEST and not surface.edges.rim.any():
+        if len(cells.seeds) < _MIN_CELLS_CLOSED and not surface.edges.rim.any():
             cells = voronoi_cells(metric, np.union1d(cells.seeds, np.argmax(cells.distance)))
             continue
         bordered = cut_borders(metric, cells)
@@ -71,7 +75,7 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: Ints, tried: set[int
     ends = metric.surface.edges.ends
     for cell in few.tolist():
         seed = int(cells.seeds[cell])
-        if seed not in tried or len(cells.seeds) - len(gone) <= _FEWEST:
+        if seed not in tried or len(cells.seeds) - len(gone) <= _MIN_CELLS_CLOSED:
             tried.add(seed)
             # farthest of the vertices of other cells that have a neighbour in this one
             own = cells.label == cell
@@ -158,7 +162,10 @@ def flattened(surface: TriangleSurface, part: Ints, border: Border) -> Floats:
     lengths = np.maximum(
         np.stack([sides, np.roll(sides, 1, axis=1)], axis=2), np.finfo(np.float64).tiny
     )
-    weights = np.clip(np.tan(surface.angles / 2), _LEAST, _MOST)[:, :, None] / lengths
+    weights = (
+        np.clip(np.tan(surface.angles / 2), _MIN_HALF_TANGENT, _MAX_HALF_TANGENT)[:, :, None]
+        / lengths
+    )
     places = _solved(corners, weights, start)[corners]
     folded = np.isin(part, part[signed_areas(places) <= 0])
     if folded.any():

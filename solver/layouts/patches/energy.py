@@ -43,16 +43,26 @@ from .seamless import (
 CHARTS = Density(power=2, even=0.5, long=0.5, small=0.0)
 
 FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
-_FLATTEST = 0.02  # least double area over squared length that the energy believes in
-_LEAST_AREA = 1e-6  # of a triangle, in units of their mean
+# Double area of a triangle over its squared length, at least, in its reference.
+_MIN_FLATNESS = 0.02
+
+# Area of a reference triangle, at least, in units of the mean area.
+_MIN_REFERENCE_AREA = 1e-6
 
 UP = (0.0, 0.0, 1.0)
 COLUMNS = (1.0, 0.0, 0.0)
 ROWS = (0.0, 1.0, 0.0)
 
-_LONGEST_STEP = 0.5  # of a chart
-_SWEEPS = 2
-_MOST_STEPS = 30
+# Way of a vertex in one Newton step, at most [charts].
+_MAX_STEP = 0.5
+
+# Sweeps over single vertices before the Newton steps.
+_SWEEPS_BEFORE_NEWTON = 2
+
+# Newton steps of a relaxation, at most.
+_MAX_NEWTON_STEPS = 30
+
+# Least and most steps of conjugate gradients in a Newton step.
 _CG_RANGE = 40, 200
 
 
@@ -69,13 +79,13 @@ def reference_of(V: Floats, F: Ints, charts: int) -> Reference:
     tiny = np.finfo(np.float64).tiny
     double = np.sqrt(dot(normal, normal))
     area = np.maximum(double / 2, tiny)
-    area = np.maximum(area, _LEAST_AREA * area.mean())
+    area = np.maximum(area, _MIN_REFERENCE_AREA * area.mean())
     area *= charts / area.sum()
     squares = np.stack([dot(bc, bc), dot(ac, ac), dot(ab, ab)])
     top = squares.argmax(axis=0)
     every = np.arange(len(F))
     # needles count as a little thicker: the corner opposite to their longest side stands higher
-    double = np.maximum(np.maximum(double, _FLATTEST * squares[top, every]), tiny)
+    double = np.maximum(np.maximum(double, _MIN_FLATNESS * squares[top, every]), tiny)
     cotangent = np.stack([dot(ab, ac), -dot(ab, bc), dot(ac, bc)]) / double
     left = cotangent[(top + 1) % 3, every]
     right = cotangent[(top + 2) % 3, every]
@@ -237,13 +247,13 @@ def relax_all(seamless: SeamlessMap, reference: Reference, least_gain: float) ->
     """
     edges = edges_of(seamless.F)
     ends = edges.ends.astype(np.int32)
-    for i in range(_SWEEPS):
+    for i in range(_SWEEPS_BEFORE_NEWTON):
         sweep_all(seamless, reference, i % 2 == 0)
     descend_by_newton(
         lambda cg_steps: newton_step(seamless, reference, edges.of, ends, cg_steps),
         lambda backwards: sweep_all(seamless, reference, backwards),
         lambda: total_energy(seamless, reference),
-        (least_gain, 1, _MOST_STEPS),
+        (least_gain, 1, _MAX_NEWTON_STEPS),
         _CG_RANGE,
     )
 
@@ -275,7 +285,7 @@ def newton_step(
     before = seamless.z.copy()
     way = step @ (1, 1j)
     bound = min(
-        0.9 * _time_of_first_fold(seamless, way), _LONGEST_STEP / float(np.sqrt(square(way).max()))
+        0.9 * _time_of_first_fold(seamless, way), _MAX_STEP / float(np.sqrt(square(way).max()))
     )
 
     def energy_at(t: float) -> float:

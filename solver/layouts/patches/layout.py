@@ -33,22 +33,39 @@ from .seamless import (
 )
 from .surface import TriangleSurface
 
-_LAYERS = 3  # of vertices that a tip's move may move
-_SWEEPS = 3  # over the vertices round a tip, before it is judged
-_WORTH = 1e-3  # share of the energy round a tip that a move must save
+# Layers of vertices round a tip that move along with it.
+_LAYERS_ROUND_TIP = 3
 
-_MOST = 4 / 3  # times as many has a mesh in parts of uneven sizes
-_FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
-_NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
+# Sweeps over the vertices round a moved tip before the move is judged.
+_SWEEPS_ROUND_TIP = 3
 
-# by so much more or less than its share of charts a part is cut again, so often
-_MISJUDGED = 0.1
-_TRIES = 3
+# Share of the energy round a tip that a move must save.
+_MIN_SAVING = 1e-3
 
-# before the tips move and after: stop when a step saves less than this share of the energy
-_ROUGH = 5e-3
-_FINE = 2e-3
-_MOST_MOVES = 5  # of a tip, by an edge each
+# A mesh in parts of uneven sizes may have so many times as many cells as other meshes.
+_MAX_CELL_FACTOR = 4 / 3
+
+# Cells that the smallest part should have by its share of the area. In truth a part has four at
+# least.
+_MIN_CELLS_OF_PART = 0.5
+
+# Share of the area of a part for which the other parts are not cut into smaller cells.
+_NEGLIGIBLE_AREA = 2e-3
+
+# A part is cut again if its number of charts is off its share by this share of it.
+_MAX_CHART_ERROR = 0.1
+
+# Times that a part is cut again, at most.
+_MAX_RECUTS = 3
+
+# Relaxation before the tips move ends when a step saves less than this share of the energy.
+_SAVING_BEFORE_TIPS = 5e-3
+
+# Relaxation after the tips have moved ends when a step saves less than this share of the energy.
+_SAVING_AFTER_TIPS = 2e-3
+
+# Moves of a tip, by an edge each.
+_MAX_TIP_MOVES = 5
 
 
 def move_tips(seamless: SeamlessMap, reference: Reference, tips: Ints) -> Ints:
@@ -113,7 +130,7 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
     mark[v] = mark[u] = stamp
     first = 0
     last = 2
-    for layer in range(_LAYERS):
+    for layer in range(_LAYERS_ROUND_TIP):
         for at in range(first, last):
             for i in range(
                 seamless.star_start[vertices[at]], seamless.star_start[vertices[at] + 1]
@@ -165,9 +182,9 @@ def _moved(
     _enter_chart(seamless, v)
     # round a wide cone's vertex the map may wind twice without a fold
     if angle < 3.0 * np.pi and energy_of(seamless, reference, triangles) < np.inf:
-        for _ in range(_SWEEPS):
+        for _ in range(_SWEEPS_ROUND_TIP):
             sweep(seamless, reference, vertices, star, True)
-        if energy_of(seamless, reference, triangles) < (1.0 - _WORTH) * before:
+        if energy_of(seamless, reference, triangles) < (1.0 - _MIN_SAVING) * before:
             return True
     seamless.z[vertices] = z
     seamless.chart[vertices] = chart
@@ -314,71 +331,86 @@ def patch_map(V: Floats, F: Ints, cells: int = CELLS) -> PatchMap:
     `AtlasError` if its triangles are too thin, or no cells are found.
     """
     parts, counts, shares = _components(V, F, cells)
-    widest = int(shares.argmax())
-    first = large_quads_of(parts[widest], counts[widest])
-    large = first is not None
-    quads = [
-        first if first and i == widest else quads_of(part, counts[i], large)
-        for i, part in enumerate(parts)
-    ]
-    wanted = shares * sum(len(each.glued) for each in quads)
-    # cells are mended until they are disks with corners enough, which changes their number: a part
-    # that has come to more or less than the charts that its area should have is cut again, and the
-    # best of the tries kept
-    for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
-        latest = quads[i]
-        count = counts[i]
-        for _ in range(_TRIES):
-            charts = len(latest.glued)
-            count, before = max(1, round(count * float(np.sqrt(wanted[i] / charts)))), count
-            if abs(charts / wanted[i] - 1) < _MISJUDGED or count == before:
-                break
-            try:
-                latest = quads_of(parts[i], count, large)
-            except AtlasError:  # what there was before is good
-                break
-            quads[i] = min(
-                quads[i], latest, key=lambda each: abs(np.log(len(each.glued) / wanted[i]))
-            )
+    largest = int(shares.argmax())
+    large_quads = large_quads_of(parts[largest], counts[largest])
+    large = large_quads is not None
+    quads = []
+    for i, part in enumerate(parts):
+        if large_quads is not None and i == largest:
+            quads.append(large_quads)
+        else:
+            quads.append(quads_of(part, counts[i], large))
+    chart_count = sum(len(part_quads.glued) for part_quads in quads)
+    wanted_charts = shares * chart_count
+    if len(parts) > 1:
+        for i in np.flatnonzero(shares > _NEGLIGIBLE_AREA).tolist():
+            quads[i] = _recut(parts[i], counts[i], large, quads[i], float(wanted_charts[i]))
     whole = _joined(quads)
     surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)
     relax(surface.V, seamless)
     return PatchMap(surface, seamless)
 
 
+def _recut(
+    part: TriangleSurface, count: int, large: bool, quads: Quads, wanted_charts: float
+) -> Quads:
+    """Cut a part again with other numbers of cells, until it has about the wanted number of charts.
+
+    Cells are mended until they are disks with corners enough, which changes their number. `quads`
+    come from `count` cells. The best of all tries is returned.
+    """
+
+    def error(candidate: Quads) -> float:
+        return float(abs(np.log(len(candidate.glued) / wanted_charts)))
+
+    best = quads
+    latest = quads
+    for _ in range(_MAX_RECUTS):
+        charts = len(latest.glued)
+        previous_count = count
+        count = max(1, round(count * float(np.sqrt(wanted_charts / charts))))
+        if abs(charts / wanted_charts - 1) < _MAX_CHART_ERROR or count == previous_count:
+            break
+        try:
+            latest = quads_of(part, count, large)
+        except AtlasError:  # the best quads so far will do
+            break
+        best = min(best, latest, key=error)
+    return best
+
+
 def relax(V: Floats, seamless: SeamlessMap) -> None:
     """Even out areas and take away shear, in place, as far as the map's cones allow.
 
-    V [n, 3] are the vertices of the map [m].
-
-    Cells are small and flat enough for that from where the quads lie; no step folds a triangle.
+    V [n, 3] are the vertices of the map [m]. The map that the quads begin with is good enough for
+    this, as cells are small and flat. No step folds a triangle.
     """
     reference = reference_of(V, seamless.F, len(seamless.glued))
-    relax_all(seamless, reference, _ROUGH)
+    relax_all(seamless, reference, _SAVING_BEFORE_TIPS)
     tips = np.flatnonzero(seamless.freedom == FIXED)
-    for i in range(_MOST_MOVES):
+    for i in range(_MAX_TIP_MOVES):
         tips = move_tips(seamless, reference, tips)
         if not len(tips):
             break
         sweep_all(seamless, reference, i % 2 == 0)
-    relax_all(seamless, reference, _FINE)
+    relax_all(seamless, reference, _SAVING_AFTER_TIPS)
 
 
 def _components(V: Floats, F: Ints, cells: int) -> tuple[list[TriangleSurface], list[int], Floats]:
     """Each connected component, how many cells it gets, and its share of the area."""
-    part = labels(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), len(V))
-    number, of = np.unique(part[F[:, 0]], return_inverse=True)
+    edges = np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2)
+    label = labels(edges, len(V))
+    numbers, part_of = np.unique(label[F[:, 0]], return_inverse=True)
     areas = TriangleSurface.of(V, F).areas
-    share = np.bincount(of, areas / areas.sum()).astype(np.float64)
-    # a small part has a few cells at least; where others have more, its texels are less tiny beside
-    # theirs
-    small = share[share >= min(_NEGLIGIBLE, share.max())].min()
-    count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(
-        int
-    )
+    share = np.bincount(part_of, areas / areas.sum()).astype(np.float64)
+    # a small part has a few cells at least: if large parts have more cells, the texels of the small
+    # part are less tiny beside theirs
+    smallest = share[share >= min(_NEGLIGIBLE_AREA, share.max())].min()
+    total = np.clip(_MIN_CELLS_OF_PART / smallest, cells, _MAX_CELL_FACTOR * cells)
+    count = np.maximum(1, np.rint(total * share)).astype(int)
     parts = []
-    for each in range(len(number)):
-        faces = np.flatnonzero(of == each)
+    for part in range(len(numbers)):
+        faces = np.flatnonzero(part_of == part)
         used, corners = np.unique(F[faces], return_inverse=True)
         parts.append(dataclasses.replace(TriangleSurface.of(V[used], corners), parent=faces))
     return parts, count.tolist(), share
@@ -388,23 +420,29 @@ def _joined(parts: list[Quads]) -> Quads:
     """Several surfaces as one."""
     if len(parts) == 1:
         return parts[0]
-    vertices = np.cumsum([0, *(len(each.surface.V) for each in parts)])
-    charts = np.cumsum([0, *(len(each.glued) for each in parts)])
+    triangles = []
+    charts = []
+    glued = []
+    first_vertex = 0
+    first_chart = 0
+    for part in parts:
+        triangles.append(part.surface.F + first_vertex)
+        charts.append(part.chart + first_chart)
+        part_glued = part.glued.copy()
+        part_glued[..., 0] += np.where(part_glued[..., 0] >= 0, first_chart, 0)
+        glued.append(part_glued)
+        first_vertex += len(part.surface.V)
+        first_chart += len(part.glued)
     surface = TriangleSurface(
-        np.concatenate([each.surface.V for each in parts]),
-        np.concatenate(
-            [each.surface.F + first for each, first in zip(parts, vertices, strict=False)]
-        ),
-        np.concatenate([each.surface.parent for each in parts]),
-        np.concatenate([each.surface.inside for each in parts]),
+        np.concatenate([part.surface.V for part in parts]),
+        np.concatenate(triangles),
+        np.concatenate([part.surface.parent for part in parts]),
+        np.concatenate([part.surface.inside for part in parts]),
     )
-    glued = np.concatenate([each.glued for each in parts])
-    first_of_part = np.repeat(charts[:-1], np.diff(charts))
-    glued[..., 0] += np.where(glued[..., 0] >= 0, first_of_part[:, None], 0)
     return Quads(
         surface,
-        np.concatenate([each.chart + first for each, first in zip(parts, charts, strict=False)]),
-        np.concatenate([each.places for each in parts]),
-        glued,
-        np.concatenate([each.cut for each in parts]),
+        np.concatenate(charts),
+        np.concatenate([part.places for part in parts]),
+        np.concatenate(glued),
+        np.concatenate([part.cut for part in parts]),
     )

@@ -39,28 +39,57 @@ from .charts import (
 from .disks import disk_cells, flattened, signed_areas
 from .surface import TriangleSurface, halved_chords, refined
 
-FEWEST = 3  # quads round a middle
-_TOO_FEW = 100.0  # what each costs that is missing
-_EXTRA = 2.0  # what one costs by which there are too many or too few, beyond the first
-_SHAPE = 0.5  # what the logarithm of the ratio of a quad's diagonals costs, squared
-# joints that a path closes, at most; where else triangles would be left
-_LONGEST = 11
-_LONGER = 16
-_MOST_PASSES = 20
-_WORTH = 1e-6
+# Least number of quads that meet round the middle of a cell.
+FEWEST = 3
 
-CELLS = 96  # of a mesh, where there are texels enough for them
-_LARGE = 1.5  # times as many cells, where quads are large
-_CORNERS = 6  # of a cell
-_RADIUS = 0.75  # of a cell, over the root of its share of the area
-_REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
-_SMALLEST = 0.85  # of the radius of cells elsewhere
+# Costs of a pairing of triangles; a quad too many or too few round a middle costs 1.
+# Each quad that is missing to `FEWEST` costs this in addition.
+_COST_MISSING = 100.0
 
-# length of a surface over its width, times the number of its cells: at 88**2 charts take a minute
-_FARTHEST = 100**2
-_TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
+# Each quad too many or too few beyond the first costs this in addition.
+_COST_EXTRA = 2.0
 
-# times as many cells, where round-off folds a triangle: other cuts fold none
+# The squared logarithm of the ratio of a quad's diagonals costs this.
+_COST_SHAPE = 0.5
+
+# Joints that an alternating path closes, at most.
+_MAX_PATH_JOINTS = 11
+
+# Joints that a path closes, at most, if triangles would stay unpaired otherwise.
+_MAX_PATH_JOINTS_LAST_TRY = 16
+
+# Passes over all joints that make a pairing better.
+_MAX_PAIRING_PASSES = 20
+
+# Cost that a change of a pairing must save.
+_MIN_GAIN = 1e-6
+
+# Cells of a mesh that has texels enough for them.
+CELLS = 96
+
+# If quads are large, so many times as many cells are cut.
+_LARGE_CELL_FACTOR = 1.5
+
+# Corners of an average cell, and thus its small quads.
+_CORNERS_PER_CELL = 6
+
+# Largest radius of cells, over the square root of a cell's share of the area.
+_LARGEST_RADIUS = 0.75
+
+# Radius of a cell on a limb, over the radius at which a geodesic disk is wrapped round the limb.
+_LIMB_SHARE = 0.5
+
+# Smallest radius of cells, over the largest.
+_SMALLEST_SHARE = 0.85
+
+# Length of a surface over its width, times the number of its cells, at most. At 88**2 laying charts
+# takes a minute.
+_MAX_LENGTH_TIMES_CELLS = 100**2
+
+# Area of a surface of `CELLS` cells, in squares of its longest edge after refinement.
+_AREA_IN_EDGE_SQUARES = 2000
+
+# If round-off folds a triangle, so many times as many cells are tried: other cuts may fold none.
 _OTHER_COUNTS = (2, 3, 5)
 
 
@@ -121,7 +150,7 @@ def chosen_joints(
     ends = np.where(ends < 0, triangle_count, ends)
     start, order = counting_sort(ends.T.ravel(), np.arange(ends.size), nodes)
     taken = np.where(inner[:, None], middles[kept], -1)
-    cost = np.where(inner, _SHAPE * shape[kept] ** 2, 0.0)
+    cost = np.where(inner, _COST_SHAPE * shape[kept] ** 2, 0.0)
     closed = np.full(nodes, -1)
     passed = np.zeros(nodes, bool)
     pairing = Pairing(
@@ -134,13 +163,13 @@ def chosen_joints(
 
 def _paired(pairing: Pairing) -> bool:
     """Find a pairing and make it better; whether no triangle is left."""
-    for most in (1, _LONGEST, _LONGER):
+    for most in (1, _MAX_PATH_JOINTS, _MAX_PATH_JOINTS_LAST_TRY):
         for node in range(len(pairing.closed)):
             if pairing.closed[node] < 0:
                 _augment(pairing, node, most, np.inf)
     if (pairing.closed < 0).any():
         return False
-    for _ in range(_MOST_PASSES):
+    for _ in range(_MAX_PAIRING_PASSES):
         joints = range(len(pairing.ends))
         better = [_improve(pairing, e) for e in joints if pairing.closed[pairing.ends[e, 0]] != e]
         if not any(better):
@@ -159,7 +188,7 @@ def _improve(pairing: Pairing, e: int) -> bool:
     )
     left = pairing.ends[f, 0] + pairing.ends[f, 1] - a
     pairing.passed[a] = pairing.passed[b] = True
-    better = _augment(pairing, left, _LONGEST, -_WORTH - cost)
+    better = _augment(pairing, left, _MAX_PATH_JOINTS, -_MIN_GAIN - cost)
     pairing.passed[a] = pairing.passed[b] = False
     if not better:
         _set_joint(pairing, e, False)
@@ -251,7 +280,7 @@ def _change(pairing: Pairing, e: int, quads: int) -> float:
                 count = pairing.quads[v]
                 off = abs(count - pairing.wanted[v])
                 cost += sign * (
-                    off + _EXTRA * max(off - 1.0, 0.0) + _TOO_FEW * max(FEWEST - count, 0)
+                    off + _COST_EXTRA * max(off - 1.0, 0.0) + _COST_MISSING * max(FEWEST - count, 0)
                 )
                 if sign < 0.0:
                     pairing.quads[v] += quads
@@ -262,42 +291,56 @@ def joined(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> list[Si
     """Join the charts of cells to larger ones: their sides, or None if that is not possible."""
     glued = glued_sides(sides)
     fans, rest = fans_of(sides, glued)
-    cell = np.unique([each[0][0] for each in sides], return_inverse=True)[1]
+    # charts of one cell begin at its middle
+    cell = np.unique([chart_sides[0][0] for chart_sides in sides], return_inverse=True)[1]
     at_rim = (glued[..., 0] < 0)[:, 1:3]
     if not at_rim[rest].any(axis=1).all():
         return None
-    triangles, middles, shape, first = _joints(surface.V, sides, glued, fans)
-    # curvature of each cell, and of the rim in it, in right angles
-    total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
-    missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
-    share = (missing / total)[surface.F] * surface.angles
-    curvature = np.bincount(cell[chart], share.sum(axis=1)) / (np.pi / 2)
-    wanted = 4 - curvature + np.bincount(cell, at_rim.all(axis=1))
+    triangles, middles, shape, side = _joints(surface.V, sides, glued, fans)
+    wanted = 4 - _curvatures(surface, cell[chart]) + np.bincount(cell, at_rim.all(axis=1))
     chosen = chosen_joints(triangles, cell[middles], shape, len(fans), np.bincount(cell), wanted)
     if chosen is None:
         return None
-    alone = triangles[chosen, 1] < 0
-    new: list[Sides] = []
-    for a in first[chosen[~alone]]:  # two triangles, joined over the side a
-        b = glued[a, 1, 0]
-        beyond = glued[a, 0, 0]
-        p, q, r, s = (
-            _whole(sides, glued, each) for each in (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0])
-        )
-        new.append((p, q, r, s))
-    # a fourth corner in the middle of side a; the charts at the rim beyond stay apart
-    for a in first[chosen[alone]]:
-        b = glued[a, 1, 0]
-        new.append(
-            (
-                sides[a][0],
-                sides[b][3],
-                _whole(sides, glued, b),
-                _whole(sides, glued, glued[b, 1, 0]),
-            )
-        )
-    new += _at_rim(sides, glued, rest, glued[first[chosen[alone]], 0, 0])
-    return None if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any() else new
+    is_alone = triangles[chosen, 1] < 0
+    joined_sides = side[chosen[~is_alone]]
+    lone_sides = side[chosen[is_alone]]
+    large = [_two_triangles(sides, glued, a) for a in joined_sides]
+    large += [_lone_triangle(sides, glued, a) for a in lone_sides]
+    # beyond the side of a lone triangle the charts at the rim stay apart
+    large += _at_rim(sides, glued, rest, glued[lone_sides, 0, 0])
+    glued_to_itself = glued_sides(large)[..., 0] == np.arange(len(large))[:, None]
+    return None if glued_to_itself.any() else large
+
+
+def _curvatures(surface: TriangleSurface, cell: Ints) -> Floats:
+    """Curvature of each cell, and of the rim in it [right angles]; `cell` [m] is each triangle's."""
+    total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
+    missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
+    share = (missing / total)[surface.F] * surface.angles
+    return np.bincount(cell, share.sum(axis=1)) / (np.pi / 2)
+
+
+def _two_triangles(sides: list[Sides], glued: Ints, a: int) -> Sides:
+    """The quad of two triangles that are joined over the side a."""
+    b = glued[a, 1, 0]
+    beyond = glued[a, 0, 0]
+    return (
+        _whole(sides, glued, b),
+        _whole(sides, glued, glued[b, 1, 0]),
+        _whole(sides, glued, beyond),
+        _whole(sides, glued, glued[beyond, 1, 0]),
+    )
+
+
+def _lone_triangle(sides: list[Sides], glued: Ints, a: int) -> Sides:
+    """The quad of a triangle that stays alone: its fourth corner is the middle of the side a."""
+    b = glued[a, 1, 0]
+    return (
+        sides[a][0],
+        sides[b][3],
+        _whole(sides, glued, b),
+        _whole(sides, glued, glued[b, 1, 0]),
+    )
 
 
 def _joints(
@@ -309,22 +352,24 @@ def _joints(
     """
     fan = np.full(len(sides), -1)
     fan[np.array(fans, np.int64).reshape(-1, 3)] = np.arange(len(fans))[:, None]
-    found = []
+    joints = []
     for a in np.flatnonzero(fan >= 0).tolist():
         b = int(glued[a, 1, 0])
         beyond = int(glued[a, 0, 0])
-        # the other triangle calls it otherwise; two triangles with two sides in common would be
-        # glued to themselves
-        if fan[beyond] < 0 or (
-            a < glued[beyond, 2, 0] and (fan[glued[fans[fan[a]], 0, 0]] == fan[beyond]).sum() == 1
-        ):
-            found.append((a, b, glued[b, 1, 0], glued[beyond, 1, 0], beyond))
-    first, second, third, fourth, other = np.array(found, dtype=np.int64).reshape(-1, 5).T
-    middle = V[[each[0][0] for each in sides]]
-    inside, across = (
-        np.linalg.norm(middle[p] - middle[q], axis=1) for p, q in ((first, second), (third, fourth))
-    )
-    shape = np.log(np.maximum(across, 1e-300) / np.maximum(inside, 1e-300))
+        if fan[beyond] >= 0:
+            # the triangle beyond calls the side by another chart: it counts once
+            if a >= glued[beyond, 2, 0]:
+                continue
+            # two triangles with two sides in common would be glued to themselves
+            common_sides = (fan[glued[fans[fan[a]], 0, 0]] == fan[beyond]).sum()
+            if common_sides != 1:
+                continue
+        joints.append((a, b, glued[b, 1, 0], glued[beyond, 1, 0], beyond))
+    first, second, third, fourth, other = np.array(joints, dtype=np.int64).reshape(-1, 5).T
+    middle = V[[chart_sides[0][0] for chart_sides in sides]]
+    along = np.linalg.norm(middle[first] - middle[second], axis=1)
+    across = np.linalg.norm(middle[third] - middle[fourth], axis=1)
+    shape = np.log(np.maximum(across, 1e-300) / np.maximum(along, 1e-300))
     return (
         np.stack([fan[first], fan[other]], axis=1),
         np.stack([first, second], axis=1),
@@ -426,13 +471,15 @@ def quads_of(part: TriangleSurface, count: int, large: bool) -> Quads:
     quads = large_quads_of(part, count) if large else None
     if quads is not None:
         return quads
-    few = max(1, round(count * _LARGE / _CORNERS)) if large else count
+    cell_count = count
+    if large:
+        cell_count = max(1, round(count * _LARGE_CELL_FACTOR / _CORNERS_PER_CELL))
     try:
-        return cut_into_quads(_cells_of(part, few))
+        return cut_into_quads(_cells_of(part, cell_count))
     except AtlasError:
         for times in _OTHER_COUNTS:
             with contextlib.suppress(AtlasError):
-                return cut_into_quads(_cells_of(part, times * few))
+                return cut_into_quads(_cells_of(part, times * cell_count))
         raise
 
 
@@ -441,7 +488,9 @@ def large_quads_of(part: TriangleSurface, count: int) -> Quads | None:
 
     None if the surface has none, or round-off folds one of them.
     """
-    cells = _cells_of(part, max(count, min(round(_LARGE * count), int(_FARTHEST / _length(part)))))
+    most_cells = int(_MAX_LENGTH_TIMES_CELLS / _length(part))
+    cell_count = max(count, min(round(_LARGE_CELL_FACTOR * count), most_cells))
+    cells = _cells_of(part, cell_count)
     try:
         return cut_into_large_quads(cells)
     except AtlasError:
@@ -455,16 +504,17 @@ def _length(part: TriangleSurface) -> float:
 
 def _cells_of(part: TriangleSurface, count: int) -> BorderedCells:
     area = part.areas.sum()
-    if count * _length(part) > _FARTHEST:
+    if count * _length(part) > _MAX_LENGTH_TIMES_CELLS:
         raise AtlasError(
             f"the surface is about {_length(part):.2g} times as long as wide, too long for charts: "
-            f"shorten what "
-            "sticks out of it, or scale it alike along all axes"
+            f"shorten what sticks out of it, or scale it alike along all axes"
         )
-    metric = Metric.of(refined(part, np.sqrt(area / (_TRIANGLES / CELLS * count))))
-    reach = np.inf
+    longest_edge = np.sqrt(area / (_AREA_IN_EDGE_SQUARES / CELLS * count))  # [m]
+    metric = Metric.of(refined(part, longest_edge))
+    reach = np.inf  # a single cell covers all
     if count > 1:
-        largest = _RADIUS * np.sqrt(area / count)
-        metric = metric.in_units(cell_sizes(metric, _REACH, (_SMALLEST * largest, largest)))
+        largest = _LARGEST_RADIUS * np.sqrt(area / count)  # [m]
+        sizes = cell_sizes(metric, _LIMB_SHARE, (_SMALLEST_SHARE * largest, largest))
+        metric = metric.in_units(sizes)
         reach = 1.0
     return disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach)))

@@ -21,19 +21,36 @@ from ...texels.topology import TexelTopology
 from .layout import PatchMap
 from .seamless import Complex, SeamlessMap, follow, places_on_charts, wedge
 
-_MARGIN = 0.1  # sine of a corner that is wide enough
-# row and column of a texel's neighbours, counter-clockwise
-_BESIDE = ((0, 1), (1, 0), (0, -1), (-1, 0))
+# Sine of a corner that is wide enough.
+_MIN_CORNER_SINE = 0.1
 
-# barycentric coordinates of a texel outside of all triangles may be so far below 0
+# Row and column of a texel's neighbours, counter-clockwise.
+_NEIGHBOURS = ((0, 1), (1, 0), (0, -1), (-1, 0))
+
+# A texel belongs to a triangle if its barycentric coordinates are no more than this below 0.
 _ROUND_OFF = 1e-7
-_REACH = 2  # of triangles, in charts beyond that in which they begin
-_LATTICE = 7  # places along a texel's side; odd, so that one is the centre
-_PULL = 0.02  # to the centre of its square, for each texel's width squared
-_FLATTEST = 0.2  # least corner of the moved lattice on its chart, in units of a square's
-_SWEEPS = 6
-_ROUNDS = 6
-_AROUND = 2  # texels round a folded one that may move
+
+# Charts over which a triangle may reach, beyond the chart in which it begins.
+_CHARTS_BEYOND = 2
+
+# Places that a texel may take along the side of its square; odd, so that one is the centre.
+_LATTICE = 7
+
+# Fault of a texel that has moved from the centre of its square by the width of a texel; it grows
+# with the square of the way.
+_PULL = 0.02
+
+# Least area at a corner of the moved lattice on its chart, in units of a texel's square.
+_MIN_LATTICE_CORNER = 0.2
+
+# Passes over the folded texels of a round, at most.
+_MAX_SWEEPS = 6
+
+# Rounds that look for folded texels and move them, at most.
+_MAX_ROUNDS = 6
+
+# Texels round a folded one that may move along with it, in each direction.
+_TEXELS_AROUND = 2
 
 
 class Texels(NamedTuple):
@@ -67,7 +84,7 @@ def _fault(texels: Texels, flat: int) -> float:
     o = texels.positions[flat]
     normal = texels.normals[flat]
     fault = 0.0
-    for i, j in _BESIDE:
+    for i, j in _NEIGHBOURS:
         p = _place(texels, chart, row + i, column + j)
         q = _place(texels, chart, row + j, column - i)
         a = subtract(p, o)
@@ -75,8 +92,10 @@ def _fault(texels: Texels, flat: int) -> float:
         facing = dot(cross(a, b), normal)
         size = np.sqrt(dot(a, a) * dot(b, b))
         # NaN, where there is no neighbour, is not below the margin
-        if facing < _MARGIN * size:
-            fault += (1.0 if facing < 0.0 else 0.0) + (_MARGIN - facing / max(size, 1e-300)) ** 2
+        if facing < _MIN_CORNER_SINE * size:
+            fault += (1.0 if facing < 0.0 else 0.0) + (
+                _MIN_CORNER_SINE - facing / max(size, 1e-300)
+            ) ** 2
     return fault
 
 
@@ -88,7 +107,7 @@ def faults(texels: Texels, flat: int) -> float:
     row = flat // n % n + 1
     column = flat % n + 1
     total = _fault(texels, flat)
-    for i, j in _BESIDE:
+    for i, j in _NEIGHBOURS:
         other = texels.halo[chart, row + i, column + j]
         if other >= 0 and not texels.rim[chart, row + i, column + j]:
             total += _fault(texels, other)
@@ -125,7 +144,7 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
     number[charts] = np.arange(len(charts))
     near = number >= 0
     beside = seamless.glued[..., 0]
-    for _ in range(_REACH):
+    for _ in range(_CHARTS_BEYOND):
         near |= (near[beside] & (beside >= 0)).any(axis=1)
     corner, homes, places = places_on_charts(seamless)
     triangles, barycentrics, best = _draw(
@@ -256,44 +275,51 @@ def untangled(
     positions = samples.positions.reshape(-1, 3).copy()
     normals = samples.normals.reshape(-1, 3).copy()
     texels = Texels(topology.halo, topology.rim, outside, positions, normals, offsets)
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         near = folded(texels).reshape(topology.shape)
-        for _ in range(_AROUND):
-            halo = topology.with_halo(near)
-            near = np.any(
-                [halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0
-            )
+        for _ in range(_TEXELS_AROUND):
+            near = _grown(near, topology)
         active = np.flatnonzero(near)
         if not len(active):
             break
         chosen, index = np.unique(active // (n * n), return_inverse=True)
-        places = sampled(mesh, patches, *locate_in_charts(patches.seamless, n * _LATTICE, chosen))
+        triangles, barycentrics = locate_in_charts(patches.seamless, n * _LATTICE, chosen)
+        lattice = sampled(mesh, patches, triangles, barycentrics)
         number = np.searchsorted(chosen, np.arange(charts))
-        candidates = (
-            np.where((places.small >= 0)[..., None], places.positions, np.nan),
-            places.normals,
-        )
-        for i in range(_SWEEPS):
-            if not _improve(texels, number, *candidates, active[:: 1 if i % 2 == 0 else -1].copy()):
+        is_known = (lattice.small >= 0)[..., None]
+        lattice_positions = np.where(is_known, lattice.positions, np.nan)
+        for i in range(_MAX_SWEEPS):
+            in_turn = active[:: 1 if i % 2 == 0 else -1].copy()
+            if not _improve(texels, number, lattice_positions, lattice.normals, in_turn):
                 break
         chart, row, column = np.unravel_index(active, topology.shape)
-        moved = offsets[chart, row + 1, column + 1]
-        at = (
-            index,
-            row * _LATTICE + _LATTICE // 2 + moved[:, 1],
-            column * _LATTICE + _LATTICE // 2 + moved[:, 0],
-        )
-        changed = moved.any(axis=1)
-        small[chart[changed], row[changed], column[changed]] = places.small[at][changed]
-        weights[chart[changed], row[changed], column[changed]] = places.weights[at][changed]
+        offset = offsets[chart, row + 1, column + 1]
+        lattice_row = row * _LATTICE + _LATTICE // 2 + offset[:, 1]
+        lattice_column = column * _LATTICE + _LATTICE // 2 + offset[:, 0]
+        moved = offset.any(axis=1)
+        source = (index[moved], lattice_row[moved], lattice_column[moved])
+        target = (chart[moved], row[moved], column[moved])
+        small[target] = lattice.small[source]
+        weights[target] = lattice.weights[source]
     return sampled(mesh, patches, small, weights), offsets[:, 1:-1, 1:-1] / _LATTICE
+
+
+def _grown(mask: Bools, topology: TexelTopology) -> Bools:
+    """A mask of texels [C, n, n] with the eight neighbours of each texel."""
+    n = mask.shape[1]
+    halo = topology.with_halo(mask)
+    shifted = []
+    for i in range(3):
+        for j in range(3):
+            shifted.append(halo[:, i : i + n, j : j + n])
+    return np.any(shifted, axis=0)
 
 
 @kernel
 def _fits(offsets: Floats, row: int, column: int) -> bool:
     """Whether the four squares round a moved texel have wide corners on its chart."""
     n = offsets.shape[0] - 2
-    least = _FLATTEST * _LATTICE * _LATTICE
+    least = _MIN_LATTICE_CORNER * _LATTICE * _LATTICE
     x = np.empty(4)
     y = np.empty(4)
     for i in range(row - 1, row + 1):

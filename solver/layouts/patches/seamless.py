@@ -27,11 +27,15 @@ from .quads import Quads
 Complex: TypeAlias = NDArray[np.complex128]
 
 Frame: TypeAlias = tuple[int, complex]  # turn and shift
-_OWN = 0, 0j
 
-# what a vector is multiplied with for each turn
+# The change from a frame to itself.
+_OWN_FRAME = 0, 0j
+
+# The factor of a vector for each turn by right angles.
 _TURNS = np.array([1, 1j, -1, -1j])
-_MOST_CHARTS = 64
+
+# Charts that a straight way may cross.
+_MAX_CHARTS_CROSSED = 64
 
 
 @kernel
@@ -194,7 +198,7 @@ def _connect(seamless: SeamlessMap, twin: Ints, places: Complex) -> None:
                 break
         first = h
         at_rim = twin[h] < 0
-        frame = _OWN
+        frame = _OWN_FRAME
         crossed = 0
         place = places[h // 3, h % 3]
         seamless.chart[v] = chart[h // 3]
@@ -263,9 +267,9 @@ def follow(seamless: SeamlessMap, chart: int, p: complex, q: complex) -> tuple[i
 
     Returns the chart in which q lies, the change of frames on the way, and q in that chart.
     """
-    change = _OWN
+    change = _OWN_FRAME
     came = -1
-    for _ in range(_MOST_CHARTS):
+    for _ in range(_MAX_CHARTS_CROSSED):
         # the side through which the way leaves the square
         side = -1
         least = 1.0

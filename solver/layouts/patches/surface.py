@@ -21,12 +21,17 @@ A, B, C, AB, BC, CA, MIDDLE = range(7)
 
 Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
 
-_ON_RAY = 1e-9  # of the size of a polygon
-_MOST_ROUNDS = 100
+# Distance from a ray up to which a vertex lies on it, in units of a polygon's radius.
+_MAX_OFF_RAY = 1e-9
 
-# of a part; of one that has more to begin with, so many times as many
-_MOST_TRIANGLES = 40_000
-_MOST_GROWTH = 3
+# Passes that split long edges.
+_MAX_REFINEMENTS = 100
+
+# Triangles above which a part is not refined any more.
+_MAX_TRIANGLES = 40_000
+
+# A part that has many triangles to begin with may grow to so many times as many.
+_MAX_TRIANGLE_GROWTH = 3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -210,7 +215,7 @@ def cut_ray(flat: Flat, start: Ints, end: Ints, on_border: Bools) -> tuple[Flat,
     reach = (offset * toward).sum(axis=2)
     beside = toward[..., 0] * offset[..., 1] - toward[..., 1] * offset[..., 0]
     ends_here = (start[flat.part][:, None] == surface.F) | (end[flat.part][:, None] == surface.F)
-    on_ray = (np.abs(beside) < _ON_RAY) & (reach > 0) & ~on_border[surface.F] | ends_here
+    on_ray = (np.abs(beside) < _MAX_OFF_RAY) & (reach > 0) & ~on_border[surface.F] | ends_here
     beside[on_ray] = 0.0
     sides = surface.edges.sides
     triangle, k = np.divmod(sides[:, 0], 3)
@@ -267,16 +272,15 @@ def refined(surface: TriangleSurface, longest: float) -> TriangleSurface:
 
     Where that would take too many triangles, longer ones are left.
     """
-    most = max(_MOST_TRIANGLES, _MOST_GROWTH * len(surface.F))
-    for _ in range(_MOST_ROUNDS):
+    most_triangles = max(_MAX_TRIANGLES, _MAX_TRIANGLE_GROWTH * len(surface.F))
+    for _ in range(_MAX_REFINEMENTS):
         lengths = surface.edge_lengths
-        own = np.take_along_axis(
-            surface.edges.of, lengths[surface.edges.of].argmax(axis=1)[:, None], axis=1
-        )
+        longest_side = lengths[surface.edges.of].argmax(axis=1)
+        longest_edge = np.take_along_axis(surface.edges.of, longest_side[:, None], axis=1)
         chosen = np.zeros(len(lengths), bool)
-        chosen[own] = True
+        chosen[longest_edge] = True
         chosen &= lengths > longest
-        if not chosen.any() or len(surface.F) > most:
+        if not chosen.any() or len(surface.F) > most_triangles:
             break
         surface = surface.subdivided(np.where(chosen, 0.5, np.nan))[0]
     return surface

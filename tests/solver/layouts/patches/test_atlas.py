@@ -200,13 +200,13 @@ def test_a_surface_too_long_for_its_width_is_refused_at_once(stretch: float) -> 
 def test_a_surface_a_little_too_long_for_so_many_cells_has_fewer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(quads, "_FARTHEST", 20**2)
+    monkeypatch.setattr(quads, "_MAX_LENGTH_TIMES_CELLS", 20**2)
     assert_atlas_carries_waves(build_atlas(ANY_MESH["strip"](), 16, cache=False, layout="patches"))
 
 
 def test_many_parts_none_of_which_has_a_share_to_speak_of(monkeypatch: pytest.MonkeyPatch) -> None:
     """As with a thousand parts, in less time."""
-    monkeypatch.setattr(layout, "_NEGLIGIBLE", 0.3)
+    monkeypatch.setattr(layout, "_NEGLIGIBLE_AREA", 0.3)
     solid = trimesh.creation.box((1, 1, 1))
     V = np.concatenate([solid.vertices + np.array([2 * i, 0, 0]) for i in range(4)])
     F = np.concatenate([solid.faces + len(solid.vertices) * i for i in range(4)])
