@@ -1,6 +1,6 @@
-"""What the renderer and its shaders agree on: units and bindings, struct layouts, numbers.
+"""The contract between the renderer and its shaders: units, bindings, struct layouts, numbers.
 
-Every shader gets all of this as defines; see `DEFINES`.
+Every shader gets the contract as defines; see `DEFINES`.
 """
 
 from __future__ import annotations
@@ -12,14 +12,23 @@ import numpy as np
 
 from .tone_mapping import CURVES
 
+# Greatest number of lights of a frame, and of lights that cast shadows.
 MAX_LIGHTS = 8
 MAX_SHADOWS = 4
-MAX_OCCLUDERS = 16
-SOFT_BOXES = 3
-HELD_LIGHTS = 2  # that come to fragments as varyings
-OBJECT_COLUMNS = 64  # objects in a row of their table; a power of two
 
-# Depths that stand for what a pixel shows, exact in every depth buffer; `NAME_LEVEL` in GLSL.
+# Greatest number of geoms that darken the ambient light of objects near them.
+MAX_OCCLUDERS = 16
+
+# Soft boxes of the studio.
+SOFT_BOXES = 3
+
+# Lights whose uniforms reach fragments as varyings.
+HELD_LIGHTS = 2
+
+# Objects in a row of the table of objects; a power of two.
+OBJECT_COLUMNS = 64
+
+# Depths that stand for the contents of a pixel, exact in every depth buffer; `NAME_LEVEL` in GLSL.
 LEVELS = {
     "OPEN": 1.0,  # background that is smooth
     "SHADED": 0.75,  # background that a shadow may reach, or that is not smooth
@@ -28,8 +37,8 @@ LEVELS = {
     "LAYER": 0.125,  # the transparent object that is being drawn
 }
 
-# Shapes of what std140 and std430 lay out alike, in float32: the columns of a mat3 are padded to
-# four.
+# Shapes, in float32, of types that std140 and std430 lay out alike. The columns of a mat3 are padded
+# to four numbers.
 _SHAPES: dict[str, tuple[int, ...]] = {"vec4": (4,), "mat3": (3, 4), "mat4": (4, 4)}
 
 
@@ -94,7 +103,7 @@ class MappingKind(IntEnum):
 
 
 class CasterMap(IntEnum):
-    """What of objects is drawn where a light or the floor sees them; `NAME_MAP` in GLSL."""
+    """Kinds of maps in which a light or the floor sees objects; `NAME_MAP` in GLSL."""
 
     DEPTH = 0
     ALBEDO = 1  # linear colour
@@ -105,15 +114,17 @@ Member: TypeAlias = "str | Struct | tuple[str | Struct, int]"
 
 
 class Struct:
-    """A struct in GLSL and the NumPy dtype of the same layout, in uniform blocks (std140) and storage buffers (std430).
+    """A struct in GLSL, and the NumPy dtype of the same layout.
+
+    The layout is that of uniform blocks (std140) and storage buffers (std430).
 
     Parameters
     ----------
     name : str
-        In GLSL.
+        Name in GLSL.
     **members
-        "vec4", "mat3", "mat4" or another struct, or a pair of one of these and the length of an
-        array of them.
+        Type of each member: "vec4", "mat3", "mat4" or another struct; for an array, a pair of the
+        type and the length.
 
     Attributes
     ----------
@@ -128,21 +139,32 @@ class Struct:
         self.name = name
         fields: list[tuple[Any, ...]] = []
         declarations = []
-        for member, given in members.items():
-            kind, count = given if isinstance(given, tuple) else (given, None)
-            word = kind if isinstance(kind, str) else kind.name
-            declarations.append(
-                f"{word} {member};" if count is None else f"{word} {member}[{count}];"
-            )
-            base, shape = ("f4", _SHAPES[kind]) if isinstance(kind, str) else (kind.dtype, ())
-            fields.append((member, base, shape if count is None else (count, *shape)))
+        for member, declared in members.items():
+            kind, count = declared if isinstance(declared, tuple) else (declared, None)
+            type_name: str
+            base: Any
+            shape: tuple[int, ...]
+            if isinstance(kind, str):
+                type_name = kind
+                base = "f4"
+                shape = _SHAPES[kind]
+            else:
+                type_name = kind.name
+                base = kind.dtype
+                shape = ()
+            if count is None:
+                declarations.append(f"{type_name} {member};")
+                fields.append((member, base, shape))
+            else:
+                declarations.append(f"{type_name} {member}[{count}];")
+                fields.append((member, base, (count, *shape)))
         self.dtype: np.dtype[Any] = np.dtype(fields)
         self.members = " ".join(declarations)
 
 
 def numbered(names: type[IntEnum], suffix: str = "") -> dict[str, int]:
-    """Defines of an enumeration's names, aliases too, each with a suffix."""
-    return {f"{name}{suffix}": each.value for name, each in names.__members__.items()}
+    """Defines for the names of an enumeration, including aliases, each with a suffix."""
+    return {f"{name}{suffix}": member.value for name, member in names.__members__.items()}
 
 
 LIGHT = Struct(
@@ -225,8 +247,12 @@ DEFINES: dict[str, object] = {
     **numbered(MappingKind),
     **numbered(CasterMap, "_MAP"),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
-    **{f"{each.name.upper()}_MEMBERS": each.members for each in (LIGHT, SHADOW, FRAME, OBJECT)},
-    "BACKDROP": 1,  # unless a pass is told otherwise, as the next
+    **{
+        f"{struct.name.upper()}_MEMBERS": struct.members
+        for struct in (LIGHT, SHADOW, FRAME, OBJECT)
+    },
+    # defaults, which passes may override
+    "BACKDROP": 1,
     "HORIZON": 0,
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,

@@ -25,20 +25,20 @@ from .surface_mesh import SurfaceMesh
 
 
 class DrawnScene:
-    """Everything of a model that is rasterised: its targets as rippled surfaces, the other geoms, and its sites.
+    """Everything that is rasterised: targets as rippling surfaces, other geoms, and sites.
 
     Parameters
     ----------
     targets : mapping
         Geom id to the surface that is drawn in place of the geom.
     size : (width, height)
-        Of the frame [pixels].
+        Size of the frame [pixels].
 
     Attributes
     ----------
     targets : list of SurfaceMesh
     opaque, transparent : list of SurfaceMesh and Instances
-        Each can draw itself: into the G-buffer, or what a map of a light or of the floor has of it.
+        Each can draw itself into the G-buffer, and into the maps of the lights and of the floor.
     """
 
     def __init__(
@@ -47,13 +47,12 @@ class DrawnScene:
         self._assets = assets
         self._model = assets.model
         self._height = size[1]
-        ordered = sorted(targets.items())
-        self.height_maps = HeightMapTextures(
-            assets.resources, [surface.charts.page for _, surface in ordered]
-        )
+        sorted_targets = sorted(targets.items())
+        pages = [surface.charts.page for _, surface in sorted_targets]
+        self.height_maps = HeightMapTextures(assets.resources, pages)
         self.targets = [
-            SurfaceMesh(assets, *each, self.height_maps, index, size)
-            for index, each in enumerate(ordered)
+            SurfaceMesh(assets, geom, surface, self.height_maps, index, size)
+            for index, (geom, surface) in enumerate(sorted_targets)
         ]
         self._occluders = Occluders(assets.resources, assets.model, np.zeros(0, dtype=np.int64))
         self._made: dict[tuple[Any, ...], Instances] = {}
@@ -65,7 +64,17 @@ class DrawnScene:
         paints: Mapping[int, Visual] | None = None,
         hidden: Sequence[int] = (),
     ) -> None:
-        """Draw these from now on, without the floor, and all targets but the hidden ones, painted as they stand for."""
+        """Choose what is drawn from now on.
+
+        Parameters
+        ----------
+        visuals : list of (Visual, NamedShape)
+            Everything except targets and the floor.
+        paints : mapping, optional
+            Geom id of a target to the visual with its colour and material.
+        hidden : sequence of int
+            Geom ids of targets that are not drawn.
+        """
         of_geoms = [visual for visual, _ in visuals if visual.index >= 0 and not visual.site]
         plane = mujoco.mjtGeom.mjGEOM_PLANE
         self._planes = [visual for visual in of_geoms if visual.kind == plane]
@@ -82,20 +91,20 @@ class DrawnScene:
         self._instances = instances_of(self._assets, visuals, self._made)
         surfaces = [target for target in self.targets if target.geom not in hidden]
         drawn: list[SurfaceMesh | Instances] = [*surfaces, *self._instances]
-        self.opaque = [each for each in drawn if not each.transparent]
-        self.transparent = [each for each in drawn if each.transparent]
+        self.opaque = [drawable for drawable in drawn if not drawable.transparent]
+        self.transparent = [drawable for drawable in drawn if drawable.transparent]
+        casters = [drawable for drawable in drawn if drawable.casts]
         self._casters = {
-            CasterMap.DEPTH: [each for each in drawn if each.casts and each.blocks],
-            CasterMap.ALBEDO: [each for each in drawn if each.occludes],
-            CasterMap.TRANSMISSION: [each for each in drawn if each.casts and not each.blocks],
+            CasterMap.DEPTH: [drawable for drawable in casters if drawable.blocks],
+            CasterMap.ALBEDO: [drawable for drawable in drawn if drawable.occludes],
+            CasterMap.TRANSMISSION: [drawable for drawable in casters if not drawable.blocks],
         }
 
     def target(self, geom: int) -> SurfaceMesh:
         """The target of a geom; raises `RippleError` if the geom is no target."""
-        if (
-            found := next((target for target in self.targets if target.geom == geom), None)
-        ) is not None:
-            return found
+        for target in self.targets:
+            if target.geom == geom:
+                return target
         geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
@@ -107,7 +116,7 @@ class DrawnScene:
         pose: Pose,
         sharp: bool = False,
     ) -> None:
-        """Bring everything on the GPU up to date; `sharp` is as for `Instances.update`."""
+        """Bring everything on the GPU up to date; for `sharp` see `Instances.update`."""
         for target in self.targets:
             target.ripple(ctx, height_maps.get(target.geom))
         self._occluders.bind(data, pose.focus)
@@ -119,50 +128,53 @@ class DrawnScene:
         self._assets.objects.bind()
 
     def balls(self, data: Any) -> NDArray[np.float64]:
-        """Balls [k, 4] that contain everything."""
+        """Balls [k, 4] that contain everything that is drawn."""
         others = [ball_of(self._model, data, visual) for visual in (*self._others, *self._planes)]
         return np.concatenate(
             [self._occluders.balls(data), *others, *(target.bounds() for target in self.targets)]
         )
 
     def casters(self, data: Any, largest: float = 0.0) -> NDArray[np.float64]:
-        """Balls that contain everything that may cast a shadow, but for planes larger than that radius [m].
+        """Balls [k, 4] that contain everything that may cast a shadow.
 
-        They do not change their size as a target turns, so that shadow maps stay as they are.
+        Planes whose radius is greater than `largest` [m] are left out. The balls keep their size
+        while a target turns, so that shadow maps stay as they are.
         """
         others = [ball_of(self._model, data, visual) for visual in self._others if visual.casts]
-        planes = [ball_of(self._model, data, visual) for visual in self._planes]
-        others += [ball for ball in planes if ball[0, 3] <= largest]
+        balls_of_planes = [ball_of(self._model, data, visual) for visual in self._planes]
+        others += [ball for ball in balls_of_planes if ball[0, 3] <= largest]
         return np.concatenate(
             [self._occluders.balls(data), *others, *(target.ball() for target in self.targets)]
         )
 
     def draw(self) -> None:
         """Draw everything opaque into the G-buffer."""
-        for each in self.opaque:
-            each.draw()
+        for drawable in self.opaque:
+            drawable.draw()
 
     def cast(self, seen: CasterMap, **uniforms: Any) -> None:
-        """Draw into a map what belongs there: of opaque casters, of all that occludes the sky, of transparent casters.
+        """Draw the objects that belong into a map of a light or of the floor.
 
-        Uniforms are those of casters.glsl: `matrix`, 16 numbers, column by column, and the `light`
-        of a transmission.
+        A depth map contains opaque casters, an albedo map everything that occludes the sky, and a
+        transmission map transparent casters. The uniforms are those of casters.glsl: `matrix`, 16
+        numbers, column by column, and for a transmission map the `light`.
         """
-        for each in self._casters[seen]:
-            each.cast(seen, **uniforms)
+        for drawable in self._casters[seen]:
+            drawable.cast(seen, **uniforms)
 
     def layers(
         self, data: Any, pose: Pose
     ) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
-        """Everything transparent with the balls about it, the furthest first."""
-        layers = [(each.bounds(data), each) for each in self.transparent]
+        """Balls about every transparent object, and the object; the furthest object comes first."""
+        layers = [(drawable.bounds(data), drawable) for drawable in self.transparent]
 
         def distance(layer: tuple[NDArray[np.float64], SurfaceMesh | Instances]) -> float:
-            if layer[1].is_plane:  # behind all else, as in MuJoCo
+            balls, drawable = layer
+            if drawable.is_plane:  # behind everything else, as in MuJoCo
                 return float("inf")
-            offset = layer[0][:, :3].mean(axis=0) - pose.eye
-            return float(
-                -offset @ pose.rotation[:, 2] if pose.orthographic else np.linalg.norm(offset)
-            )
+            offset = balls[:, :3].mean(axis=0) - pose.eye
+            if pose.orthographic:
+                return float(-offset @ pose.rotation[:, 2])
+            return float(np.linalg.norm(offset))
 
         return sorted(layers, key=lambda layer: -distance(layer))

@@ -13,12 +13,12 @@ from .resources import Resources
 
 
 class FrameUniforms:
-    """The block's values and its buffer.
+    """Values of the uniform block, and the buffer on the GPU.
 
     Attributes
     ----------
     values : structured array, shape []
-        Of the dtype of `contract.FRAME`.
+        Values with the dtype of `contract.FRAME`.
     """
 
     def __init__(self, resources: Resources) -> None:
@@ -27,20 +27,25 @@ class FrameUniforms:
         self._buffer = resources.buffer(reserve=FRAME.dtype.itemsize, dynamic=True)
 
     def set_vector(self, name: str, xyz: Any, w: float = 0.0) -> None:
-        """Set a vec4 from three numbers and one."""
+        """Set a vec4 from three numbers and a fourth."""
         self.values[name][:3] = xyz
         self.values[name][3] = w
 
     def set_camera(
         self, pose: Pose, aspect: float, balls: NDArray[np.float64] | None = None
     ) -> None:
-        """Set whatever depends on the camera; `aspect` is width over height, and the `balls` contain all solids."""
-        near, far = planes = pose.clip_planes if balls is None else pose.planes_about(balls)
+        """Set the uniforms that depend on the camera.
+
+        `aspect` is the frame's width over its height. The `balls` contain all solids: the near
+        plane is moved forward to the first ball.
+        """
+        near, far = pose.clip_planes if balls is None else pose.planes_about(balls)
         half_width, half_height = pose.half_sizes(aspect)
-        matrix = pose.projection(aspect, planes) @ view_matrix(pose)
-        self.values["view_projection"] = matrix.T  # column by column
+        world_to_clip = pose.projection(aspect, (near, far)) @ view_matrix(pose)
+        floor_begins = 0.0 if pose.clip is None else pose.clip[0]  # [m]
+        self.values["view_projection"] = world_to_clip.T  # column by column
         self.set_vector("eye", pose.eye, pose.distance)
-        self.set_vector("focus", pose.focus, 0.0 if pose.clip is None else pose.clip[0])
+        self.set_vector("focus", pose.focus, floor_begins)
         self.set_vector("ray", pose.rotation @ [*pose.shear, -1.0], near)
         self.set_vector("ray_right", half_width * pose.rotation[:, 0], far)
         self.set_vector("ray_up", half_height * pose.rotation[:, 1], float(pose.orthographic))

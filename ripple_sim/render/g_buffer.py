@@ -14,32 +14,33 @@ class GBuffer:
     Parameters
     ----------
     size : (width, height)
-        [pixels].
+        Width and height [pixels].
     samples : int
-        A pixel; at most as many as the driver has.
+        Samples a pixel; at most as many as the driver has.
 
     Attributes
     ----------
     samples : int
-        1 or more.
+        Samples a pixel, 1 or more.
     """
 
     def __init__(self, resources: Resources, size: tuple[int, int], samples: int) -> None:
         with resources.gl as ctx:
             samples = min(samples, ctx.max_samples)
-        many = samples if samples > 1 else 0
-        self.samples = max(many, 1)
-        depths = resources.depth_texture(size, samples=many)
-        normals, colors = (resources.texture(size, 4, samples=many, dtype="nu2") for _ in range(2))
+        self.samples = max(samples, 1)
+        texture_samples = samples if samples > 1 else 0  # 0: no multisampling
+        depths = resources.depth_texture(size, samples=texture_samples)
+        normals = resources.texture(size, 4, samples=texture_samples, dtype="nu2")
+        colors = resources.texture(size, 4, samples=texture_samples, dtype="nu2")
         self._textures = {Unit.DEPTHS: depths, Unit.NORMALS: normals, Unit.COLORS: colors}
-        if not many:
+        if texture_samples == 0:
             depths.compare_func = ""
             for texture in self._textures.values():
                 texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._framebuffer = resources.framebuffer([normals, colors], depths)
 
     def use(self, ctx: moderngl.Context) -> None:
-        """Draw into it from now on."""
+        """Draw into the G-buffer from now on."""
         self._framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
 

@@ -22,9 +22,9 @@ class MovedHeightMap(NamedTuple):
     Attributes
     ----------
     height_map : float32 [C, n + 2, n + 2, 4]
-        Its gradients are those on the moved surface; see `MovedGradients`.
+        Height map with gradients on the moved surface; see `MovedGradients`.
     V : float64 [vertex_count, 3]
-        Where the vertices of the target's mesh are, in its frame [m].
+        Positions of the vertices of the target's mesh, in its frame [m].
     """
 
     height_map: NDArray[np.float32]
@@ -34,30 +34,30 @@ class MovedHeightMap(NamedTuple):
         return np.asarray(self.height_map, dtype=dtype)
 
 
-# in the host's memory, or on the GPU, where it is made
+# A height map in the host's memory, or on the GPU if the waves are computed there.
 AnyHeightMap: TypeAlias = NDArray[np.float32] | DeviceHeightMap | MovedHeightMap
 
 
 class HeightMapTextures:
-    """A texture array with one layer a target: a page of its charts.
+    """A texture array with one layer a target, which contains the page of its charts.
 
     Layers are as large as the largest page.
 
     Parameters
     ----------
     pages : sequence of ChartPage
-        Of the targets.
+        Pages of the targets.
     """
 
     def __init__(self, resources: Resources, pages: Sequence[ChartPage]) -> None:
         self._pages = pages
-        width, height = (max((page.size[axis] for page in pages), default=1) for axis in range(2))
-        self._texture = resources.clamped_texture(
-            (width, height, max(len(pages), 1)), 4, dtype="f4"
-        )
+        width = max((page.size[0] for page in pages), default=1)
+        height = max((page.size[1] for page in pages), default=1)
+        layers = max(len(pages), 1)
+        self._texture = resources.clamped_texture((width, height, layers), 4, dtype="f4")
 
     def write(self, layer: int, height_map: NDArray[np.float32] | DeviceHeightMap) -> float:
-        """Replace a target's height map, [C, n + 2, n + 2, 4]; return the largest height in it [m]."""
+        """Replace a target's height map, [C, n + 2, n + 2, 4]; return its greatest |height| [m]."""
         if isinstance(height_map, DeviceHeightMap):
             return height_map.fill(self._texture, layer)
         write_page(self._texture, self._pages[layer], layer, height_map)
@@ -73,7 +73,7 @@ def write_page(
 ) -> None:
     """Write charts with halo, [C, n + 2, n + 2, ...], to the page in a layer of a texture array."""
     for first in range(0, len(charts), page.columns):
-        # a row of charts at once: each write has its price
+        # a row of charts at once, since each write takes time
         row = np.ascontiguousarray(
             np.concatenate(charts[first : first + page.columns], axis=1), dtype=np.float32
         )

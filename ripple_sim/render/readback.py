@@ -22,9 +22,10 @@ class FrameFormat:
     Attributes
     ----------
     size : (width, height)
-        [pixels].
+        Width and height [pixels].
     samples : int
-        Samples a pixel for smooth edges; at most as many as the driver has. 0 or 1: none.
+        Samples a pixel for smooth edges; at most as many as the driver has. With 0 or 1 edges are
+        not smoothed.
     alpha : bool
         Whether there is an alpha channel: the background is transparent, and only the shadows are
         left of the floor.
@@ -52,8 +53,8 @@ class FrameFormat:
 class Readback:
     """Frames on their way from the GPU, first in, first out.
 
-    There are as many buffers as frames were ever on their way at a time: pixel buffers of the GPU,
-    or plain memory where the driver draws in that itself.
+    There are as many buffers as there were frames on their way at the same time. They are pixel
+    buffers of the GPU, or plain memory for a software driver.
     """
 
     def __init__(self, resources: Resources, frame_format: FrameFormat) -> None:
@@ -61,14 +62,14 @@ class Readback:
         self._resources = resources
         self._format = frame_format
         width, height = frame_format.size
-        # always four channels: drivers copy those as they are, and convert any other number on the
-        # processor
+        # Four channels in any case: drivers copy them unchanged, and convert any other number of
+        # channels on the processor.
         self._pixels = np.empty((height, width, 4), np.uint16 if frame_format.linear else np.uint8)
         self._free: list[moderngl.Buffer | NDArray] = []
         self._pending: deque[tuple[moderngl.Buffer | NDArray, int]] = deque()
 
     def submit(self, frame: moderngl.Framebuffer) -> None:
-        """Copy a frame as soon as it is drawn; the next one may be drawn over it.
+        """Copy a frame as soon as it is drawn; the next frame may then overwrite it.
 
         Parameters
         ----------
@@ -76,7 +77,7 @@ class Readback:
             RGBA8, or RGBA16F of linear light; bottom row first, multiplied by alpha.
         """
         with self._gl:
-            # which would draw the frame in the next call, holding the interpreter's lock
+            # a software driver draws in the next call otherwise, and holds the interpreter's lock
             if self._gl.software:
                 self._gl.wait()
             if self._free:
@@ -89,18 +90,18 @@ class Readback:
             self._pending.append((buffer, self._gl.put_fence()))
 
     def fetch(self) -> NDArray:
-        """Wait for the earliest frame that is on its way.
+        """Wait for the earliest frame on its way, and return its pixels.
 
         Returns
         -------
         array, shape [height, width, 3], or [height, width, 4] with alpha
-            Top row first; a fresh array for every frame. uint8, alpha straight; or, of linear
-            light, float16, multiplied by alpha.
+            Top row first; a new array for every frame. sRGB frames are uint8, not multiplied by
+            alpha. Linear frames are float16, multiplied by alpha.
 
         Raises
         ------
         RippleError
-            If none is on its way.
+            If no frame is on its way.
         """
         if not self._pending:
             raise RippleError(
@@ -115,7 +116,7 @@ class Readback:
             with self._gl:
                 buffer.read_into(pixels)
         frame = np.empty((*pixels.shape[:2], 4 if self._format.alpha else 3), pixels.dtype)
-        # all at once would be rows of three numbers, which are slow
+        # channel by channel: copying rows of three numbers at once is slower
         for channel in range(frame.shape[2]):
             frame[..., channel] = pixels[::-1, :, channel]
         self._free.append(buffer)
@@ -126,7 +127,7 @@ class Readback:
         return frame
 
     def forget(self) -> None:
-        """Drop all frames that are on their way."""
+        """Discard all frames on their way."""
         while self._pending:
             buffer, fence = self._pending.popleft()
             self._gl.wait_for(fence)

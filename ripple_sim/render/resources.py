@@ -13,18 +13,20 @@ from ripple_sim.solver.gl import GLContext
 
 from .contract import DEFINES
 
+# Package in which programs are looked up by path.
 _PACKAGE = "ripple_sim.render"
 
 
 class Resources:
-    """Creates objects on the GPU and releases all of them at once, at the latest when their owner is collected.
+    """Creates objects on the GPU and releases all of them at once.
 
-    It has the methods of `moderngl.Context` that create something (`buffer`, `texture`, ...).
+    They are released at the latest when their owner is garbage collected. `Resources` has the
+    methods of `moderngl.Context` that create objects (`buffer`, `texture`, ...).
 
     Parameters
     ----------
     owner : object
-        Whoever uses the objects.
+        The object that uses the created objects.
 
     Attributes
     ----------
@@ -45,9 +47,10 @@ class Resources:
         return create
 
     def program(self, name: str, *captured: str, **options: object) -> moderngl.Program:
-        """Program of one of the renderer's files, by its path; `options` are defines beside the contract.
+        """Program of one of the renderer's GLSL files, by its path.
 
-        For `captured` see `GLContext.program`.
+        `options` are defines in addition to `contract.DEFINES`. For `captured` see
+        `GLContext.program`.
         """
         defines = {"HOLD_UNIFORMS": int(self.gl.software), **DEFINES, **options}
         return self._own(self.gl.program(_PACKAGE, name, *captured, **defines))
@@ -55,34 +58,39 @@ class Resources:
     def compute_shader(
         self, name: str, stage: str = "compute", **options: object
     ) -> moderngl.ComputeShader:
-        """One of the renderer's compute shaders, likewise; it is shared."""
+        """Compute shader of one of the renderer's GLSL files, by its path; it is shared."""
         return self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options)
 
     def clamped_texture(
         self, size: tuple[int, ...], components: int, *, mipmaps: bool = False, **options: Any
     ) -> Any:
-        """Texture (width, height), or array of them with a number of layers, that does not repeat.
+        """Texture (width, height) or texture array (width, height, layers) that does not repeat.
 
-        It is read linearly, over its mipmaps too where it has some.
+        Texels are interpolated linearly, and mipmaps too.
         """
-        texture = (self.texture if len(size) == 2 else self.texture_array)(
-            size, components, **options
-        )
-        texture.repeat_x = texture.repeat_y = False
-        texture.filter = (
-            moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR,
-            moderngl.LINEAR,
-        )
+        create = self.texture if len(size) == 2 else self.texture_array
+        texture = create(size, components, **options)
+        texture.repeat_x = False
+        texture.repeat_y = False
+        minified = moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR
+        texture.filter = (minified, moderngl.LINEAR)
         return texture
 
     def release(self) -> None:
-        """Release everything, at once or when the context is next entered; a second time does nothing."""
+        """Release everything, now or when the context is entered next.
+
+        A second call does nothing.
+        """
         self._finalizer()
         self.gl.free()
 
     @contextlib.contextmanager
     def drawing(self) -> Iterator[None]:
-        """A frame: if it is interrupted, by Ctrl-C for instance, the next one begins like the first."""
+        """Context in which a frame is drawn.
+
+        If drawing is interrupted, by Ctrl-C for instance, the framebuffers are reset, so that the
+        next frame begins like the first.
+        """
         try:
             yield
         except BaseException:
@@ -90,7 +98,7 @@ class Resources:
             raise
 
     def _reset_framebuffers(self) -> None:
-        """Undo what passes set for a while: masks, scissors, viewports, and the reflection's winding."""
+        """Reset the state that passes change: masks, scissors, viewports and winding."""
         all_channels = (True, True, True, True)
         with self.gl as ctx:
             ctx.front_face = "ccw"

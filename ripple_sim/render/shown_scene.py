@@ -1,7 +1,7 @@
-"""Which of a scene's entries are drawn as what: rippling surfaces, the floor, and everything else.
+"""The entries of a scene, sorted by how they are drawn: as targets, as the floor, or otherwise.
 
-An entry is compared with what it showed in the frame before, so that a frame in which only poses
-change costs little.
+The entries are compared with those of the frame before, so that a frame in which only poses change
+takes little time.
 """
 
 from __future__ import annotations
@@ -32,38 +32,42 @@ from .visuals.scene_entries import (
 from .visuals.shapes import NamedShape
 from .visuals.visual import WALLS, Visual, geom_visual
 
-_OPAQUE = 0.995  # opacity from which MuJoCo draws something as opaque
-_FROM_BEHIND = 0.3  # opacity of planes that are seen from behind, over that from the front
-# Of the model's materials, what entries of a scene do not repeat.
-_MATERIALS = ("mat_texid", "mat_texrepeat", "mat_texuniform", "mat_roughness", "mat_metallic")
+# Opacity from which MuJoCo draws an object as opaque.
+_MIN_OPAQUE = 0.995
+
+# Opacity of planes that are seen from behind, as a share of the opacity from the front.
+_OPACITY_FROM_BEHIND = 0.3
+
+# Arrays of the model's materials whose values a scene's entries do not contain.
+_MATERIAL_ARRAYS = ("mat_texid", "mat_texrepeat", "mat_texuniform", "mat_roughness", "mat_metallic")
 
 
 class ShownScene:
-    """What a scene of MuJoCo's shows.
+    """The visible contents of a scene of MuJoCo's.
 
     Parameters
     ----------
     model : mujoco.MjModel
     targets : iterable of int
-        Geom ids of the rippling surfaces, which are drawn in the place of their geoms.
+        Geom ids of the rippling surfaces, which are drawn in place of their geoms.
     floor : int, optional
-        Geom id of the plane that is drawn as the floor, where it is seen from above and opaque.
+        Geom id of the plane that is drawn as the floor, if it is opaque and seen from above.
     cut_out : bool
-        Whether it is drawn as the floor from above in any case, and not at all from below: only its
-        shadows are left.
+        Whether frames show only the shadows on the floor. The plane is then drawn as the floor from
+        above even if it is transparent, and not at all from below.
 
     Attributes
     ----------
     visuals : list of (Visual, NamedShape)
-        All that is neither.
+        Everything except targets and floor.
     targets : dict of int to Visual
-        What the scene says of the targets that it has, by geom id.
+        Visuals of the targets that the scene contains, by geom id.
     floor : Visual, optional
-        Likewise.
+        Visual of the floor, if the scene contains it.
     hidden : list of int
         Targets that are not drawn.
     left_out : set of str
-        What is not drawn as the scene has it, in words.
+        Descriptions of things that are not drawn as the scene has them.
     """
 
     def __init__(
@@ -71,13 +75,17 @@ class ShownScene:
     ) -> None:
         self._model = model
         self._cut_out = cut_out
+        # targets by identity, and their visuals in the model
         self._targets = {geom_visual(model, target).identity: target for target in targets}
-        self._own = {target: geom_visual(model, target) for target in self._targets.values()}
+        self._model_visuals = {
+            target: geom_visual(model, target) for target in self._targets.values()
+        }
         self._floor = None if floor is None else geom_visual(model, floor)
         flex = int(mujoco.mjtObj.mjOBJ_FLEX)
         self._colliders = {(collider, flex) for collider in find_flex_colliders(model).values()}
-        self._content: list[tuple[Any, ...]] | None = None
-        self._own_entries = EntryPoses(model, [])
+        self._content: list[tuple[Any, ...]] | None = None  # of the frame before
+        self._poses = EntryPoses(model, [])
+        # visuals that are not of the model, and the entries that they follow
         self._placed: list[tuple[Visual, mujoco.MjvGeom]] = []
         self.visuals: list[tuple[Visual, NamedShape]] = []
         self.targets: dict[int, Visual] = {}
@@ -93,18 +101,25 @@ class ShownScene:
         assets: Assets,
         doubled: bool = False,
     ) -> bool:
-        """Take in what a scene has, seen from an eye [m]; whether that is something else than before, but for poses.
+        """Read a scene, and return whether anything except poses has changed.
 
-        Of what is `segmented` there is only what has a number for it. With `doubled` what is
-        transparent is as opaque as in MuJoCo, which draws it twice.
+        Parameters
+        ----------
+        eye : array, shape [3]
+            Position of the camera [m].
+        segmented : bool
+            Whether entries without a `segid` are left out.
+        doubled : bool
+            Whether transparent objects are as opaque as in MuJoCo, which draws them twice.
         """
-        entries = [each for each in scene.geoms[: scene.ngeom] if each.segid >= 0 or not segmented]
-        content: list[tuple[Any, ...]] = [
-            (*content_of(each), is_behind(each, eye)) for each in entries
+        entries = [
+            entry for entry in scene.geoms[: scene.ngeom] if entry.segid >= 0 or not segmented
         ]
-        content.append(
-            (assets.version, *(getattr(self._model, name).tobytes() for name in _MATERIALS))
-        )
+        content: list[tuple[Any, ...]] = [
+            (*content_of(entry), is_behind(entry, eye)) for entry in entries
+        ]
+        materials = [getattr(self._model, name).tobytes() for name in _MATERIAL_ARRAYS]
+        content.append((assets.version, *materials))
         if content == self._content:
             self._place()
             return False
@@ -115,8 +130,8 @@ class ShownScene:
         return True
 
     def poses(self, data: Any) -> Any:
-        """Where geoms and sites are, by names of MuJoCo's data: as the scene has them."""
-        return self._own_entries.of(data)
+        """Poses of geoms and sites as the scene has them, by the names of `mujoco.MjData`."""
+        return self._poses.of(data)
 
     def _sort(
         self,
@@ -124,48 +139,54 @@ class ShownScene:
         entries: list[mujoco.MjvGeom],
         reshaped: Collection[tuple[str, int]],
     ) -> None:
+        """Sort the entries into targets, floor and other visuals; `reshaped` is of `Assets`."""
         self.targets = {}
         self.floor = None
         self.left_out = set()
         self._placed = []
         visuals: list[Visual] = []
-        own: dict[tuple[int, int], mujoco.MjvGeom] = {}
+        # the first entry of each object of the model; further entries are decoration
+        model_entries: dict[tuple[int, int], mujoco.MjvGeom] = {}
         for entry in entries:
             identity = identity_of(entry)
             if entry.label:
                 self.left_out.add("labels")
-            first = identity not in own
-            if first and (is_of_model(self._model, entry) or identity in self._targets):
-                own[identity] = entry
-            if first and identity in self._targets and self._ripples(entry):
+            is_first = identity not in model_entries
+            if is_first and (is_of_model(self._model, entry) or identity in self._targets):
+                model_entries[identity] = entry
+            if is_first and identity in self._targets and self._ripples(entry):
                 self._take_target(self._targets[identity], entry)
                 if self._doubled and entry.type == mujoco.mjtGeom.mjGEOM_HFIELD:
                     walls = own_visual(self._model, entry, reshaped)
                     visuals.append(self._as_seen(replace(walls, part=WALLS), entry))
-            elif first and self._is_floor(entry):
+            elif is_first and self._is_floor(entry):
                 self.floor = own_visual(self._model, entry)
             elif self._cut_out and self._floor is not None and identity == self._floor.identity:
                 continue
             elif identity not in self._colliders:
-                found = [
-                    self._as_seen(each, entry)
-                    for each in visuals_in(self._model, scene, entry, not first, reshaped)
-                ]
-                visuals += found
-                if len(found) == 1 and found[0].pose is not None and found[0].corners is None:
-                    self._placed.append((found[0], entry))
+                entry_visuals = visuals_in(self._model, scene, entry, not is_first, reshaped)
+                visuals += self._see(entry_visuals, entry)
         self.visuals = shaped(self._model, visuals)
-        drawn = {visual.kind for visual, _ in self.visuals}
-        self.left_out |= {_name_of(visual.kind) for visual in visuals if visual.kind not in drawn}
+        drawn_kinds = {visual.kind for visual, _ in self.visuals}
+        self.left_out |= {
+            _name_of(visual.kind) for visual in visuals if visual.kind not in drawn_kinds
+        }
         self.hidden = [
             target
-            for target, each in self._own.items()
-            if target not in self.targets and each.visible
+            for target, visual in self._model_visuals.items()
+            if target not in self.targets and visual.visible
         ]
-        self._own_entries = EntryPoses(self._model, list(own.values()))
+        self._poses = EntryPoses(self._model, list(model_entries.values()))
+
+    def _see(self, visuals: Iterable[Visual], entry: mujoco.MjvGeom) -> list[Visual]:
+        """The visuals of an entry, as the camera sees them; they follow the entry's pose."""
+        seen = [self._as_seen(visual, entry) for visual in visuals]
+        if len(seen) == 1 and seen[0].pose is not None and seen[0].corners is None:
+            self._placed.append((seen[0], entry))
+        return seen
 
     def _place(self) -> None:
-        """Bring the poses of what is none of the model's up to date."""
+        """Bring the poses of visuals that are not of the model up to date."""
         for visual, entry in self._placed:
             position, rotation = visual.pose  # type: ignore[misc]
             position[:] = entry.pos
@@ -176,19 +197,23 @@ class ShownScene:
         target = self._targets[identity_of(entry)]
         if is_soft(self._model, target):
             return True
-        own = self._own[target]
-        visual = own_visual(self._model, entry)
-        same = visual.kind == own.kind and visual.asset == own.asset
-        same &= np.array_equal(
-            visual.half_sizes.astype(np.float32), own.half_sizes.astype(np.float32)
+        in_model = self._model_visuals[target]
+        in_scene = own_visual(self._model, entry)
+        # entries have single precision
+        has_same_size = np.array_equal(
+            in_scene.half_sizes.astype(np.float32), in_model.half_sizes.astype(np.float32)
         )
-        if not same:
+        has_same_shape = (
+            in_scene.kind == in_model.kind and in_scene.asset == in_model.asset and has_same_size
+        )
+        if not has_same_shape:
             self.left_out.add(
                 f"the ripples of {target_name(self._model, target)!r}, which has another shape"
             )
-        return bool(same)
+        return has_same_shape
 
     def _take_target(self, target: int, entry: mujoco.MjvGeom) -> None:
+        """Add a target with the colour and material of its entry."""
         paint: dict[str, Any] = {
             "rgba": np.array(entry.rgba, dtype=np.float64),
             "material": int(entry.matid),
@@ -200,22 +225,23 @@ class ShownScene:
         self.targets[target] = self._as_seen(visual, entry)
 
     def _is_floor(self, entry: mujoco.MjvGeom) -> bool:
-        """Whether an entry is the floor, and drawn as such."""
+        """Whether an entry is the floor's, and is drawn as the floor."""
         if self._floor is None or identity_of(entry) != self._floor.identity:
             return False
-        return not is_behind(entry, self._eye) and (self._cut_out or entry.rgba[3] >= _OPAQUE)
+        is_opaque = entry.rgba[3] >= _MIN_OPAQUE
+        return not is_behind(entry, self._eye) and (self._cut_out or is_opaque)
 
     def _as_seen(self, visual: Visual, entry: mujoco.MjvGeom) -> Visual:
-        """A visual with the opacity with which MuJoCo shows it: less of planes from behind."""
+        """A visual with its opacity in MuJoCo, which is smaller for planes from behind."""
         behind = is_behind(entry, self._eye)
-        opacity = float(visual.rgba[3]) * (_FROM_BEHIND if behind else 1.0)
-        if self._doubled and opacity < _OPAQUE:
-            opacity = 1.0 - (1.0 - opacity) ** 2
+        opacity = float(visual.rgba[3]) * (_OPACITY_FROM_BEHIND if behind else 1.0)
+        if self._doubled and opacity < _MIN_OPAQUE:
+            opacity = 1.0 - (1.0 - opacity) ** 2  # drawn twice
         return replace(visual, behind=behind, shown_opacity=opacity)
 
 
 def _name_of(kind: int) -> str:
-    """Name of a type of geom, or its number where it is none of MuJoCo's."""
+    """Name of a type of geom; a description with its number if MuJoCo has no such type."""
     try:
         return mujoco.mjtGeom(kind).name
     except ValueError:

@@ -13,20 +13,24 @@ from ripple_sim.solver.errors import warn_caller
 
 from .resources import Resources
 
+# OpenGL's number of the internal format of sRGB colours with alpha.
 SRGB8_ALPHA8 = 0x8C43
 
 
 def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Texture:
-    """Repeating texture with mipmaps, of pixels [height, width, 3], the first row at v = 0.
+    """Repeating texture with mipmaps, from pixels [height, width, 3]; the first row is at v = 0.
 
-    Where the driver takes none as large it is scaled down, with a warning.
+    A texture that is too large for the driver is scaled down, with a warning.
     """
     size, opaque = _flat_texels(resources, pixels)
     return _trilinear(resources.texture(size, 4, opaque, internal_format=SRGB8_ALPHA8))
 
 
 def srgb_cube(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
-    """Cube map with mipmaps, of pixels [6 size, size, 3]: its faces below one another, or one image for all of them."""
+    """Cube map with mipmaps, from pixels of its faces below one another, [6 size, size, 3].
+
+    An image of another height is one image for all faces.
+    """
     size, opaque = _cube_texels(resources, pixels)
     return _trilinear(resources.texture_cube((size, size), 4, opaque, internal_format=SRGB8_ALPHA8))
 
@@ -36,7 +40,7 @@ def write_srgb(
     texture: moderngl.Texture | moderngl.TextureCube,
     pixels: NDArray[np.uint8],
 ) -> None:
-    """Replace the pixels of a texture of `srgb_texture` or `srgb_cube` by others of the same shape."""
+    """Replace the pixels of a texture of `srgb_texture` or `srgb_cube`; the shape stays."""
     if isinstance(texture, moderngl.TextureCube):
         size, opaque = _cube_texels(resources, pixels)
         face = 4 * size * size
@@ -75,8 +79,7 @@ def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
     size = max(1, round(scale * width)), max(1, round(scale * height))
     warn_caller(
         f"a texture of {width}x{height} pixels is larger than the {largest} that the OpenGL driver "
-        f"takes: it is scaled "
-        f"down to {size[0]}x{size[1]}"
+        f"takes: it is scaled down to {size[0]}x{size[1]}"
     )
     return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
 

@@ -1,4 +1,4 @@
-"""Surface images: distance, normal, geom and place on the height map of each pixel, without light."""
+"""Surface images: distance, normal, geom and place on the height map of each pixel."""
 
 from __future__ import annotations
 
@@ -18,24 +18,26 @@ from .resources import Resources
 
 
 class SurfaceImage(NamedTuple):
-    """What is seen at the middle of each pixel, top row first.
+    """The surface at the middle of each pixel, top row first.
 
     Attributes
     ----------
     depth : float32 [height, width]
-        Distance along the camera's axis [m]; 0 where nothing is.
+        Distance along the camera's axis [m]; 0 without a surface.
     geom : int32 [height, width]
-        Geom id, that of the nearest geom of the body for a site; -1 where nothing is.
+        Geom id; for a site the id of the nearest geom of its body; -1 without a surface.
     identity : int32 [height, width, 2]
-        Id and type, of `mujoco.mjtObj`, of what is seen; -1 where nothing is.
-    normal, smooth_normal : float32 [height, width, 3]
-        In the world, with ripples and without, of an open surface's outer side in the latter case.
+        Id and type (`mujoco.mjtObj`) of the object; -1 without a surface.
+    normal : float32 [height, width, 3]
+        Normal in the world, with ripples.
+    smooth_normal : float32 [height, width, 3]
+        Normal in the world without ripples; on an open surface, of its outer side.
     place : float32 [height, width, 2]
-        On a target's page of charts [texels].
+        Place on a target's page of charts [texels].
     target : int32 [height, width]
-        Index of the target among the targets by geom id; -1: none.
+        Index of the target among all targets in the order of geom ids; -1 without a target.
     height : float32 [height, width]
-        Of the ripples [m].
+        Height of the ripples [m].
     """
 
     depth: NDArray[np.float32]
@@ -54,7 +56,7 @@ class SurfaceBuffers:
     Parameters
     ----------
     size : (width, height)
-        [pixels].
+        Width and height [pixels].
     """
 
     def __init__(self, resources: Resources, size: tuple[int, int]) -> None:
@@ -67,9 +69,16 @@ class SurfaceBuffers:
     def draw(
         self, ctx: moderngl.Context, draw: Callable[[], None], objects: ObjectTable, floor_geom: int
     ) -> SurfaceImage:
-        """Draw what `draw` draws into the G-buffer; the frame's uniforms, objects and height maps are bound already.
+        """Draw a surface image; the frame's uniforms, objects and height maps must be bound.
 
-        `floor_geom` is the geom id of the floor, -1 without.
+        Parameters
+        ----------
+        draw : callable
+            Draws everything into the G-buffer.
+        objects : ObjectTable
+            Objects by their number in the G-buffer.
+        floor_geom : int
+            Geom id of the floor, or -1 without a floor.
         """
         ctx.depth_func = "<="
         self._g_buffer.use(ctx)
@@ -85,13 +94,15 @@ class SurfaceBuffers:
             np.frombuffer(image.read(), np.float32).reshape(height, width, 4)[::-1]
             for image in self._images
         )
-        # with nothing at 0 and the floor at the end
+        # numbers of objects: 0 stands for no surface, the last number for the floor
         number = np.rint(smooth[..., 3]).astype(np.int32)
-        floor = floor_geom, int(mujoco.mjtObj.mjOBJ_GEOM)
+        floor_identity = floor_geom, int(mujoco.mjtObj.mjOBJ_GEOM)
+        geoms = np.array([-1, *objects.geoms, floor_geom], dtype=np.int32)
+        identities = np.array([(-1, -1), *objects.identities, floor_identity], dtype=np.int32)
         return SurfaceImage(
             depth=shown[..., 3],
-            geom=np.array([-1, *objects.geoms, floor_geom], dtype=np.int32)[number],
-            identity=np.array([(-1, -1), *objects.identities, floor], dtype=np.int32)[number],
+            geom=geoms[number],
+            identity=identities[number],
             normal=shown[..., :3],
             smooth_normal=smooth[..., :3],
             place=rippling[..., :2],

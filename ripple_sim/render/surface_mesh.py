@@ -26,45 +26,61 @@ from .bounds import balls_about
 from .contract import CasterMap, MappingKind
 from .height_map_textures import AnyHeightMap, HeightMapTextures, MovedHeightMap
 
-_PIXELS = 5.6  # length of an edge where the target fills the frame's height
+# Length of an edge [pixels], where the target fills the frame's height.
+_EDGE_LENGTH = 5.6
 
+# Distance between the waves and an edge from which the edge is split [pixels], likewise.
+_SPLIT_TOLERANCE = 0.25
 
-_TOLERANCE = 0.25  # [pixels], likewise: edges from which the waves depart further are split
+# Edges shorter than this many times the ordinary edge length are not split.
+_MIN_SPLIT_LENGTH = 1.5
 
+# Pixels of the frame a face, at least: smaller faces cost more than they show.
+_PIXELS_PER_FACE = 192
 
-_PIXELS_PER_FACE = 192  # of the frame: fewer than about eight pixels each cost more than they show
+# Balls that bound a mesh that moves.
+_BALL_COUNT = 16
 
+# Bias of shadows: in heights of the highest wave, and at most [radii of the target].
+_BIAS_PER_HEIGHT = 1.5
+_MAX_BIAS = 0.015
 
-_BALLS = 16  # that bound a mesh that moves
-
-
-_HIGHEST_BIAS = 0.015  # of shadows, in radii
+# The ball about a mesh that moves is this much larger than the mesh, and grows in steps of an eighth
+# of an octave, so that shadow maps stay as they are while the surface wobbles.
+_REACH_MARGIN = 1.02
+_REACH_STEPS_PER_OCTAVE = 8
 
 
 class SurfaceMesh:
-    """A target on the GPU: triangles of a few pixels, so that it is round in outline and displaces smoothly.
+    """A target on the GPU, as a mesh that the height map displaces.
 
+    Its triangles are a few pixels wide, so that the outline is round and the displacement smooth.
     Where waves are sharp, a frame has up to four triangles in place of one. An open surface shows
     both of its sides.
 
     Parameters
     ----------
     geom : int
-        The target's geom.
+        Geom id of the target.
     height_maps : HeightMapTextures
-        Of all targets.
+        Height maps of all targets.
     index : int
-        Of the target among them.
+        Index of the target among all targets, which is the layer of its height map.
     size : (width, height)
-        Of the frame [pixels].
+        Size of the frame [pixels].
 
     Attributes
     ----------
     numbers : list of int
-        Its one number in the table of objects.
-    transparent, blocks, occludes, casts : bool
-        Whether the scene behind shows through, and whether no light passes; whether it hides the
-        sky from what is below, and casts shadows, as every target does.
+        The target's one number in the table of objects.
+    transparent : bool
+        Whether the scene behind the target shows through.
+    blocks : bool
+        Whether no light passes through the target.
+    occludes : bool
+        Whether the target hides the sky from objects below it; every target does.
+    casts : bool
+        Whether the target casts shadows; every target does.
     """
 
     def __init__(
@@ -79,7 +95,7 @@ class SurfaceMesh:
         resources = assets.resources
         page = surface.charts.page
         self.geom = geom
-        self._open = surface.open
+        self._is_open = surface.open
         self._gl = resources.gl
         self._resources = resources
         self._assets = assets
@@ -87,11 +103,13 @@ class SurfaceMesh:
         self._height_maps = height_maps
         self._layer = index
         self._page = page
-        self._shape = (page.charts, page.block, page.block, 4)
-        self._middle = np.zeros(3)  # of what is soft its own, of a geom that of its frame
+        self._shape = (page.charts, page.block, page.block, 4)  # of the height map
+        # middle of the ball about the target: a geom's origin, or the middle of a soft mesh [m]
+        self._middle = np.zeros(3)
         if is_soft(assets.model, geom):
             self._middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
-        self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
+        self._radius = float(np.linalg.norm(surface.V - self._middle, axis=1).max())  # at rest [m]
+        self._reach = self._radius  # of the ball about the mesh, as far as it has moved [m]
         visual = geom_visual(assets.model, geom)
         look, _, mapping = appearance(assets.model, visual, surface)
         self.occludes = True
@@ -108,54 +126,64 @@ class SurfaceMesh:
             chart=page.block,
         )
         self.numbers = [number]
-        pixel = 2 * self._radius / size[1]
-        self._vertices = vertices = surface_vertices(
-            surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE
-        )
+        pixel = 2 * self._radius / size[1]  # [m], where the target fills the frame's height
+        max_faces = size[0] * size[1] // _PIXELS_PER_FACE
+        vertices = surface_vertices(surface, pixel * _EDGE_LENGTH, max_faces)
+        self._vertices = vertices
         self._balls = vertices.balls
         self._adaptive = AdaptiveTessellation(
-            vertices, page, _TOLERANCE * pixel, min_length=1.5 * _PIXELS * pixel
+            vertices,
+            page,
+            _SPLIT_TOLERANCE * pixel,
+            min_length=_MIN_SPLIT_LENGTH * _EDGE_LENGTH * pixel,
         )
+        # up to four triangles for each face
         self._indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
-        self._written: NDArray[np.int32] | None = None  # the triangles that the buffer holds
+        self._written: NDArray[np.int32] | None = None  # the triangles in the buffer
         self._on_device: DeviceTessellation | None = None
+        # number of indices, or a buffer with an indirect draw call
         self._count: int | moderngl.Buffer
         mapped = mapped_coordinates(vertices.attributes, mapping)
-        self._displacement = displacement = Displacement(resources, vertices, mapped, index)
+        self._displacement = Displacement(resources, vertices, mapped, index)
         self._mesh = surface.moving or (surface.V, surface.F)
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
-
         colors = surface.heatmap_colors
         self._heatmap = None if colors is None else HeatmapTexture(resources, page, colors)
         self._programs: dict[MappingKind, tuple[moderngl.Program, moderngl.VertexArray]] = {}
-        moved = (displacement.moved, "4f", "in_moved")
-        # whoever looks from afar, or for shapes alone, need not see every wave split in its
-        # triangles
-        whole, coarse = (
-            resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, vertices.coarse)
-        )
-        lens = int(not self._open and look.transparency > 0.0)
-        self._casters = {
-            seen: resources.vertex_array(
-                resources.program("passes/casters", MOVED=1, MAP=seen, SOLID=lens),
-                [moved],
-                triangles,
-            )
-            for seen, triangles in zip(CasterMap, (whole, coarse, self._indices), strict=True)
-        }
+        is_lens = not self._is_open and look.transparency > 0.0
+        self._casters = self._make_casters(is_lens)
         self._surface = surface
         self._mapping = mapping
         self.paint(visual)
 
+    def _make_casters(self, is_lens: bool) -> dict[CasterMap, moderngl.VertexArray]:
+        """Make what draws the mesh into each map of a light or of the floor.
+
+        Depths need no triangles that are split along waves, and colours on the floor only coarse
+        triangles.
+        """
+        resources = self._resources
+        moved = (self._displacement.moved, "4f", "in_moved")
+        indices = {
+            CasterMap.DEPTH: resources.buffer(self._vertices.F.astype("i4").tobytes()),
+            CasterMap.ALBEDO: resources.buffer(self._vertices.coarse.astype("i4").tobytes()),
+            CasterMap.TRANSMISSION: self._indices,
+        }
+        casters = {}
+        for kind, triangles in indices.items():
+            program = resources.program("passes/casters", MOVED=1, MAP=kind, SOLID=int(is_lens))
+            casters[kind] = resources.vertex_array(program, [moved], triangles)
+        return casters
+
     def paint(self, visual: Visual) -> None:
-        """Be painted as what it stands for."""
+        """Take colour, material and texture from the visual of the target's geom."""
         look, rgb, mapping = appearance(self._assets.model, visual, self._surface)
-        opacity = visual.opacity or 1.0  # what MuJoCo shows nothing of is drawn all the same
+        opacity = visual.opacity or 1.0  # targets that MuJoCo does not show are drawn all the same
         self._objects.paint(self.numbers[0], look, opacity)
         self.transparent = look.transparency > 0.0 or opacity < 1.0
         self.blocks = not self.transparent
         self._color = (*rgb, float(self.numbers[0]))
-        # linear colour of the light that passes
+        # linear colour of the light that passes through the target
         passing = 1.0 - opacity + opacity * look.transparency * rgb
         self._casters[CasterMap.ALBEDO].program["color"] = tuple(rgb - passing)
         self._casters[CasterMap.TRANSMISSION].program["transmission"] = tuple(passing)
@@ -170,7 +198,7 @@ class SurfaceMesh:
             self._program["tiling"] = mapping.tiling
 
     def _program_of(self, kind: MappingKind) -> tuple[moderngl.Program, moderngl.VertexArray]:
-        """What the surface is drawn with into the G-buffer where its texture lies so."""
+        """Program and vertex array for the G-buffer, for a kind of texture."""
         resources = self._resources
         surface = self._surface
         displacement = self._displacement
@@ -184,13 +212,22 @@ class SurfaceMesh:
             (displacement.moved, "4f", "in_moved"),
             (displacement.vertices, *displacement.KEPT),
         ]
-        # what a program does not use is optimised away
-        return program, resources.vertex_array(program, content, self._indices, skip_errors=True)
+        # drivers remove attributes that a program does not use
+        vertex_array = resources.vertex_array(program, content, self._indices, skip_errors=True)
+        return program, vertex_array
 
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
-        """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.
+        """Read a height map, and choose the triangles for it; `update` displaces the vertices.
 
-        `update` displaces the vertices. Raises `RippleError` if the height map has another shape.
+        Parameters
+        ----------
+        height_map : array, shape [C, n + 2, n + 2, 4], or None
+            Gradient and height; None stands for a flat surface.
+
+        Raises
+        ------
+        RippleError
+            If the height map has another shape.
         """
         if isinstance(height_map, MovedHeightMap):
             self._move(height_map.V)
@@ -203,74 +240,94 @@ class SurfaceMesh:
                 f"{list(self._shape)}: charts with a halo of one texel, gradient and height"
             )
         if not isinstance(height_map, np.ndarray) and height_map.gl is not self._gl:
-            height_map = np.asarray(height_map)  # it is in the memory of another device
+            height_map = np.asarray(height_map)  # from the memory of another device
         self._highest = self._height_maps.write(self._layer, height_map)
         if isinstance(height_map, np.ndarray):
-            triangles, midpoints = self._adaptive(height_map)
-            if triangles is not self._written:
-                self._indices.write(triangles)
-                self._written = triangles
-            self._count = triangles.size
+            self._tessellate(height_map)
         else:
-            self._height_maps.bind()
-            if self._on_device is None:
-                self._on_device = DeviceTessellation(
-                    self._resources, self._adaptive, self._page, self._layer, self._indices
-                )
-            self._on_device.run(ctx)
-            midpoints = self._on_device.midpoints
-            self._count = self._on_device.command
-            self._written = None
+            self._tessellate_on_device(ctx)
+
+    def _tessellate(self, height_map: NDArray[np.float32]) -> None:
+        """Choose the triangles for a height map in the host's memory."""
+        triangles, midpoints = self._adaptive(height_map)
+        if triangles is not self._written:
+            self._indices.write(triangles)
+            self._written = triangles
+        self._count = triangles.size
         self._displacement.use(midpoints)
+
+    def _tessellate_on_device(self, ctx: moderngl.Context) -> None:
+        """Choose the triangles for a height map on the GPU, on the GPU."""
+        self._height_maps.bind()
+        if self._on_device is None:
+            self._on_device = DeviceTessellation(
+                self._resources, self._adaptive, self._page, self._layer, self._indices
+            )
+        self._on_device.run(ctx)
+        self._count = self._on_device.command
+        self._written = None
+        self._displacement.use(self._on_device.midpoints)
 
     def update(
         self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: Occluders
     ) -> None:
-        """Displace the vertices by the height map where the geom is, among bound occluders."""
+        """Displace the vertices by the height map, at the pose of the geom.
+
+        The `occluders` must be bound.
+        """
         self._pose = rotation, origin
-        near = int(occluders.near(self.ball(), np.array([self.geom]))[0])
-        bias = min(1.5 * self._highest, _HIGHEST_BIAS * self._radius)
-        self._objects.place(self.numbers[0], bias, rotation=rotation)
+        near_occluders = int(occluders.near(self.ball(), np.array([self.geom]))[0])  # a bit each
+        shadow_bias = min(_BIAS_PER_HEIGHT * self._highest, _MAX_BIAS * self._radius)  # [m]
+        self._objects.place(self.numbers[0], shadow_bias, rotation=rotation)
         self._height_maps.bind()
-        self._displacement.run(rotation, origin, near)
+        self._displacement.run(rotation, origin, near_occluders)
 
     def _move(self, V: NDArray[np.float64]) -> None:
-        """Take the vertices along with those of the mesh, [n, 3] [m]."""
+        """Move the vertices with the vertices `V` [n, 3] of the target's mesh [m]."""
         if self._moving is None:
-            columns = (POSITION, DIRECTION, NORMAL, BAKED)
-            rest, along, upright, baked = (self._vertices.attributes[:, each] for each in columns)
-            vertices = MovingVertices(*self._mesh, rest, along, upright)
-            self._moving = vertices, MovingOcclusion(*self._mesh, rest, along, baked)
+            attributes = self._vertices.attributes
+            position = attributes[:, POSITION]
+            direction = attributes[:, DIRECTION]
+            normal = attributes[:, NORMAL]
+            rest_V, F = self._mesh
+            self._moving = (
+                MovingVertices(rest_V, F, position, direction, normal),
+                MovingOcclusion(rest_V, F, position, direction, attributes[:, BAKED]),
+            )
         vertices, occlusion = self._moving
         points, directions, normals = vertices(V)
         self._displacement.move(points, directions, normals, occlusion(V))
-        self._balls = balls_about(V[self._mesh[1]], _BALLS)
+        self._balls = balls_about(V[self._mesh[1]], _BALL_COUNT)
         self._middle = (V.min(axis=0) + V.max(axis=0)) / 2
-        # in steps, so that shadow maps stay as they are while the surface wobbles
-        need = 1.02 * float(np.linalg.norm(V - self._middle, axis=1).max())
-        self._reach = max(self._reach, float(2 ** (np.ceil(8 * np.log2(need)) / 8)))
+        needed_reach = _REACH_MARGIN * float(np.linalg.norm(V - self._middle, axis=1).max())
+        steps = np.ceil(_REACH_STEPS_PER_OCTAVE * np.log2(needed_reach))
+        self._reach = max(self._reach, float(2 ** (steps / _REACH_STEPS_PER_OCTAVE)))
 
     def set_heatmap(self, values: NDArray[np.float32], limit: float) -> None:
-        """Replace the heatmap's values, [C, n + 2, n + 2] with a halo; the colours range from -limit to limit.
+        """Replace the heatmap's values, which have a halo; the colours range from -limit to limit.
 
-        Raises `RippleError` if the surface has no heatmap, the shape is another, or the limit is
-        not a positive, finite number.
+        Raises `RippleError` if the surface has no heatmap, the shape is not [C, n + 2, n + 2], or
+        the limit is not a positive, finite number.
         """
         if self._heatmap is None:
             raise RippleError(f"geom {self.geom} has no heatmap; give its `Surface` heatmap_colors")
         self._heatmap.set(values, limit)
 
     def ball(self) -> NDArray[np.float64]:
-        """Ball [1, 4] about the geom's origin that contains the displaced mesh; it is the same as the geom turns."""
+        """Ball [1, 4] that contains the displaced mesh.
+
+        Its size stays the same while the geom turns.
+        """
         rotation, origin = self._pose
-        return np.array([[*(origin + rotation @ self._middle), self._reach + self._highest]])
+        centre = origin + rotation @ self._middle
+        return np.array([[*centre, self._reach + self._highest]])
 
     def bounds(self, data: Any = None) -> NDArray[np.float64]:
-        """Balls [k, 4] that together contain the displaced mesh, where it was updated last."""
+        """Balls [k, 4] that together contain the displaced mesh, at the pose of the last update."""
         rotation, origin = self._pose
-        return np.column_stack(
-            [self._balls[:, :3] @ rotation.T + origin, self._balls[:, 3] + self._highest]
-        )
+        centres = self._balls[:, :3] @ rotation.T + origin
+        radii = self._balls[:, 3] + self._highest
+        return np.column_stack([centres, radii])
 
     def draw(self) -> None:
         """Draw into the G-buffer."""
@@ -290,13 +347,16 @@ class SurfaceMesh:
         self._render(casters, self._count if seen == CasterMap.TRANSMISSION else -1)
 
     def _render(self, triangles: moderngl.VertexArray, count: int | moderngl.Buffer) -> None:
-        """Render so many indices, -1: all; where back faces are culled, both sides of an open surface."""
+        """Render a number of indices, -1 for all.
+
+        Both sides of an open surface are drawn, also where back faces are culled.
+        """
         with self._gl as ctx:
-            if self._open:
+            if self._is_open:
                 ctx.disable(moderngl.CULL_FACE)
             if isinstance(count, moderngl.Buffer):  # of an indirect draw call
                 triangles.render_indirect(count, count=1)
             else:
                 triangles.render(vertices=count)
-            if self._open:
+            if self._is_open:
                 ctx.enable(moderngl.CULL_FACE)
