@@ -1,8 +1,8 @@
-"""What a frame does to a target's mesh: edges from which the waves depart are split, and vertices are displaced.
+"""The mesh of a target in a frame: edges are split where the waves bend, vertices are displaced.
 
-Edges are split either on the processor, from heights in its memory, or on the GPU, from a texture's
-heights, by compute shaders, as the waves are: the same triangles in the same order. Heights between
-the texels are those of a quadratic B-spline (glsl/height_maps.glsl).
+Edges are split where the waves are computed: on the processor, from heights in its memory, or on
+the GPU, by compute shaders, from heights in a texture. Both give the same triangles in the same
+order. Heights between the texels are interpolated by a quadratic B-spline (glsl/height_maps.glsl).
 """
 
 from __future__ import annotations
@@ -19,21 +19,20 @@ from ripple_sim.solver.texels.chart_page import ChartPage
 from .tessellation import BAKED, DIRECTION, NORMAL, POSITION
 from .vertices import SurfaceVertices
 
-_GROUP = 256
+_GROUP = 256  # invocations in a work group of the compute shaders
 
 
 def spline_samples(
     chart: NDArray, row: NDArray, column: NDArray, resolution: int
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Where places on charts, [k] each, lie between the texels.
+    """The 3 x 3 texels about places on charts, [k] each, and how far the places are off the middle.
 
     Returns
     -------
     texel : int32 [k, 3]
-        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels about each
-        place.
+        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels.
     offset : float32 [k, 2]
-        How far off the middle one's centre it is [texels].
+        From the centre of the middle texel to the place, in rows and columns [texels].
     """
     place = np.stack([row, column], axis=1)
     nearest = np.clip(np.floor(place + 0.5), 0, resolution - 1)
@@ -42,9 +41,9 @@ def spline_samples(
 
 @kernel(inline="always")
 def spline_weights(t: np.float32) -> tuple[np.float32, np.float32, np.float32]:
-    """Weights of the texels before, at and after the nearest one at a distance from its centre, along an axis.
+    """Weights of three texels in a row at a place `t` [texels] from the centre of the middle one.
 
-    glsl/height_maps.glsl has the same for both axes.
+    glsl/height_maps.glsl has the same weights for both axes.
     """
     half = np.float32(0.5)
     return half * (half - t) * (half - t), np.float32(0.75) - t * t, half * (half + t) * (half + t)
@@ -52,10 +51,10 @@ def spline_weights(t: np.float32) -> tuple[np.float32, np.float32, np.float32]:
 
 @kernel
 def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
-    """Heights [k] of a height map [C, n + 2, n + 2, 4] at offsets [k, 2] in texels [k, 3]; see `spline_samples`."""
+    """Heights [k] of a height map [C, n + 2, n + 2, 4] at places given by `spline_samples`."""
     height = np.empty(len(texel), np.float32)
     for i in range(len(texel)):
-        # number by number: unpacking rows takes longer than all the rest
+        # number by number: to unpack a row takes longer than all the rest
         chart = texel[i, 0]
         row = texel[i, 1]
         column = texel[i, 2]
@@ -74,7 +73,7 @@ def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Flo
 
 
 class AdaptiveTessellation:
-    """Splits the edges of a mesh at their midpoints where a height map bends too much between their ends.
+    """Splits the edges of a mesh at their midpoints where a height map bends too much.
 
     Whether an edge is split depends only on its length and the heights at its ends and midpoint, so
     that the triangles on both sides of it agree, across seams and creases, too: no gap opens.
@@ -126,32 +125,35 @@ class AdaptiveTessellation:
     def __call__(
         self, height_map: NDArray[np.float32]
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.
+        """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s] they use.
 
-        In the triangles these midpoints follow the mesh's own vertices, as `Displacement.use`
-        arranges them. Where no edge is split, the triangles are the same array each time.
+        The midpoints are numbers of vertices. In the triangles they follow the mesh's own vertices,
+        as `Displacement.use` arranges them. Where no edge is split, the triangles are the same
+        array each time.
         """
-        whole = self.faces, np.empty(0, np.int32)
+        unsplit = self.faces, np.empty(0, np.int32)
         if not len(self.long) or not height_map[..., 3].any():
-            return whole
+            return unsplit
         height = spline_heights(height_map, self.texel, self.offset)
         middle = height[-len(self.long) :]
         ends = height[self.ends]
-        split = self.long[
-            np.abs(middle - np.float32(0.5) * (ends[:, 0] + ends[:, 1])) > self.tolerance
-        ]
+        bend = np.abs(middle - np.float32(0.5) * (ends[:, 0] + ends[:, 1]))  # [m]
+        split = self.long[bend > self.tolerance]
         if not len(split):
-            return whole
+            return unsplit
         midpoint = np.full(len(self.length), -1, np.int32)
         midpoint[split] = np.arange(self.base_count, self.base_count + len(split))
-        return _triangles(self.faces, self.sides, midpoint, self.length), np.int32(
-            self.base_count
-        ) + split
+        triangles = _triangles(self.faces, self.sides, midpoint, self.length)
+        return triangles, np.int32(self.base_count) + split
 
 
 @kernel
 def _triangles(faces: Ints32, sides: Ints32, midpoint: Ints32, length: Floats) -> Ints32:
-    """Cut every triangle [m, 3] into 1 to 4 by the midpoints of its sides [m, 3], -1: none; lengths are the edges'."""
+    """Cut every triangle [m, 3] into 1 to 4 by the midpoints of its sides.
+
+    `sides` [m, 3] are the edges of the triangles; `midpoint` [k] is the vertex in the middle of an
+    edge, -1 without one; `length` [k] is that of the edges [m].
+    """
     triangles = np.empty((4 * len(faces), 3), np.int32)
     count = 0
     for face in range(len(faces)):
@@ -198,10 +200,10 @@ def _triangles(faces: Ints32, sides: Ints32, midpoint: Ints32, length: Floats) -
 
 
 class DeviceTessellation:
-    """Decides which edges are split, and writes triangles and the draw call's size, without asking the host.
+    """Splits edges on the GPU: writes the triangles and the size of the draw call there.
 
-    How many triangles come before each face's is a sum over all faces before it: within groups of
-    faces first, and then over the groups. So their order is always the same.
+    Nothing is read back. The first triangle of a face is found by a sum over all faces before it,
+    within groups of faces first and then over the groups, so the order is always the same.
 
     Parameters
     ----------
@@ -232,8 +234,10 @@ class DeviceTessellation:
         self._tolerance = float(adaptive.tolerance)
         self._counts = len(adaptive.long), len(adaptive.faces)
         _, rank = np.unique(adaptive.length, return_inverse=True)
-        first = np.array([page.corner(chart) for chart in range(page.charts)])[adaptive.texel[:, 0]]
-        places = np.concatenate([first + adaptive.texel[:, :0:-1], adaptive.offset], axis=1)
+        corners = np.array([page.corner(chart) for chart in range(page.charts)])
+        first_texel = corners[adaptive.texel[:, 0]] + adaptive.texel[:, :0:-1]
+        places = np.concatenate([first_texel, adaptive.offset], axis=1)
+        # lookups of the midpoints are the last ones
         middles = len(adaptive.texel) - len(adaptive.long) + np.arange(len(adaptive.long))
         groups = -(-len(adaptive.faces) // _GROUP)
         self.midpoints = np.arange(
@@ -259,17 +263,22 @@ class DeviceTessellation:
             Binding.INDICES: indices,
             Binding.COMMAND: self.command,
         }
-        self._split_edges, self._count, self._add, self._write = (
-            resources.compute_shader("surfaces/adaptive", stage, GROUP=_GROUP)
-            for stage in ("split", "count", "add", "write")
-        )
+
+        def shader(stage: str) -> moderngl.ComputeShader:
+            return resources.compute_shader("surfaces/adaptive", stage, GROUP=_GROUP)
+
+        self._split_edges = shader("split")
+        self._count = shader("count")
+        self._add = shader("add")
+        self._write = shader("write")
 
     def run(self, ctx: moderngl.Context) -> None:
         """Write the triangles for the height map that is bound."""
         edges, faces = self._counts
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
-        self._split_edges["layer"], self._split_edges["tolerance"] = self._layer, self._tolerance
+        self._split_edges["layer"] = self._layer
+        self._split_edges["tolerance"] = self._tolerance
         for shader in (self._count, self._write):
             shader["first_midpoint"] = self.midpoints[0]
         for shader, count in (
@@ -286,10 +295,10 @@ class DeviceTessellation:
 
 
 class Displacement:
-    """The vertices of a target on the GPU, and the pass that displaces them and puts them into the world, once a frame.
+    """The vertices of a target on the GPU, and the pass that displaces them once a frame.
 
-    First come the mesh's own, then the midpoints in use. What the pass finds is captured by
-    transform feedback.
+    The pass also puts them into the world; its results are captured by transform feedback. The
+    mesh's own vertices come first, then the midpoints in use.
 
     Parameters
     ----------
@@ -350,14 +359,17 @@ class Displacement:
     def move(
         self, points: Floats32, directions: Floats32, normals: Floats32, baked: Floats32
     ) -> None:
-        """Replace where all vertices are at rest [m], the directions that they are displaced in, and more, [n, 3]."""
+        """Replace the points of all vertices at rest [m], their directions and more, [n, 3] each.
+
+        The directions are those of the displacement.
+        """
         self._content[:, :6] = np.hstack([points, directions])
         self._content[:, 8:14] = np.hstack([normals, baked])
         self.vertices.write(self._content[: self._base_count])
         self._used = None
 
     def use(self, midpoints: NDArray[np.int32]) -> None:
-        """Let these vertices follow the mesh's own."""
+        """Let these vertices follow the mesh's own vertices in the buffer."""
         if len(midpoints) and midpoints is not self._used:
             rows = self._content[midpoints]
             self.vertices.write(rows, offset=self._base_count * rows.strides[0])
@@ -367,14 +379,14 @@ class Displacement:
     def run(
         self, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: int
     ) -> None:
-        """Displace all that are in use; height maps and occluders are bound already.
+        """Displace all vertices that are in use; height maps and occluders are bound already.
 
         Parameters
         ----------
         rotation, origin : float64 [3, 3], [3]
             Of the target in the world [m].
         occluders : int
-            Bits of those near it; see `Occluders.near`.
+            Bits of the occluders near the target; see `Occluders.near`.
         """
         self._program["rotation"] = tuple(rotation.T.ravel())
         self._program["origin"] = tuple(origin)

@@ -1,4 +1,4 @@
-"""A tessellated surface whose own vertices move: its points and normals, and its ambient occlusion."""
+"""A tessellated surface on a mesh that moves: its points, normals and ambient occlusion."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 from .tessellation import coarse_mesh
 
-_SAMPLES = 1_000  # vertices that cast rays, at most
-_RAYS = 32_000  # a frame, about
-_NEAR = 6  # samples about a point
+_MAX_SAMPLES = 1_000  # vertices of the coarse mesh, which cast rays
+_RAYS = 32_000  # in a frame, about, on both sides of the surface
+_NEAR_SAMPLES = 6  # about a point, from which its occlusion is interpolated
 
 
 class MovingVertices:
-    """Takes the points of a finer surface along with the mesh on which it was made.
+    """Moves the points of a finer surface along with the mesh on which the surface was made.
 
-    A triangle's motion is a linear map, which leaves unit normals of unit length; a vertex takes
-    the mean of those about it, and a point the mean of its triangle's corners: what bulges out
-    bulges on, and normals turn smoothly.
+    The motion of a triangle is a linear map, under which unit normals keep their length. A vertex
+    takes the mean of the maps about it, and a point the mean of the maps at the corners of its
+    triangle: bulges of the surface stay, and normals turn smoothly.
 
     Parameters
     ----------
@@ -55,12 +55,16 @@ class MovingVertices:
         self.rest = corners, weights, offset, *rest[1:]
 
     def __call__(self, V: NDArray[np.float64]) -> tuple[Floats32, Floats32, Floats32]:
-        """Points [m], directions of displacement and normals, float32 [n, 3] each, for vertices [k, 3] [m]."""
+        """Points [m], directions of displacement and normals for vertices [k, 3] [m].
+
+        All three are float32 [n, 3].
+        """
         V = np.ascontiguousarray(V, np.float64)
         maps = _vertex_maps(self._V, V, self._F)
-        points, directions, normals = (
-            np.empty((len(self.rest[0]), 3), np.float32) for _ in range(3)
-        )
+        count = len(self.rest[0])
+        points = np.empty((count, 3), np.float32)
+        directions = np.empty((count, 3), np.float32)
+        normals = np.empty((count, 3), np.float32)
         _move(V, maps, *self.rest, points, directions, normals)
         return points, directions, normals
 
@@ -131,10 +135,22 @@ def _turn(mean: Floats, rest: Floats, i: int, out: Floats32) -> None:
 
 @kernel
 def _move(
-    V: Floats, maps: Floats, corners: Ints, weights: Floats, offset: Floats, rest_directions: Floats,
-    rest_normals: Floats, points: Floats32, directions: Floats32, normals: Floats32,
-) -> None:  # fmt: skip
-    """Points n, by corners and weights in the nearest triangle and the way from there [m], each [n, 3]."""
+    V: Floats,
+    maps: Floats,
+    corners: Ints,
+    weights: Floats,
+    offset: Floats,
+    rest_directions: Floats,
+    rest_normals: Floats,
+    points: Floats32,
+    directions: Floats32,
+    normals: Floats32,
+) -> None:
+    """Fill in points, directions and normals [n, 3] for vertices `V` and their maps.
+
+    `corners` and `weights` are the corners of the nearest triangle and the weights of these at the
+    nearest place; `offset` is the way from there to the point at rest [m].
+    """
     mean = np.empty((3, 3))
     for i in range(len(points)):
         mean[:] = 0
@@ -154,11 +170,11 @@ def _move(
 
 
 class MovingOcclusion:
-    """Adds to what is baked at rest how it changes.
+    """Ambient occlusion of a surface that moves: the one baked at rest, plus its change.
 
-    Rays find the change, from the vertices of a coarse mesh that moves along, against that mesh, at
-    rest and in each frame: what is coarse about it is then in both. The rays turn with the surface,
-    so that a rigid motion changes nothing and noise does not crawl.
+    The change is found on a coarse mesh that moves along: its vertices cast rays against it, at
+    rest and in each frame, so that the error of the coarse mesh cancels. The rays turn with the
+    surface: a rigid motion changes nothing, and noise does not crawl.
 
     Parameters
     ----------
@@ -174,7 +190,7 @@ class MovingOcclusion:
     def __init__(
         self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, baked: NDArray
     ) -> None:
-        count = min(_SAMPLES, len(V))
+        count = min(_MAX_SAMPLES, len(V))
         normals = smooth_normals(V, F)
         spacing = float(np.sqrt(Mesh(V, F).area / count))
         # so that the two sides of a thin body are far from each other
@@ -182,9 +198,9 @@ class MovingOcclusion:
         vertices, coarse = coarse_mesh(F, np.hstack([V, apart]), count)
         samples = cKDTree(np.hstack([V, apart])[vertices])
         distance, near = samples.query(
-            np.hstack([points, 2 * spacing * directions]), min(_NEAR + 1, samples.n)
+            np.hstack([points, 2 * spacing * directions]), min(_NEAR_SAMPLES + 1, samples.n)
         )
-        # the farthest one's weight is 0: no point jumps
+        # the weight of the farthest sample is 0, so that no point jumps when its samples change
         weights = (1 - distance / np.maximum(distance[:, -1:], 1e-300)) ** 2 + 1e-12
         self._baked = baked
         self._near = near
@@ -203,17 +219,18 @@ class MovingOcclusion:
         self._rest = self._measured(V)
 
     def __call__(self, V: NDArray[np.float64]) -> NDArray[np.float32]:
-        """What `baked` is for vertices [k, 3] [m]."""
+        """The baked values, as in `baked`, for vertices [k, 3] [m]."""
         change = self._measured(V) - self._rest
         baked = self._baked + np.einsum("ij,ijk->ik", self._weights, change[self._near])
         return np.clip(baked, 0.0, [1.0, 4.0, 1.0]).astype(np.float32)
 
     def _of(self, V: NDArray[np.float64]) -> NDArray[np.float64]:
         """Vertices of the coarse mesh, about their mean: rays are in single precision."""
-        some = V[self._vertices]
-        return some - some.mean(axis=0)
+        coarse = V[self._vertices]
+        return coarse - coarse.mean(axis=0)
 
     def _measured(self, V: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Occlusion and thickness of the coarse mesh, see `cast`, for vertices [k, 3] [m]."""
         V = self._of(V)
         _, directions, normals = self._frames(V)
         return cast(

@@ -1,4 +1,4 @@
-"""The surface of a target as it is drawn: geometry, its place on the charts of its atlas, look and texture.
+"""`Surface`: the surface of a target as it is drawn: geometry, charts, look and texture.
 
 A heatmap shows one of the solver's fields on it in false colours.
 """
@@ -33,10 +33,12 @@ from ripple_sim.solver.texels.chart_page import ChartPage
 
 from .tessellation import COORDINATES, NORMAL, POSITION
 
-_ON_BORDER = 1e-9  # of a chart
-_BITS = 36  # of the attributes of cut points: round-off is within their last one
+_BORDER_WIDTH = (
+    1e-9  # a place is on the border of a chart if it is this close, in sides of the chart
+)
+_ATTRIBUTE_BITS = 36  # kept of the attributes of cut points: round-off is within the last bit
 
-# What is lit under the colours: only its shadows are kept.
+# Look of the surface under a heatmap: only its shadows are seen.
 UNDER_HEATMAP = Look(color=(0.81, 0.81, 0.81), roughness=0.8)
 
 
@@ -65,7 +67,7 @@ def split_at_charts(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Cut the triangles of a mesh where they leave a chart.
 
-    What the vertices have is linear in each triangle.
+    The attributes of the vertices are linear in each triangle.
 
     Parameters
     ----------
@@ -75,9 +77,8 @@ def split_at_charts(
     Returns
     -------
     F, attributes, same
-        The mesh, of which every triangle lies in one chart; vertices on the borders stand once for
-        each chart, and `same` is equal for those that differ in their texture coordinates and
-        charts at most.
+        The mesh. Every triangle lies in one chart; a vertex on a border exists once for each chart.
+        `same` is equal for vertices that differ in their texture coordinates and charts at most.
     chart : int64 [n]
         Of each vertex.
     """
@@ -90,7 +91,7 @@ def split_at_charts(
     cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
     cut[:, NORMAL] /= np.maximum(np.linalg.norm(cut[:, NORMAL], axis=1, keepdims=True), 1e-12)
     # without the round-off by which two triangles differ in a point that they share
-    step = np.ldexp(1.0, np.frexp(np.abs(attributes).max(axis=0))[1] - _BITS)
+    step = np.ldexp(1.0, np.frexp(np.abs(attributes).max(axis=0))[1] - _ATTRIBUTE_BITS)
     cut = np.round(cut / step) * step
     _, point = np.unique(np.hstack([cut[:, POSITION], cut[:, NORMAL]]), axis=0, return_inverse=True)
     _, distinct = np.unique(cut, axis=0, return_inverse=True)
@@ -109,12 +110,12 @@ def split_at_charts(
 def shared_places(
     uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray
 ) -> NDArray[np.float64]:
-    """Places [n, 2] on the page that are the same for vertices at the same point, whatever their charts.
+    """Places [n, 2] on the page, equal for vertices at the same point, whatever their charts.
 
     Heights on both sides of a border are equal but for round-off; looked up in one place they are
     the same, so that no gap opens. `points` [n, k] are equal where the vertices are at one point.
     """
-    border = np.flatnonzero(((uv < _ON_BORDER) | (uv > 1 - _ON_BORDER)).any(axis=1))
+    border = np.flatnonzero(((uv < _BORDER_WIDTH) | (uv > 1 - _BORDER_WIDTH)).any(axis=1))
     _, first, index = np.unique(points[border], axis=0, return_index=True, return_inverse=True)
     shared = places.copy()
     shared[border] = places[border[first[index.ravel()]]]
@@ -218,7 +219,7 @@ class Surface:
 def appearance(
     model: Any, visual: Visual, surface: Surface
 ) -> tuple[Look, NDArray[np.float64], TextureMapping]:
-    """Look, linear colour under the texture, and how the texture lies on a surface that stands for a visual."""
+    """Look, linear colour under the texture, and texture mapping of the surface of a visual."""
     if surface.heatmap_colors is not None:
         return UNDER_HEATMAP, np.ones(3), TextureMapping()
     color = surface.color
@@ -231,32 +232,43 @@ def appearance(
 def painted(
     model: Any, geom: int, look: str, color: tuple[float, float, float] | None, has_uv: bool
 ) -> tuple[Look, NDArray[np.float64], TextureMapping]:
-    """The same for a target of a look, with an sRGB colour if it is given one, and texture coordinates or none."""
+    """Look, linear colour under the texture, and texture mapping of a target.
+
+    Parameters
+    ----------
+    look : str
+        Name of one of `LOOKS`.
+    color : tuple, optional
+        sRGB; by default the model's or the look's.
+    has_uv : bool
+        Whether the target has texture coordinates of its own.
+    """
     return _painted(model, geom_visual(model, geom), look, color, has_uv)
 
 
 def _painted(
     model: Any, visual: Visual, look: str, color: tuple[float, float, float] | None, has_uv: bool
 ) -> tuple[Look, NDArray[np.float64], TextureMapping]:
-    found = find_look(look)
+    look_found = find_look(look)
     mapping = mapping_of(model, visual)
     if mapping.own and not has_uv:
         mapping = TextureMapping()
     if look == MODEL_LOOK:
-        return (
-            look_of(model, visual),
-            visual.color if color is None else srgb_to_linear(color),
-            mapping,
-        )
+        linear = visual.color if color is None else srgb_to_linear(color)
+        return look_of(model, visual), linear, mapping
     if color is None and mapping.kind != MappingKind.NO_IMAGE:
-        return found, visual.color, mapping
-    return found, srgb_to_linear(_own_color(model, visual, look, color)), TextureMapping()
+        return look_found, visual.color, mapping
+    linear = srgb_to_linear(_own_color(model, visual, look, color))
+    return look_found, linear, TextureMapping()
 
 
 def target_color(
     model: Any, geom: int, look: str, given: tuple[float, float, float] | None
 ) -> NDArray[np.float64]:
-    """Colour of a target without its texture, sRGB [3]: the given one, or else the model's own, or else the look's."""
+    """Colour of a target without its texture, sRGB [3].
+
+    It is the given colour, or else the model's, or else the look's.
+    """
     return _own_color(model, geom_visual(model, geom), look, given)
 
 

@@ -1,7 +1,7 @@
 """Finer and coarser meshes of the same shape.
 
-Static tessellation splits long edges at their midpoints; smooth surfaces get rounder. A coarse mesh
-has few of the vertices, spread evenly.
+`tessellate` splits long edges at their midpoints; smooth surfaces get rounder. `coarse_mesh` keeps
+few of the vertices, spread evenly.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.topology import Edges, edges_of, undirected
 
-# columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced;
-# COORDINATES are for the chart map
-POSITION = slice(0, 3)
-NORMAL = slice(3, 6)
-COORDINATES = slice(6, 9)
-DIRECTION = slice(9, 12)
-BAKED = slice(12, 15)
-UV = slice(15, 17)
+# Columns of the vertex attributes.
+POSITION = slice(0, 3)  # [m]
+NORMAL = slice(3, 6)  # jumps at creases
+COORDINATES = slice(6, 9)  # for the chart map
+DIRECTION = slice(9, 12)  # in which a vertex is displaced: the smooth normal
+BAKED = slice(12, 15)  # ambient visibility, thickness, inner ambient visibility
+UV = slice(15, 17)  # texture coordinates
 
 
 def tessellate(
@@ -30,7 +29,7 @@ def tessellate(
     max_faces: int,
     crease_length: float | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """Split edges until none is longer than `max_length` or the mesh has about `max_faces` triangles.
+    """Split edges until none is too long, or the mesh has about `max_faces` triangles.
 
     A midpoint has the mean of its ends' attributes. Between two triangles that share the normals at
     both ends of their edge it also bulges out to where a surface with these normals would be: half
@@ -48,7 +47,7 @@ def tessellate(
         Whole numbers, equal for vertices that differ in their texture coordinates at most: a seam
         is no crease.
     max_length : float
-        [m]
+        Of the edges [m].
     max_faces : int
         The longest edges are split first; a mesh that is finer from the start stays as it is.
     crease_length : float, optional
@@ -64,8 +63,8 @@ def tessellate(
     F = np.asarray(F, dtype=np.int64)
     attributes = np.asarray(attributes, dtype=np.float64)
     same = np.asarray(same, dtype=np.int64)
-    most = max_faces if crease_length is None else max(max_faces, len(F)) * 5 // 4
-    while len(F) < most:
+    max_total = max_faces if crease_length is None else max(max_faces, len(F)) * 5 // 4
+    while len(F) < max_total:
         edges = edges_of(F)
         weld, inner = welded(edges, F, same)
         length = np.linalg.norm(
@@ -73,7 +72,7 @@ def tessellate(
         )
         marked = _longest(length, max_length, max_faces - len(F))
         if crease_length is not None and not marked.any():
-            marked = _longest(np.where(inner, 0.0, length), crease_length, most - len(F))
+            marked = _longest(np.where(inner, 0.0, length), crease_length, max_total - len(F))
         if not marked.any():
             break
         midpoint = np.full(len(marked), -1)
@@ -87,10 +86,11 @@ def tessellate(
 def welded(
     edges: Edges, F: NDArray[np.int64], same: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Two things of each edge [k] of triangles [m, 3]; `same` as for `tessellate`.
+    """Which edges [k] of triangles [m, 3] are one, and whether an edge is an inner one.
 
-    A number that is equal for edges whose ends differ in their texture coordinates at most, and
-    whether two triangles share the edge, and the normals at its ends: whether it is an inner one.
+    The first array has equal numbers for edges whose ends differ in their texture coordinates at
+    most. An edge is an inner one if two triangles share it and the normals at its ends. `same` is
+    as for `tessellate`.
     """
     _, weld_of_side = np.unique(undirected(same[F])[0], return_inverse=True)
     weld = np.empty(len(edges.ends), dtype=np.int64)
@@ -117,27 +117,34 @@ def bulges(
     a = attributes[ends[:, 0]]
     b = attributes[ends[:, 1]]
     half = (b[:, POSITION] - a[:, POSITION]) / 2
-    above_a, above_b = (
-        np.einsum("ij,ij->i", half, end[:, NORMAL])[:, None] * end[:, NORMAL] for end in (a, b)
-    )
+    normal_a = a[:, NORMAL]
+    normal_b = b[:, NORMAL]
+    above_a = np.einsum("ij,ij->i", half, normal_a)[:, None] * normal_a
+    above_b = np.einsum("ij,ij->i", half, normal_b)[:, None] * normal_b
     return inner[:, None] * ((above_b - above_a) / 4)
 
 
 def _longest(length: NDArray, max_length: float, new_faces: int) -> NDArray[np.bool_]:
-    """Mark the edges over the limit; a split edge makes two more triangles, so only the longest that fit."""
+    """Mark the edges that are longer than `max_length`, but only the longest ones.
+
+    A split edge makes two more triangles; there is room for `new_faces`.
+    """
     if new_faces <= 0:
         return np.zeros(len(length), np.bool_)
     budget = max(new_faces // 2, 1)
     if budget < len(length):
-        max_length = max(
-            max_length, np.partition(length, len(length) - budget)[len(length) - budget]
-        )
+        rank = len(length) - budget
+        max_length = max(max_length, np.partition(length, rank)[rank])
     # half of the longest edge as a floor keeps the triangles in shape: long edges are split first
     return length > max(max_length, length.max() / 2)
 
 
 def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]:
-    """Cut every triangle into 1 to 4 by the midpoints of its sides (side k runs from corner k to k + 1), -1 = none."""
+    """Cut every triangle [m, 3] into 1 to 4 by the midpoints of its sides.
+
+    `middle` [m, 3] are the midpoints, -1 where a side is not split; side k runs from corner k to
+    corner k + 1.
+    """
     split = middle >= 0
     count = (middle >= 0).sum(axis=1)
     # turn the triangles so that their only split side, or their only whole one, is side 0
@@ -147,8 +154,10 @@ def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]
     points = np.hstack(
         [np.take_along_axis(F, index, axis=1), np.take_along_axis(middle, index, axis=1)]
     )
-    one, two, three = (points[count == number] for number in (1, 2, 3))
-    # the quadrilateral 0 1 4 5 that is left of those with two is cut along its shorter diagonal
+    one = points[count == 1]
+    two = points[count == 2]
+    three = points[count == 3]
+    # with two midpoints the quadrilateral 0 1 4 5 is left, and cut along its shorter diagonal
     diagonals = np.linalg.norm(positions[two[:, :2]] - positions[two[:, 4:]], axis=2)
     shorter = diagonals[:, 0] <= diagonals[:, 1]
     patterns = [
@@ -158,34 +167,38 @@ def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]
         (two[shorter], [[0, 1, 4], [0, 4, 5]]),
         (two[~shorter], [[0, 1, 5], [1, 4, 5]]),
     ]
-    return np.concatenate(
-        [F[count == 0], *(each[:, corners] for each, some in patterns for corners in some)]
-    )
+    parts = [F[count == 0]]
+    for triangles, pattern in patterns:
+        for corners in pattern:
+            parts.append(triangles[:, corners])
+    return np.concatenate(parts)
 
 
 def coarse_mesh(
     F: NDArray[np.int64], features: NDArray[np.float64], count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Merge every vertex with the nearest of `count` that are far from one another (Rossignac and Borrel 1993).
+    """Merge the vertices of a mesh into `count` vertices that are far from one another.
+
+    Every vertex is merged with the nearest of these (Rossignac and Borrel 1993).
 
     Parameters
     ----------
     F : int64 [m, 3]
     features : float64 [n, d]
-        Of the vertices; near is what is near in them.
+        Of the vertices; distances are measured between features.
 
     Returns
     -------
     vertices : int64 [k]
-        Those that are left.
+        The vertices that are left.
     F : int64 [m, 3]
         Triangles between them.
     """
     if len(features) <= count:
         return np.arange(len(features)), np.asarray(F)
-    # each of those left is the farthest from those before, and `owner` the number of the nearest to
-    # every vertex; plain numpy, column by column, takes twice the time of a compiled loop, and less
-    # than to compile that
+    # Each chosen vertex is the farthest from the ones chosen before. `owner` is the number of the
+    # nearest chosen vertex to every vertex. Plain NumPy, column by column, takes twice the time of
+    # a compiled loop, and less than to compile the loop.
     columns = np.ascontiguousarray(features.T)
     chosen = np.zeros(count, np.int64)
     owner = np.zeros(len(features), np.int64)
@@ -202,6 +215,6 @@ def coarse_mesh(
         latest = int(square.argmax())
     merged = owner[F]
     merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
-    # each begins with its least vertex, so that the same triangle is the same row
+    # triangles begin with their least vertex, so that equal triangles are equal rows
     first = merged.argmin(axis=1)[:, None]
     return chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0)

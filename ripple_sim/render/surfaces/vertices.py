@@ -1,7 +1,8 @@
-"""The triangles and vertices that a target is drawn with: small, round in outline, split at creases and seams.
+"""`surface_vertices`: the triangles and vertices with which a `Surface` is drawn.
 
-`surface_vertices` makes them of a `Surface`: its mesh is cut into the parts of its chart map,
-tessellated, cut where its triangles leave a chart, and ordered for vertex caches.
+They are small, round in outline, and split at creases and seams. The mesh of the surface is cut
+into the parts of its chart map, tessellated, cut where triangles leave a chart, and ordered for
+vertex caches.
 """
 
 from __future__ import annotations
@@ -38,32 +39,35 @@ from .tessellation import (
     welded,
 )
 
-_ALIKE = 1e-4  # normals at a vertex that differ by less are one
+_SAME_NORMAL = 1e-4  # normals at a vertex that differ by less are one
+_MORTON_BITS = 10  # of a coordinate, in the code of a Morton curve
 
-_BITS = 10  # of a coordinate
-_LEAST_FACES = 8_000
-_MOST_FACES = 400_000
+# Bounds of the number of triangles of a target, whatever the frame's size asks for.
+_MIN_FACES = 8_000
+_MAX_FACES = 400_000
 
-# Creases are split down to half a texel, as heights have no finer detail, but to no less than a
-# quarter of other edges.
-_CREASE = 0.5
-_CREASE_PARTS = 4
-_BALLS = 16  # that bound the mesh
-_COARSE = 600  # vertices of what the floor sees: texels of its map are about as far apart
-_APART = 0.1  # of the bounding radius: how far from each other the two sides of a thin body are
-_MOST_KEPT_FACES = 100_000  # of a surface that is kept: 30 MB
+# Creases are split down to this many texels, as heights have no finer detail, but not into more
+# parts than this for each other edge.
+_CREASE_LENGTH = 0.5
+_MAX_CREASE_PARTS = 4
+
+_BALLS = 16  # that together bound the mesh
+_COARSE_VERTICES = 600  # of the mesh that the floor sees: texels of its map are about as far apart
+
+# Distance in features between the two sides of a thin body, over the bounding radius.
+_SIDE_DISTANCE = 0.1
+
+_MAX_CACHED_FACES = 100_000  # of a surface that is kept for later: 30 MB
 
 
 def rounded_parts(
     mesh: Mesh, chart_map: ChartMap
 ) -> tuple[PartsMesh, NDArray[np.float64], NDArray[np.float64]]:
-    """Cut a mesh into the parts of its chart map, as round as before; return also their vertices and corner normals.
+    """Cut a mesh into the parts of its chart map, as round as before.
 
-    Vertices are [n, 3] [m], normals [m, 3, 3]. These go over from the mesh's triangles, whose parts
-    bulge out as the triangles themselves would.
-
-    A triangle is the quadratic patch whose edges have the midpoints of `tessellate`: flat where its
-    normals say so.
+    Return also the vertices of the parts [n, 3] [m] and their corner normals [m, 3, 3], which are
+    carried over from the mesh. The parts of a triangle bulge out as the triangle itself would: as
+    the quadratic patch whose edges have the midpoints of `tessellate`, flat where the normals are.
     """
     parts = parts_mesh(chart_map, mesh)
     normals = corner_normals(mesh.V, mesh.F)
@@ -80,7 +84,7 @@ def rounded_parts(
     V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out[parts.triangle])
     # corner normals are the same to the last bit where they differ by round-off at a vertex
     normals = normalized(parts.carry(normals)).reshape(-1, 3)
-    key = np.column_stack([parts.F.ravel(), np.rint(normals / _ALIKE).astype(np.int64)])
+    key = np.column_stack([parts.F.ravel(), np.rint(normals / _SAME_NORMAL).astype(np.int64)])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return parts, V, normals[first[group.ravel()]].reshape(-1, 3, 3)
 
@@ -88,9 +92,10 @@ def rounded_parts(
 def memory_order(
     F: NDArray[np.int64], points: NDArray
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles along a Morton (Z-order) curve through their centres, and vertices in the order of their first use.
+    """Triangles along a Morton (Z-order) curve, and vertices in the order of their first use.
 
-    Neighbours are then close in memory, for the vertex caches of GPUs and software drivers.
+    The curve goes through the centres of the triangles. Neighbours are then close in memory, for
+    the vertex caches of GPUs and software drivers.
 
     Parameters
     ----------
@@ -104,7 +109,7 @@ def memory_order(
     vertices : int64 [n]
         The old numbers of the vertices, in their new order; unused ones come last.
     triangles : int64 [m]
-        Likewise those of the triangles.
+        The old numbers of the triangles, in their new order.
     """
     triangles = morton_order(points[F].mean(axis=1))
     used, first = np.unique(F[triangles], return_index=True)
@@ -113,12 +118,14 @@ def memory_order(
 
 
 def morton_order(points: NDArray) -> NDArray[np.int64]:
-    """Order of points [k, 3] along a Morton curve: by the bits of their coordinates, interleaved."""
+    """Order of points [k, 3] along a Morton curve, by the interleaved bits of their coordinates."""
     low = points.min(axis=0)
     high = points.max(axis=0)
-    cell = ((points - low) / max((high - low).max(), 1e-300) * (2**_BITS - 1)).astype(np.int64)
+    cell = ((points - low) / max((high - low).max(), 1e-300) * (2**_MORTON_BITS - 1)).astype(
+        np.int64
+    )
     code = np.zeros(len(points), dtype=np.int64)
-    for bit in range(_BITS):
+    for bit in range(_MORTON_BITS):
         for axis in range(3):
             code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
     return np.argsort(code, kind="stable")
@@ -135,7 +142,7 @@ def tessellated(
     baked: NDArray | None = None,
     corner_uv: NDArray | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """Split a mesh's vertices where normals, texture or map coordinates jump, and its edges where they are long.
+    """Tessellate a mesh; split its vertices where normals, texture or chart coordinates jump.
 
     Parameters
     ----------
@@ -195,9 +202,9 @@ class SurfaceVertices(NamedTuple):
     lookups : float64 [n + k, 2]
         Where heights are looked up: the same for all vertices at one point.
     balls : float64 [b, 4]
-        That together contain the surface without waves.
+        Balls that together contain the surface without waves: centre and radius [m].
     coarse : int64 [c, 3]
-        Few triangles of the same shape.
+        Few triangles that have about the same shape.
     """
 
     F: NDArray[np.int64]
@@ -210,6 +217,7 @@ class SurfaceVertices(NamedTuple):
 
 
 def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:
+    """The vertices of a surface with edges up to a length [m]."""
     V = np.asarray(surface.V, dtype=np.float64)
     F = np.asarray(surface.F, dtype=np.int64)
     smooth = smooth_normals(V, F)
@@ -222,8 +230,8 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
         charts,
         smooth=smooth,
         max_length=max_length,
-        max_faces=int(np.clip(max_faces, _LEAST_FACES, _MOST_FACES)),
-        crease_length=max(_CREASE * texel_size, max_length / _CREASE_PARTS),
+        max_faces=int(np.clip(max_faces, _MIN_FACES, _MAX_FACES)),
+        crease_length=max(_CREASE_LENGTH * texel_size, max_length / _MAX_CREASE_PARTS),
         baked=bake(V, F, smooth),
         corner_uv=uv[F] if uv.ndim == 2 else uv,
     )
@@ -245,15 +253,17 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     lookups = shared_places(chart_uv, places, points)
     corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of])
     balls = balls_about(attributes[:, POSITION][corners], _BALLS)
-    apart = _APART * np.ptp(points, axis=0)[:3].max() / 2 * attributes[: len(same), DIRECTION]
-    some, coarse = coarse_mesh(
-        faces, np.hstack([attributes[: len(same), POSITION], apart]), _COARSE
+    own = attributes[: len(same)]  # without midpoints
+    apart = _SIDE_DISTANCE * np.ptp(points, axis=0)[:3].max() / 2 * own[:, DIRECTION]
+    features = np.hstack([own[:, POSITION], apart])
+    coarse_vertices, coarse = coarse_mesh(faces, features, _COARSE_VERTICES)
+    vertices = SurfaceVertices(
+        faces, attributes, edges, places, lookups, balls, coarse_vertices[coarse]
     )
-    made = SurfaceVertices(faces, attributes, edges, places, lookups, balls, some[coarse])
-    for array in (*edges, *made):
+    for array in (*edges, *vertices):
         if isinstance(array, np.ndarray):
             array.flags.writeable = False
-    return made
+    return vertices
 
 
 def mapped_coordinates(
@@ -267,11 +277,13 @@ def mapped_coordinates(
     return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1)
 
 
-_kept: ResultCache[SurfaceVertices] = ResultCache(4, lambda each: len(each.F) <= _MOST_KEPT_FACES)
+_cache: ResultCache[SurfaceVertices] = ResultCache(
+    4, lambda vertices: len(vertices.F) <= _MAX_CACHED_FACES
+)
 
 
 def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:
-    """Tessellate a surface, or take what came of it before; the arrays cannot be written to.
+    """Tessellate a surface, or take the result of an earlier call; the arrays are read-only.
 
     In a batch the next scene mostly has the same surfaces.
     """
@@ -280,4 +292,4 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
     arrays = charts.map.arrays()
     name = f"{charts.map.layout} {charts.page} {list(arrays)} {max_length!r} {max_faces}"
     key = content_key(name, [surface.V, surface.F, uv, *arrays.values()])
-    return _kept.get(key, lambda: _surface_vertices(surface, max_length, max_faces))
+    return _cache.get(key, lambda: _surface_vertices(surface, max_length, max_faces))

@@ -1,4 +1,4 @@
-"""What the vertices of a mesh get for being drawn: normals, split where they jump, ambient occlusion and thickness."""
+"""Vertices of meshes for drawing: normals, splits where they jump, occlusion and thickness."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from ripple_sim.solver.mesh.topology import (
     undirected,
 )
 
-_ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex
+# Angle between the normal of a triangle and the normal that it shares at a vertex above which the
+# triangle keeps its own [degrees].
+_MAX_NORMAL_ANGLE = 60.0
 
-_RAYS = 1_000_000
+_RAYS = 1_000_000  # for a mesh, about, on both sides of its surface
 
 
 def split_corners(
@@ -32,11 +34,22 @@ def split_corners(
     NDArray[np.float64],
     NDArray[np.float64],
 ]:
-    """Split vertices where normals, texture coordinates [m, 3, 2] or other coordinates [m, 3, d] jump.
+    """Split vertices where normals, texture coordinates or other coordinates jump.
 
-    The normals, [m, 3, 3], are those of `corner_normals` unless given. Return the vertex of the
-    original mesh that each was [n], triangles [m, 3], and normals [n, 3], texture coordinates [n,
-    2] and other coordinates [n, d].
+    Parameters
+    ----------
+    corner_uv : array, shape [m, 3, 2], optional
+        Texture coordinates.
+    coordinates : array, shape [m, 3, d], optional
+    normals : array, shape [m, 3, 3], optional
+        By default the ones of `corner_normals`.
+
+    Returns
+    -------
+    vertices : int64 [n]
+        Number that each vertex had before.
+    faces : int64 [m, 3]
+    normals, uv, coordinates : float64 [n, 3], [n, 2], [n, d]
     """
     normals = corner_normals(V, F) if normals is None else normals
     uv = np.zeros((*F.shape, 2)) if corner_uv is None else corner_uv
@@ -67,12 +80,16 @@ def corner_normals(V: NDArray, F: NDArray, crease: float = 45.0) -> NDArray[np.f
     own = np.repeat(triangle_normals(V, F), 3, axis=0)
     fan = _fans(F, own[::3], crease)
     shared = _sums(_weighted(V, F), fan, len(fan))[fan]
-    far = (np.einsum("ij,ij->i", shared, own) < np.cos(np.radians(_ASTRAY))) & own.any(axis=1)
-    return np.where(far[:, None], own, shared).reshape(len(F), 3, 3)
+    cosine = np.einsum("ij,ij->i", shared, own)
+    is_astray = (cosine < np.cos(np.radians(_MAX_NORMAL_ANGLE))) & own.any(axis=1)
+    return np.where(is_astray[:, None], own, shared).reshape(len(F), 3, 3)
 
 
 def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[np.int64]:
-    """Numbers of the corners [3 m] that are equal where their triangles hang together round a vertex."""
+    """Numbers of the corners [3 m], equal where their triangles are connected round a vertex.
+
+    Triangles are not connected across a crease; `triangle` [m, 3] are their normals.
+    """
     ends = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
     number = np.arange(F.size).reshape(F.shape)
     corners = np.stack([number, np.roll(number, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -83,12 +100,10 @@ def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[n
     a = triangle[one // 3]
     b = triangle[other // 3]
     # a triangle without area bends nowhere
-    even = (
-        (np.einsum("ij,ij->i", a, b) >= np.cos(np.radians(crease)) - 1e-9)
-        | ~a.any(axis=1)
-        | ~b.any(axis=1)
-    )
-    pairs = np.stack([corners[one[even]], corners[other[even]]], axis=1).reshape(-1, 2, 2)
+    cosine = np.einsum("ij,ij->i", a, b)
+    is_smooth = (cosine >= np.cos(np.radians(crease)) - 1e-9) | ~a.any(axis=1) | ~b.any(axis=1)
+    pairs = np.stack([corners[one[is_smooth]], corners[other[is_smooth]]], axis=1)
+    pairs = pairs.reshape(-1, 2, 2)
     return labels(pairs.swapaxes(1, 2).reshape(-1, 2), F.size)
 
 
@@ -109,7 +124,9 @@ def _sums(weighted: NDArray[np.float64], group: NDArray, count: int) -> NDArray[
 
 
 def bake(V: NDArray, F: NDArray, normals: NDArray) -> NDArray[np.float64]:
-    """Ambient occlusion and thickness by cosine-distributed rays from every vertex, outwards and inwards.
+    """Ambient occlusion and thickness, by rays from every vertex outwards and inwards.
+
+    The rays are cosine-distributed.
 
     Returns
     -------
@@ -140,9 +157,9 @@ def cast(
     count : int
         Rays to each side of a vertex.
     radius : float
-        Length that thickness is told in; walls further away than that hide no light [m].
+        Unit of the thickness; walls further away than this length hide no light [m].
     start : float
-        Walls nearer than that are not seen [m].
+        Walls nearer than this length are not seen [m].
     """
     scene = RayScene(V, F)
     # cosine-distributed directions on a spiral about every normal, turned differently at every
@@ -166,10 +183,10 @@ def cast(
     # nearby walls hide the light, those further than a radius away reflect some themselves
     outer = distances(1.0)
     inner = distances(-1.0)
-    means = np.stack(
-        [each.mean(axis=1) for each in (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0))],
-        axis=1,
-    )
+    visibility = np.minimum(outer, 1.0).mean(axis=1)
+    thickness = inner.mean(axis=1)
+    inner_visibility = np.minimum(inner, 1.0).mean(axis=1)
+    means = np.stack([visibility, thickness, inner_visibility], axis=1)
     ends = edges_of(F).ends
     here, there = np.concatenate([ends, ends[:, ::-1]]).T
     degree = np.maximum(np.bincount(here, minlength=len(V)), 1)[:, None]
@@ -180,7 +197,10 @@ def cast(
 
 
 def frames_about(normals: NDArray, along: NDArray | None = None) -> NDArray[np.float64]:
-    """Tangent, bitangent and normal as rows [n, 3, 3]; the bitangent is as near as may be to a direction, [n, 3]."""
+    """Tangent, bitangent and normal as rows [n, 3, 3].
+
+    The bitangent is as near as possible to the direction `along` [n, 3].
+    """
     if along is None:
         along = np.where(np.abs(normals[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     tangent = normalized(np.cross(along, normals))  # a vertex without triangles has no normal

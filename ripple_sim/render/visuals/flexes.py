@@ -1,4 +1,4 @@
-"""Flexes as a scene of MuJoCo's shows them: the corners of the triangles of their faces, edges and vertices.
+"""Flexes as in a scene of MuJoCo: corners of the triangles of their faces, edges and vertices.
 
 Corners are float32 [3 m, 8], three for each triangle: point, normal and texture coordinates. Edges
 are cylinders without caps, vertices balls, both as thick as the flex's radius.
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from .corners import normalized
 
-_SIDES = 20  # of the cylinder of an edge, and round the ball of a vertex
-_STACKS = 10  # of that ball, from pole to pole
+_SIDES = 20  # of the cylinder of an edge, and of the rings of a vertex's ball
+_STACKS = 10  # bands of a vertex's ball, from pole to pole
 
 
 def flex_parts(
     model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom
 ) -> dict[str, NDArray[np.float32]]:
-    """Corners of what MuJoCo draws of a flex, as far as there is any: of its "faces", "edges" and "vertices".
+    """Corners of the parts of a flex that MuJoCo draws: of its "faces", "edges" and "vertices".
 
     The smooth skin of a flex replaces edges and vertices.
     """
@@ -96,7 +96,10 @@ def _strips(
     lower_normals: NDArray[np.float64],
     upper_normals: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Corners of the bands between pairs of rings [k, sides + 1, 3], counter-clockwise as seen from outside."""
+    """Corners of the bands between pairs of rings [k, sides + 1, 3].
+
+    They are counter-clockwise as seen from outside.
+    """
 
     def corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
         a = low[:, :-1]

@@ -36,7 +36,7 @@ INSTANCE = np.dtype(
 )
 _GEOM = mujoco.mjtGeom
 _ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
-# Kinds that are made of as many segments as they need; others are always the same.
+# Kinds that have as many segments as the frame needs; other kinds always have the same mesh.
 _WITH_LEVELS = (
     *_ROUND,
     _GEOM.mjGEOM_BOX,
@@ -44,14 +44,20 @@ _WITH_LEVELS = (
     _GEOM.mjGEOM_ARROW1,
     _GEOM.mjGEOM_ARROW2,
 )
-_LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
-# where shapes are measured, in depth and segmentation
+
+# Segments to a right angle, from coarse to fine: in colours, and where shapes are measured, in
+# depth and segmentation.
+_LEVELS = (4, 6, 8, 11, 15, 22)
 _MEASURED_LEVELS = (*_LEVELS, 2 * _LEVELS[-1])
-_BIAS = 3.0  # of shadows, in sagittas of the edges: where light grazes, one is not enough
-_SHARPEST = 1e-6  # bevel of sharp edges, in half sizes: normals need some
-# How far the edges of a round shape may be off its surface [pixels]: in colours; and where shapes
-# are measured. There depths are off by as much of a pixel's width, and more only where a surface is
-# seen at a slant.
+
+# Bias of shadows, in sagittas of the edges: where light grazes, one sagitta is not enough.
+_SHADOW_BIAS = 3.0
+
+_SHARP_BEVEL = 1e-6  # of sharp edges, in half sizes: their normals need some
+
+# How far the edges of a round shape may be off its surface [pixels]: in colours, and where shapes
+# are measured. Measured depths are off by as much of a pixel's width; they are off by more only
+# where a surface is seen at a slant.
 _FLATNESS = 0.25
 _MEASURED_FLATNESS = 1 / 64
 
@@ -83,7 +89,7 @@ class Levels:
         return self._levels[segments][2]
 
     def renew(self, make: Callable[[int], Shape] | None = None) -> None:
-        """Make the shape anew, in the same buffers, by another function if one is given."""
+        """Make the shape again, in the same buffers; with `make` from now on, if it is given."""
         self._make = make or self._make
         for segments, (vertices, indices, _) in self._levels.items():
             contents = _packed(self._make(segments))
@@ -101,14 +107,15 @@ def _packed(shape: Shape) -> tuple[bytes, bytes]:
 
 
 class Instances:
-    """Geoms, sites or other visuals of one shape with one texture, or a single transparent one: one draw call.
+    """Visuals of one shape with one texture, or a single transparent visual: one draw call.
 
     Parameters
     ----------
     programs : mapping of moderngl.Program
-        None: for the G-buffer.
+        By map; the program of None is for the G-buffer.
     members : list of (Visual, int)
-        Either geoms, sites or others, each with its number in the table of objects; see `hold`.
+        Either geoms, or sites, or other visuals, each with its number in the table of objects; see
+        `hold`.
 
     Attributes
     ----------
@@ -119,11 +126,11 @@ class Instances:
     blocks : bool
         Whether no light passes.
     is_plane : bool
-        Which has two sides.
+        A plane is seen from both sides.
     occludes : bool
-        Whether it hides the sky from what is below: opaque geoms do.
+        Whether it hides the sky from things below: opaque geoms do.
     casts : bool
-        Whether it casts shadows: what MuJoCo adds to explain a scene does not.
+        Whether it casts shadows: entries that MuJoCo adds to explain a scene do not.
     shadow_biases : float64 [k]
         How far above the surface shadows must be looked up so that its edges do not shade it [m].
     """
@@ -147,7 +154,7 @@ class Instances:
         self.hold(members)
 
     def hold(self, members: list[tuple[Visual, int]]) -> None:
-        """Have these members from now on, of the same shape and texture as before."""
+        """Draw these members from now on; shape and texture are the same as before."""
         model = self._assets.model
         self._visual = members[0][0]
         self.numbers = [number for _, number in members]
@@ -165,63 +172,67 @@ class Instances:
             record["color"] = [*visual.color, number]
             record["mapping"] = [*mapping.scale, mapping.stretch * mapping.scale[2]]
             record["tiling"] = mapping.tiling
-        # with round edges, and with sharp ones
-        self._sizes = [
-            np.array([sizes(model, each, *bevel) for each, _ in members])
-            for bevel in ((), (_SHARPEST,))
-        ]
+        # core and shell size of each member, [k, 2, 3], with round edges and with sharp ones
+        self._round_sizes = np.array([sizes(model, visual) for visual, _ in members])
+        self._sharp_sizes = np.array([sizes(model, visual, _SHARP_BEVEL) for visual, _ in members])
         self._unit = mapping.unit
         self._image = None if mapping.texture < 0 else self._assets.texture(mapping.texture)
         if self._buffer.size < self._records.nbytes:
             self._buffer.orphan(2 * self._records.nbytes)
-        if (
-            self._visual.corners is not None
-            and (found := shape_of(model, self._visual)) is not None
-        ):
-            self._level.renew(found[1])
+        if self._visual.corners is not None:  # its shape changes with every frame
+            shape = shape_of(model, self._visual)
+            if shape is not None:
+                _, make = shape
+                self._level.renew(make)
         self.shadow_biases = np.zeros(len(members))
 
     def update(
         self, data: Any, pose: Pose, height: int, occluders: Occluders, sharp: bool = False
     ) -> None:
-        """Take the poses from MuJoCo's data; they are seen from a pose in frames of a height [pixels].
+        """Take the poses from MuJoCo's data, and choose the level of detail.
 
-        With `sharp` edges are as MuJoCo has them, and each one that is round has as many segments
-        as it needs itself.
+        The members are seen from `pose` in frames of a height [pixels]. With `sharp` edges are as
+        in MuJoCo, and each round member has its own level.
         """
-        if self._poses:
-            position, rotation = (np.array(each) for each in zip(*self._poses, strict=True))
-        else:
-            poses = (
-                (data.site_xpos, data.site_xmat)
-                if self._visual.site
-                else (data.geom_xpos, data.geom_xmat)
-            )
-            position, rotation = (each[self._indices] for each in poses)
+        position, rotation = self._places(data)
+        member_sizes = self._sharp_sizes if sharp else self._round_sizes
         self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
         self._records["origin"] = position
-        self._records["core_size"], self._records["shell_size"] = self._sizes[sharp].transpose(
-            1, 0, 2
-        )
+        self._records["core_size"] = member_sizes[:, 0]
+        self._records["shell_size"] = member_sizes[:, 1]
         self._buffer.write(self._records.tobytes())
         half = self._records["core_size"] + self._records["shell_size"]
         balls = np.column_stack([position, np.linalg.norm(half, axis=1)])
-        radius = half.max(axis=1)
-        away = np.maximum(np.linalg.norm(position - pose.position, axis=1) - radius, 0.1 * radius)
-        nearest = np.ones_like(radius) if pose.orthographic else away
+        radius = half.max(axis=1)  # [m]
+        to_middle = np.linalg.norm(position - pose.position, axis=1)
+        to_surface = np.maximum(to_middle - radius, 0.1 * radius)
+        nearest = np.ones_like(radius) if pose.orthographic else to_surface
         pixels = radius / nearest / pose.pixel_height(1.0, height)
         self._segments = int(_segments(pixels.max(), _FLATNESS, _LEVELS))
         self._draws = [(self._segments, self._buffer, len(self._records))]
         if sharp and self._visual.kind in _WITH_LEVELS:
             self._draws = self._by_level(_segments(pixels, _MEASURED_FLATNESS, _MEASURED_LEVELS))
         if self._visual.kind in _ROUND:
-            self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
+            self.shadow_biases = _SHADOW_BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
         near = occluders.near(balls, self._hosts)
         for number, bias, bits in zip(self.numbers, self.shadow_biases, near, strict=True):
             self._assets.objects.place(number, float(bias), occluders=int(bits))
 
+    def _places(self, data: Any) -> tuple[NDArray, NDArray]:
+        """Positions [k, 3] [m] and rotations, 9 numbers for each member."""
+        if self._poses:
+            position = np.array([position for position, _ in self._poses])
+            rotation = np.array([rotation for _, rotation in self._poses])
+            return position, rotation
+        if self._visual.site:
+            return data.site_xpos[self._indices], data.site_xmat[self._indices]
+        return data.geom_xpos[self._indices], data.geom_xmat[self._indices]
+
     def _by_level(self, segments: NDArray[np.int64]) -> list[tuple[int, moderngl.Buffer, int]]:
-        """Draw calls of the members by their segments [k]: segments, a buffer of the members, and their count."""
+        """Draw calls of the members by their segments [k].
+
+        A draw call consists of the segments, a buffer of members, and the number of members.
+        """
         levels = np.unique(segments).tolist()
         if len(levels) == 1:
             return [(levels[0], self._buffer, len(self._records))]
@@ -240,7 +251,10 @@ class Instances:
         return draws
 
     def bounds(self, data: Any) -> NDArray[np.float64]:
-        """Bounding ball [1, 4] of the first one, the only one of what is transparent, where the data says it is."""
+        """Bounding ball [1, 4] of the first member, where it is in MuJoCo's data.
+
+        A transparent member is the only one.
+        """
         return ball_of(self._assets.model, data, self._visual)
 
     def draw(self) -> None:
@@ -262,7 +276,7 @@ class Instances:
     def _render(
         self, seen: CasterMap | None, segments: int, members: moderngl.Buffer, count: int
     ) -> None:
-        """Render so many members, whose records are in a buffer."""
+        """Render `count` members, whose records are in the buffer `members`."""
         segments = segments if self._visual.kind in _WITH_LEVELS else 0
         if (seen, segments, members) not in self._arrays:
             vertices, indices = self._level(segments)
@@ -274,7 +288,7 @@ class Instances:
                     *(f"in_{name}" for name in INSTANCE.names or ()),
                 ),
             ]
-            # what a program does not use is optimised away
+            # inputs that a program does not use are optimised away
             self._arrays[seen, segments, members] = self._assets.resources.vertex_array(
                 self._programs[seen], content, indices, skip_errors=True
             )
@@ -291,25 +305,30 @@ class Instances:
 def _segments(
     radius: NDArray[np.float64], flatness: float, levels: tuple[int, ...]
 ) -> NDArray[np.int64]:
-    """The level, segments to a right angle, at which circles of a radius [pixels] are so flat [pixels]; or the finest.
+    """The coarsest level, in segments to a right angle, that is flat enough; else the finest level.
 
-    The sagitta of a chord over a right angle's nth part is r (1 - cos(pi / 4n)).
+    Edges of circles of a radius [pixels] may be off by `flatness` [pixels]. The sagitta of a chord
+    over a right angle's nth part is r (1 - cos(pi / 4n)).
     """
     needed = np.pi / 4 / np.sqrt(2 * np.minimum(flatness / np.maximum(radius, 1e-9), 1.0))
     return np.array(levels)[np.minimum(np.searchsorted(levels, needed), len(levels) - 1)]
 
 
 def visuals_of(model: Any, geoms: Iterable[int]) -> list[tuple[Visual, NamedShape]]:
-    """Given geoms of a model and its visible sites, as far as they have a shape, with that."""
-    visuals = [geom_visual(model, geom) for geom in geoms] + [
-        site_visual(model, i) for i in visible_sites(model)
-    ]
+    """The given geoms of a model and its visible sites that have a shape, each with its shape."""
+    visuals = [geom_visual(model, geom) for geom in geoms]
+    visuals += [site_visual(model, site) for site in visible_sites(model)]
     return shaped(model, visuals)
 
 
 def shaped(model: Any, visuals: Iterable[Visual]) -> list[tuple[Visual, NamedShape]]:
-    """The visuals that have a shape, each with it."""
-    return [(visual, shape) for visual in visuals if (shape := shape_of(model, visual)) is not None]
+    """The visuals that have a shape, each with its shape."""
+    result = []
+    for visual in visuals:
+        shape = shape_of(model, visual)
+        if shape is not None:
+            result.append((visual, shape))
+    return result
 
 
 def instances_of(
@@ -317,9 +336,9 @@ def instances_of(
     visuals: list[tuple[Visual, NamedShape]],
     made: dict[tuple[Any, ...], Instances] | None = None,
 ) -> list[Instances]:
-    """Draw calls of visuals: those alike in shape and texture in one, transparent ones each in its own.
+    """Draw calls of visuals: one for each shape and texture, and one for each transparent visual.
 
-    Those `made` for other visuals are taken again, and new ones added.
+    Draw calls in `made` are used again, for the new visuals; new draw calls are added to it.
     """
     model = assets.model
     resources = assets.resources
@@ -332,15 +351,18 @@ def instances_of(
         number = assets.objects.add(
             look, host, opacity=visual.opacity, identity=visual.identity, lit_in_front=visual.behind
         )
-        kind = visual.site, visual.pose is not None, visual.casts
+        name, _ = shape
         key = (
-            *kind,
-            shape[0],
+            visual.site,
+            visual.pose is not None,
+            visual.casts,
+            name,
             mapping.kind,
             mapping.texture,
             index if visual.opacity < 1.0 else None,
         )
-        groups.setdefault(key, (shape, mapping, []))[2].append((visual, number))
+        _, _, members = groups.setdefault(key, (shape, mapping, []))
+        members.append((visual, number))
 
     @functools.cache
     def program(kind: int, own: bool) -> moderngl.Program:
@@ -354,7 +376,6 @@ def instances_of(
             made[key].hold(members)
         else:
             level = assets.levels.setdefault(name, Levels(resources, make))
-            made[key] = Instances(
-                assets, level, casters | {None: program(mapping.kind, mapping.own)}, members
-            )
+            programs = casters | {None: program(mapping.kind, mapping.own)}
+            made[key] = Instances(assets, level, programs, members)
     return [made[key] for key in groups]

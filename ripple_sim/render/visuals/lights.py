@@ -26,28 +26,32 @@ from .surroundings import RenderFlags, set_surroundings
 
 _KIND = mujoco.mjtLightType
 _SUN_TANGENT = 0.05  # of the angular radius of a directional light, which MJCF does not give
-_UNLIT = 0.3  # ambient light in sRGB where there is no light at all, as in MuJoCo
+_UNLIT_AMBIENT = 0.3  # ambient light in sRGB where there is no light at all, as in MuJoCo
 _GAMMA = 2.2  # of sRGB, about: factor of a beam's exponent from sRGB to linear light
-_BRIGHTEST = 1.3  # sum of all lights above which exposure is reduced, as MuJoCo's frames saturate
 
-_KEY_RADIANCE = np.array([1.34, 1.28, 1.19])
-_KEY_TANGENT = 0.10
-_KEY_AZIMUTH = 92.0
-_KEY_ELEVATION = 44.0
+# Sum of all lights in sRGB above which they are dimmed, as MuJoCo's frames saturate.
+_MAX_BRIGHTNESS = 1.3
 
-# soft boxes: azimuth from the camera's forward axis (left is positive) and elevation [degrees],
-# half width and half height over distance, radiance
+# Key light of the studio.
+_KEY_RADIANCE = np.array([1.34, 1.28, 1.19])  # linear, of a white surface that faces it
+_KEY_TANGENT = 0.10  # of its angular radius
+_KEY_AZIMUTH = 92.0  # from the camera's forward axis, left is positive [degrees]
+_KEY_ELEVATION = 44.0  # [degrees]
+
+# Soft boxes: azimuth from the camera's forward axis (left is positive) and elevation [degrees],
+# half width and half height over distance, radiance.
 SOFT_BOX_LIGHTS = (
     (100.0, 46.0, 0.26, 0.34, (7.5, 7.2, 6.8)),
     (-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
     (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
 )
 BESIDE_LIGHTS = 0.5  # brightness of the soft boxes' reflections beside lights of the MJCF
-_FLOOR_IN_BACKGROUND = 0.6  # most of the floor's colour that the background takes on
+_MAX_FLOOR_TINT = 0.6  # share of the floor's colour that the background takes on, at most
 
-# of the floor into the background, in distances of the focus
+# Where the floor begins to fade into the background and where it ends, in distances of the focus.
 STUDIO_FADE = (0.4, 3.4)
 FADE = (1.5, 10.0)
+
 LIGHTING = ("auto", "model", "studio")
 _AS_USUAL = RenderFlags()
 
@@ -175,22 +179,21 @@ def scene_lighting(lights: Sequence[mujoco.MjvLight]) -> Lighting:
         if light.type != _KIND.mjLIGHT_IMAGE:
             ambient += light.ambient
             lamps.append(_scene_light(light))
-    return _in_linear_light(lamps, ambient if len(lights) else np.full(3, _UNLIT))
+    return _in_linear_light(lamps, ambient if len(lights) else np.full(3, _UNLIT_AMBIENT))
 
 
 def _in_linear_light(lights: list[Light], ambient: NDArray[np.float64]) -> Lighting:
-    """Lights and ambient light that add up in linear light, of those that add up in sRGB."""
+    """Convert lights and ambient light from MuJoCo's, which add up in sRGB, to linear light."""
     lights = [light for light in lights if light.radiance.any()]
     # lights that cast shadows come before the others, the brightest first
     lights.sort(key=lambda light: (not light.shadow, -light.radiance.sum()))
     lights = lights[:MAX_LIGHTS]
     total = sum((light.radiance for light in lights), np.zeros(3)).max()
     base = srgb_to_linear(ambient.max())
-    scale = (
-        (srgb_to_linear(min(ambient.max() + total, _BRIGHTEST)) - base) / total
-        if total > 0
-        else 0.0
-    )
+    scale = 0.0
+    if total > 0:
+        brightest = srgb_to_linear(min(ambient.max() + total, _MAX_BRIGHTNESS))
+        scale = (brightest - base) / total
     lights = [
         dataclasses.replace(light, radiance=max(scale, 0.0) * light.radiance) for light in lights
     ]
@@ -198,7 +201,10 @@ def _in_linear_light(lights: list[Light], ambient: NDArray[np.float64]) -> Light
 
 
 def _gloss(specular: ArrayLike) -> float:
-    """Share of a light's highlights, by MuJoCo's specular colour: from a lamp's default, 0.3, on they are physical."""
+    """Share of a light's radiance that its highlights have, by MuJoCo's specular colour.
+
+    From 0.3 on, the default of a lamp, highlights are physical: the share is 1.
+    """
     return min(float(srgb_to_linear(np.max(specular)) / srgb_to_linear(0.3)), 1.0)
 
 
@@ -238,7 +244,7 @@ def _scene_light(light: mujoco.MjvLight) -> Light:
 
 
 def studio_lighting(pose: Pose) -> Lighting:
-    """One key light that turns with the camera, as with a turntable: ripples look alike from all sides."""
+    """One key light that turns with the camera, so that ripples look alike from all sides."""
     key = Light(
         _direction(pose, _KEY_AZIMUTH, _KEY_ELEVATION),
         _KEY_RADIANCE,
@@ -251,22 +257,22 @@ def studio_lighting(pose: Pose) -> Lighting:
 def sky_colors(
     lighting: Lighting, pose: Pose, floor_albedo: NDArray | None, sky: NDArray | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Linear colours [3] of the background at the horizon and overhead, and the radiance that lights what is below.
+    """Linear colours [3] of the background at the horizon and overhead, and radiance of the sky.
 
-    Parameters as for `set_lighting`.
+    The radiance of the sky is what lights surfaces that face it. Parameters as for `set_lighting`.
     """
     if not lighting.backdrop:
         return np.zeros(3), np.zeros(3), lighting.ambient
     tint = np.array([0.40, 0.42, 0.46])
     if floor_albedo is not None:
-        # irradiance over pi of the floor far away, as far as it tints the background
-        away = [
+        # irradiance over pi of the floor far away, by the lights that reach it
+        irradiances = [
             light.at(pose.focus, np.array([0.0, 0.0, 1.0]))
             for light in lighting.lights
             if light.position is None
         ]
-        far = np.minimum(sum(away, lighting.ambient), _FLOOR_IN_BACKGROUND)
-        tint = (_FLOOR_IN_BACKGROUND if lighting.studio else far) * floor_albedo
+        far = np.minimum(sum(irradiances, lighting.ambient), _MAX_FLOOR_TINT)
+        tint = (_MAX_FLOOR_TINT if lighting.studio else far) * floor_albedo
     zenith = tint * np.array([0.36, 0.40, 0.48])
     if lighting.studio:
         return tint, zenith, 0.75 * (0.7 * tint + 0.3 * zenith)
@@ -291,7 +297,7 @@ def set_lighting(
         Mean linear colour of a skybox.
     """
     boxes = np.full(3, 1.0 if lighting.studio else BESIDE_LIGHTS)
-    # what a surface reflects besides the lamps is as dark and of the colour as these
+    # without a backdrop the reflections of the soft boxes have the brightness and hue of the lamps
     if not lighting.backdrop:
         total = sum((light.radiance for light in lighting.lights), lighting.ambient)
         boxes = boxes * np.minimum(total, 1.0)
@@ -302,9 +308,8 @@ def set_lighting(
         record["radiance"] = [*light.radiance, light.exponent]
         record["falloff"] = [*light.falloff, light.gloss]
     # the soft boxes turn with the camera
-    for index, (azimuth, elevation, half_width, half_height, brightness) in enumerate(
-        SOFT_BOX_LIGHTS
-    ):
+    for index, box in enumerate(SOFT_BOX_LIGHTS):
+        azimuth, elevation, half_width, half_height, brightness = box
         normal = _direction(pose, azimuth, elevation)
         tangent = np.cross([0.0, 0.0, 1.0], normal)
         frame.values["soft_box_normal"][index] = [*normal, half_width]
@@ -319,6 +324,7 @@ def set_lighting(
 
 
 def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float64]:
+    """Unit vector in the world, by azimuth and elevation [degrees] from the camera's heading."""
     right = pose.rotation[:, 0]
     right = np.array([right[0], right[1], 0.0]) / max(np.hypot(right[0], right[1]), 1e-9)
     forward = np.cross([0.0, 0.0, 1.0], right)
@@ -328,7 +334,7 @@ def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float
 
 
 class SceneLight:
-    """What lights a model.
+    """The lights and the background of a model.
 
     Parameters
     ----------
@@ -375,24 +381,23 @@ class SceneLight:
         self.make_room(None)
 
     def make_room(self, lights: Sequence[mujoco.MjvLight] | None) -> None:
-        """Have the options allow the lights of a scene, or else those of the model as they are now."""
+        """Make the options allow the lights of a scene, or the present lights of the model."""
         if self.studio:
             return
         if lights is None:
             kinds = self._model.light_type
             casting = self._model.light_castshadow
         else:
-            kinds, casting = (
-                np.array([(each.type, each.castshadow) for each in lights]).reshape(-1, 2).T
-            )
+            pairs = np.array([(light.type, light.castshadow) for light in lights])
+            kinds, casting = pairs.reshape(-1, 2).T
         cast = np.count_nonzero(casting.astype(bool) & (kinds != _KIND.mjLIGHT_IMAGE))
         needed = {
             "NEAR_LIGHTS": int((kinds != _KIND.mjLIGHT_DIRECTIONAL).any()),
             "LIGHTS": min(len(kinds) + 1, MAX_LIGHTS),  # with the headlight
             "SHADOWS": min(int(cast), MAX_SHADOWS),
         }
-        for name, least in needed.items():
-            self.options[name] = max(self.options[name], least)
+        for name, count in needed.items():
+            self.options[name] = max(self.options[name], count)
 
     def set(
         self,
@@ -408,11 +413,15 @@ class SceneLight:
     ) -> list[Light]:
         """Set the frame's light and background; return the lights.
 
-        The floor's colour and normal are [3] each, likewise a point of it, the `ground`, where it
-        is an infinite plane that is seen from above: nothing that is seen has the light of lamps
-        below it, unless they cast no shadows.
-
-        `lights` are those of a scene that replace the model's.
+        Parameters
+        ----------
+        floor_albedo, floor_normal : array, shape [3], optional
+            Colour and normal of the floor.
+        lights : sequence of mujoco.MjvLight, optional
+            Of a scene; they replace the model's.
+        ground : array, shape [3], optional
+            A point of the floor [m], if it is an infinite plane that is seen from above. Lamps
+            below the floor that cast shadows then light nothing.
         """
         lighting = lighting_of(self._model, data, pose, self._lighting, lights)
         shining = lighting.lights
@@ -430,7 +439,9 @@ class SceneLight:
             if lights is None and not (
                 self._model.vis.headlight.active or self._model.light_active.any()
             ):
-                lighting = dataclasses.replace(lighting, ambient=np.full(3, srgb_to_linear(_UNLIT)))
+                lighting = dataclasses.replace(
+                    lighting, ambient=np.full(3, srgb_to_linear(_UNLIT_AMBIENT))
+                )
             sky = self._sky is not None
             set_surroundings(
                 frame, self._model, pose, flags, skybox=sky, endless=ground is not None

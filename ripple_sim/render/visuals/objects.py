@@ -1,4 +1,4 @@
-"""What shaders look up of all objects: their table, the textures of the model, and geoms that darken what is near."""
+"""Data of all objects for the shaders: their table, textures, and capsules that occlude light."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ from .uploads import WrittenAssets
 from .visual import Look, texture_pixels
 
 _ROW = OBJECT.dtype
-_MOST_TEXELS = 2048  # of a texture, along a side, that its mean colour is taken from
 
-_REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky
+# Texels along a side of a texture, at most, from which its mean colour is taken.
+_MAX_MEAN_TEXELS = 2048
+
+# Distance in radii of a capsule above which it hides less than a hundredth of the sky.
+_OCCLUSION_REACH = 9.5
 
 
 class ObjectTable:
@@ -55,11 +58,22 @@ class ObjectTable:
     ) -> int:
         """Append a row and return its number.
 
-        `identity` is the id and the type, of `mujoco.mjtObj`, of what is drawn; `size` [m] is how
-        thick a transparent object is where its relative thickness is 1; `heatmap` says that colours
-        are shown as they are, but for shadows; `lit_in_front` that a sheet's back is as bright as
-        its front; `height_map` is the layer of the object's height map, and `chart` the side of a
-        chart with its halo in it [texels].
+        Parameters
+        ----------
+        geom : int
+            See `geoms`.
+        identity : (int, int)
+            Id and type, of `mujoco.mjtObj`, of the object.
+        size : float
+            Thickness of a transparent object where its relative thickness is 1 [m].
+        heatmap : bool
+            Whether colours are shown as they are, except for shadows.
+        lit_in_front : bool
+            Whether the back of a sheet is as bright as its front.
+        height_map : int, optional
+            Layer of the object's height map.
+        chart : int
+            Side of a chart with its halo in the height map [texels].
         """
         row = np.zeros((), dtype=_ROW)
         row["volume"][3] = opacity
@@ -87,15 +101,15 @@ class ObjectTable:
         occluders: int = 0,
         rotation: NDArray[np.float64] | None = None,
     ) -> None:
-        """Set what changes from frame to frame.
+        """Set the values that change from frame to frame.
 
         Parameters
         ----------
         number : int
             Of the row.
         bias : float
-            How far above its surface an object's shadows are looked up [m]: its bumps shall not
-            shade each other.
+            How far above its surface an object's shadows are looked up [m], so that its bumps do
+            not shade each other.
         occluders : int
             Which occluders darken it, as bits; see `Occluders.near`.
         rotation : float64 [3, 3], optional
@@ -109,11 +123,11 @@ class ObjectTable:
 
     @property
     def geoms(self) -> NDArray[np.int64]:
-        """Geom of each row, that of the nearest geom of the body for a site, -1 without."""
+        """Geom of each row, for a site the nearest geom of its body; -1 without a geom."""
         return np.array([row["place"][0] for row in self._rows], dtype=np.int64)
 
     def keep(self, count: int) -> None:
-        """Drop all rows but so many."""
+        """Drop all rows except the first `count`."""
         del self._rows[count:], self.identities[count:]
 
     def bind(self) -> None:
@@ -146,7 +160,9 @@ class Skybox(NamedTuple):
 
 
 class Assets:
-    """What all visuals of a model share on the GPU: its textures, each uploaded at its first use, and a table.
+    """Textures, shapes and table that all visuals of a model share on the GPU.
+
+    A texture is uploaded at its first use.
 
     Attributes
     ----------
@@ -155,9 +171,10 @@ class Assets:
     levels : dict
         `Levels` of shapes, by their names.
     version : int
-        Counts what was uploaded anew.
+        Number of uploads of changed assets so far.
     reshaped : set of (str, int)
-        Kind, "hfield" or "mesh", and id of what has another shape than the model was compiled with.
+        Kind, "hfield" or "mesh", and id of assets whose shape has changed since the model was
+        compiled.
     """
 
     def __init__(self, model: Any, resources: Resources) -> None:
@@ -172,18 +189,18 @@ class Assets:
         self._written: WrittenAssets | None = None
 
     def watch(self) -> None:
-        """Upload what a program writes into the model from now on, at each `refresh`."""
+        """From now on upload assets that a program writes into the model, at each `refresh`."""
         self._written = WrittenAssets(self.model)
         self.reshaped |= outgrown_assets(self.model)
 
     def refresh(self) -> None:
-        """Upload whatever a program has written into the model since the last time, where this is watched."""
+        """Upload assets that a program has written since the last call, if `watch` was called."""
         if self._written is not None:
             for kind, index in sorted(self._written.look()):
                 self.upload(kind, index)
 
     def upload(self, kind: str, index: int) -> None:
-        """Take a "texture", "hfield" or "mesh" of the model as it is now, where it was uploaded before."""
+        """Upload a "texture", "hfield" or "mesh" of the model again, if it was uploaded before."""
         self.version += 1
         if kind == "texture":
             self._mean_colors.pop(index, None)
@@ -207,11 +224,10 @@ class Assets:
         """Mean linear colour [3] of the texture of an id."""
         if texture not in self._mean_colors:
             pixels = texture_pixels(self.model, texture)
-            # all of a large one would be gigabytes of numbers
-            apart = -(-max(pixels.shape) // _MOST_TEXELS)
-            self._mean_colors[texture] = srgb_to_linear(pixels[::apart, ::apart] / 255.0).mean(
-                axis=(0, 1)
-            )
+            # all texels of a large texture would be gigabytes of numbers
+            step = -(-max(pixels.shape) // _MAX_MEAN_TEXELS)
+            linear = srgb_to_linear(pixels[::step, ::step] / 255.0)
+            self._mean_colors[texture] = linear.mean(axis=(0, 1))
         return self._mean_colors[texture]
 
     def skybox(self) -> Skybox | None:
@@ -235,7 +251,7 @@ class Assets:
 
 
 class Occluders:
-    """Capsules of about each geom's size.
+    """Capsules, each about as large as a geom, that hide the sky from objects near them.
 
     Parameters
     ----------
@@ -251,9 +267,10 @@ class Occluders:
         self.hold(geoms)
 
     def hold(self, geoms: NDArray[np.int64], boxes: NDArray[np.float64] | None = None) -> None:
-        """Be the capsules of these geoms from now on.
+        """Have capsules of these geoms [k] from now on.
 
-        `boxes`, centres and half sizes [k, 6] [m], hold them; by default they are the model's.
+        `boxes` [k, 6] [m] are centres and half sizes of their bounding boxes, by default the
+        model's.
         """
         boxes = self._model.geom_aabb[geoms] if boxes is None else boxes
         self._geoms = geoms
@@ -289,29 +306,30 @@ class Occluders:
         self._bound_geoms = self._geoms[nearest]
 
     def near(self, balls: NDArray[np.float64], geoms: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Bits of the bound capsules that darken objects by a hundredth or more; never an object's own.
+        """Bits of the bound capsules that darken objects by a hundredth or more.
+
+        The capsule of an object's own geom is left out.
 
         Parameters
         ----------
         balls : float64 [k, 4]
-            That contain the objects.
+            Balls that contain the objects [m].
         geoms : int64 [k]
-            The objects' own.
+            Geoms of the objects.
         """
         first = self._bound[:, 0, :3]
         last = self._bound[:, 1, :3]
         radius = self._bound[:, 0, 3]
         axis = last - first
         to = balls[:, None, :3] - first
-        along = np.einsum("ej,kej->ke", axis, to) / np.maximum(
-            np.einsum("ej,ej->e", axis, axis), 1e-12
-        )
+        square_length = np.maximum(np.einsum("ej,ej->e", axis, axis), 1e-12)
+        along = np.einsum("ej,kej->ke", axis, to) / square_length
         away = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * axis, axis=2) - balls[:, 3:]
-        counts = (away < _REACH * radius) & (geoms[:, None] != self._bound_geoms)
+        counts = (away < _OCCLUSION_REACH * radius) & (geoms[:, None] != self._bound_geoms)
         return (counts << np.arange(len(radius))).sum(axis=1)
 
     def _middles(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rotations [k, 3, 3] of the geoms, and middles [k, 3] of their boxes [m], in the world."""
         rotation = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
-        return rotation, data.geom_xpos[self._geoms] + np.einsum(
-            "gij,gj->gi", rotation, self._centre
-        )
+        middle = data.geom_xpos[self._geoms] + np.einsum("gij,gj->gi", rotation, self._centre)
+        return rotation, middle

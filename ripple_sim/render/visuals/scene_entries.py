@@ -1,8 +1,8 @@
-"""What the entries of a scene of MuJoCo's show: geoms and sites of the model, and all that is added to these.
+"""Visuals of the entries of a MuJoCo scene: geoms and sites of the model, and additions to them.
 
-An entry says everything of what it shows: type, size, pose, colour and finish, whoever wrote it.
-The first entry of a geom or a site is that geom or site; others of the same id are shown beside it,
-as ghosts.
+An entry alone decides the type, size, pose, colour and finish of its visual, whoever wrote it. The
+first entry of a geom or a site stands for the geom or site; further entries of the same id are
+shown beside it, as ghosts.
 """
 
 from __future__ import annotations
@@ -24,15 +24,17 @@ _GEOM = mujoco.mjtGeom
 _MESHES = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF)
 _SOFT = (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN)
 _DECOR = int(mujoco.mjtCatBit.mjCAT_DECOR)
-# How far a scene's rounded pose of an infinite plane may be off the plane, over the distance from
-# the origin.
-_IN_PLANE = 1e-5
-# How far apart two boxes may be that are one, over their size.
+
+# How far the position of an infinite plane, rounded by the scene, may be off the plane, over its
+# distance from the origin.
+_MAX_OFF_PLANE = 1e-5
+
+# Difference between two boxes up to which they are equal, over their size.
 _SAME_BOX = 1e-3
 
 
 def content_of(entry: mujoco.MjvGeom) -> tuple[Any, ...]:
-    """What an entry shows, but for its pose; a flex or skin always shows something new."""
+    """Everything that an entry shows, except its pose; a flex or skin never equals another."""
     return (
         entry.objid,
         entry.objtype,
@@ -76,10 +78,9 @@ def visuals_in(
     ghost: bool = False,
     reshaped: Collection[tuple[str, int]] = (),
 ) -> list[Visual]:
-    """What an entry of a scene shows: one visual, but of a flex its faces, edges and vertices.
+    """Visuals of an entry of a scene: one, or for a flex its faces, edges and vertices.
 
-    A `ghost` of a geom or a site is none of the model's, but something beside them. For `reshaped`
-    see `own_visual`.
+    A `ghost` of a geom or a site is shown beside the model's own. For `reshaped` see `own_visual`.
     """
     if not ghost and is_of_model(model, entry):
         return [own_visual(model, entry, reshaped)]
@@ -104,24 +105,20 @@ def visuals_in(
     in_world = replace(visual, pose=(np.zeros(3, np.float32), np.eye(3, dtype=np.float32)))
     if entry.type == _GEOM.mjGEOM_SKIN:
         return [replace(in_world, corners=_skin_corners(model, scene, int(entry.objid)))]
-    return [
-        replace(
-            in_world,
-            corners=corners,
-            part=part,
-            material=in_world.material if part == "faces" else -1,
-        )
-        for part, corners in flex_parts(model, scene, entry).items()
-    ]
+    visuals = []
+    for part, corners in flex_parts(model, scene, entry).items():
+        material = in_world.material if part == "faces" else -1
+        visuals.append(replace(in_world, corners=corners, part=part, material=material))
+    return visuals
 
 
 def own_visual(
     model: Any, entry: mujoco.MjvGeom, reshaped: Collection[tuple[str, int]] = ()
 ) -> Visual:
-    """The geom or site of the model that an entry shows; its pose is that of the model's data, see `ScenePoses`.
+    """The geom or site of the model that an entry shows; for its pose see `ScenePoses`.
 
-    What is `reshaped`, by "mesh" or "hfield" and its id, has outgrown the box that the model was
-    compiled with.
+    Assets in `reshaped`, by "mesh" or "hfield" and id, have outgrown the box with which the model
+    was compiled.
     """
     site = entry.objtype == SITE_OBJECT
     visual = (site_visual if site else geom_visual)(model, int(entry.objid))
@@ -150,39 +147,48 @@ def own_visual(
 def asset_box(
     model: Any, kind: int, asset: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Centre and half sizes [m] of the box about a mesh or a height field, in the frame of its geom; else None."""
+    """Centre and half sizes [m] of the box about a mesh or height field, in its geom's frame.
+
+    None without an asset.
+    """
     if asset < 0:
         return None
     if kind in _MESHES:
         points = mesh_arrays(model, asset)[0]
     else:
-        points = height_field_triangles(model, asset)[0]
-        points = np.concatenate(
-            [points, points[:1] * [1, 1, 0] - [0, 0, model.hfield_size[asset, 3]]]
-        )
-    least = points.min(axis=0)
-    most = points.max(axis=0)
-    return (least + most) / 2, (most - least) / 2
+        ground = height_field_triangles(model, asset)[0]
+        foot = ground[:1] * [1, 1, 0] - [0, 0, model.hfield_size[asset, 3]]
+        points = np.concatenate([ground, foot])
+    low = points.min(axis=0)
+    high = points.max(axis=0)
+    return (low + high) / 2, (high - low) / 2
 
 
 def outgrown_assets(model: Any) -> set[tuple[str, int]]:
-    """Meshes and height fields, "mesh" or "hfield" and id, with geoms whose boxes in the model are others' by now."""
-    found = set()
+    """Meshes and height fields whose box in the model is not their box any more.
+
+    Each is "mesh" or "hfield", and its id.
+    """
+    outgrown = set()
     kinds = (*_MESHES, _GEOM.mjGEOM_HFIELD)
     for geom in np.flatnonzero(np.isin(model.geom_type, [int(kind) for kind in kinds])).tolist():
         kind = int(model.geom_type[geom])
         asset = int(model.geom_dataid[geom])
         box = asset_box(model, kind, asset)
-        if (
-            box is not None
-            and np.abs(np.concatenate(box) - model.geom_aabb[geom]).max() > _SAME_BOX * box[1].max()
-        ):
-            found.add(("mesh" if kind in _MESHES else "hfield", asset))
-    return found
+        if box is None:
+            continue
+        _, half = box
+        difference = np.abs(np.concatenate(box) - model.geom_aabb[geom]).max()
+        if difference > _SAME_BOX * half.max():
+            outgrown.add(("mesh" if kind in _MESHES else "hfield", asset))
+    return outgrown
 
 
 def _asset_of(model: Any, entry: mujoco.MjvGeom) -> int:
-    """Id of an entry's mesh or height field, -1 without; a mesh has a number for itself and one for its hull."""
+    """Id of an entry's mesh or height field, -1 without.
+
+    In `dataid` a mesh has two numbers: one for itself, one for its hull.
+    """
     data = int(entry.dataid)
     if entry.type in _MESHES and 0 <= data < 2 * model.nmesh:
         return data // 2
@@ -224,7 +230,7 @@ def _skin_corners(model: Any, scene: mujoco.MjvScene, index: int) -> NDArray[np.
 
 
 class ScenePoses(NamedTuple):
-    """Where geoms and sites are, called as in MuJoCo's data: as a scene says."""
+    """Poses of geoms and sites in a scene, with the names of MuJoCo's data."""
 
     model: mujoco.MjModel
     geom_xpos: NDArray[np.float64]
@@ -234,33 +240,36 @@ class ScenePoses(NamedTuple):
 
 
 class EntryPoses:
-    """Poses of the entries of a scene that are geoms and sites of a model, against those in MuJoCo's data.
+    """Compares the poses of geoms and sites in a scene with the poses in MuJoCo's data.
 
     Parameters
     ----------
     model : mujoco.MjModel
     entries : sequence of mujoco.MjvGeom
-        One at most for each geom and site.
+        At most one for each geom and site.
     """
 
     def __init__(self, model: Any, entries: Sequence[mujoco.MjvGeom]) -> None:
         self._model = model
-        self._geoms = [each for each in entries if each.objtype == GEOM_OBJECT]
-        self._sites = [each for each in entries if each.objtype == SITE_OBJECT]
-        self._geom_ids = np.array([each.objid for each in self._geoms], dtype=np.int64)
-        self._site_ids = np.array([each.objid for each in self._sites], dtype=np.int64)
+        self._geoms = [entry for entry in entries if entry.objtype == GEOM_OBJECT]
+        self._sites = [entry for entry in entries if entry.objtype == SITE_OBJECT]
+        self._geom_ids = np.array([entry.objid for entry in self._geoms], dtype=np.int64)
+        self._site_ids = np.array([entry.objid for entry in self._sites], dtype=np.int64)
 
     def of(self, data: Any) -> Any:
-        """Where everything is: the data itself where the scene agrees with it, but for rounding, else `ScenePoses`."""
+        """Poses of all geoms and sites, as the scene has them.
+
+        They are the data itself if the scene agrees with it but for rounding, else `ScenePoses`.
+        """
         geom = self._differing(
             self._geoms, self._geom_ids, data.geom_xpos, data.geom_xmat, planes=True
         )
         site = self._differing(self._sites, self._site_ids, data.site_xpos, data.site_xmat)
         if geom is site is None:
             return data
-        geom_poses = geom or (data.geom_xpos, data.geom_xmat)
-        site_poses = site or (data.site_xpos, data.site_xmat)
-        return ScenePoses(self._model, *geom_poses, *site_poses)
+        geom_xpos, geom_xmat = geom or (data.geom_xpos, data.geom_xmat)
+        site_xpos, site_xmat = site or (data.site_xpos, data.site_xmat)
+        return ScenePoses(self._model, geom_xpos, geom_xmat, site_xpos, site_xmat)
 
     def _differing(
         self,
@@ -270,11 +279,14 @@ class EntryPoses:
         rotations: NDArray[np.float64],
         planes: bool = False,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Positions and rotations of all geoms or sites as the entries have them; None if those are the given ones."""
+        """Positions and rotations of all geoms or sites as the entries have them.
+
+        None if they are equal to `positions` and `rotations`.
+        """
         if not entries:
             return None
-        position = np.array([each.pos for each in entries])
-        rotation = np.array([each.mat for each in entries]).reshape(-1, 9)
+        position = np.array([entry.pos for entry in entries])
+        rotation = np.array([entry.mat for entry in entries]).reshape(-1, 9)
         moved = (position != positions[ids].astype(np.float32)).any(axis=1)
         turned = (rotation != rotations[ids].astype(np.float32)).any(axis=1)
         if planes and moved.any():
@@ -295,8 +307,11 @@ class EntryPoses:
         own: NDArray[np.float64],
         rotation: NDArray[np.float64],
     ) -> NDArray[np.bool_]:
-        """Which of the geoms are infinite planes that MuJoCo has moved along themselves, to be below the camera."""
+        """Which of the geoms are infinite planes that MuJoCo has moved to be below the camera.
+
+        MuJoCo moves them within themselves.
+        """
         endless = (self._model.geom_size[ids, :2] <= 0).any(axis=1)
         endless &= self._model.geom_type[ids] == _GEOM.mjGEOM_PLANE
         off = np.abs(np.einsum("ij,ij->i", position - own, rotation[:, 2::3]))
-        return endless & (off <= _IN_PLANE * (1.0 + np.abs(position).max(axis=1)))
+        return endless & (off <= _MAX_OFF_PLANE * (1.0 + np.abs(position).max(axis=1)))

@@ -1,9 +1,9 @@
-"""Shapes of visuals: which mesh each kind of geom is drawn as, with vertex normals, and its sizes.
+"""Shapes of visuals: the mesh with which each kind of geom is drawn, and its sizes.
 
-Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it
-is `core * core_size
-+ shell * shell_size`, component by component. A sphere has no core, a capsule's is a segment, a
-  box's a box; boxes and cylinders get a small round shell: edges that catch the light.
+Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell. A point of it
+is `core * core_size + shell * shell_size`, component by component. A sphere has no core; the core
+of a capsule is a segment, the core of a box is a box. Boxes and cylinders get a small round shell:
+edges that catch the light.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CH
 from .corners import normalized, split_corners
 from .visual import WALLS, Visual
 
-_BEVEL = 0.06
-_ENDLESS = 100.0  # half size of infinite planes, in extents of the model
+_BEVEL = 0.06  # radius of round edges, in smallest half sizes
+_INFINITE_HALF_SIZE = 100.0  # of infinite planes, in extents of the model
 _GEOM = mujoco.mjtGeom
 
 
@@ -96,10 +96,10 @@ def sheet() -> Shape:
 
 
 def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices and outward triangles of a cube with the grid line x line on each face; edges are welded.
+    """Vertices and outward triangles of a cube with the grid `line` x `line` on each face.
 
-    Vertices are welded by whole numbers: a coordinate is the entry of `line` at (lattice + last) /
-    2.
+    Vertices on the cube's edges are shared. They are found by whole numbers: a coordinate is the
+    entry of `line` at (lattice + last) / 2.
     """
     last = len(line) - 1
     row, column = np.divmod(np.arange(len(line) ** 2), len(line))
@@ -114,15 +114,17 @@ def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     quad = np.stack([corner, corner + 1, corner + len(line) + 1, corner + len(line)], axis=1)
     quads = np.concatenate([quad + face * len(line) ** 2 for face in range(6)])
     welded, index = np.unique(lattice.reshape(-1, 3), axis=0, return_inverse=True)
-    return line[(welded + last) // 2], index.ravel()[
-        np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    ]
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return line[(welded + last) // 2], index.ravel()[triangles]
 
 
 def _revolved(
     core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArray, sides: int
 ) -> Shape:
-    """Revolve a profile, from the lower pole to the upper one, about z; the poles are single vertices."""
+    """Revolve a profile about z, from the lower pole to the upper one.
+
+    The poles are single vertices.
+    """
     turn = 2 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=1)
     axis = np.array([0.0, 0.0, 1.0])
@@ -141,10 +143,9 @@ def _revolved(
     d = index[1:]
     between = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=1)
     top = np.stack([index[-1], after[-1], np.full(sides, 1 + count * sides)], axis=1)
+    core = rings(core_r, core_z)
     shell = normalized(rings(shell_r, shell_z))
-    return Shape(
-        rings(core_r, core_z), shell, shell, np.concatenate([bottom, between.reshape(-1, 3), top])
-    )
+    return Shape(core, shell, shell, np.concatenate([bottom, between.reshape(-1, 3), top]))
 
 
 def _arrow(*profile: tuple[float, float]) -> Callable[[int], Shape]:
@@ -171,7 +172,7 @@ def mesh_asset(model: Any, mesh: int, hull: bool = False) -> Shape:
 
 
 def height_field(model: Any, hfield: int, walls_only: bool = False) -> Shape:
-    """Height field of a MuJoCo model with its walls, or these alone, in its geom's frame."""
+    """Height field of a MuJoCo model with its walls, or the walls alone, in its geom's frame."""
     ground, F = height_field_triangles(model, hfield)
     index = np.arange(len(ground)).reshape(model.hfield_nrow[hfield], model.hfield_ncol[hfield])
     # round the rim, counter-clockwise from above
@@ -187,15 +188,14 @@ def height_field(model: Any, hfield: int, walls_only: bool = False) -> Shape:
 
 
 def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
-    """Mesh of a fixed size, its vertices split where normals or texture coordinates [m, 3, 2] jump."""
+    """Shape of a mesh, with vertices split where normals or texture coordinates [m, 3, 2] jump."""
     vertices, faces, normals, uv, _ = split_corners(V, F, corner_uv)
     positions = V[vertices]
-    return Shape(
-        np.zeros_like(positions), positions, normals, faces, None if corner_uv is None else uv
-    )
+    no_core = np.zeros_like(positions)
+    return Shape(no_core, positions, normals, faces, None if corner_uv is None else uv)
 
 
-# name, and a function that makes the shape with a number of segments to a right angle
+# Name of a shape, and a function that makes the shape with a number of segments to a right angle.
 NamedShape: TypeAlias = tuple[str, Callable[[int], Shape]]
 _SHAPES: dict[int, NamedShape] = {
     _GEOM.mjGEOM_SPHERE: ("ball", ball),
@@ -215,16 +215,15 @@ _SHAPES: dict[int, NamedShape] = {
 
 
 def shape_of(model: Any, visual: Visual) -> NamedShape | None:
-    """Name of a visual's shape, and a function that makes it with a number of segments to a right angle.
+    """Name of the shape of a visual, and a function that makes it; None without a shape.
 
-    None for other types.
+    The function takes the number of segments to a right angle.
     """
     kind = visual.kind
     asset = visual.asset
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and asset >= 0:
-        return f"{'hull' if visual.hull else 'mesh'} {asset}", lambda _: mesh_asset(
-            model, asset, visual.hull
-        )
+        name = f"{'hull' if visual.hull else 'mesh'} {asset}"
+        return name, lambda _: mesh_asset(model, asset, visual.hull)
     if visual.corners is not None:
         own = visual.corners.astype(np.float64)
         points = own[:, :3]
@@ -243,7 +242,10 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
 def sizes(
     model: Any, visual: Visual, bevel: float = _BEVEL
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Core and shell size of a visual [m], shape [3] each, see above; `bevel` is in its smallest half sizes."""
+    """Core and shell size of a visual [m], shape [3] each; see the top of the module.
+
+    `bevel` is the radius of round edges over the smallest half size.
+    """
     half = visual.half_sizes
     match visual.kind:
         case _GEOM.mjGEOM_SPHERE | _GEOM.mjGEOM_ELLIPSOID:
@@ -251,7 +253,7 @@ def sizes(
         case _GEOM.mjGEOM_CAPSULE:
             return np.array([0.0, 0.0, half[2]]), np.full(3, half[0])
         case _GEOM.mjGEOM_PLANE:
-            half = np.where(half > 0, half, _ENDLESS * model.stat.extent)
+            half = np.where(half > 0, half, _INFINITE_HALF_SIZE * model.stat.extent)
             return np.array([half[0], half[1], 0.0]), np.full(3, 1e-9)
         case _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX:
             round_edge = bevel * half.min()

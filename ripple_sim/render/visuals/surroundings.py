@@ -1,4 +1,4 @@
-"""What is around a scene: the skybox and its horizon; fog and haze as MuJoCo has them, by the flags of the scene."""
+"""Surroundings of a scene: horizon of the skybox, fog and haze, by the flags of the scene."""
 
 from __future__ import annotations
 
@@ -14,22 +14,29 @@ from ripple_sim.render.pose import Pose
 from ripple_sim.render.tone_mapping import srgb_to_linear
 
 _FLAG = mujoco.mjtRndFlag
-_FADE = 0.9, 1.0  # of the floor into what is behind it, in distances of the far plane
-_SKYBOX = 0.7  # distance of MuJoCo's skybox, likewise
 
+# Where the floor begins to fade into the background and where it ends, in distances of the far
+# plane.
+_FLOOR_FADE = 0.9, 1.0
 
-_AZIMUTHS = 64  # of the horizon
-# directions whose median is the horizon's colour there
-_BESIDE = 16
-_ABOVE = 8
-_HIGHEST = 0.06  # of them, as a slope
-_SMOOTH = 0.03  # difference in linear colour from the median up to which a horizon is smooth
+_SKYBOX_DISTANCE = 0.7  # of MuJoCo's skybox, in distances of the far plane
+
+# Azimuths at which the horizon has a colour: the median of so many directions beside one another,
+# times so many above one another, up to a slope.
+_AZIMUTHS = 64
+_DIRECTIONS_BESIDE = 16
+_DIRECTIONS_ABOVE = 8
+_MAX_SLOPE = 0.06
+
+# Difference in linear colour from the median up to which a horizon is smooth.
+_SMOOTH_DIFFERENCE = 0.03
 
 
 def horizon_of(pixels: NDArray[np.uint8]) -> NDArray[np.float64] | None:
-    """Linear colours [n, 3] of a skybox along its horizon, by the azimuth, without stars and other details.
+    """Linear colours [n, 3] of a skybox along its horizon, by the azimuth.
 
-    They begin at +x and go round counter-clockwise. None if the horizon is as smooth without.
+    They begin at +x and go round counter-clockwise; stars and other details are left out. None if
+    the horizon is smooth anyway.
 
     Parameters
     ----------
@@ -42,20 +49,21 @@ def horizon_of(pixels: NDArray[np.uint8]) -> NDArray[np.float64] | None:
         if len(pixels) != 6 * size
         else pixels.reshape(6, size, size, -1)
     )
-    azimuth = 2 * np.pi * (np.arange(_AZIMUTHS * _BESIDE) + 0.5) / (_AZIMUTHS * _BESIDE)
-    slope = _HIGHEST * np.arange(_ABOVE) / (_ABOVE - 1)
+    count = _AZIMUTHS * _DIRECTIONS_BESIDE
+    azimuth = 2 * np.pi * (np.arange(count) + 0.5) / count
+    slope = _MAX_SLOPE * np.arange(_DIRECTIONS_ABOVE) / (_DIRECTIONS_ABOVE - 1)
     directions = np.stack(
         np.broadcast_arrays(np.cos(azimuth)[:, None], np.sin(azimuth)[:, None], slope), axis=-1
     )
     seen = srgb_to_linear(_texels(faces, directions) / 255.0).reshape(_AZIMUTHS, -1, 3)
     middle = np.median(seen, axis=1)
-    if np.abs(seen - middle[:, None]).max() < _SMOOTH:
+    if np.abs(seen - middle[:, None]).max() < _SMOOTH_DIFFERENCE:
         return None
     return (np.roll(middle, 1, axis=0) + 2 * middle + np.roll(middle, -1, axis=0)) / 4
 
 
 def _texels(faces: NDArray[np.uint8], directions: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """What a skybox, whose +y is up, shows in directions [..., 3] of the world that lie near the horizon."""
+    """Colours of a skybox, whose +y is up, in directions [..., 3] of the world near the horizon."""
     x = directions[..., 0]
     y = directions[..., 2]
     z = -directions[..., 1]
@@ -64,10 +72,8 @@ def _texels(faces: NDArray[np.uint8], directions: NDArray[np.float64]) -> NDArra
     face = np.where(side, np.where(x > 0, 0, 1), np.where(z > 0, 4, 5))
     across = np.select([face == 0, face == 1, face == 4], [-z, z, x], -x)
     size = faces.shape[1]
-    column, row = (
-        np.clip((0.5 * (each / along + 1) * size).astype(np.int64), 0, size - 1)
-        for each in (across, -y)
-    )
+    column = np.clip((0.5 * (across / along + 1) * size).astype(np.int64), 0, size - 1)
+    row = np.clip((0.5 * (-y / along + 1) * size).astype(np.int64), 0, size - 1)
     return faces[face, row, column]
 
 
@@ -83,25 +89,31 @@ class RenderFlags:
 
     @classmethod
     def of(cls, scene: mujoco.MjvScene | None) -> RenderFlags:
-        """Those of a scene."""
+        """The flags of a scene; MuJoCo's defaults without a scene."""
         if scene is None:
             return cls()
-        names = cls.__dataclass_fields__
-        return cls(
-            **{name: bool(scene.flags[getattr(_FLAG, f"mjRND_{name.upper()}")]) for name in names}
-        )
+        values = {name: bool(scene.flags[_flag(name)]) for name in cls.__dataclass_fields__}
+        return cls(**values)
+
+
+def _flag(name: str) -> int:
+    """Number of a flag, of `mujoco.mjtRndFlag`, by its name in `RenderFlags`."""
+    return int(getattr(_FLAG, f"mjRND_{name.upper()}"))
 
 
 def followed_flags(*, backdrop: bool) -> set[int]:
-    """Numbers of the flags, of `mujoco.mjtRndFlag`, that have an effect; before a backdrop those of shadows alone."""
+    """Numbers of the flags, of `mujoco.mjtRndFlag`, that have an effect.
+
+    Before a backdrop only the flag of shadows has one.
+    """
     names = ["shadow"] if backdrop else list(RenderFlags.__dataclass_fields__)
-    return {int(getattr(_FLAG, f"mjRND_{name.upper()}")) for name in names}
+    return {_flag(name) for name in names}
 
 
 def set_surroundings(
     frame: FrameUniforms, model: Any, pose: Pose, flags: RenderFlags, *, skybox: bool, endless: bool
 ) -> None:
-    """Set what is around a scene without a backdrop.
+    """Set floor fade, fog, haze and skybox of a scene without a backdrop.
 
     Parameters
     ----------
@@ -112,16 +124,19 @@ def set_surroundings(
     """
     shown = skybox and flags.skybox
     far = pose.clip_planes[1]
-    frame.set_vector("floor_fade", [*(share * far / pose.distance for share in _FADE), 0.0])
+    frame.set_vector("floor_fade", [*(share * far / pose.distance for share in _FLOOR_FADE), 0.0])
     frame.set_vector("fog", model.vis.rgba.fog[:3], float(flags.fog))
     frame.set_vector("haze", model.vis.rgba.haze[:3], float(shown and flags.haze and endless))
     width = float(model.vis.map.haze)
-    frame.set_vector("haze_cone", [width, _densest(width), _SKYBOX * far])
+    frame.set_vector("haze_cone", [width, _densest_height(width), _SKYBOX_DISTANCE * far])
     begins, ends = model.stat.extent * np.array([model.vis.map.fogstart, model.vis.map.fogend])
     frame.set_vector("shown_far", [begins, ends, float(shown)])
 
 
-def _densest(width: float) -> float:
-    """How high MuJoCo's haze is densest, in heights of the ring: where its cone meets one of 45 degrees."""
+def _densest_height(width: float) -> float:
+    """Height at which MuJoCo's haze is densest, in heights of its ring.
+
+    It is where the cone of the haze meets a cone of 45 degrees.
+    """
     steepness = np.arctan2(1.0, width)
     return float(np.sqrt(0.5) * width * np.sin(steepness) / np.sin(0.75 * np.pi - steepness))

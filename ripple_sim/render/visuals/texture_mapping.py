@@ -25,7 +25,7 @@ _WRAPPED = {
     _GEOM.mjGEOM_CAPSULE: MappingKind.CAPSULE_IMAGE,
 }
 
-_PLAIN = 1.0, 1.0, 0.0, 0.0  # tiling of a whole texture
+_WHOLE = 1.0, 1.0, 0.0, 0.0  # tiling with the texture once, not shifted
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class TextureMapping:
     texture: int = -1
     scale: NDArray[np.float64] = field(default_factory=lambda: np.ones(3))
     own: bool = False
-    tiling: tuple[float, float, float, float] = _PLAIN
+    tiling: tuple[float, float, float, float] = _WHOLE
     straight: float = 0.0
     stretch: float = 1.0
 
@@ -113,14 +113,13 @@ def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
     factor = np.where(half > 0, half, 1.0) if cube and uniform else np.ones(3)
     if visual.kind in _WRAPPED:  # by coordinates from -factor to factor
-        kind, tiling = (
-            (MappingKind.CUBE_IMAGE, _PLAIN)
-            if cube
-            else (_WRAPPED[visual.kind], (*times, 0.0, 0.0))
-        )
-        straight, stretch = (
-            (half[2], half[2] / half[0]) if visual.kind == _GEOM.mjGEOM_CAPSULE else (0.0, 1.0)
-        )
+        kind = MappingKind.CUBE_IMAGE if cube else _WRAPPED[visual.kind]
+        tiling = _WHOLE if cube else (*times, 0.0, 0.0)
+        straight = 0.0
+        stretch = 1.0
+        if visual.kind == _GEOM.mjGEOM_CAPSULE:
+            straight = half[2]
+            stretch = half[2] / half[0]
         return TextureMapping(
             kind,
             texture,

@@ -1,4 +1,4 @@
-"""Which textures, height fields and meshes of a model a program has written anew, so that they are uploaded again."""
+"""`WrittenAssets`: textures, height fields and meshes of a model that a program has changed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,17 @@ from ripple_sim.coupling.watched import WatchedArray
 
 
 class Part(NamedTuple):
-    """Where an asset's content lies in an array of the model: where it begins, and how many entries it has."""
+    """Where the content of an asset lies in an array of the model.
+
+    Attributes
+    ----------
+    kind : str
+        "texture", "hfield" or "mesh".
+    asset : int
+        Id of the asset.
+    begin, entries : int
+        First entry, and number of entries.
+    """
 
     kind: str
     asset: int
@@ -45,6 +55,7 @@ def _mesh_coordinates(model: Any) -> Iterator[Part]:
             yield Part("mesh", i, int(model.mesh_texcoordadr[i]), int(model.mesh_texcoordnum[i]))
 
 
+# Arrays of the model with the content of assets, and functions that find the parts of the assets.
 _ARRAYS = {
     "tex_data": _textures,
     "hfield_data": _height_fields,
@@ -63,12 +74,12 @@ class WrittenAssets:
         self._watched = {name: WatchedArray(array) for name, array in arrays.items() if array.size}
 
     def look(self) -> set[tuple[str, int]]:
-        """Kind ("texture", "hfield" or "mesh") and id of each."""
+        """Kind ("texture", "hfield" or "mesh") and id of the assets changed since the last look."""
         written = set()
         for name, watched in self._watched.items():
             array = getattr(self._model, name)
             if watched.changed(array):
-                size = array.nbytes // len(array)
+                size = array.nbytes // len(array)  # of an entry [bytes]
                 for part in _ARRAYS[name](self._model):
                     if watched.differs(array, part.begin * size, part.entries * size):
                         written.add((part.kind, part.asset))

@@ -1,6 +1,6 @@
-"""Visuals: the geoms and sites that a MuJoCo model shows, read alike, and their materials in the shaders' terms.
+"""Visuals: the geoms and sites that a MuJoCo model shows, and their materials for the shaders.
 
-Looks are named sets of parameters for the surface of a target.
+A look is a named set of parameters for the surface of a target.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _GEOM = mujoco.mjtGeom
 GEOM_OBJECT = int(mujoco.mjtObj.mjOBJ_GEOM)
 SITE_OBJECT = int(mujoco.mjtObj.mjOBJ_SITE)
 _VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
-_UNSET = [0.5, 0.5, 0.5, 1.0]  # a geom's or site's colour where the MJCF gives none
+_DEFAULT_RGBA = [0.5, 0.5, 0.5, 1.0]  # of a geom or site where the MJCF gives no colour
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def find_look(name: str) -> Look:
 
 
 class Finish(NamedTuple):
-    """How a surface answers light, as MuJoCo's materials say it; by default as without a material."""
+    """How a surface reflects light, as MuJoCo's materials say; by default without a material."""
 
     emission: float = 0.0
     specular: float = 0.5
@@ -103,7 +103,7 @@ class SceneTexture(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Visual:
-    """A geom or a site as it is drawn, or something else of a scene of MuJoCo's: a contact, a tendon, a flex and so on.
+    """A geom or a site as it is drawn, or another entry of a MuJoCo scene, such as a contact.
 
     Attributes
     ----------
@@ -119,34 +119,34 @@ class Visual:
     rgba : float64 [4]
         sRGB and opacity: its own, or else its material's.
     material : int
-        -1 without.
+        Id of the material, -1 without.
     group : int
     hull : bool
         Whether a mesh is drawn as its convex hull.
     identity : (int, int)
-        Id and type, of `mujoco.mjtObj`, of what it shows.
+        Id and type, of `mujoco.mjtObj`, of the object that it shows.
     pose : (float32 [3], float32 [3, 3]), optional
-        Where it is [m], and its rotation, of anything but geoms and sites.
+        Position [m] and rotation of a visual that is no geom or site.
     corners : float32 [3 m, 8], optional
         Points, normals and texture coordinates of the corners of a flex's or a skin's triangles.
     part : str
-        Which part of a flex they are, see `flex_parts`; or `WALLS`, of a height field without its
-        ground.
+        The part of a flex to which the corners belong, see `flex_parts`; or `WALLS`: of a height
+        field without its ground.
     finish : Finish, optional
-        As a scene has it; by default the material's.
+        Of a scene; by default the material's.
     texture : SceneTexture, optional
-        That a scene gives in place of the material's.
+        Of a scene, in place of the material's.
     decor : bool
         Whether it explains a scene, and casts no shadow.
     half_size : float64 [3], optional
-        Half sizes along its axes that a scene gives in place of `size` [m].
+        Half sizes along its axes, of a scene, in place of `size` [m].
     box : (float64 [3], float64 [3]), optional
-        Centre and half sizes of the box about it in its own frame [m], of what has an asset and is
-        no geom.
+        Centre and half sizes of its bounding box in its own frame [m], for a visual that has an
+        asset and is no geom.
     behind : bool
         Whether it is a plane that is seen from behind.
     shown_opacity : float, optional
-        With which it is seen, if that is not its own.
+        Opacity with which it is seen, if it is not its own.
     """
 
     site: bool
@@ -177,7 +177,7 @@ class Visual:
 
     @property
     def casts(self) -> bool:
-        """Whether it casts shadows: as in MuJoCo all does but what explains a scene."""
+        """Whether it casts shadows: everything does that does not explain a scene, as in MuJoCo."""
         return not self.decor
 
     @property
@@ -188,11 +188,11 @@ class Visual:
     @property
     def colored(self) -> bool:
         """Whether the model gives it a colour of its own; a material does."""
-        return self.material >= 0 or not np.array_equal(self.rgba[:3], _UNSET[:3])
+        return self.material >= 0 or not np.array_equal(self.rgba[:3], _DEFAULT_RGBA[:3])
 
     @property
     def opacity(self) -> float:
-        """With which it is seen, 0 to 1."""
+        """Opacity with which it is seen, 0 to 1."""
         return float(self.rgba[3]) if self.shown_opacity is None else self.shown_opacity
 
     @property
@@ -202,7 +202,10 @@ class Visual:
 
     @property
     def half_sizes(self) -> NDArray[np.float64]:
-        """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane is infinite."""
+        """Half sizes of a primitive along its axes [m].
+
+        A capsule's are without its ends; a plane's are 0 where it is infinite.
+        """
         if self.half_size is not None:
             return self.half_size
         match self.kind:
@@ -218,9 +221,13 @@ def geom_visual(model: Any, geom: int) -> Visual:
     """Geom of a model, or a soft target, see `find_soft`."""
     if is_soft(model, geom):
         skin = geom - first_skin(model)
-        which, index = ("skin", skin) if skin >= 0 else ("flex", geom - first_flex(model))
-        identity = index, int(mujoco.mjtObj.mjOBJ_SKIN if skin >= 0 else mujoco.mjtObj.mjOBJ_FLEX)
-        paint = _paint(model, which, index)
+        if skin >= 0:
+            identity = skin, int(mujoco.mjtObj.mjOBJ_SKIN)
+            paint = _paint(model, "skin", skin)
+        else:
+            flex = geom - first_flex(model)
+            identity = flex, int(mujoco.mjtObj.mjOBJ_FLEX)
+            paint = _paint(model, "flex", flex)
         return Visual(
             False, geom, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, *paint, identity=identity
         )
@@ -234,31 +241,31 @@ def geom_visual(model: Any, geom: int) -> Visual:
 def paint_of(
     model: Any, geom: int, look: str | None
 ) -> tuple[str, tuple[float, float, float] | None]:
-    """Look of a target in a model of the user's, and its sRGB colour, None where the model or the look says it.
+    """Look of a target in a model of the user's, and its sRGB colour.
 
-    Without a look it is rubber in the grey that MuJoCo draws what has no colour in: nobody has
-    asked for another.
+    The colour is None where the model or the look has one. A target without look and colour is
+    rubber in the grey of MuJoCo's geoms without a colour.
     """
     visual = geom_visual(model, geom)
     red, green, blue = visual.rgba[:3].tolist()
-    return look or "rubber", (red, green, blue) if look is None and not visual.colored else None
+    is_grey = look is None and not visual.colored
+    return look or "rubber", (red, green, blue) if is_grey else None
 
 
 def site_visual(model: Any, site: int) -> Visual:
     """Site of a model."""
     kind = int(model.site_type[site])
     size = np.array(model.site_size[site], dtype=np.float64)
-    return Visual(
-        True, site, kind, size, -1, *_paint(model, "site", site), identity=(site, SITE_OBJECT)
-    )
+    paint = _paint(model, "site", site)
+    return Visual(True, site, kind, size, -1, *paint, identity=(site, SITE_OBJECT))
 
 
 def _paint(model: Any, which: str, index: int) -> tuple[NDArray[np.float64], int, int]:
     """Colour, material and group of a geom, site, flex or skin."""
-    rgba, material, group = (
-        getattr(model, f"{which}_{name}")[index] for name in ("rgba", "matid", "group")
-    )
-    if material >= 0 and np.array_equal(rgba, _UNSET):
+    rgba = getattr(model, f"{which}_rgba")[index]
+    material = getattr(model, f"{which}_matid")[index]
+    group = getattr(model, f"{which}_group")[index]
+    if material >= 0 and np.array_equal(rgba, _DEFAULT_RGBA):
         rgba = model.mat_rgba[material]
     return np.array(rgba, dtype=np.float64), int(material), int(group)
 
@@ -274,15 +281,17 @@ def visible_sites(model: Any) -> list[int]:
 
 
 def host_of(model: Any, visual: Visual) -> int:
-    """Geom that a visual belongs to: itself, or the nearest geom of a site's body; -1 if that has none."""
+    """Geom that a visual belongs to: itself, or the geom of a site's body nearest to the site.
+
+    It is -1 if the body has no geom.
+    """
     if not visual.site:
         return visual.index
     near = np.flatnonzero(model.geom_bodyid == model.site_bodyid[visual.index])
     if not len(near):
         return -1
-    return int(
-        near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[visual.index], axis=1))]
-    )
+    distances = np.linalg.norm(model.geom_pos[near] - model.site_pos[visual.index], axis=1)
+    return int(near[np.argmin(distances)])
 
 
 def box_of(model: Any, visual: Visual) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -310,16 +319,8 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
     if visual.pose is not None:
         position, rotation = visual.pose
         if visual.kind == _GEOM.mjGEOM_PLANE:
-            return np.array(
-                [
-                    [
-                        *position,
-                        np.linalg.norm(visual.half_sizes[:2])
-                        if visual.half_sizes[:2].all()
-                        else np.inf,
-                    ]
-                ]
-            )
+            half = visual.half_sizes[:2]
+            return np.array([[*position, np.linalg.norm(half) if half.all() else np.inf]])
         centre = np.zeros(3)
         half = 2 * visual.half_sizes
         if visual.box is not None:
@@ -327,7 +328,7 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
         return np.array([[*(position + rotation @ centre), np.linalg.norm(half)]])
     if visual.site:
         half = visual.half_sizes
-        radius = float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
+        radius = float(np.linalg.norm(half) + half[0])  # with the ends of a capsule
         return np.array([[*data.site_xpos[visual.index], radius]])
     position = data.geom_xpos[visual.index]
     if visual.kind == _GEOM.mjGEOM_PLANE:
@@ -339,7 +340,7 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
 
 
 def finish_of(model: Any, visual: Visual) -> Finish:
-    """Finish of a visual: that of the scene's entry, or else of its material."""
+    """Finish of a visual: of the scene's entry, or else of its material."""
     material = visual.material
     if visual.finish is not None or material < 0:
         return visual.finish or Finish()
@@ -347,7 +348,10 @@ def finish_of(model: Any, visual: Visual) -> Finish:
 
 
 def look_of(model: Any, visual: Visual) -> Look:
-    """Look of a visual's material; roughness is derived from MuJoCo's shininess where the material gives none."""
+    """Look of the material of a visual.
+
+    Roughness is derived from MuJoCo's shininess where the material gives none.
+    """
     red, green, blue = visual.color.tolist()
     rgb = (red, green, blue)
     material = visual.material
@@ -372,12 +376,11 @@ def look_of(model: Any, visual: Visual) -> Look:
 
 def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     """Pixels of a model's texture, uint8 [height, width, 3], top row first."""
-    height, width, channels = (
-        int(n[texture]) for n in (model.tex_height, model.tex_width, model.tex_nchannel)
-    )
+    height = int(model.tex_height[texture])
+    width = int(model.tex_width[texture])
+    channels = int(model.tex_nchannel[texture])
     start = int(model.tex_adr[texture])
-    pixels = np.asarray(model.tex_data[start : start + height * width * channels]).reshape(
-        height, width, channels
-    )
+    content = np.asarray(model.tex_data[start : start + height * width * channels])
+    pixels = content.reshape(height, width, channels)
     colors = np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3]
     return np.ascontiguousarray(colors, dtype=np.uint8)
