@@ -1,4 +1,4 @@
-"""Results that leave the house: moving geometry, fields and tables in the formats of other programs."""
+"""Results for other programs: moving geometry, fields and tables in their formats."""
 
 import lazy_loader
 

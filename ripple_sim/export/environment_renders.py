@@ -1,9 +1,9 @@
-"""An environment's own `render` runs, and what it draws with draws the ripples.
+"""`RenderedInPlace`: an environment's own `render` draws the ripples.
 
-Environments add more than a camera: markers of goals, overlays, settings of their own. Two classes
-draw for nearly all of them, Gymnasium's `MujocoRenderer` and `mujoco.Renderer`. For as long as
-`RenderedInPlace.replacing` lasts, those of one model draw through `RippleRenderer`. Needs
-Gymnasium.
+Environments add more than a camera: markers of goals, overlays, settings of their own. Nearly all
+of them draw with one of two classes, Gymnasium's `MujocoRenderer` or `mujoco.Renderer`. Within the
+context `RenderedInPlace.replacing`, the objects of these classes that draw one model draw through
+`RippleRenderer`. The module needs Gymnasium.
 """
 
 from __future__ import annotations
@@ -28,22 +28,25 @@ from .renderer import RippleRenderer
 # Gymnasium's modes in which frames with ripples are drawn.
 DRAWN_MODES = ("rgb_array", "depth_array", "rgbd_tuple")
 
-# Entries of a scene, as of `mujoco.Renderer`.
+# Entries that a scene may have, as for `mujoco.Renderer`.
 _MAX_GEOM = 10_000
 
 
 def depth_buffer(model: mujoco.MjModel, depth: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What Gymnasium returns for depths [m]: MuJoCo's depth buffer, 0 at the near plane and 1 at the far one."""
+    """MuJoCo's depth buffer for depths [m], which Gymnasium returns.
+
+    It is 0 at the near plane and 1 at the far plane.
+    """
     near, far = model.stat.extent * np.array([model.vis.map.znear, model.vis.map.zfar])
-    return np.clip((1 / near - 1 / depth.astype(np.float64)) / (1 / near - 1 / far), 0, 1).astype(
-        np.float32
-    )
+    share = (1 / near - 1 / depth.astype(np.float64)) / (1 / near - 1 / far)
+    return np.clip(share, 0, 1).astype(np.float32)
 
 
 def frames_of(renderer: RippleRenderer, mode: str) -> Any:
-    """What Gymnasium's `render` returns in one of `DRAWN_MODES`, of what the renderer has taken in.
+    """Frames as Gymnasium's `render` returns them in one of `DRAWN_MODES`.
 
-    Colours, uint8 [height, width, 3], their depth buffer, float32 [height, width], or both.
+    They are colours, uint8 [height, width, 3], the depth buffer, float32 [height, width], or both,
+    of the scene that the renderer has taken in.
     """
     frames: list[NDArray] = []
     if mode != "depth_array":
@@ -56,7 +59,9 @@ def frames_of(renderer: RippleRenderer, mode: str) -> Any:
 
 
 class RippleViewer(OffScreenViewer):
-    """Gymnasium's offscreen viewer, whose frames are ours: its camera, its options and its markers stay.
+    """Gymnasium's offscreen viewer with frames of `RippleRenderer`.
+
+    Camera, options and markers are Gymnasium's.
 
     Parameters
     ----------
@@ -67,7 +72,7 @@ class RippleViewer(OffScreenViewer):
     """
 
     def __init__(self, renderer: RippleRenderer, data: mujoco.MjData, visual_options: Any) -> None:
-        # that of Gymnasium makes an OpenGL context, which nothing here needs
+        # Gymnasium's own __init__ makes an OpenGL context, which nothing here needs
         self.model = renderer.model
         self.data = data
         self.viewport = mujoco.MjrRect(0, 0, renderer.width, renderer.height)
@@ -175,7 +180,7 @@ class RenderedInPlace:
 
     @contextlib.contextmanager
     def replacing(self) -> Iterator[None]:
-        """Draw in place of each `MujocoRenderer` and `mujoco.Renderer` of this model within the context."""
+        """Within the context draw for each `MujocoRenderer` and `mujoco.Renderer` of this model."""
         with _lock:
             if not _in_place:
                 _replace_methods()
@@ -197,7 +202,7 @@ class RenderedInPlace:
         self._viewers.clear()
 
     def viewer(self, drawn_by: MujocoRenderer, mode: str) -> RippleViewer:
-        """What draws for a `MujocoRenderer` in a mode."""
+        """The viewer that draws for a `MujocoRenderer` in a mode."""
         viewers = self._viewers.setdefault(drawn_by, {})
         is_new = mode not in viewers
         if is_new:
@@ -210,21 +215,22 @@ class RenderedInPlace:
         return viewers[mode]
 
     def update_scene(self, drawn_by: mujoco.Renderer, *args: Any, **kwargs: Any) -> None:
-        """Take in what a `mujoco.Renderer` would."""
+        """Take in the scene in place of a `mujoco.Renderer`."""
         renderer = self.renderer(drawn_by.width, drawn_by.height)
         renderer.update_scene(*args, **kwargs)
         self._taken_in.add(drawn_by)
 
     def scene(self, drawn_by: mujoco.Renderer) -> mujoco.MjvScene | None:
-        """The scene that is drawn for a `mujoco.Renderer`; None if its `update_scene` was not called within."""
-        return (
-            self.renderer(drawn_by.width, drawn_by.height).scene
-            if drawn_by in self._taken_in
-            else None
-        )
+        """The scene that is drawn for a `mujoco.Renderer`.
+
+        None if its `update_scene` was not called within the context.
+        """
+        if drawn_by not in self._taken_in:
+            return None
+        return self.renderer(drawn_by.width, drawn_by.height).scene
 
     def render(self, drawn_by: mujoco.Renderer, out: NDArray | None) -> NDArray:
-        """Draw what a `mujoco.Renderer` would."""
+        """Draw the frame in place of a `mujoco.Renderer`."""
         renderer = self.renderer(drawn_by.width, drawn_by.height)
         renderer.disable_depth_rendering()
         renderer.disable_segmentation_rendering()
@@ -240,9 +246,9 @@ class RenderedInPlace:
 
 
 _lock = threading.Lock()
-# By the id of the model, which whoever draws keeps alive.
+# Who draws a model at present, by the id of the model, which is kept alive by its renderers.
 _in_place: dict[int, RenderedInPlace] = {}
-# What is replaced while there are any: by class and name, how it was.
+# The original methods that are replaced meanwhile, by class and name.
 _methods: dict[tuple[type, str], Any] = {}
 
 
@@ -299,7 +305,7 @@ def _render(original: Any) -> Any:
 def _scene(original: property) -> property:
     def scene(self: mujoco.Renderer) -> mujoco.MjvScene:
         in_place = _in_place.get(id(self.model))
-        found = None if in_place is None else in_place.scene(self)
-        return original.__get__(self) if found is None else found
+        drawn = None if in_place is None else in_place.scene(self)
+        return original.__get__(self) if drawn is None else drawn
 
     return property(scene)

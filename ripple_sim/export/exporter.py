@@ -1,4 +1,4 @@
-"""`Exporter` writes a loop of one's own to the file of another program, frame by frame; `export_scene` a scene."""
+"""`Exporter` writes a loop of one's own to a file frame by frame; `export_scene` writes a scene."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .options import MOST_TRIANGLES, ExportOptions
 from .place import Unfinished, check_export, check_options, check_written
 from .source import Source
 
-_HEIGHT = 420  # [pixels]
+_PAGE_HEIGHT = 420  # of a page within a notebook [pixels]
 
 
 class Exporter:
@@ -45,7 +45,7 @@ class Exporter:
     ripples : Ripples
         Whose targets are written with their ripples.
     output : path
-        Its ending says what is written: .usdc, .usda, .usdz, .html, .zarr, .csv, .parquet or .wav.
+        Its ending decides the format: .usdc, .usda, .usdz, .html, .zarr, .csv, .parquet or .wav.
     fps : float
         Frames per second of the file.
     camera : str or CameraEntry, optional
@@ -112,6 +112,9 @@ class Exporter:
         check_written(size, tessellation, triangles, chunk)
         for look in named.values():
             find_look(look)
+        paints = {
+            name: paint_of(model, geom, named.get(name)) for name, geom in ripples.geom_ids.items()
+        }
         source = Source(
             model=model,
             ripples=ripples,
@@ -119,10 +122,7 @@ class Exporter:
             camera=camera_entry(model, camera),
             size=size,
             lighting=lighting,
-            paints={
-                name: paint_of(model, geom, named.get(name))
-                for name, geom in ripples.geom_ids.items()
-            },
+            paints=paints,
             limited=dict.fromkeys(ripples, limit),
             tessellation=tessellation,
             triangles=triangles,
@@ -139,6 +139,7 @@ class Exporter:
         return exporter
 
     def _begin(self, source: Source, output: str | Path, overwrite: bool) -> None:
+        """Begin the file in a hidden folder beside the output."""
         self.output = Path(output)
         self.frames = 0
         self._source = source
@@ -171,10 +172,12 @@ class Exporter:
         """
         if self._place is None:
             raise ExportError(f"the export {self.output} is closed; make another Exporter")
-        given = self._source.ripples.last_impulses if impulses is None else impulses
+        if impulses is None:
+            impulses = self._source.ripples.last_impulses
         with self._reported():
             model = self._source.model
-            self._writer.write(self.frames, posed(model, own_data(model, data, drawn=True)), given)
+            state = posed(model, own_data(model, data, drawn=True))
+            self._writer.write(self.frames, state, impulses)
         self.frames += 1
 
     def close(self) -> None:
@@ -199,7 +202,7 @@ class Exporter:
             self.discard()
 
     def discard(self) -> str:
-        """Stop, and remove what was written; say what is kept to be resumed, if anything.
+        """Stop, and remove the unfinished file; say which files are kept for resuming, if any.
 
         An earlier file in the same place stays.
         """
@@ -225,12 +228,14 @@ class Exporter:
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.close()
-        elif kept := self.discard():
-            error.add_note(kept)
+        else:
+            kept = self.discard()
+            if kept:
+                error.add_note(kept)
 
     @contextlib.contextmanager
     def _reported(self) -> Iterator[None]:
-        """Say of what fails while it is written which file it was."""
+        """Add the name of the file to errors while it is written."""
         try:
             yield
         except OSError as error:
@@ -238,9 +243,9 @@ class Exporter:
 
 
 def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> CameraEntry:
-    """What `[camera]` of a scene file would say; MuJoCo's free camera by default.
+    """A camera as `[camera]` of a scene file describes it; by default MuJoCo's free camera.
 
-    Raises `SceneError` if the model has not what it names.
+    Raises `SceneError` if the model does not have the camera, body or geom that it names.
     """
     if not isinstance(camera, CameraEntry):
         free = model.vis.global_
@@ -254,7 +259,7 @@ def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> Cam
 def framed(page: Path, aspect: float) -> str:
     """A page as HTML to be shown within another, `aspect` times as wide as high."""
     source = html.escape(page.read_text(encoding="utf-8"), quote=True)
-    size = f'width="{round(_HEIGHT * aspect)}" height="{_HEIGHT}"'
+    size = f'width="{round(_PAGE_HEIGHT * aspect)}" height="{_PAGE_HEIGHT}"'
     return (
         f'<iframe srcdoc="{source}" {size} style="border: 0; max-width: 100%" '
         f"allowfullscreen></iframe>"
@@ -263,7 +268,10 @@ def framed(page: Path, aspect: float) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class ExportSummary:
-    """What an export took: its frames, and times [s]; by Cycles, `write_seconds` is what the pictures took."""
+    """Number of frames of an export, and the times that it took [s].
+
+    For pictures by Cycles `write_seconds` is the time that Cycles took.
+    """
 
     output: Path
     frames: int
@@ -288,9 +296,9 @@ def export_scene(
     """Simulate a scene and write it to the file of another program.
 
     The same scene and options give the same numbers on the same machine. Memory does not grow with
-    the duration. In chunks, the complete ones stay in a folder beside the output, `output` with
-    `.part` appended, if the export is interrupted. Resumed, the simulation runs again up to there
-    and is checked to be the same.
+    the duration. If an export in chunks is interrupted, the complete chunks stay in a folder beside
+    the output, `output` with `.part` appended. An export that is resumed runs the simulation again
+    up to the interruption and checks that it is the same.
 
     Parameters
     ----------
@@ -318,7 +326,8 @@ def export_scene(
         raise ExportError(
             f"scene {scene.name!r} has no sensors; add a [[sensor]], or leave out --signals"
         )
-    simulated = written = 0.0
+    simulate_seconds = 0.0
+    write_seconds = 0.0
     source = scene_source(scene, simulation, options)
     if options.chunk is not None:
         settings: Settings = {
@@ -345,15 +354,15 @@ def export_scene(
                 simulation.advance_frame()
             done = time.perf_counter()
             exporter.write(simulation.data, simulation.impulses)
-            simulated = simulated + done - start
-            written = written + time.perf_counter() - done
+            simulate_seconds = simulate_seconds + done - start
+            write_seconds = write_seconds + time.perf_counter() - done
             if progress is not None:
                 progress(number + 1, frames)
-    return ExportSummary(Path(output), frames, simulated, written)
+    return ExportSummary(Path(output), frames, simulate_seconds, write_seconds)
 
 
 def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -> Source:
-    """What is recorded of a scene."""
+    """The source of an export of a scene."""
     return Source(
         model=simulation.model,
         ripples=simulation.ripples,

@@ -19,18 +19,19 @@ from ripple_sim.solver.waves.sensor import UNITS
 from .source import Source, Writer
 from .tables import COLUMNS, rows
 
-CHUNK = 16  # entries that are kept in memory, and lie in one chunk
+CHUNK = 16  # frames that are kept in memory, and lie in one chunk of an array
+_IMPULSE_CHUNK = 4096  # impulses that lie in one chunk
+
+# Names of the files of a Zarr store.
 _METADATA = (".zgroup", ".zattrs", ".zarray", ".zmetadata")
 _CHUNK_NAME = re.compile(r"\d+(\.\d+)*")
 
-_IMPULSES = 4096  # in one chunk
-
-# of the columns of impulses in NumPy
+# NumPy's types of the columns of impulses, by the types for pyarrow.
 DTYPES = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}
 
 
 class Store:
-    """Arrays that are fixed and arrays that grow, the latter written chunk by chunk, and attributes of the whole."""
+    """Fixed arrays, growing arrays, which are written chunk by chunk, and attributes of all."""
 
     def __init__(self, path: Path, attributes: Mapping[str, Any]) -> None:
         import zarr
@@ -62,7 +63,10 @@ class Store:
         chunk: int = CHUNK,
         before: int = 0,
     ) -> Any:
-        """Begin an array of entries like one, which stands `before` times in it already; replace one of this name."""
+        """Begin an array of entries like `like`; replace an array of the same name.
+
+        The array begins with `like` as its entries `before` times.
+        """
         if name in self._group:
             del self._group[name]
         array = self._group.create_array(
@@ -85,9 +89,10 @@ class Store:
         self._waiting[name].append(np.array(value))
 
     def flush(self) -> None:
-        """Write what waits."""
+        """Write the entries that wait."""
         for name, array in self._growing.items():
-            if values := self._waiting[name]:
+            values = self._waiting[name]
+            if values:
                 before = array.shape[0]
                 array.resize((before + len(values), *array.shape[1:]))
                 array[before:] = np.stack(values)
@@ -103,27 +108,33 @@ class Store:
 
 def made_here(path: Path) -> bool:
     """Whether a folder is a store from here, with nothing else in it."""
-    return read_object(path / ".zattrs").get("software") == MARK and all(
-        not each.is_symlink()
-        and (each.is_dir() or each.name in _METADATA or _CHUNK_NAME.fullmatch(each.name))
-        for each in path.rglob("*")
-    )
+    if read_object(path / ".zattrs").get("software") != MARK:
+        return False
+    return all(_belongs_to_store(file) for file in path.rglob("*"))
+
+
+def _belongs_to_store(path: Path) -> bool:
+    if path.is_symlink():
+        return False
+    is_chunk = _CHUNK_NAME.fullmatch(path.name) is not None
+    return path.is_dir() or path.name in _METADATA or is_chunk
 
 
 def _attributes(dimensions: list[str], unit: str, text: str) -> Mapping[str, Any]:
     attributes: dict[str, Any] = {"_ARRAY_DIMENSIONS": dimensions}
-    return {
-        **attributes,
-        **({"units": unit} if unit else {}),
-        **({"long_name": text} if text else {}),
-    }
+    if unit:
+        attributes["units"] = unit
+    if text:
+        attributes["long_name"] = text
+    return attributes
 
 
 class FieldWriter(Writer):
-    """Writes heights, velocities, energies, poses and impulses to a Zarr store, with units and coordinates.
+    """Writes heights, velocities, energies, poses and impulses to a Zarr store.
 
-    Variables of a target end in its name: `height_duck` has the dimensions time, chart_duck,
-    row_duck and column_duck. The places of texels have no time, but for surfaces that move.
+    All arrays have units and coordinates. Variables of a target end in its name: `height_duck` has
+    the dimensions time, chart_duck, row_duck and column_duck. Only on surfaces that move the places
+    of texels have a time.
     """
 
     def __init__(self, source: Source, path: Path) -> None:
@@ -155,7 +166,7 @@ class FieldWriter(Writer):
                 one,
                 unit,
                 f"{column} of an impulse",
-                chunk=_IMPULSES,
+                chunk=_IMPULSE_CHUNK,
             )
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
@@ -194,14 +205,15 @@ class _TargetFields:
         self._waves = source.ripples[name]
         self._store = store
         self._suffix = re.sub(r"\W", "_", name)
-        self._dimensions = [f"{each}_{self._suffix}" for each in ("chart", "row", "column")]
+        self._dimensions = [f"{index}_{self._suffix}" for index in ("chart", "row", "column")]
         self._ride: SurfaceRide | None = None
         over_time = ["time", *self._dimensions]
         rest = self._waves.rest
         suffix = self._suffix
-        for axis, each in enumerate("xyz"):
-            text = f"{each} of texels, geom's frame"
-            store.fixed(f"{each}_{suffix}", self._dimensions, rest.positions[..., axis], "m", text)
+        for axis, name_of_axis in enumerate("xyz"):
+            text = f"{name_of_axis} of texels, geom's frame"
+            values = rest.positions[..., axis]
+            store.fixed(f"{name_of_axis}_{suffix}", self._dimensions, values, "m", text)
         store.fixed(f"area_{suffix}", self._dimensions, rest.areas, "m^2", "area of texels at rest")
         one = np.zeros(rest.areas.shape, np.float32)
         store.grow(f"height_{suffix}", over_time, one, "m", "displacement along the outward normal")
@@ -224,13 +236,13 @@ class _TargetFields:
         if V is not None and self._ride is None:
             self._ride = SurfaceRide(waves.rest)
             # the places get a time: at rest in the frames so far
-            for axis, each in enumerate("xyz"):
+            over_time = ["time", *self._dimensions]
+            for axis, name_of_axis in enumerate("xyz"):
+                name = f"{name_of_axis}_{suffix}"
                 rest = waves.rest.positions[..., axis]
-                text = f"{each} of texels, geom's frame; the world's if soft"
-                self._store.grow(
-                    f"{each}_{suffix}", ["time", *self._dimensions], rest, "m", text, before=number
-                )
+                text = f"{name_of_axis} of texels, geom's frame; the world's if soft"
+                self._store.grow(name, over_time, rest, "m", text, before=number)
         if self._ride is not None:
             positions, _ = self._ride.positions(waves.rest.mesh.V if V is None else V)
-            for axis, each in enumerate("xyz"):
-                self._store.add(f"{each}_{suffix}", positions[..., axis])
+            for axis, name_of_axis in enumerate("xyz"):
+                self._store.add(f"{name_of_axis}_{suffix}", positions[..., axis])

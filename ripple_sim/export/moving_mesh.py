@@ -1,4 +1,4 @@
-"""A target's surface as a mesh of constant triangles, whose points, normals and velocities follow the waves."""
+"""`MovingMesh`: the surface of a target as a mesh of constant triangles that follows the waves."""
 
 from __future__ import annotations
 
@@ -81,12 +81,12 @@ class MovingMesh:
         mesh = atlas.mesh
         smooth = smooth_normals(atlas.mesh.V, atlas.mesh.F)
         if tessellation == "own":  # vertices are split at creases
-            each, self.F, normals, _, _ = split_corners(mesh.V, mesh.F)
+            vertex, self.F, normals, _, _ = split_corners(mesh.V, mesh.F)
             self.uv = mesh.corner_uv
-            points = mesh.V[each]
-            directions = smooth[each]
-            chart, row, column = (place[each] for place in atlas.locate(mesh.V))
-        else:  # as the renderer makes them, of about the size of texels
+            points = mesh.V[vertex]
+            directions = smooth[vertex]
+            chart, row, column = (place[vertex] for place in atlas.locate(mesh.V))
+        else:  # the renderer's triangles, of about the size of texels
             charts = Charts.of(atlas)
             length = float(np.sqrt(atlas.areas.mean()))
             F, attributes, same = tessellated(
@@ -102,9 +102,9 @@ class MovingMesh:
             self.F = point.ravel()[F]
             self.uv = None if mesh.corner_uv is None else attributes[F][:, :, UV]
             vertices = attributes[first]
-            points, directions, normals = (
-                vertices[:, part] for part in (POSITION, DIRECTION, NORMAL)
-            )
+            points = vertices[:, POSITION]
+            directions = vertices[:, DIRECTION]
+            normals = vertices[:, NORMAL]
             chart, row, column = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
         self.rest = points.astype(np.float32)
         self.directions = normalized(directions).astype(np.float32)
@@ -132,18 +132,23 @@ class MovingMesh:
     ) -> Displaced:
         """The surface under waves of a height [m] and a velocity [m/s], float32 [C, n, n] both.
 
-        With the vertices of its mesh at V [vertex_count, 3] [m], where they have moved; velocities
-        are those of the waves alone.
+        `V` [vertex_count, 3] [m] are the vertices of its mesh, if they have moved. The velocities
+        of the shape are those of the waves alone.
         """
-        points, normals, velocities = (np.empty_like(self.rest) for _ in range(3))
-        shape = Displaced(points, normals, velocities, np.empty(len(self.rest), np.float32))
+        shape = Displaced(
+            points=np.empty_like(self.rest),
+            normals=np.empty_like(self.rest),
+            velocities=np.empty_like(self.rest),
+            height=np.empty(len(self.rest), np.float32),
+        )
         height_map = self._height_map(height)
         rates = self._height_map.rates(height, velocity)
-        still = self.rest, self.directions, self._normals
+        points, directions, normals = self.rest, self.directions, self._normals
         if V is not None:
-            still = self.vertices(V)
+            points, directions, normals = self.vertices(V)
             height_map = self._gradients(height_map, V)
-        _displace(height_map, rates, *still, self._texels, self._offsets, shape)
+        texels = self._texels
+        _displace(height_map, rates, points, directions, normals, texels, self._offsets, shape)
         return shape
 
 
@@ -158,9 +163,9 @@ def _displace(
     offsets: Floats32,
     shape: Displaced,
 ) -> None:
-    """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2].
+    """Fill in a shape from a height map [C, n + 2, n + 2, 4] and its rates [C, n + 2, n + 2].
 
-    The surface without waves has its points `still`, directions and normals `upright`, [n, 3].
+    The surface without waves has the points `still`, directions, and normals `upright`, all [n, 3].
     `texels` [n, 3] are the first of 3 x 3 (chart, row, column) on charts with halo, `offsets` [n,
     2] are from the middle one [texels].
     """

@@ -1,6 +1,7 @@
 """`ExportOptions`: every option of an export, listed once for Python and for the command line.
 
-It imports nothing heavy, so that the help of a command comes at once; `place` checks options.
+The module imports nothing heavy, so that the help of a command comes at once; `place` checks the
+options.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from ripple_sim.solver.errors import check_fields, whole
 from ripple_sim.video.options import IN_ANY_CASE, SceneOptions
 
 TESSELLATIONS = ("refined", "own")
-MOST_TRIANGLES = 100_000
+MOST_TRIANGLES = 100_000  # of a refined surface, about, by default
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -36,7 +37,8 @@ class ExportOptions(SceneOptions):
     sound: bool = False
     """Write what is heard at the camera also where the scene has sensors (.wav)."""
     chunk: int | None = None
-    """Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside it."""
+    """Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside
+    it."""
     resume: bool = False
     """Keep the complete chunks of an interrupted export of the same scene with the same options."""
 

@@ -39,39 +39,48 @@ from .visuals import Finish, Solid, mean_color, solids, target_finish
 
 __all__ = ["PageWriter", "made_here"]
 
-# of a target, and of a primitive to a right angle
-_TRIANGLES = 16_000
-_SEGMENTS = 6
-_LARGEST_IMAGE = 1024  # [pixels]
+_MAX_TRIANGLES = 16_000  # of a target, about
+_SEGMENTS = 6  # of a primitive to a right angle
+_MAX_IMAGE_SIZE = 1024  # of a texture, along a side [pixels]
 
-_LARGEST = 1 << 20
-_STEP = 5e-5  # of heights, in sizes of the object
-_PLACE_STEP = 2e-5  # of moving vertices, in sizes of the mesh
+_MAX_STEPS = 1 << 20  # of a quantised height or coordinate
+_HEIGHT_STEP = 5e-5  # of heights, in sizes of the object
+_PLACE_STEP = 2e-5  # of the coordinates of moving vertices, in sizes of the mesh
 _CHUNK = 16  # frames that are decoded together
+
+# The page's scripts, in the order in which they are joined.
 _SCRIPTS = (
-    *(
-        "algebra.js",
-        "decode.js",
-        "motion.js",
-        "light_shaders.js",
-        "shaders.js",
-        "environment.js",
-        "light.js",
-    ),
-    *(
-        "programs.js",
-        "parts.js",
-        "groups.js",
-        "lit_points.js",
-        "floor.js",
-        "drawing.js",
-        "player.js",
-    ),
+    "algebra.js",
+    "decode.js",
+    "motion.js",
+    "light_shaders.js",
+    "shaders.js",
+    "environment.js",
+    "light.js",
+    "programs.js",
+    "parts.js",
+    "groups.js",
+    "lit_points.js",
+    "floor.js",
+    "drawing.js",
+    "player.js",
 )
 
 
 class PagePart(NamedTuple):
-    """A mesh of a page: what describes it, its arrays, its triangles, and which vertices of the source are its own."""
+    """A mesh of a page.
+
+    Attributes
+    ----------
+    meta : dict
+        Its description, for the page's JSON.
+    arrays : list
+        Its coded arrays.
+    F : int64 [m, 3]
+        Triangles.
+    vertices : int64 [n]
+        Numbers that its vertices have in the source.
+    """
 
     meta: dict[str, Any]
     arrays: list[NDArray]
@@ -160,7 +169,7 @@ def _solid_part(solid: Solid) -> PagePart:
 def _part(
     meta: dict[str, Any], finish: Finish, F: NDArray, fields: list[NDArray], uv: NDArray | None
 ) -> PagePart:
-    """Points and directions in 16 bits each, triangles, and texture coordinates of their corners."""
+    """Code points and directions in 16 bits each, triangles, and corners' texture coordinates."""
     names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
     values = {name: float(getattr(finish.look, name)) for name in names}
     look = {
@@ -185,7 +194,7 @@ def _part(
 
 def _data_uri(model: mujoco.MjModel, texture: int) -> str:
     image = Image.fromarray(texture_pixels(model, texture))
-    image.thumbnail((_LARGEST_IMAGE, _LARGEST_IMAGE))
+    image.thumbnail((_MAX_IMAGE_SIZE, _MAX_IMAGE_SIZE))
     file = io.BytesIO()
     kind = "jpeg" if image.width > 64 else "png"
     image.save(file, kind, quality=88)  # which JPEG alone has
@@ -208,16 +217,20 @@ def parents_of(F: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 
 def quantised(heights: NDArray[np.float32], step: float) -> NDArray[np.int64]:
     """Heights [n] in whole steps [m]."""
-    return np.clip(np.rint(heights / step), -_LARGEST, _LARGEST).astype(np.int64)
+    return np.clip(np.rint(heights / step), -_MAX_STEPS, _MAX_STEPS).astype(np.int64)
 
 
 def residuals(
     now: NDArray[np.int64], before: NDArray[np.int64], parents: NDArray[np.int64]
 ) -> bytes:
-    """What is left of the steps [n] since the frame before after prediction: low bytes of all, then high bytes."""
-    change = np.append(now - before, 0)  # -1: no parent, no change
-    left = change[:-1] - (change[parents[:, 0]] + change[parents[:, 1]] >> 1)
-    zigzag = np.where(left < 0, -2 * left - 1, 2 * left).astype("<u4")
+    """Errors of the prediction of steps [n] from the frame before and from the parents.
+
+    The low bytes of all come first, then the higher bytes.
+    """
+    change = np.append(now - before, 0)  # the last entry: no parent, no change
+    predicted = change[parents[:, 0]] + change[parents[:, 1]] >> 1
+    error = change[:-1] - predicted
+    zigzag = np.where(error < 0, -2 * error - 1, 2 * error).astype("<u4")
     # the prediction's error may take 23 bits
     return b"".join((zigzag >> shift & 255).astype(np.uint8).tobytes() for shift in (0, 8, 16))
 
@@ -237,10 +250,10 @@ class PageTarget:
     def __init__(self, source: Source, name: str) -> None:
         self._waves = source.ripples[name]
         self._surface = MovingMesh(
-            self._waves.rest, source.tessellation, source.limited[name], _TRIANGLES
+            self._waves.rest, source.tessellation, source.limited[name], _MAX_TRIANGLES
         )
         self.part = target_part(source, name, self._surface)
-        self.step = _STEP * float(np.ptp(self._surface.rest, axis=0).max())
+        self.step = _HEIGHT_STEP * float(np.ptp(self._surface.rest, axis=0).max())
         self._point_parents = parents_of(self.part.F, len(self.part.vertices))
         mesh = self._waves.rest.mesh
         self._rest = mesh.V
@@ -252,7 +265,10 @@ class PageTarget:
         self.moves = False
 
     def add(self, V: NDArray[np.float64] | None) -> bytes:
-        """Add a frame, with the vertices of its own mesh at V [m], or at rest; return its coded heights."""
+        """Add a frame; return its coded heights.
+
+        `V` are the vertices of the target's mesh [m], if they have moved.
+        """
         heights = self._surface.shape(self._waves.height, self._waves.velocity).height[
             self.part.vertices
         ]
@@ -264,11 +280,11 @@ class PageTarget:
         self._frames.append(self._rest if V is None else np.array(V))
         return residuals(steps, before, self._point_parents)
 
-    def told(self) -> dict[str, Any]:
-        """The mesh at rest, and how the page's points ride on it."""
-        (corners, weights, off, *_) = self._surface.vertices.rest
+    def motion(self) -> dict[str, Any]:
+        """The mesh at rest, and the way in which the page's points ride on it."""
+        corners, weights, off, _, _ = self._surface.vertices.rest
         points = self.part.vertices
-        far = max(float(np.abs(off).max()), 1e-30)
+        far = max(float(np.abs(off).max()), 1e-30)  # largest offset from the mesh [m]
         arrays = [
             self._rest[self._order].astype("<f4"),
             self._F.astype("<u4"),
@@ -282,10 +298,13 @@ class PageTarget:
             "step": self._place_step,
             "far": far,
         }
-        return {**meta, "arrays": packed(b"".join(each.tobytes() for each in arrays))}
+        return {**meta, "arrays": packed(b"".join(array.tobytes() for array in arrays))}
 
     def chunk(self) -> tuple[list[list[float]], bytes]:
-        """Middles [m] and coded vertices of the frames since the last chunk, both empty if the surface never moved."""
+        """Middles [m] and coded vertices of the frames since the last chunk.
+
+        Both are empty if the surface never moved.
+        """
         middles = []
         planes = []
         frames = self._frames
@@ -303,13 +322,16 @@ class PageTarget:
 
 
 class PageWriter(Writer):
-    """Writes a page that plays a run: the player, what stays the same, and chunks of frames, each when it is full."""
+    """Writes a page that plays a run: the player, constant content, and chunks of frames.
+
+    A chunk is written when it is full.
+    """
 
     def __init__(self, source: Source, path: Path) -> None:
         self._source = source
         self._file = path.open("w", encoding="utf-8")
         self._targets = {name: PageTarget(source, name) for name in source.ripples}
-        self._told: set[int] = set()  # targets whose motion has been told of
+        self._with_motion: set[int] = set()  # targets whose mesh for motion is written
         self._poses: list[list[list[float]]] = []
         self._arrows: list[list[list[float]]] = []
         self._planes: list[bytes] = []
@@ -326,14 +348,13 @@ class PageWriter(Writer):
         places = np.vstack([[*pose.position, *turn], np.hstack([data.xpos, data.xquat])])
         self._poses.append(np.round(places, 5).tolist())  # of the camera and all bodies
         self._arrows.append([])
-        for each in impulses:  # point and inward direction in the world, and impulse [N s]
-            _, rotation = target_pose(data, ripples.geom_ids[each.geom])
-            inwards = (
-                -rotation @ ripples[each.geom].atlas.normals[each.texel] * (-1 if each.inner else 1)
-            )
-            self._arrows[-1].append(
-                [round(float(x), 5) for x in (*each.point, *inwards, each.impulse)]
-            )
+        for hit in impulses:
+            _, rotation = target_pose(data, ripples.geom_ids[hit.geom])
+            normal = ripples[hit.geom].atlas.normals[hit.texel]
+            inwards = -rotation @ normal * (-1 if hit.inner else 1)
+            # point [m] and inward direction in the world, and impulse [N s]
+            arrow = (*hit.point, *inwards, hit.impulse)
+            self._arrows[-1].append([round(float(x), 5) for x in arrow])
         self._planes += [
             target.add(ripples.vertices(name, data)) for name, target in self._targets.items()
         ]
@@ -355,25 +376,24 @@ class PageWriter(Writer):
         model = self._source.model
         targets = set(source.ripples.geom_ids.values())
         floor = find_floor(model, targets)
-        found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
-        parts = [
-            *(target.part for target in self._targets.values()),
-            *(_solid_part(solid) for solid in found),
-        ]
+        left_out = targets if floor is None else {*targets, floor}
+        parts = [target.part for target in self._targets.values()]
+        parts += [_solid_part(solid) for solid in solids(model, left_out, _SEGMENTS)]
         aspect = source.size[0] / source.size[1]
         pose = source.pose(data).in_perspective(aspect, "the page")
         floor_meta = None if floor is None else floor_of(model, floor)
         textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])
+        images = {}
+        for surface in textured:
+            texture = surface["texture"]
+            if texture >= 0:
+                images[texture] = _data_uri(model, texture)
         meta = {
             "fps": source.fps,
             "chunk": _CHUNK,
             "steps": [target.step for target in self._targets.values()],
             "parts": [part.meta for part in parts],
-            "images": {
-                each["texture"]: _data_uri(model, each["texture"])
-                for each in textured
-                if each["texture"] >= 0
-            },
+            "images": images,
             "floor": floor_meta,
             "light": light_of(source, data),
             "fovy": pose.fovy,
@@ -383,9 +403,8 @@ class PageWriter(Writer):
             "heat": color_table()[::8].tolist(),
         }
         folder = importlib.resources.files(__package__).joinpath("html")
-        page, *scripts = (
-            folder.joinpath(name).read_text("utf-8") for name in ("page.html", *_SCRIPTS)
-        )
+        page = folder.joinpath("page.html").read_text("utf-8")
+        scripts = [folder.joinpath(name).read_text("utf-8") for name in _SCRIPTS]
         page = page.replace("TITLE", html.escape(", ".join(self._targets))).replace("MARK", MARK)
         self._file.write(page.replace("SCRIPTS", "\n".join(scripts)))
         arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
@@ -401,11 +420,11 @@ class PageWriter(Writer):
             places, coded = target.chunk()
             if not target.moves:
                 continue
-            if number not in self._told:  # before it first moves
-                told = json.dumps(target.told())
+            if number not in self._with_motion:  # before the chunk in which it first moves
+                motion = json.dumps(target.motion())
                 name = f'class="motion" data-target="{number}"'
-                self._file.write(f'<script type="application/json" {name}>{told}</script>\n')
-                self._told.add(number)
+                self._file.write(f'<script type="application/json" {name}>{motion}</script>\n')
+                self._with_motion.add(number)
             middles[number] = places
             self._planes.append(coded)
         text = json.dumps(

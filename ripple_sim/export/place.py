@@ -1,6 +1,7 @@
-"""Where an export goes: whole or not at all, and over nothing foreign; and what writes the files of each ending.
+"""The place of an export: it is written whole or not at all, and replaces nothing foreign.
 
-The options of an export are checked here, too, before anything that takes time.
+`ENDINGS` lists the writers of the formats. The options of an export are checked here, too, before
+anything that takes time.
 """
 
 from __future__ import annotations
@@ -24,17 +25,27 @@ from .source import Source, Writer
 
 Recognised = Callable[[Path], bool]
 
-MAX_FPS = 1000
-LARGEST_MESH = 10_000_000
+MAX_FPS = 1000  # frames per second
+LARGEST_MESH = 10_000_000  # triangles of a refined surface, at most
 
 
 class Unfinished:
-    """A hidden folder beside a path, in which all is written that then moves to its place.
+    """A hidden folder beside a target, in which an export is written and from which it is moved.
 
-    `path` lies in the folder and has the target's name. What lies beside it there moves to its
-    place too, and first. The target is followed where it is a link. `recognised` says whether a
-    file or folder at a path was made here; with `overwrite` what was not is replaced, but never a
-    folder of other things.
+    Parameters
+    ----------
+    target : path
+        A link is followed.
+    recognised : callable
+        Whether a file or folder at a path was made by ripple-sim.
+    overwrite : bool
+        Replace a file that was not made by ripple-sim; a folder of other things is never replaced.
+
+    Attributes
+    ----------
+    path : Path
+        The unfinished file in the folder; it has the target's name. Files beside it are moved to
+        their places first.
     """
 
     def __init__(self, target: Path, recognised: Recognised, overwrite: bool) -> None:
@@ -56,16 +67,16 @@ class Unfinished:
         def own(file: Path) -> bool:
             return file.suffix in made and (self._overwrite or made[file.suffix](file))
 
-        written = sorted(self._folder.iterdir(), key=lambda each: each == self.path)
-        for each in written[:-1]:  # folders of images or chunks
-            check_folder(
-                ExportError, each.suffix.removeprefix("."), self._target.with_name(each.name), own
-            )
-        for each in written:
-            target = self._target.with_name(each.name)
+        # the target itself comes last
+        written = sorted(self._folder.iterdir(), key=lambda path: path == self.path)
+        for folder in written[:-1]:  # of images or chunks
+            kind = folder.suffix.removeprefix(".")
+            check_folder(ExportError, kind, self._target.with_name(folder.name), own)
+        for path in written:
+            target = self._target.with_name(path.name)
             if target.is_dir():
                 shutil.rmtree(target)
-            move(each, target)
+            move(path, target)
 
     def remove(self) -> None:
         """Remove the folder with all that is in it."""
@@ -97,10 +108,10 @@ class Ending:
     Attributes
     ----------
     home, kind : str
-        Module, below this package, and its class that writes the files; `made_here` of the module
-        tells them.
+        Module of this package, and its class that writes the files; `made_here` of the module
+        recognises them.
     package, extra : str, optional
-        What it needs beside ripple-sim, and the extra that brings it.
+        Package that the writer needs, and the extra of ripple-sim that installs it.
     chunks : bool
         Whether a run can be divided over files.
     """
@@ -134,7 +145,10 @@ ENDINGS = {
 
 
 def ending_of(path: Path) -> Ending:
-    """How a path's file is written; raises `ExportError` if its ending is unknown, or needs what is not installed."""
+    """How the file of a path is written.
+
+    Raises `ExportError` if its ending is unknown, or needs a package that is not installed.
+    """
     suffix = path.suffix.lower()
     if path.name.lower() in ENDINGS or suffix not in ENDINGS:
         problem = f"ends in {path.suffix}" if path.suffix else "has no ending"
@@ -151,7 +165,9 @@ def ending_of(path: Path) -> Ending:
 
 
 def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Ending:
-    """Make sure, before anything that takes time, that an export can be written to a path; return how. Leaves nothing.
+    """Check that an export can be written to a path, and return how; leave no file.
+
+    Call it before anything that takes time.
 
     Raises
     ------
@@ -164,13 +180,13 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
     """
     ending = ending_of(path)
     if chunked and not ending.chunks:
-        able = " and ".join(suffix for suffix, each in ENDINGS.items() if each.chunks)
+        able = " and ".join(suffix for suffix, other in ENDINGS.items() if other.chunks)
         raise ExportError(
             f"there are chunks of {able} files alone, not of {path.name}; leave chunk out"
         )
     try:
         final = final_path(path)
-        # what is written there, and told again, goes by the ending
+        # the writer, and `made_here`, go by the ending
         if final.suffix.lower() != path.suffix.lower():
             raise ExportError(
                 f"output {str(path)!r} is a link to {final.name!r}; valid is a link to a name that "
@@ -178,7 +194,8 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
                 f"{path.suffix}"
             )
         _check_replaceable(final, ending.made_here, overwrite)
-        with tempfile.TemporaryFile(dir=next(each for each in final.parents if each.exists())):
+        folder = next(parent for parent in final.parents if parent.exists())
+        with tempfile.TemporaryFile(dir=folder):
             return ending
     except OSError as error:
         kind = ExportError if error.errno in NO_NAME else EncodingError
@@ -188,7 +205,7 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
 
 
 def check_options(options: ExportOptions) -> None:
-    """Make sure that the options are possible, before anything that takes time; raises `RippleError`."""
+    """Check the options of an export, before anything that takes time; raise `RippleError`."""
     if options.fps > MAX_FPS:
         raise ExportError(
             f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a "
@@ -204,7 +221,7 @@ def check_options(options: ExportOptions) -> None:
 def check_written(
     size: tuple[int, int], tessellation: str, triangles: int, chunk: int | None
 ) -> None:
-    """Make sure that options of an export in anybody's own loop are possible; raises `RippleError`."""
+    """Check the options of an export in a loop of one's own; raise `RippleError`."""
     check_size(*size)
     if not isinstance(triangles, int) or not 1 <= triangles <= LARGEST_MESH:
         raise ExportError(

@@ -1,4 +1,4 @@
-"""`RippleRenderer` renders the frames of a loop of one's own, in the place of `mujoco.Renderer`."""
+"""`RippleRenderer` renders the frames of a loop of one's own, in place of `mujoco.Renderer`."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from .exporter import Exporter, camera_entry, framed
 
 AnyCamera: TypeAlias = Camera | FixedCamera | str | int | mujoco.MjvCamera
 
-# Numbers of the scene's cameras, beside their poses.
-_CAMERA = (
+# Attributes of the scene's cameras that are numbers.
+_CAMERA_NUMBERS = (
     "orthographic",
     "frustum_bottom",
     "frustum_center",
@@ -46,9 +46,9 @@ _CAMERA = (
     "frustum_width",
 )
 
-# Of the scene's lights, what is drawn.
+# Attributes of the scene's lights that are drawn.
 _LIGHT_ARRAYS = ("pos", "dir", "attenuation", "ambient", "diffuse", "specular")
-_LIGHT = ("type", "cutoff", "exponent", "castshadow", "bulbradius")
+_LIGHT_NUMBERS = ("type", "cutoff", "exponent", "castshadow", "bulbradius")
 
 
 class RippleRenderer:
@@ -188,7 +188,9 @@ class RippleRenderer:
         camera: AnyCamera = -1,
         scene_option: mujoco.MjvOption | None = None,
     ) -> None:
-        """Take in the present state of bodies and ripples, which `render` draws, whatever becomes of them.
+        """Take in the present state of bodies and ripples, which `render` draws.
+
+        Later changes of the data and the ripples have no effect on what is drawn.
 
         Parameters
         ----------
@@ -231,7 +233,8 @@ class RippleRenderer:
             self._ripples.geom_ids[name]: height_map(heights[name], state)
             for name, height_map in self._height_maps.items()
         }
-        self._drawn, self._seen = (state, height_maps, seen), (now, self._entry(camera, own))
+        self._drawn = (state, height_maps, seen)
+        self._seen = (now, self._entry(camera, own))
 
     def render(
         self,
@@ -367,7 +370,7 @@ class RippleRenderer:
         self._renderer.upload(kind, index)
 
     def _now(self) -> tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint]:
-        """What is to be drawn: bodies and waves as they were taken in, seen with the scene's camera as it is."""
+        """Bodies and waves as they were taken in, and the scene's camera as it is now."""
         if self._drawn is None:
             raise RenderError(
                 "there is nothing to render; call update_scene(data) before, or render(data)"
@@ -395,10 +398,11 @@ class RippleRenderer:
         return np.full((*size, 2), -1, np.int32)
 
     def _warn_of_flags(self) -> None:
-        """Warn once of each flag of the scene that differs from MuJoCo's default and has no effect here."""
+        """Warn once of each flag of the scene that is not MuJoCo's default and has no effect."""
         changed = set(np.flatnonzero(self.scene.flags != self._usual_flags).tolist())
         followed = followed_flags(backdrop=in_studio(self.model, self._lighting))
-        if new := changed - followed - self._told_flags:
+        new = changed - followed - self._told_flags
+        if new:
             self._told_flags |= new
             names = ", ".join(mujoco.mjtRndFlag(flag).name for flag in sorted(new))
             valid = ", ".join(mujoco.mjtRndFlag(flag).name for flag in sorted(followed))
@@ -407,7 +411,10 @@ class RippleRenderer:
             )
 
     def _own(self, camera: AnyCamera) -> mujoco.MjvCamera:
-        """A camera of MuJoCo's for its scene; for ours the scene's own, which is set to what ours sees."""
+        """A camera as MuJoCo's for its scene.
+
+        For a camera of ripple-sim it is the scene's own camera, which is set to the same view.
+        """
         pose_of_ours = getattr(camera, "pose", None)
         if not callable(pose_of_ours):
             return mujoco_camera(self.model, camera)
@@ -417,7 +424,7 @@ class RippleRenderer:
         return own
 
     def _entry(self, camera: AnyCamera, own: mujoco.MjvCamera) -> CameraEntry:
-        """What `[camera]` of a scene file says of a camera; MuJoCo's free one where it has no words."""
+        """A camera as `[camera]` of a scene file describes it, or else MuJoCo's free camera."""
         if isinstance(camera, Camera):
             return CameraEntry(**dataclasses.asdict(camera))
         if own.type == mujoco.mjtCamera.mjCAMERA_FIXED:
@@ -439,7 +446,7 @@ class RippleRenderer:
         """HTML for a notebook: the present state of what was rendered last, to turn and to zoom."""
         if self._seen is None:
             return None
-        (data, camera) = self._seen
+        data, camera = self._seen
         size = (self.width, self.height)
         with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
             page = Path(folder) / "now.html"
@@ -458,18 +465,18 @@ class RippleRenderer:
 
 
 def _camera_content(scene: mujoco.MjvScene) -> list[object]:
-    """What the cameras of a scene say, to be compared."""
+    """All numbers of the cameras of a scene, for comparison."""
     content: list[object] = []
     for camera in scene.camera:
         content += [camera.pos.tobytes(), camera.forward.tobytes(), camera.up.tobytes()]
-        content += [getattr(camera, name) for name in _CAMERA]
+        content += [getattr(camera, name) for name in _CAMERA_NUMBERS]
     return content
 
 
 def _light_content(scene: mujoco.MjvScene) -> list[object]:
-    """What the lights of a scene say, to be compared."""
+    """All numbers of the lights of a scene, for comparison."""
     content: list[object] = [scene.nlight]
     for light in scene.lights[: scene.nlight]:
         content += [getattr(light, name).tobytes() for name in _LIGHT_ARRAYS]
-        content += [getattr(light, name) for name in _LIGHT]
+        content += [getattr(light, name) for name in _LIGHT_NUMBERS]
     return content

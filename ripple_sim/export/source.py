@@ -1,4 +1,4 @@
-"""What an export records: a model with its ripples, and how they are to be seen."""
+"""`Source`: what an export records; `Writer`: the interface of everything that writes an export."""
 
 from __future__ import annotations
 
@@ -90,16 +90,19 @@ class Source:
 class Writer(Protocol):
     """Writes a run to a file or folder, frame by frame; it is made with its source and path."""
 
-    _file: Any = None  # what is open all the time, if anything
+    _file: Any = None  # the file that is open all the time, if there is one
 
     def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
-        """Add a frame, of a number from 0, with the impulses since the frame before; the ripples are the source's."""
+        """Add a frame with its number, from 0, and the impulses since the frame before.
+
+        The ripples are those of the source.
+        """
 
     def finish(self) -> None:
         """Complete the file."""
 
     def close(self) -> str:
-        """Leave the file incomplete; say what is kept for later, if anything."""
+        """Leave the file incomplete; say which files are kept for resuming, if any."""
         with contextlib.suppress(OSError):
             if self._file is not None:
                 self._file.close()

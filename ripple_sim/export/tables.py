@@ -15,7 +15,7 @@ from ripple_sim.solver.waves.sensor import UNITS, Sensor
 
 from .source import Source, Writer
 
-# Name and unit of every column, and its type for pyarrow.
+# Columns of a table of impulses: name, unit, and type for pyarrow.
 COLUMNS = {
     "frame": ("", "int64"),
     "time": ("s", "float64"),
@@ -30,6 +30,8 @@ COLUMNS = {
     "column": ("", "int64"),
     "inner": ("", "bool"),
 }
+
+# Columns of a table of samples of sensors.
 SIGNALS = {
     "sensor": ("", "string"),
     "point": ("", "int64"),
@@ -38,7 +40,7 @@ SIGNALS = {
     "unit": ("", "string"),
 }
 
-_GROUP = 10_000  # rows that are kept in memory
+_MAX_WAITING_ROWS = 10_000  # of a .parquet file: rows that are kept in memory
 
 
 def header(columns: Mapping[str, tuple[str, str]]) -> list[str]:
@@ -51,16 +53,22 @@ HEADER = header(COLUMNS)
 
 def rows(number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> Iterator[tuple]:
     """The impulses of a frame of a number, in the order of the columns."""
-    for each in impulses:
+    for hit in impulses:
+        x, y, z = map(float, hit.point)
+        chart, row, column = hit.texel
         yield (
             number,
             data.time,
-            each.geom,
-            each.other,
-            *map(float, each.point),
-            each.impulse,
-            *each.texel,
-            each.inner,
+            hit.geom,
+            hit.other,
+            x,
+            y,
+            z,
+            hit.impulse,
+            chart,
+            row,
+            column,
+            hit.inner,
         )
 
 
@@ -68,9 +76,9 @@ def samples(sensors: Mapping[str, Sensor]) -> Iterator[tuple]:
     """The samples of sensors that were not read yet, in the order of the columns of `SIGNALS`."""
     for name, sensor in sensors.items():
         times, values = sensor.read()
-        for point, column in enumerate(values.T.tolist()):
-            for at, value in zip(times.tolist(), column, strict=True):
-                yield name, point, at, value, UNITS[sensor.kind]
+        for point, signal in enumerate(values.T.tolist()):
+            for time, value in zip(times.tolist(), signal, strict=True):
+                yield name, point, time, value, UNITS[sensor.kind]
 
 
 class CsvWriter(Writer):
@@ -117,7 +125,7 @@ class ParquetWriter(Writer):
         self._rows += (
             samples(self._source.sensors) if self._source.signals else rows(number, data, impulses)
         )
-        if len(self._rows) >= _GROUP:
+        if len(self._rows) >= _MAX_WAITING_ROWS:
             self._flush()
 
     def finish(self) -> None:
@@ -128,9 +136,9 @@ class ParquetWriter(Writer):
     def _flush(self) -> None:
         import pyarrow
 
-        columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [
-            [] for _ in self._schema
-        ]
+        columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)]
+        if not columns:
+            columns = [[] for _ in self._schema]
         self._file.write_table(pyarrow.table(columns, schema=self._schema))
         self._rows = []
 

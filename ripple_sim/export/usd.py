@@ -33,41 +33,42 @@ from .source import Source
 from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
 from .visuals import solids, target_finish
 
-# at least every so many frames the simulation's state is fingerprinted, to be compared on resuming
-_CHECKED = 16
-_MANIFEST = "manifest.usdc"
+# Frames from one fingerprint of the simulation's state to the next, at most. An export that is
+# resumed compares them.
+_MAX_FINGERPRINT_INTERVAL = 16
 
-# height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
-_SENSOR = 0.024
-_TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
+_MANIFEST = "manifest.usdc"  # name of the file that lists the attributes of the chunks
 
-# of the camera's distance
-_NEAR = 0.01
-_FAR = 1000.0
+# Height of the camera's film [m], as of 35 mm film. Angle of view and depth of field do not depend
+# on it.
+_FILM_HEIGHT = 0.024
+_TENTHS = 10.0  # USD has lengths within a camera in tenths of a unit
 
-# time of the files in a .usdz, 1980-01-02, so that the same run gives the same bytes
-_PACKED = 315_619_200
-_KEPT = 8  # so many frames are kept in memory, and then appended to the file
+# Clipping planes, in distances of the camera from what it looks at.
+_NEAR_PLANE = 0.01
+_FAR_PLANE = 1000.0
+
+# Time of the files in a .usdz, 1980-01-02 [s], so that the same run gives the same bytes.
+_FILE_TIME = 315_619_200
+
+_FRAMES_IN_MEMORY = 8  # which are then appended to the file
 
 
 def succeed(work: Callable[..., bool], *arguments: object) -> None:
-    """Do what says whether it could write, and raise OSError if it could not."""
+    """Call a function that returns whether it could write; raise OSError if it could not."""
     try:
         if work(*arguments):
             return
         reason = "it could not be written"
     except Tf.ErrorException as error:
         text = " ".join(str(error).split())
-        reason = (
-            first[1]
-            if (first := re.search(r"line \d+ in file \S+ : '(.*?)'(?= Error in |$)", text))
-            else text
-        )
+        quoted = re.search(r"line \d+ in file \S+ : '(.*?)'(?= Error in |$)", text)
+        reason = quoted[1] if quoted else text
     raise OSError(reason)
 
 
 class Chunks:
-    """Takes time samples into layers of some frames each, which wait in a folder until the run is complete.
+    """Writes time samples to layers of some frames each, in a folder until the run is complete.
 
     A layer has the first frame of the next one, too, so that readers interpolate between the two.
     What is the same at all times belongs in the stage's root layer. A layer is in memory until it
@@ -96,9 +97,8 @@ class Chunks:
         self._part: Any = Part(
             target, ".usdc", source.chunk, settings, resume=source.resume, overwrite=True
         )
-        if damaged := [
-            segment.name for segment, _ in self._part.segments if not made_here(segment)
-        ]:
+        damaged = [segment.name for segment, _ in self._part.segments if not made_here(segment)]
+        if damaged:
             self._part.keep()
             raise VideoError(
                 f"cannot resume {source.output}: {damaged[0]} is damaged; leave --resume out to "
@@ -124,13 +124,16 @@ class Chunks:
         self._waiting += 1
 
     def check_state(self, number: int, data: mujoco.MjData) -> None:
-        """Record the fingerprint of a frame's state, or compare it with that of the run which is resumed."""
-        if number % min(_CHECKED, self._source.chunk) == 0:
+        """Record the fingerprint of the state at a frame, or compare it with an earlier run's."""
+        if number % min(_MAX_FINGERPRINT_INTERVAL, self._source.chunk) == 0:
             heights = (self._source.ripples[name].height for name in self._source.ripples)
             self._part.check_state(number, state_digest(data, heights))
 
     def finish(self, folder: Path, last: int) -> None:
-        """Complete the layers, hand them over to a folder, and join them in the root layer up to the last frame."""
+        """Complete the layers, move them to a folder, and join them in the root layer.
+
+        `last` is the number of the last frame.
+        """
         if self._layer is not None:
             self._end()
         part = self._part
@@ -240,7 +243,7 @@ class UsdWriter:
             if number >= chunks.stored:
                 chunks.write(lambda: self._sample(number, data, shapes))
         self._last = number
-        if number % _KEPT == _KEPT - 1:
+        if number % _FRAMES_IN_MEMORY == _FRAMES_IN_MEMORY - 1:
             succeed(self._stage.GetRootLayer().Save)
 
     def finish(self) -> None:
@@ -255,7 +258,7 @@ class UsdWriter:
                 succeed(self._stage.GetRootLayer().Export, str(self._path))
             case ".usdz":
                 for packed in (self._binary, *self._images.glob("*")):
-                    os.utime(packed, (_PACKED, _PACKED))
+                    os.utime(packed, (_FILE_TIME, _FILE_TIME))
                 succeed(
                     UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path)
                 )
@@ -268,14 +271,14 @@ class UsdWriter:
         return "" if self._chunks is None else self._chunks.close()
 
     def _begin(self, data: mujoco.MjData) -> None:
-        """Define what stays as it is at the first frame."""
+        """Define everything that stays as it is at the first frame."""
         pose = self._source.pose(data)
         width, height = self._source.size
         half_width, half_height = pose.half_sizes(width / height)
         # of an orthographic camera the aperture is what it sees, and it has no lens
-        focal = 1.0 if pose.orthographic else _SENSOR / 2 / half_height
+        focal = 1.0 if pose.orthographic else _FILM_HEIGHT / 2 / half_height
         lens = 0.0 if pose.orthographic else self._source.camera.aperture
-        near, far = pose.clip or (_NEAR * pose.distance, _FAR * pose.distance)
+        near, far = pose.clip or (_NEAR_PLANE * pose.distance, _FAR_PLANE * pose.distance)
         placing(self._camera)
         self._camera.CreateProjectionAttr("orthographic" if pose.orthographic else "perspective")
         self._camera.CreateHorizontalApertureAttr(_TENTHS * 2 * focal * half_width)
@@ -343,12 +346,10 @@ class UsdWriter:
         mesh = define_mesh(self._stage, path, surface.F, uv, open_surface=not atlas.mesh.closed)
         if not soft:
             place(mesh, model.geom_pos[geom], model.geom_quat[geom])
-        (
-            mesh.CreatePointsAttr(),
-            mesh.CreateNormalsAttr(),
-            mesh.CreateVelocitiesAttr(),
-            mesh.CreateExtentAttr(),
-        )
+        mesh.CreatePointsAttr()
+        mesh.CreateNormalsAttr()
+        mesh.CreateVelocitiesAttr()
+        mesh.CreateExtentAttr()
         self._materials.bind(mesh, finish)
         return surface, mesh
 

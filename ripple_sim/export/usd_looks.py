@@ -1,6 +1,6 @@
-"""What stays the same over time in a stage of USD: meshes, looks with their textures, and the lamps.
+"""Parts of a USD stage that stay the same over time: meshes, looks with textures, and lamps.
 
-Looks are UsdPreviewSurface materials, lamps UsdLux lights.
+Looks are UsdPreviewSurface materials; lamps are UsdLux lights.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ripple_sim.render.visuals.visual import texture_pixels
 from .source import Source
 from .visuals import Finish
 
-_LEAST_RADIUS = 0.01  # of a lamp whose MJCF gives none [m]
-_STUDIO_SKY = 0.25  # radiance that stands for the studio's soft boxes, which USD has no equal of
+_MIN_LAMP_RADIUS = 0.01  # of a lamp whose MJCF gives no radius [m]
+_STUDIO_SKY = 0.25  # radiance of a sky in place of the studio's soft boxes, which USD does not have
 _COAT_ROUGHNESS = 0.1
-_WATER = 1.33  # refractive index of what is transparent
+_WATER = 1.33  # refractive index of transparent surfaces
 
 
 def define_mesh(
@@ -124,7 +124,7 @@ class Lamps:
                 keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
             else:
                 lamp = UsdLux.SphereLight.Define(self._stage, path)
-                lamp.CreateRadiusAttr(max(light.size, _LEAST_RADIUS))
+                lamp.CreateRadiusAttr(max(light.size, _MIN_LAMP_RADIUS))
                 lamp.CreateNormalizeAttr(True)
                 distance = max(
                     float(np.linalg.norm(light.position - self._source.model.stat.center)), 1e-3
@@ -161,13 +161,17 @@ def _set_light(
     lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float, gloss: float = 1.0
 ) -> None:
     brightest = max(float(radiance.max()), 1e-9)
-    lamp.CreateColorAttr(Gf.Vec3f(*(float(each) / brightest for each in radiance)))
+    red, green, blue = (float(value) / brightest for value in radiance)
+    lamp.CreateColorAttr(Gf.Vec3f(red, green, blue))
     lamp.CreateIntensityAttr(intensity * brightest)
     lamp.CreateSpecularAttr(gloss)
 
 
 class Materials:
-    """Materials under the prim at a path, and their images in a folder beside the stage's file, made when needed."""
+    """Materials under the prim at a path; each is defined when it is first needed.
+
+    Their images are in a folder beside the file of the stage.
+    """
 
     def __init__(
         self, stage: Usd.Stage, path: Sdf.Path, model: mujoco.MjModel, images: Path

@@ -1,4 +1,4 @@
-"""The bodies of a model as meshes: what the renderer draws beside the targets."""
+"""The bodies of a model as meshes: everything that the renderer draws beside the targets."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Solid(NamedTuple):
     points, normals : float64 [n, 3]
     F : int64 [m, 3]
     uv : float64 [m, 3, 2], optional
-        Of the corners in its flat texture, v from the image's lower edge; images repeat.
+        Places of the corners in its flat texture, v from the image's lower edge; images repeat.
     """
 
     finish: Finish
@@ -56,7 +56,17 @@ class Solid(NamedTuple):
 
 
 class Finish(NamedTuple):
-    """How a surface looks: parameters, linear colour [3], opacity, and the id of its flat texture, -1 without."""
+    """How a surface looks.
+
+    Attributes
+    ----------
+    look : Look
+    color : float64 [3]
+        Linear.
+    opacity : float
+    texture : int
+        Id of its flat texture, -1 without.
+    """
 
     look: Look
     color: NDArray[np.float64]
@@ -65,7 +75,10 @@ class Finish(NamedTuple):
 
 
 def solids(model: mujoco.MjModel, targets: set[int], segments: int = 12) -> list[Solid]:
-    """Everything that is drawn of a model but its targets, which are geom ids; `segments` make up a right angle."""
+    """Everything that is drawn of a model, except its targets.
+
+    `targets` are geom ids; `segments` is the number of edges of round shapes to a right angle.
+    """
     geoms = [geom for geom in visible_geoms(model) if geom not in targets]
     return [_solid(model, visual, make(segments)) for visual, (_, make) in visuals_of(model, geoms)]
 
@@ -73,9 +86,9 @@ def solids(model: mujoco.MjModel, targets: set[int], segments: int = 12) -> list
 def target_finish(
     source: Source, name: str, mesh: MovingMesh
 ) -> tuple[Finish, NDArray[np.float64] | None]:
-    """How a target looks, as in the renderer; and places [m, 3, 2] of its mesh's corners in its flat texture, if any.
+    """How a target looks, and the places [m, 3, 2] of its mesh's corners in its flat texture.
 
-    See `Solid` for the places.
+    It looks as in the renderer. The places are None without a flat texture; see `Solid`.
     """
     model = source.model
     geom = source.ripples.geom_ids[name]
@@ -105,7 +118,10 @@ def _finish(
 def texture_places(
     mapping: TextureMapping, coordinates: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Places [..., 2] in a flat texture, v from its lower edge, of a mapping's coordinates [..., 2 or 3]."""
+    """Places [..., 2] in a flat texture, v from its lower edge, for coordinates of a mapping.
+
+    The coordinates are [..., 2 or 3].
+    """
     places = coordinates[..., :2] * mapping.tiling[:2] + mapping.tiling[2:]
     return np.stack([places[..., 0], 1.0 - places[..., 1]], axis=-1)
 
@@ -114,9 +130,8 @@ def mean_color(model: mujoco.MjModel, mapping: TextureMapping) -> NDArray[np.flo
     """Mean linear colour of a mapping's texture [3], white without one."""
     if mapping.texture < 0:
         return np.ones(3)
-    return srgb_to_linear(texture_pixels(model, mapping.texture)[::4, ::4] / 255.0).mean(
-        axis=(0, 1)
-    )
+    pixels = texture_pixels(model, mapping.texture)[::4, ::4]
+    return srgb_to_linear(pixels / 255.0).mean(axis=(0, 1))
 
 
 def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:

@@ -1,4 +1,4 @@
-"""Signals as a .wav file: those of a scene's sensors, a channel a point, or what is heard at the camera."""
+"""Signals as a .wav file: of a scene's sensors, or of a microphone at the camera."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .source import Source, Writer
 class WavWriter(Writer):
     """Writes one file of 16 bits a sample, with one gain for all channels; see `Writer`.
 
-    Slow motion makes it longer and lower.
+    Each point of a sensor has a channel. Slow motion makes the sound longer and lower.
     """
 
     def __init__(self, source: Source, path: Path) -> None:
@@ -51,12 +51,11 @@ class WavWriter(Writer):
             signals = self._microphone.pressure(self._frames / (source.fps * source.slow_motion))
             rate = self._microphone.rate
         else:
-            each = [sensor.samples for sensor in source.sensors.values()]
-            # of sensors of coarser surfaces the last samples come later
-            shortest = min(map(len, each))
-            signals = np.concatenate([samples[:shortest] for samples in each], axis=1).astype(
-                np.float64
-            )
+            sampled = [sensor.samples for sensor in source.sensors.values()]
+            # the last samples of sensors on coarser surfaces come later
+            count = min(map(len, sampled))
+            channels = [samples[:count] for samples in sampled]
+            signals = np.concatenate(channels, axis=1).astype(np.float64)
             rate = next(iter(source.sensors.values())).rate
         write_wav(self._path, signals * gain(signals), round(rate / source.slow_motion))
 

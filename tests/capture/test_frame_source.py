@@ -1,4 +1,4 @@
-"""Motion blur and depth of field as of a camera, means of pixels, and where a scene's camera stands."""
+"""Motion blur, depth of field, means of pixels, and the place of a scene's camera."""
 
 import dataclasses
 from typing import Any
@@ -39,7 +39,7 @@ def last_frame(scene: Scene, frames: int = 1, **options: Any) -> np.ndarray:
 
 
 def blot(scene: Scene, part: tuple[slice, slice], frames: int = 1) -> tuple[float, np.ndarray]:
-    """Area [pixels] of what covers a part of the picture, and its variance along x and y [pixels^2]."""
+    """Area of a shape in a picture [pixels], and its variance along x and y [pixels^2]."""
     alpha = last_frame(scene, frames, transparent=True)[part][..., 3] / 255
     at = np.indices(alpha.shape)[::-1]
     mean = (alpha * at).sum(axis=(1, 2), keepdims=True) / alpha.sum()

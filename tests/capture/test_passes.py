@@ -1,4 +1,4 @@
-"""Passes against what is known of the scene: a ball, a floor, and points that are tracked on a rippling egg."""
+"""Passes of scenes that are known: a ball, a floor, and tracked points on a rippling egg."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""What a program writes into the model between two frames is seen in the next one, as a renderer made then sees it."""
+"""Changes of the model between two frames are drawn in the next one, as by a new renderer."""
 
 import numpy as np
 import pytest
@@ -111,7 +111,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def drawn():
-    """Frames of the model as it was, and a function that draws it after a change, with this renderer and a new one."""
+    """A frame, and a function that draws the changed model with this renderer and a new one."""
     model, data, ripples = scene()
     kept = {name: getattr(model, name).copy() for name in WRITTEN}
     headlight = model.vis.headlight.diffuse.copy()

@@ -48,7 +48,7 @@ def page(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def ours(scene: Scene, opengl: None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A frame of our renderer, which of its pixels show the egg, and the heights of the page's vertices."""
+    """A frame of our renderer, its pixels of the egg, and the heights of the page's vertices."""
     simulation = Simulation(scene, fps=FPS)
     source = FrameSource(simulation, width=SIZE[0], height=SIZE[1])
     *_, snapshot = snapshots(simulation, SEEN + 1)
@@ -291,7 +291,7 @@ def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
 def test_the_browser_has_moving_surfaces(
     browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
 ) -> None:
-    """A soft body that moves from the first frame, and a geom that is moved by hand within the second chunk."""
+    """A soft body that moves from the first frame, and a geom moved by hand in the second chunk."""
     data = mujoco.MjData(soft_model)
     waves = Material(speed=0.3, density=1500.0)
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")

@@ -1,4 +1,4 @@
-"""Frames of a model with ripples in somebody's own loop, where `mujoco.Renderer` was, which draws the rest alike."""
+"""`RippleRenderer` in a loop of one's own, in place of `mujoco.Renderer`."""
 
 import copy
 import os

@@ -1,4 +1,4 @@
-"""`RippleRenderer` draws the scene as it stands, whatever a program writes into it before `render`, as MuJoCo does."""
+"""`RippleRenderer` draws what a program writes into the scene before `render`, as MuJoCo does."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Colour map and heatmaps, baselines, grids, bounded histories, limits that hold still, short numbers."""
+"""Colour map, heatmaps, baselines, grids, bounded histories, steady limits, short numbers."""
 
 import numpy as np
 import pytest

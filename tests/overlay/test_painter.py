@@ -1,4 +1,4 @@
-"""Sprites, arrows and panels: coverage, opacity, clipping, text; overlays are drawn where they belong alone."""
+"""Sprites, arrows and panels: coverage, opacity, clipping, text, and their places."""
 
 import dataclasses
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Panels and contact marks: sizes follow the frame's, panels stay inside it, and marks are where a camera sees them."""
+"""Panels have sizes that follow the frame's; contact marks are where a camera sees them."""
 
 import itertools
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ SCALE = 1.0, 1.0
 
 @pytest.fixture
 def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, float, Sprite]]:
-    """Boxes (left, top, right, bottom) of everything that is written, and the sprite that it is written on."""
+    """Boxes (left, top, right, bottom) of all texts, and the sprites on which they are written."""
     boxes = []
     plain = Sprite.text
 

@@ -1,4 +1,4 @@
-"""Options of a video: what the scene and the output decide, what is refused, and how many frames there are."""
+"""Options of a video: defaults by scene and output, refusals, and the number of frames."""
 
 import dataclasses
 import importlib.resources

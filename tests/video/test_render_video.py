@@ -157,7 +157,7 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
 def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(
     scene, tmp_path, monkeypatch
 ):
-    """The software driver taken for hardware: two threads share its context, and two frames are on their way."""
+    """A software driver taken for hardware: two threads share its context, two frames wait."""
     threads: set[str] = set()
     for hardware in (False, True):
         threads.clear()

@@ -1,4 +1,4 @@
-"""The surface of a target: its colour, its heatmap, both of its sides, and its mesh, cut at charts."""
+"""The surface of a target: colour, heatmap, both sides, and its mesh cut at charts."""
 
 from types import SimpleNamespace
 
@@ -52,7 +52,7 @@ def turned(points: np.ndarray, seed: int) -> np.ndarray:
 
 
 def ball_mesh(divisions: int, seed: int):
-    """F, attributes, same of a ball whose coordinates for the charts are its vertices' directions."""
+    """F, attributes and same of a ball; its chart coordinates are directions of vertices."""
     ball = shapes.ball(divisions)
     V = turned(ball.shell, seed)
     return ball.faces, np.concatenate([2 * V, V, V], axis=1), np.arange(len(V))
@@ -135,7 +135,7 @@ def test_vertices_are_the_same_on_both_sides_of_a_border_and_nowhere_else(pair):
 
 
 def test_texture_coordinates_keep_their_jump_where_a_seam_crosses_a_border():
-    """Two triangles with a common side over an edge of the cube: a texture ends on one side and begins on the other."""
+    """Two triangles share a side over an edge of the cube, at which a texture ends and begins."""
     V = np.array(
         [[1.0, 0.1, 0.5], [1.0, 0.1, -0.5], [0.5, -0.6, 1.0], [0.5, 0.8, 1.0], [0.5, 0.1, 1.0]]
     )
@@ -211,7 +211,7 @@ def sheet(turned: bool) -> TexelMesh:
 
 
 def picture(gl, turned: bool, above: bool) -> np.ndarray:
-    """Frame of a bump under a lamp and a ball that are above or below the sheet, as is the camera."""
+    """Frame of a bump, with lamp, ball and camera above or below the sheet."""
     side = 1 if above else -1
     model, data = posed(MODEL.format(-side, 0.6 * side))
     texels = sheet(turned)

@@ -1,4 +1,4 @@
-"""Displaced vertices: the GPU's spline against the CPU's and against a sum over texels, and the world they end in."""
+"""Displaced vertices in the world: splines on GPU and CPU, against a sum over texels."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ class NoGeoms:
 def vertices_at(
     chart, uv, positions=None, directions=None, midpoints=0, page=PAGE
 ) -> SurfaceVertices:
-    """Vertices at places in charts; the last of them are midpoints, at least one that is never used."""
+    """Vertices at places in charts; the last ones are midpoints, at least one is never used."""
     chart = np.append(chart, 0)
     uv = np.concatenate([uv, [[0.5, 0.5]]])
     positions, directions = (
@@ -81,7 +81,7 @@ def random_places(count: int, seed: int):
 
 
 def spline_sum(height_map: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """The quadratic B-spline as a sum over all texels of a chart with its halo, by its definition."""
+    """The quadratic B-spline by its definition: a sum over all texels of a chart and its halo."""
 
     def weight(x):
         x = np.abs(x)

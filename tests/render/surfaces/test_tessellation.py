@@ -37,7 +37,7 @@ def test_subdivision_splits_long_edges_opens_no_gap_and_rounds_a_ball():
 
 
 def test_subdivision_keeps_creases_and_flat_faces_as_they_are():
-    """A cube whose vertices are split at its edges, and one of whose faces is cut by a seam of texture coordinates."""
+    """A cube with vertices split at its edges; a seam of texture coordinates cuts one face."""
     cube = shapes.box(1)
     V = cube.positions(np.ones(3), np.full(3, 1e-9))
     F = cube.faces
@@ -73,7 +73,7 @@ def test_subdivision_stops_at_the_budget():
 
 
 def ball(tolerance, min_length=0.0):
-    """A ball whose triangles share no vertices, so that each edge is a seam: its refinement, and all vertices."""
+    """A refined ball whose triangles share no vertices: each edge is a seam; and all vertices."""
     shape = shapes.ball(12)
     V = shape.shell[shape.faces].reshape(-1, 3)
     _, same = np.unique(V.round(9), axis=0, return_inverse=True)
@@ -176,7 +176,7 @@ SIZE = (120, 480)
 
 @pytest.fixture(scope="module")
 def scene(gl):
-    """A renderer of a ball and its atlas, and what draws its height field: from the host's memory, or on the GPU."""
+    """A renderer of a ball, its atlas, and a function that draws heights from host or GPU."""
     balls = (
         '<geom type="sphere" size=".5" pos="0 0 .5"/><geom type="sphere" size=".1" pos=".5 .4 .9"/>'
     )

@@ -1,4 +1,4 @@
-"""The vertices that a target is drawn with: as round and sharp as it is, and looked up in one place."""
+"""Vertices of a target: as round and as sharp as it is, with heights from one place."""
 
 import mujoco
 import numpy as np
@@ -53,7 +53,7 @@ def test_midpoints_come_last_and_lie_halfway_on_the_map(vertices):
 
 
 def test_a_wave_over_the_edges_of_a_box_is_a_smooth_curve():
-    """Of 8 texels a length, at the worst moment: the chords of its curve are off by less than a fiftieth."""
+    """Of 8 texels a length, at the worst moment: its chords are off by less than a fiftieth."""
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><geom type="box" size=".5 .4 .3"/></worldbody></mujoco>'
     )

@@ -1,4 +1,4 @@
-"""Normals of a mesh's corners; ambient occlusion and thickness of solids on which both are known."""
+"""Normals of the corners of meshes; ambient occlusion and thickness of known solids."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def test_normals_are_smooth_below_the_crease_angle_and_sharp_above():
 
 
 def test_triangles_share_normals_from_crease_to_crease():
-    """A sheet folded sharply along half of a line: the fold has two sides, and runs out smoothly at its end."""
+    """A sheet folded along half a line: the fold has two sides and runs out smoothly."""
     x, y = (a.ravel() for a in np.mgrid[-3:4, -3:4].astype(float))
     V = np.stack([x, y, np.abs(x) * np.clip(y, 0, None) * 0.8], axis=1)
     i = (np.arange(6)[:, None] * 7 + np.arange(6)).ravel()

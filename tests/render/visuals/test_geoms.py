@@ -1,4 +1,4 @@
-"""Geoms and sites that are drawn, their materials, and how much of the sky capsules in their place hide."""
+"""Geoms and sites as they are drawn, their materials, and the sky that capsules hide."""
 
 import warnings
 
@@ -23,7 +23,7 @@ def test_groups_above_two_are_hidden(gl):
 
 
 def test_sites_of_visible_groups_are_drawn_like_geoms(gl):
-    """As MuJoCo draws them: round, in their colour or their material's, clear where they are, with a shadow."""
+    """Sites are drawn as by MuJoCo: round, in their colour or material's, clear, with a shadow."""
     site = '<site type="sphere" size=".3" pos="0 0 .8" {}/>'
     plain = frame_of(gl, FLOOR, camera=FRONT)
     as_body = frame_of(gl, FLOOR + BALL, camera=FRONT)

@@ -30,7 +30,7 @@ def test_light_adds_up_to_mujocos_brightness_in_both_extremes():
 
 
 def test_the_beam_of_a_spot_falls_off_in_srgb_as_in_mujoco():
-    """At 60 degrees from the axis, MuJoCo's cosine to the power of 2 leaves a quarter of the light, in sRGB."""
+    """At 60 degrees from the axis MuJoCo's squared cosine leaves a quarter of the light in sRGB."""
     lamp = '<light pos="0 0 1" dir="0 0 -1" diffuse=".5 .5 .5" cutoff="80" exponent="2"/>'
     model, data = posed(
         f'<mujoco><visual><headlight active="0"/></visual><worldbody>{lamp}</worldbody></mujoco>'

@@ -1,4 +1,4 @@
-"""Round geoms are as finely tessellated as the frame needs, stand where MuJoCo's do, and shaders read their table."""
+"""Round geoms: tessellation as fine as a frame needs, MuJoCo's places, and the table."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Shapes of geoms, meshes and height fields are as large as MuJoCo says, closed, and of the right area."""
+"""Shapes of geoms, meshes and height fields have MuJoCo's sizes and areas, and are closed."""
 
 import mujoco
 import numpy as np
@@ -59,7 +59,7 @@ def ellipsoid_area(a: float, b: float, c: float) -> float:
 def test_a_primitive_is_closed_and_has_its_sizes_its_volume_and_its_area(
     geom, half, volume, area, segments
 ):
-    """Edges of a box and rims of a cylinder are drawn a little rounded, and have their area where they are sharp."""
+    """Edges of a box and rims of a cylinder are a little rounded; sharp ones have their area."""
     _, shape, core, shell = drawn(geom, segments)
     V = shape.positions(core, shell)
     F = shape.faces

@@ -19,7 +19,7 @@ FROM_X = Camera((0.0, 0.0, 0.0), 4.0, 180.0, 0.0, 20.0)  # the frame's right is 
 
 
 def names(gl, model, places, camera=FROM_X, targets=None) -> str:
-    """Names of the colours at points of the frame, x to the right and y upwards from its middle, in pixels."""
+    """Names of the colours at points of the frame [pixels], right and up of its middle."""
     with Renderer(gl, model, targets or {}, size=(SIZE, SIZE), lighting="studio") as renderer:
         frame = renderer.render(forwarded(model), {}, camera).astype(float)
     found = ""
