@@ -195,6 +195,23 @@ class Pair(NamedTuple):
         return min(self.key), max(self.key)
 
 
+class Work(NamedTuple):
+    """What the force of a pair does in a step.
+
+    Attributes
+    ----------
+    pair : Pair
+    on_bodies : float
+        Work of the pair's contacts on the bodies [J].
+    force : float
+        On the surface [N].
+    """
+
+    pair: Pair
+    on_bodies: float
+    force: float
+
+
 class DualDiagonal:
     """The diagonal of A + R, the matrix of MuJoCo's dual problem, with A the inverse mass that each row feels.
 
@@ -304,8 +321,8 @@ class ContactProblem:
                 soft[rows] += less * (self._R[rows] + soft[rows] + lost)
         return self._total(force)
 
-    def works(self) -> list[tuple[Pair, float, float]]:
-        """Work that each pair's contacts do on bodies [J], and the force on the surface [N]."""
+    def works(self) -> list[Work]:
+        """What the force of each pair does, with the forces that were found."""
         force = self._data.efc_force
         work = defaultdict[Key, float](float)
         means = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
@@ -314,7 +331,7 @@ class ContactProblem:
             aside = self._dt * float(force[whole] @ means[whole]) - along
             work[mine[0].key] += along + max(aside, 0.0)
         total = self._total(force)
-        return [(pair, work[key], total[key]) for key, pair in self._pairs.items()]
+        return [Work(pair, work[key], total[key]) for key, pair in self._pairs.items()]
 
     def _normal(self, force: Floats) -> list[float]:
         """Normal force of each contact on its bodies, without what adhesion takes of it [N]."""

@@ -3,14 +3,13 @@
 Two elastic bodies press each other with a force that grows as the power 3/2 of their approach
 (Hertz 1882; Johnson, Contact Mechanics, 1985, sections 4.2 and 11.4). A ball that hits leaves after
 microseconds to milliseconds, where MuJoCo's contact holds it for tens of milliseconds. When a hit
-begins, its impulse is foreseen from MuJoCo's own contact law, and given over Hertz's time. What
-MuJoCo's contact then gives, the surface has already, and the rest comes as it comes: nothing is
-lost.
+begins, its impulse is foreseen from MuJoCo's own contact law, and given over Hertz's time. The
+surface then has the impulse of MuJoCo's contact in advance; what the contact gives beyond the
+foreseen impulse follows when it comes, so that nothing is lost.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -24,6 +23,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Load
 from ripple_sim.solver.errors import POSITIVE, shown, warn_caller
 from ripple_sim.solver.kernel import Floats, Ints
+from ripple_sim.solver.waves.load import StepLoad
 
 from .contacts import Contacts, collider_ids, normal_rows
 from .energy import impedance
@@ -33,23 +33,27 @@ from .target import Target
 
 PULSES = ("contact", "hertz")
 
-# A body is put down, and does not hit, where its speed is what it gains within this time as it
-# falls [s].
-_PUT_DOWN = 0.005
-# Steps of MuJoCo's contact until it is at rest, at most.
-_STEPS = 1000
+# A body is put down, and does not hit, where it gains its speed within this time as it falls [s].
+_PUT_DOWN_TIME = 0.005
+# Steps of MuJoCo's contact in which it is looked for when the bodies part.
+_MAX_CONTACT_STEPS = 1000
 # Product over squared sum of the principal curvatures of a gap that counts as round: 1/4 for a
 # ball, 0.08 where one is ten times the other. Hertz's time is off by 4 % there if both count by
 # their mean.
-_ROUND = 0.08
-# Cosine to the axis of a capsule or a cylinder, up to which its side touches.
-_SIDE = 0.02
-# Mean of the normals under a footprint, below which it lies over an edge.
-_EDGE = 0.9
+_MIN_ROUNDNESS = 0.08
+# Cosine between a normal and the axis of a capsule or a cylinder, up to which its side touches.
+_MAX_SIDE_COSINE = 0.02
+# Length of the mean of the normals under a footprint, below which it lies over an edge.
+_MIN_MEAN_NORMAL = 0.9
 # A pulse is given in so many parts, or as many as it has substeps.
-_PARTS = 32
-# Shares beyond this are all.
-_WHOLE = 1 - 1e-9
+_PARTS_PER_PULSE = 32
+# From this share of its time on, a pulse is over: a bound for round-off.
+_OVER = 1 - 1e-9
+# Singular values of a footprint's extent below this share of the greatest are 0: the footprint has
+# no extent along its normal.
+_MIN_EXTENT_SHARE = 1e-6
+# Factor of Hertz's time of contact: Johnson, equation 11.24, whose rounded factor is 2.87.
+_HERTZ_TIME_FACTOR = 2.868
 
 
 def hertz_moduli(model: mujoco.MjModel, targets: Mapping[str, Target]) -> dict[int, float]:
@@ -61,18 +65,17 @@ def hertz_moduli(model: mujoco.MjModel, targets: Mapping[str, Target]) -> dict[i
     for name, target in targets.items():
         if target.pulse not in PULSES:
             raise SceneError(
-                f"pulse is {shown(target.pulse)} for geom {name!r}; valid are "
-                f"{', '.join(map(repr, PULSES))}"
+                f"pulse of geom {name!r} must be one of {', '.join(map(repr, PULSES))}, got "
+                f"{shown(target.pulse)}"
             )
         if target.pulse != "hertz":
             continue
         if not POSITIVE.holds(target.modulus):
             raise SceneError(
                 f"modulus is {shown(target.modulus)} Pa for geom {name!r}, whose pulse is 'hertz'; "
-                f"valid is "
-                f"{POSITIVE.words}: E* of the two materials, 1 / E* = (1 - nu1^2) / E1 + (1 - "
-                f"nu2^2) / E2, about 1e11 "
-                "for steel on steel, 1e9 for wood, 1e6 for a rubber ball on anything hard"
+                f"valid is {POSITIVE.words}: E* of the two materials, "
+                "1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2, about 1e11 for steel on steel, "
+                "1e9 for wood, 1e6 for a rubber ball on anything hard"
             )
         moduli[find_any(model, name)] = float(target.modulus or 0.0)
     return moduli
@@ -84,7 +87,7 @@ def given_share(age: float) -> float:
     With x the approach over the greatest one, x' = sqrt(1 - x^(5/2)) in its own time: time is an
     incomplete beta function of x^(5/2), and the impulse is (1 - x') / 2 while they approach.
     """
-    if age >= _WHOLE:
+    if age >= _OVER:
         return 1.0
     early = min(age, 1 - age)
     share = (1 - math.sqrt(1 - float(betaincinv(0.4, 0.5, 2 * early)))) / 2
@@ -92,90 +95,163 @@ def given_share(age: float) -> float:
 
 
 class Pulse(NamedTuple):
-    """What a hit gives: impulses [N s] on texels [k], over how long, and how long ago it began [s]."""
+    """The impulse of a hit, which is given over some time.
+
+    Attributes
+    ----------
+    texels : int64 [k]
+        Flat texel indices.
+    impulses : float64 [k]
+        On the texels [N s], positive inwards.
+    duration : float
+        How long the pulse lasts [s].
+    age : float
+        How long ago the pulse began [s].
+    """
 
     texels: Ints
     impulses: Floats
     duration: float
     age: float
 
+    def load(self, first: int, count: int, substep: float) -> Load | None:
+        """Mean force over `count` substeps [s] from the first one; None where nothing is given."""
+        begin = (self.age + first * substep) / self.duration
+        end = (self.age + (first + count) * substep) / self.duration
+        share = given_share(end) - given_share(begin)
+        if not share:
+            return None
+        return Load(self.texels, self.impulses * (share / (count * substep)))
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class PulsedLoad(Load):
-    """A load with pulses, which change within a step."""
 
+class PulsedLoad(NamedTuple):
+    """A constant load together with pulses, which change within a step; a `StepLoad`.
+
+    It is no `Load`: what takes constant forces alone does not take it.
+
+    Attributes
+    ----------
+    constant : Load
+    pulses : tuple of Pulse
+        At least one.
+    """
+
+    constant: Load
     pulses: tuple[Pulse, ...]
 
     def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
-        """Each part is a substep, or the 32nd of the shortest pulse; then what is held alone."""
-        held = Load(self.texels, self.forces)
+        """Each part is a substep, or the 32nd of the shortest pulse; then the constant load alone."""
         substep = dt / substeps
-        size = max(1, int(min(each.duration for each in self.pulses) / (_PARTS * substep)))
-        last = min(
-            substeps,
-            math.ceil(max(each.duration - each.age for each in self.pulses) / substep * _WHOLE),
-        )
-        for first in range(0, last, size):
-            count = min(size, last - first)
-            loads = [held]
-            for each in self.pulses:
-                begin, end = (
-                    (each.age + at * substep) / each.duration for at in (first, first + count)
-                )
-                share = given_share(end) - given_share(begin)
-                if share:
-                    loads.append(Load(each.texels, each.impulses * (share / (count * substep))))
+        shortest = min(pulse.duration for pulse in self.pulses)
+        remaining = max(pulse.duration - pulse.age for pulse in self.pulses)
+        substeps_a_part = max(1, int(shortest / (_PARTS_PER_PULSE * substep)))
+        pulsed_substeps = min(substeps, math.ceil(remaining / substep * _OVER))
+        for first in range(0, pulsed_substeps, substeps_a_part):
+            count = min(substeps_a_part, pulsed_substeps - first)
+            loads = [self.constant]
+            for pulse in self.pulses:
+                load = pulse.load(first, count, substep)
+                if load is not None:
+                    loads.append(load)
             yield count, Load.together(loads)
-        if last < substeps:
-            yield substeps - last, held
+        if pulsed_substeps < substeps:
+            yield substeps - pulsed_substeps, self.constant
 
 
-def foreseen(
-    model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints
-) -> tuple[float, float, float] | None:
-    """How a pair hits at the beginning of a step: effective mass [kg], speed [m/s], and the impulse to come [N s].
+class Hit(NamedTuple):
+    """How a pair hits at the beginning of a step.
+
+    Attributes
+    ----------
+    mass : float
+        Effective mass [kg].
+    speed : float
+        With which the two approach [m/s].
+    impulse : float
+        Impulse that MuJoCo's contact is going to give [N s].
+    """
+
+    mass: float
+    speed: float
+    impulse: float
+
+
+def foreseen(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Hit | None:
+    """The hit of a pair whose contacts begin in this step, by their indices among MuJoCo's, [k].
 
     None where nothing pushes, or not against a mass, or a body is put down. The mass is the
     contacts' force over the acceleration that all constraints give the pair: where a body hits at
-    several places at once, each has its share. The impulse is what it takes to turn the bodies
-    round as MuJoCo's contact does in its steps, but for what pulls.
+    several places at once, each has its share. The impulse is the one that turns the bodies round
+    as MuJoCo's contact does in its steps, without the forces that pull the two together.
     """
-    rows, of = normal_rows(model, data, contacts)
-    force = float(data.efc_force[rows].sum())
+    rows, contact_of_row = normal_rows(model, data, contacts)
+    row_forces = data.efc_force[rows]
+    force = float(row_forces.sum())
     if not force > 0:
         return None
     # what is across the normal cancels in a mean over the edges of a pyramid, whatever their forces
-    shares = (np.bincount(of, data.efc_force[rows]) / np.bincount(of))[of] / force
-    along = np.zeros((2, data.nefc))
-    mujoco.mj_mulJacVec(model, data, along[0], data.qacc_smooth)
-    mujoco.mj_mulJacVec(model, data, along[1], data.qacc)
-    free, solved = along[:, rows] @ shares
-    pull = -free  # together [m/s^2]
-    start = speed = -shares @ data.efc_vel[rows]
-    if not solved > free or speed <= max(pull, 0.0) * _PUT_DOWN:
+    edge_means = np.bincount(contact_of_row, row_forces) / np.bincount(contact_of_row)
+    shares = edge_means[contact_of_row] / force
+    accelerations = np.zeros((2, data.nefc))
+    mujoco.mj_mulJacVec(model, data, accelerations[0], data.qacc_smooth)
+    mujoco.mj_mulJacVec(model, data, accelerations[1], data.qacc)
+    # along the normal, without and with the constraints' forces [m/s^2]
+    free, solved = accelerations[:, rows] @ shares
+    pull = -free  # acceleration towards each other [m/s^2]
+    speed = -shares @ data.efc_vel[rows]
+    if not solved > free or speed <= max(pull, 0.0) * _PUT_DOWN_TIME:
         return None
+    rebound = _rebound_speed(model, data, contacts, rows, shares, speed, pull)
+    mass = force / (solved - free)
+    return Hit(mass, speed, mass * (speed + rebound))
+
+
+def _rebound_speed(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    contacts: Ints,
+    rows: Ints,
+    shares: Floats,
+    speed: float,
+    pull: float,
+) -> float:
+    """Speed with which MuJoCo's contact lets two bodies part [m/s]; 0 where they stay together.
+
+    Parameters
+    ----------
+    model, data, contacts
+        See `foreseen`.
+    rows : int64 [m]
+        Of the constraint solver, which carry the normal forces of the contacts.
+    shares : float64 [m]
+        Of each row in the motion of the pair.
+    speed : float
+        With which the two approach [m/s].
+    pull : float
+        Acceleration towards each other without the contact [m/s^2].
+    """
     # MuJoCo's contact: a spring [1/s^2] and a damper [1/s] at a depth [m]
     spring, damper, *_ = shares @ data.efc_KBIP[rows]
     depth = shares @ (data.efc_margin - data.efc_pos)[rows]
     solimp = data.contact.solimp[contacts[0]]
-    for _ in range(_STEPS):
-        decides = impedance(solimp, max(depth, 0.0))
-        push = decides * (damper * speed + spring * decides * depth + pull)
+    for _ in range(_MAX_CONTACT_STEPS):
+        impedance_here = impedance(solimp, max(depth, 0.0))
+        push = impedance_here * (damper * speed + spring * impedance_here * depth + pull)
         if push <= max(pull, 0.0):
             break
         speed -= (push - pull) * model.opt.timestep
         depth += speed * model.opt.timestep
-    mass = force / (solved - free)
-    return mass, start, mass * (start + max(-speed, 0.0))
+    return max(-speed, 0.0)
 
 
 def surface_bend(model: mujoco.MjModel, geom: int, normal: Floats) -> NDArray[np.float64] | None:
-    """How the normal of a round geom turns along its surface, where it is the given one, in its frame: [3, 3] [1/m].
+    """How the normal of a round geom turns along its surface, in the geom's frame, [3, 3] [1/m].
 
-    Of spheres, ellipsoids, capsules, the sides of cylinders, and planes; None for all others.
+    It holds where the surface has the given normal [3]. Round are spheres, ellipsoids, capsules,
+    the sides of cylinders, and planes; None for all others.
     """
     size = model.geom_size[geom]
-    on_side = abs(normal[2]) < _SIDE
+    on_side = abs(normal[2]) < _MAX_SIDE_COSINE
     match mujoco.mjtGeom(model.geom_type[geom]):
         case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
             return np.diag(size**-2.0) * np.linalg.norm(size * normal)
@@ -189,7 +265,9 @@ def surface_bend(model: mujoco.MjModel, geom: int, normal: Floats) -> NDArray[np
 
 
 def atlas_bend(atlas: Atlas, texels: Ints, normal: Floats) -> NDArray[np.float64] | None:
-    """The same of a target, by least squares over some texels; None over an edge.
+    """How the normal of a target turns along its surface, [3, 3] [1/m]; None over an edge.
+
+    It is found by least squares over some texels.
 
     Parameters
     ----------
@@ -198,23 +276,26 @@ def atlas_bend(atlas: Atlas, texels: Ints, normal: Floats) -> NDArray[np.float64
     normal : float64 [3]
         On the side that is touched.
     """
-    points, normals = (each.reshape(-1, 3)[texels] for each in (atlas.positions, atlas.normals))
-    mean = normals.mean(axis=0)
-    if np.linalg.norm(mean) < _EDGE:
+    points = atlas.positions.reshape(-1, 3)[texels]
+    normals = atlas.normals.reshape(-1, 3)[texels]
+    mean_normal = normals.mean(axis=0)
+    if np.linalg.norm(mean_normal) < _MIN_MEAN_NORMAL:
         return None
-    away = points - points.mean(axis=0)
-    turned = normals - mean
-    bend = turned.T @ away @ np.linalg.pinv(away.T @ away, rcond=1e-6) * np.sign(mean @ normal)
+    offsets = points - points.mean(axis=0)
+    turns = normals - mean_normal
+    inverse = np.linalg.pinv(offsets.T @ offsets, rcond=_MIN_EXTENT_SHARE)
+    bend = turns.T @ offsets @ inverse * np.sign(mean_normal @ normal)
     return (bend + bend.T) / 2
 
 
 class Hits:
     """Gives the hits on a target the pulse of Hertz's law.
 
-    It is that of two smooth round bodies: the other geom is a sphere, an ellipsoid, a capsule, the
-    side of a cylinder or a plane, and the gap is about as round along one axis as along the other.
-    Other hits keep MuJoCo's pulse, and a warning says so, once a reason. Bodies that are put down
-    keep it without a word, and all that comes after a hit.
+    The law is one of two smooth round bodies: the other geom is a sphere, an ellipsoid, a capsule,
+    the side of a cylinder or a plane, and the gap is about as round along one axis as along the
+    other. Other hits keep MuJoCo's pulse, and a warning says so, once for each reason. MuJoCo's
+    pulse also stays for bodies that are put down, and for all forces after a hit; both without a
+    warning.
 
     Parameters
     ----------
@@ -230,7 +311,8 @@ class Hits:
         self._target = target
         self._modulus = modulus
         self._pulses: list[Pulse] = []
-        self._told: set[str] = set()
+        # reasons for which a warning was given
+        self._warned_of: set[str] = set()
 
     def clear(self) -> None:
         """End all pulses."""
@@ -246,11 +328,11 @@ class Hits:
         data : mujoco.MjData
         atlas : Atlas
         pair : Contacts
-            Of that geom.
+            Of the geom with the target.
         texels : int64 [k]
-            That carry them.
+            The texels that carry the contacts.
         shares : float64 [k]
-            What a unit of the contacts' impulse gives these.
+            What a unit of the contacts' impulse gives each texel.
 
         Returns
         -------
@@ -258,66 +340,76 @@ class Hits:
             Impulse that the target gets by the pulse [N s], positive inwards.
         """
         other = int(pair.others[0])
-        colliders = collider_ids(self._coupled, data)
-        ours = np.isin(colliders, [self._target, *self._coupled.collision_geoms(self._target)])
-        touching = (ours[:, ::-1] & (colliders == other)).any(axis=1) & (
-            data.contact.efc_address >= 0
-        )
-        hit = foreseen(self._coupled.model, data, touching.nonzero()[0])
+        hit = foreseen(self._coupled.model, data, self._contacts_with(data, other))
         if hit is None or not shares.any():
             return 0.0
         radius = self._radius(data, atlas, pair, texels, other)
         if isinstance(radius, str):
-            if radius not in self._told:
-                self._told.add(radius)
-                names = self._coupled.names
-                owners = self._coupled.owners
-                own = names[owners[self._target]]
-                others = names[owners[other]]
-                warn_caller(
-                    f"the hit of {others!r} on {own!r} keeps MuJoCo's contact pulse, and so do "
-                    f"others like it: {radius}"
-                )
+            self._warn(other, radius)
             return 0.0
-        # how long two elastic bodies touch: Johnson, equation 11.24, whose factor is 2.87, with
-        # 1 / m = 1 / m1 + 1 / m2 and 1 / R = 1 / R1 + 1 / R2
-        mass, speed, impulse = hit
-        duration = 2.868 * (mass**2 / (radius * self._modulus**2 * speed)) ** 0.2
-        impulses = impulse * shares
-        self._pulses.append(Pulse(texels, impulses, duration, 0.0))
+        # how long two elastic bodies touch, with 1 / m = 1 / m1 + 1 / m2 and
+        # 1 / R = 1 / R1 + 1 / R2
+        time_to_the_fifth = hit.mass**2 / (radius * self._modulus**2 * hit.speed)
+        duration = _HERTZ_TIME_FACTOR * time_to_the_fifth**0.2
+        impulses = hit.impulse * shares
+        self._pulses.append(Pulse(texels, impulses, duration, age=0.0))
         return float(impulses.sum())
 
-    def over(self, load: Load, elapsed: float) -> Load:
-        """A load with the pulses of a time [s], which then has passed."""
+    def over(self, load: Load, elapsed: float) -> StepLoad:
+        """Add the pulses of the coming time [s] to a load; the pulses are then older by this time."""
         if not self._pulses:
             return load
         pulses = tuple(self._pulses)
-        older = (each._replace(age=each.age + elapsed) for each in pulses)
-        self._pulses = [each for each in older if each.age < _WHOLE * each.duration]
-        return PulsedLoad(load.texels, load.forces, pulses)
+        older = (pulse._replace(age=pulse.age + elapsed) for pulse in pulses)
+        self._pulses = [pulse for pulse in older if pulse.age < _OVER * pulse.duration]
+        return PulsedLoad(load, pulses)
+
+    def _contacts_with(self, data: mujoco.MjData, other: int) -> Ints:
+        """MuJoCo's contacts of a collider with the target that carry a force, [k]."""
+        colliders = collider_ids(self._coupled, data)
+        ours = np.isin(colliders, [self._target, *self._coupled.collision_geoms(self._target)])
+        of_pair = (ours[:, ::-1] & (colliders == other)).any(axis=1)
+        return (of_pair & (data.contact.efc_address >= 0)).nonzero()[0]
+
+    def _warn(self, other: int, reason: str) -> None:
+        """Warn once that hits keep MuJoCo's pulse for this reason."""
+        if reason in self._warned_of:
+            return
+        self._warned_of.add(reason)
+        names = self._coupled.names
+        owners = self._coupled.owners
+        target_name = names[owners[self._target]]
+        other_name = names[owners[other]]
+        warn_caller(
+            f"the hit of {other_name!r} on {target_name!r} keeps MuJoCo's contact pulse, and so do "
+            f"others like it: {reason}"
+        )
 
     def _radius(
         self, data: mujoco.MjData, atlas: Atlas, pair: Contacts, texels: Ints, other: int
     ) -> float | str:
-        """Radius of the ball on a plane whose gap is like that of a pair [m], or why there is none."""
+        """Radius of a ball on a plane with the same gap as the pair [m], or why there is none."""
         coupled = self._coupled
         if self._target in coupled.soft or other >= coupled.model.ngeom:
             return "Hertz's law is one of rigid geoms, not of flexes and skins"
         shares = pair.forces / pair.forces.sum()
         normal = shares @ pair.normals
         normal /= np.linalg.norm(normal)
-        turn = data.geom_xmat[other].reshape(3, 3)
-        own = data.geom_xmat[self._target].reshape(3, 3)
-        theirs = surface_bend(coupled.model, other, -normal @ turn)
-        if theirs is None:
+        rotation = data.geom_xmat[other].reshape(3, 3)
+        target_rotation = data.geom_xmat[self._target].reshape(3, 3)
+        bend = surface_bend(coupled.model, other, -normal @ rotation)
+        if bend is None:
             return "valid are spheres, ellipsoids, capsules, sides of cylinders, and planes"
-        ours = atlas_bend(atlas, texels, normal @ own)
-        if ours is None:
+        target_bend = atlas_bend(atlas, texels, normal @ target_rotation)
+        if target_bend is None:
             return "an edge is hit"
         across = np.eye(3) - np.outer(normal, normal)
-        gap = across @ (turn @ theirs @ turn.T + own @ ours @ own.T) @ across
+        bend_in_world = rotation @ bend @ rotation.T
+        target_bend_in_world = target_rotation @ target_bend @ target_rotation.T
+        gap = across @ (bend_in_world + target_bend_in_world) @ across
+        # sum and product of the principal curvatures of the gap
         total = float(np.trace(gap))
         product = (total**2 - float((gap * gap).sum())) / 2
-        if total <= 0 or product < _ROUND * total**2:
+        if total <= 0 or product < _MIN_ROUNDNESS * total**2:
             return "they touch along a line, or over an area, not at a point"
         return product**-0.5

@@ -1,15 +1,14 @@
 """From the contacts of a physics step to the loads on the texels of all targets.
 
-What the contacts did is kept, from which the user's records of impulses are made when they are
-asked for. Bodies that MuJoCo lets sleep have no contacts in its data; they still press on what they
-lie on.
+The contacts of each step are kept, and the user's records of impulses are made from them when they
+are asked for. Bodies that MuJoCo lets sleep have no contacts in its data; they still press on the
+targets that they lie on.
 """
 
 from __future__ import annotations
 
 import collections
 import dataclasses
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -17,8 +16,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver import Atlas, Load, WaveSolver
+from ripple_sim.solver import Atlas, WaveSolver
 from ripple_sim.solver.kernel import Bools, Floats, Ints
+from ripple_sim.solver.waves.load import StepLoad
 
 from .contacts import ContactReader, Contacts, first_rows
 from .easing import Easing
@@ -29,7 +29,8 @@ from .rest_filter import DEFAULT_TIME_CONSTANT, NO_FORCES, RestFilter, TexelForc
 from .sleep import SLEEP, at_rest
 from .soft import target_pose
 
-_TINY = 1e-12
+# Keeps a division by the stiffness of a contact's spring finite [1/s^2].
+_MIN_STIFFNESS = 1e-12
 
 # A body falls asleep after it was slow for this many steps: `mjMINAWAKE` of MuJoCo.
 _SLOW_STEPS = 10
@@ -38,8 +39,8 @@ _SLOW_STEPS = 10
 class SleepingContacts:
     """Holds the contacts of bodies that sleep on a target that sleeps too or is static.
 
-    A sleeping body's contacts stay where they were, with their mean force over the steps before it
-    fell asleep, until one of the two wakes.
+    The contacts of a sleeping body stay where they were, with their mean force over the steps
+    before the body fell asleep, until body or target wakes.
     """
 
     def __init__(self, coupled: CoupledModel) -> None:
@@ -49,38 +50,38 @@ class SleepingContacts:
 
     def add(self, data: mujoco.MjData, contacts: Mapping[int, Contacts]) -> dict[int, Contacts]:
         """Contacts of each target, by geom id, with those of sleeping bodies."""
-        present = {
-            (t, other): pair
-            for t, each in contacts.items()
-            for other, pair in each.split(each.others).items()
-        }
-        found = dict(contacts)
+        present: dict[tuple[int, int], Contacts] = {}
+        for target, on_target in contacts.items():
+            for other, pair in on_target.split(on_target.others).items():
+                present[target, other] = pair
+        all_contacts = dict(contacts)
         for key, (pair, sums) in list(self._pairs.items()):
             if key in present:
                 continue
-            if self._coupled.are_still(data, key):
-                mean = pair._replace(
-                    forces=pair.forces * (sum(sums) / len(sums) / pair.forces.sum())
-                )
-                found[key[0]] = (
-                    Contacts.together([found[key[0]], mean]) if key[0] in found else mean
-                )
-            else:
+            if not self._coupled.are_still(data, key):
                 sums.append(0.0)
                 if not any(sums):
                     del self._pairs[key]
+                continue
+            mean_force = sum(sums) / len(sums)
+            asleep = pair._replace(forces=pair.forces * (mean_force / pair.forces.sum()))
+            target = key[0]
+            if target in all_contacts:
+                asleep = Contacts.together([all_contacts[target], asleep])
+            all_contacts[target] = asleep
         for key, pair in present.items():
             _, sums = self._pairs.get(key, (pair, collections.deque[float](maxlen=_SLOW_STEPS)))
             sums.append(float(pair.forces.sum()))
             self._pairs[key] = pair, sums
-        return found
+        return all_contacts
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Impulse:
-    """The impulse that one geom gave to one target in one physics step; one at each place where it is wedged.
+    """The impulse that one geom gave to one target in one physics step.
 
-    Two are equal if all their values are.
+    A geom that is wedged gives one at each place where it touches. Two impulses are equal if all
+    their values are.
 
     Attributes
     ----------
@@ -124,6 +125,30 @@ class Impulse:
         )
 
 
+class _Touches(NamedTuple):
+    """Where geoms or flexes touch a target, for the records of impulses.
+
+    Attributes
+    ----------
+    others : int64 [m]
+        Owners of the colliders that touch, see `CoupledModel`.
+    places : float64 [m, 3]
+        Points on the surface, in the target's frame [m].
+    texels : int64 [m]
+        Flat indices of the texels nearest to the places.
+    forces : float64 [m]
+        [N].
+    inner : bool [m]
+        Whether the inner side of an open surface is touched.
+    """
+
+    others: Ints
+    places: Floats
+    texels: Ints
+    forces: Floats
+    inner: Bools
+
+
 class StepContacts(NamedTuple):
     """What touched a target in a step, and what its surface got, before the rest filter.
 
@@ -141,12 +166,13 @@ class StepContacts(NamedTuple):
         Surface points nearest to the force-weighted middles of their contacts, in the target's
         frame [m].
     texels : int64 [p]
-        Flat indices of the texels nearest to these.
+        Flat indices of the texels nearest to the places.
     forces : float64 [p]
-        Their normal forces [N].
+        Normal force of each collider [N].
     inner : bool [p]
         Whether the inner side of an open surface is touched.
     on_texels : TexelForces
+        The forces on the texels, which the rest filter takes.
     """
 
     target: int
@@ -163,7 +189,7 @@ class StepContacts(NamedTuple):
     def impulses(
         self, names: Sequence[str], owners: Ints, atlas: Atlas, timestep: float
     ) -> Iterator[Impulse]:
-        """One record for each geom or flex that touches; for each place of one that touches in several.
+        """One record for each geom or flex that touches, and for each place where it is wedged.
 
         Parameters
         ----------
@@ -174,47 +200,54 @@ class StepContacts(NamedTuple):
         timestep : float
             How long the forces were held [s].
         """
-        geom = names[owners[self.target]]
         others = owners[self.on_texels.geoms]
-        places = self.places
-        forces = self.forces
-        texels = self.texels
-        inner = self.inner
-        # the last ids are those of a flex's vertices, which touch for themselves and are told of
-        # together
+        offsets2 = ((self.places - self.on_texels.middles) ** 2).sum(axis=1)
+        wedged = offsets2 > self.on_texels.place_radii**2
+        # the last ids are the ids of a flex's vertices, which touch one by one
         if others[-1] != self.on_texels.geoms[-1]:
-            first = first_rows(others)
-            weighted = np.add.reduceat(forces[:, None] * places, first)
-            forces = np.add.reduceat(forces, first)
-            others = others[first]
-            inner = inner[first]
-            places, texels = atlas.nearest(weighted / forces[:, None])
-        # what touches in several places, and not in their middle, as what is wedged does
-        elif (
-            apart := ((places - self.on_texels.middles) ** 2).sum(axis=1)
-            > self.on_texels.place_radii**2
-        ).any():
-            ends = np.append(self.starts[1:], len(self.contacts.forces))
-            points = (self.contacts.points - self.position) @ self.rotation
-            rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
-            whose, middles, forces = corners(
-                rows, points, self.contacts.forces, 2 * self.on_texels.place_radii
-            )
-            kept = np.concatenate([(~apart).nonzero()[0], apart[whose].nonzero()[0] + len(apart)])
-            whose = np.concatenate([np.arange(len(apart)), whose])[kept]
-            forces = np.concatenate([self.forces, forces])[kept]
-            places, texels = atlas.nearest(np.concatenate([places, middles])[kept])
-            others = others[whose]
-            inner = inner[whose]
-        points = self.position + places @ self.rotation.T
-        at = zip(
-            *(each.tolist() for each in np.unravel_index(texels, atlas.areas.shape)), strict=True
+            touches = self._joined_by_flex(others, atlas)
+        elif wedged.any():
+            touches = self._divided_where(wedged, others, atlas)
+        else:
+            touches = _Touches(others, self.places, self.texels, self.forces, self.inner)
+        points = self.position + touches.places @ self.rotation.T
+        impulses = (touches.forces * timestep).tolist()
+        charts, rows, columns = np.unravel_index(touches.texels, atlas.areas.shape)
+        texels = zip(charts.tolist(), rows.tolist(), columns.tolist(), strict=True)
+        inner = touches.inner.tolist()
+        records = zip(touches.others.tolist(), points, impulses, texels, inner, strict=True)
+        geom = names[owners[self.target]]
+        for other, point, impulse, texel, is_inner in records:
+            yield Impulse(geom, names[other], point, impulse, texel, is_inner)
+
+    def _joined_by_flex(self, others: Ints, atlas: Atlas) -> _Touches:
+        """Touches with the vertices of each flex joined, at their force-weighted middle."""
+        first = first_rows(others)
+        weighted = np.add.reduceat(self.forces[:, None] * self.places, first)
+        forces = np.add.reduceat(self.forces, first)
+        places, texels = atlas.nearest(weighted / forces[:, None])
+        return _Touches(others[first], places, texels, forces, self.inner[first])
+
+    def _divided_where(self, wedged: Bools, others: Ints, atlas: Atlas) -> _Touches:
+        """Touches with the geoms that are wedged, [p], divided into the places where they touch.
+
+        A geom that is wedged touches in several places, and not in their middle.
+        """
+        count = len(wedged)
+        ends = np.append(self.starts[1:], len(self.contacts.forces))
+        points = (self.contacts.points - self.position) @ self.rotation
+        rows = np.repeat(np.arange(count), ends - self.starts)
+        corner_rows, corner_points, corner_forces = corners(
+            rows, points, self.contacts.forces, 2 * self.on_texels.place_radii
         )
-        told = zip(
-            others.tolist(), points, (forces * timestep).tolist(), at, inner.tolist(), strict=True
-        )
-        for other, point, impulse, texel, behind in told:
-            yield Impulse(geom, names[other], point, impulse, texel, behind)
+        # whole geoms that are not wedged, then the corners of geoms that are
+        whole = (~wedged).nonzero()[0]
+        divided = wedged[corner_rows].nonzero()[0]
+        chosen = np.concatenate([whole, divided + count])
+        rows = np.concatenate([np.arange(count), corner_rows])[chosen]
+        forces = np.concatenate([self.forces, corner_forces])[chosen]
+        places, texels = atlas.nearest(np.concatenate([self.places, corner_points])[chosen])
+        return _Touches(others[rows], places, texels, forces, self.inner[rows])
 
 
 class TargetLoad:
@@ -229,13 +262,13 @@ class TargetLoad:
     radii : float64 [c]
         Footprint radius of each collider [m]: of a pair the smaller one counts.
     convex : bool [c]
-        Whether what touches at two points touches between them too.
+        Whether a collider that touches at two points touches between them too.
     time_constant : float
-        Of contacts with it [s].
+        Of contacts with the target [s].
     hits : Hits, optional
-        What gives hits the pulse of Hertz's law.
+        Gives hits the pulse of Hertz's law.
     easing : Easing, optional
-        What share of forces is taken up; by default all.
+        Says which share of forces is taken up; by default all.
     """
 
     def __init__(
@@ -248,11 +281,11 @@ class TargetLoad:
         hits: Hits | None = None,
         easing: Easing | None = None,
     ) -> None:
-        self._hits = hits
-        self._easing = easing
         self._target = target
         self._radii = np.minimum(radii, radii[target])
         self._convex = convex
+        self._hits = hits
+        self._easing = easing
         self._is_open = not waves.atlas.mesh.closed
         self._filter = RestFilter(len(radii), waves.atlas.areas.size, time_constant)
         self.set_waves(waves)
@@ -265,7 +298,7 @@ class TargetLoad:
         self._filter.forget_places()
 
     def take_up_all(self) -> None:
-        """Ease no forces any more."""
+        """Take up all of every force from now on."""
         self._easing = None
 
     def touched(
@@ -275,8 +308,8 @@ class TargetLoad:
         timestep: float,
         elapsed: float,
         data: mujoco.MjData | None = None,
-    ) -> tuple[Load, StepContacts]:
-        """Load over a time in which geoms touch, and what they did.
+    ) -> tuple[StepLoad, StepContacts]:
+        """Load over a time in which geoms touch, and a record of the touches.
 
         Parameters
         ----------
@@ -286,71 +319,128 @@ class TargetLoad:
         timestep, elapsed : float
             How long the contacts' forces were held, and over which time their impulse is given [s].
         data : mujoco.MjData, optional
-            Whose contacts they are, for hits.
+            The data that holds the contacts; without it no hit begins.
         """
         if self._waves.atlas is not self._atlas:  # the surface has moved
             self._atlas = self._waves.atlas
             self._footprints.follow(self._atlas)
-        starts = first_rows(contacts.others)
         (position, rotation) = pose
+        starts = first_rows(contacts.others)
         geoms = contacts.others[starts]
         points = (contacts.points - position) @ rotation
         forces = np.add.reduceat(contacts.forces, starts)
         middles = np.add.reduceat(contacts.forces[:, None] * points, starts) / forces[:, None]
-        places, at = self._atlas.nearest_places(middles)
-        inner = np.zeros(len(starts), dtype=np.bool_)
-        if self._is_open:  # which may be touched from inside
-            pushes = (
-                np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts)
-                @ rotation
-            )
-            inner = np.asarray((pushes * self._atlas.texels.grid.normals[at]).sum(axis=1) < 0)
-        patches, points, parts, radii = load_points(
+        places, texels = self._atlas.nearest_places(middles)
+        inner = self._touch_inside(contacts, starts, rotation, texels)
+        # force on the surface over force of the contacts: negative from inside, which is outwards
+        factors = np.where(inner, -timestep / elapsed, timestep / elapsed)
+        if self._easing is not None:
+            held_forces = forces * (timestep / elapsed)
+            factors *= self._easing.shares(geoms, texels, held_forces, elapsed)
+        on_texels = self._spread(points, contacts.forces, starts, geoms, middles, factors)
+        touches = StepContacts(
+            target=self._target,
+            position=position,
+            rotation=rotation,
+            contacts=contacts,
+            starts=starts,
+            places=places,
+            texels=texels,
+            forces=forces,
+            inner=inner,
+            on_texels=on_texels,
+        )
+        self._filter.set_timestep(timestep)
+        if data is not None:
+            self._begin_hits(touches, timestep, elapsed, data)
+        return self.given(elapsed, on_texels), touches
+
+    def given(self, elapsed: float, present: TexelForces = NO_FORCES) -> StepLoad:
+        """Load over a time [s] with the pulses of hits, while these forces act, or no geom touches."""
+        if self._easing is not None and present is NO_FORCES:
+            self._easing.pause(elapsed)
+        load = self._filter(present, elapsed)
+        return load if self._hits is None else self._hits.over(load, elapsed)
+
+    def _touch_inside(
+        self, contacts: Contacts, starts: Ints, rotation: Floats, texels: Ints
+    ) -> Bools:
+        """Whether each collider touches the inner side of an open surface, [p].
+
+        Parameters
+        ----------
+        contacts, starts, rotation, texels
+            See `StepContacts`.
+        """
+        if not self._is_open:
+            return np.zeros(len(starts), dtype=np.bool_)
+        amounts = np.abs(contacts.forces)[:, None]
+        outward = np.add.reduceat(amounts * contacts.normals, starts) @ rotation
+        return np.asarray((outward * self._atlas.texels.grid.normals[texels]).sum(axis=1) < 0)
+
+    def _spread(
+        self,
+        points: Floats,
+        forces: Floats,
+        starts: Ints,
+        geoms: Ints,
+        middles: Floats,
+        factors: Floats,
+    ) -> TexelForces:
+        """Spread the forces of contacts over the texels.
+
+        Parameters
+        ----------
+        points : float64 [k, 3]
+            Of the contacts, in the target's frame [m].
+        forces : float64 [k]
+            Of the contacts [N].
+        starts, geoms : int64 [p]
+            The first contact of each collider, and the collider's id.
+        middles : float64 [p, 3]
+            Force-weighted contact points [m].
+        factors : float64 [p]
+            Force on the surface over force of the contacts.
+        """
+        patches, points, point_forces, radii = load_points(
             points,
-            contacts.forces,
+            forces,
             starts,
             self._radii[geoms],
             self._convex[geoms],
             self._atlas.closest_places,
         )
         under = self._footprints.under(geoms[patches], points, radii, self._filter.active)
-        # what touches from inside pushes outwards
-        signs = np.where(inner, -timestep / elapsed, timestep / elapsed)
-        if self._easing is not None:
-            signs *= self._easing.shares(geoms, at, forces * (timestep / elapsed), elapsed)
-        pushes = parts * signs[patches]
-        texels, shares = (np.concatenate(each) for each in zip(*under, strict=True))
-        counts = [len(each) for each, _ in under]
-        first = np.searchsorted(patches, np.arange(len(geoms) + 1))
-        begins = np.array([0, *itertools.accumulate(counts)])[first]
-        on_texels = TexelForces(
-            geoms,
-            middles,
-            radii[first[:-1]] / 2,
-            begins,
-            texels,
-            shares * np.repeat(pushes, counts),
+        texels = np.concatenate([point_texels for point_texels, _ in under])
+        shares = np.concatenate([point_shares for _, point_shares in under])
+        counts = [len(point_texels) for point_texels, _ in under]
+        point_begins = np.append(0, np.cumsum(counts))
+        first_points = np.searchsorted(patches, np.arange(len(geoms) + 1))
+        pushes = point_forces * factors[patches]
+        return TexelForces(
+            geoms=geoms,
+            middles=middles,
+            place_radii=radii[first_points[:-1]] / 2,
+            begins=point_begins[first_points],
+            texels=texels,
+            forces=shares * np.repeat(pushes, counts),
         )
-        done = StepContacts(
-            self._target, *pose, contacts, starts, places, at, forces, inner, on_texels
-        )
-        self._filter.set_timestep(timestep)
-        if self._hits is not None and data is not None:
-            for row in self._filter.arrived(geoms, elapsed):
-                mine = slice(begins[row], begins[row + 1])
-                # what a unit of the contact's impulse gives each texel
-                shares = on_texels.forces[mine] * (elapsed / (timestep * forces[row]))
-                pair = contacts.rows(contacts.others == geoms[row])
-                prepaid = self._hits.begin(data, self._atlas, pair, texels[mine], shares)
-                self._filter.prepay(int(geoms[row]), prepaid)
-        return self.given(elapsed, on_texels), done
 
-    def given(self, elapsed: float, present: TexelForces = NO_FORCES) -> Load:
-        """Load over a time [s] in which these forces act, or in which no geom touches, with the pulses of hits."""
-        if self._easing is not None and present is NO_FORCES:
-            self._easing.pause(elapsed)
-        load = self._filter(present, elapsed)
-        return load if self._hits is None else self._hits.over(load, elapsed)
+    def _begin_hits(
+        self, touches: StepContacts, timestep: float, elapsed: float, data: mujoco.MjData
+    ) -> None:
+        """Begin the pulses of the geoms that touch for the first time."""
+        if self._hits is None:
+            return
+        contacts = touches.contacts
+        geoms, _, _, begins, texels, texel_forces = touches.on_texels
+        for row in self._filter.arrived(geoms, elapsed):
+            mine = slice(begins[row], begins[row + 1])
+            # what a unit of the contact's impulse gives each texel
+            shares = texel_forces[mine] * (elapsed / (timestep * touches.forces[row]))
+            pair = contacts.rows(contacts.others == geoms[row])
+            prepaid = self._hits.begin(data, self._atlas, pair, texels[mine], shares)
+            self._filter.prepay(int(geoms[row]), prepaid)
 
 
 class ContactLoads:
@@ -360,11 +450,11 @@ class ContactLoads:
     ----------
     coupled : CoupledModel
     waves : mapping
-        Geom id of every target to its waves. Looked at again by `waves_changed` and `clear`.
+        Geom id of every target to its waves. `waves_changed` and `clear` look at the mapping again.
     hits : mapping, optional
-        Geom id of targets whose hits have the pulse of Hertz's law.
+        Pulses by geom id, for targets whose hits have the pulse of Hertz's law.
     easings : mapping, optional
-        Geom id of targets that take up a share of forces alone.
+        Easing by geom id, for targets that take up only a share of forces.
 
     Attributes
     ----------
@@ -383,38 +473,48 @@ class ContactLoads:
         self._waves = waves
         self._hits = hits or {}
         self._easings = dict(easings or {})
-        self._contacts = ContactReader(coupled, {geom: each.atlas for geom, each in waves.items()})
+        atlases = {geom: solver.atlas for geom, solver in waves.items()}
+        self._contacts = ContactReader(coupled, atlases)
         self.clear()
 
     def clear(self) -> None:
         """Forget all contacts."""
         self._sleeping: SleepingContacts | None = None
-        coupled = self._coupled
-        self._targets = dict[int, TargetLoad]()
-        for geom, waves in self._waves.items():
-            surface = coupled.soft.get(geom)
-            hits = self._hits.get(geom)
-            constant = DEFAULT_TIME_CONSTANT
-            if surface is None:
-                constant = float(coupled.solref[geom, 0])
-            elif surface.flex >= 0:
-                constant = float(coupled.model.flex_solref[surface.flex, 0])
-            if constant <= 0:  # -omega^2 of a spring: 1 / omega stands for a time constant
-                constant = 1 / float(np.sqrt(max(-constant, _TINY)))
-            # a flex has a contact at each of its vertices: nothing touches between them
-            convex = coupled.convex & (surface is None)
-            easing = self._easings.get(geom)
-            self._targets[geom] = TargetLoad(
-                waves, geom, coupled.footprint_radii, convex, constant, hits, easing
-            )
-            if hits is not None:
-                hits.clear()
-            if easing is not None:
-                easing.clear()
+        self._targets = {geom: self._target_load(geom) for geom in self._waves}
+        for hits in self._hits.values():
+            hits.clear()
+        for easing in self._easings.values():
+            easing.clear()
         self.skip()
 
+    def _target_load(self, geom: int) -> TargetLoad:
+        coupled = self._coupled
+        # a flex has a contact at each of its vertices: nothing touches between them
+        convex = coupled.convex & (geom not in coupled.soft)
+        return TargetLoad(
+            self._waves[geom],
+            geom,
+            coupled.footprint_radii,
+            convex,
+            self._time_constant(geom),
+            self._hits.get(geom),
+            self._easings.get(geom),
+        )
+
+    def _time_constant(self, geom: int) -> float:
+        """Time constant of contacts with a target, from its `solref` [s]."""
+        surface = self._coupled.soft.get(geom)
+        constant = DEFAULT_TIME_CONSTANT
+        if surface is None:
+            constant = float(self._coupled.solref[geom, 0])
+        elif surface.flex >= 0:
+            constant = float(self._coupled.model.flex_solref[surface.flex, 0])
+        if constant <= 0:  # -omega^2 of a spring: 1 / omega stands for a time constant
+            constant = 1 / float(np.sqrt(max(-constant, _MIN_STIFFNESS)))
+        return constant
+
     def skip(self) -> None:
-        """Forget the latest steps: nothing was given since."""
+        """Forget the touches of the latest steps."""
         self.since_skip: list[StepContacts] = []
         self._impulses: list[Impulse] | None = None
 
@@ -423,49 +523,53 @@ class ContactLoads:
         self._targets[geom].set_waves(self._waves[geom])
 
     def take_up_all(self, geom: int) -> None:
-        """Ease no forces on a target any more."""
+        """Take up all of every force on a target from now on."""
         self._easings.pop(geom, None)
         self._targets[geom].take_up_all()
 
-    def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, Load]:
-        """Load on each target over a time [s], from the contact forces that MuJoCo held over its latest time step.
+    def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, StepLoad]:
+        """Load on each target over a time [s], from the contact forces of MuJoCo's latest step.
 
         Bodies that sleep press as before.
         """
-        loads = {}
+        loads: dict[int, StepLoad] = {}
         self._impulses = None
         self._timestep = self._coupled.model.opt.timestep
         contacts = self._contacts.read(data)
         if self._coupled.model.opt.enableflags & SLEEP:
-            if self._sleeping is None:
-                # bodies that sleep already never touched before our eyes
-                self._sleeping = SleepingContacts(self._coupled)
-                resting = at_rest(self._coupled.model, data)
-                if resting is not None:
-                    self._sleeping.add(data, self._contacts.read(resting))
-            contacts = self._sleeping.add(data, contacts)
+            contacts = self._with_sleeping(data, contacts)
         for geom, target in self._targets.items():
-            if geom in contacts:
-                pose = target_pose(data, geom)
-                loads[geom], done = target.touched(
-                    contacts[geom], pose, self._timestep, elapsed, data
-                )
-                self.since_skip.append(done)
-            else:
+            if geom not in contacts:
                 loads[geom] = target.given(elapsed)
+                continue
+            pose = target_pose(data, geom)
+            loads[geom], touches = target.touched(
+                contacts[geom], pose, self._timestep, elapsed, data
+            )
+            self.since_skip.append(touches)
         return loads
+
+    def _with_sleeping(
+        self, data: mujoco.MjData, contacts: dict[int, Contacts]
+    ) -> dict[int, Contacts]:
+        """Contacts of each target, by geom id, with those of sleeping bodies."""
+        if self._sleeping is None:
+            # the contacts of bodies that sleep from the beginning were never seen
+            self._sleeping = SleepingContacts(self._coupled)
+            resting = at_rest(self._coupled.model, data)
+            if resting is not None:
+                self._sleeping.add(data, self._contacts.read(resting))
+        return self._sleeping.add(data, contacts)
 
     @property
     def impulses(self) -> list[Impulse]:
-        """The impulses given since `skip`, one record for each pair and step, or for each place of what is wedged."""
+        """The impulses given since `skip`; see `StepContacts.impulses`."""
         if self._impulses is None:
             names = self._coupled.names
             owners = self._coupled.owners
-            self._impulses = [
-                impulse
-                for done in self.since_skip
-                for impulse in done.impulses(
-                    names, owners, self._waves[done.target].atlas, self._timestep
-                )
-            ]
+            impulses: list[Impulse] = []
+            for touches in self.since_skip:
+                atlas = self._waves[touches.target].atlas
+                impulses += touches.impulses(names, owners, atlas, self._timestep)
+            self._impulses = impulses
         return self._impulses

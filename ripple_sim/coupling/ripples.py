@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Material, SolverError, WaveSolver
+from ripple_sim.solver import Load, Material, SolverError, WaveSolver
 from ripple_sim.solver.errors import checked, warn_caller, whole
 from ripple_sim.solver.operator.plate_rim import Rim
 from ripple_sim.solver.texels.atlas import check_points
@@ -491,7 +491,9 @@ class Ripples:
         for geom, easing in self._eased.items():
             self._warn_once(f"eased {geom}", easing_warning(target_name(self.model, geom), easing))
         for target, filtered in self._high_pass.items():
-            loads[target] = filtered(loads[target])
+            load = loads[target]
+            if isinstance(load, Load):  # always: hits on what is soft have no pulses
+                loads[target] = filtered(load)
         for geom, waves in self._waves.items():
             load = loads[geom] if shared is None else shared.get(geom)
             waves.step(elapsed, load=load)

@@ -1,12 +1,12 @@
-"""Two-way coupling: the contact force is found with the motion of both, body and surface, and both get it.
+"""Two-way coupling: contact forces that follow from the motion of bodies and surfaces together.
 
-MuJoCo's contact problem knows rigid surfaces alone. Here it is solved again with a surface that
-gives way: a contact's gap counts from the displaced surface, and a unit of its force moves that
-surface as the waves say. What is found replaces the forces of the step, and the bodies' motion in
-it.
+MuJoCo's contact problem knows rigid surfaces alone. `TwoWay` solves it again with surfaces that
+give way: a contact's gap counts from the displaced surface, and a unit of the contact's force moves
+the surface as the wave solver says. The new forces replace the forces of the step, and correct the
+motion of the bodies in the step.
 
-MuJoCo sees a body over a risen surface apart from it. `within_reach` finds such bodies by their
-support points, and they are given the force after which both move alike.
+MuJoCo takes a body over a risen surface for apart from it. `within_reach` finds such bodies by
+their support points. They get the force after which body and surface move alike.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
 from .collision_geoms import ENDLESS
 from .contacts import collider_ids, pair_rows, places_facing, points_outside
-from .energy import ContactProblem, Key, Pair, VelocityChange, affordable_share
+from .energy import ContactProblem, Key, Pair, VelocityChange, Work, affordable_share
 from .geoms import TARGET_TYPES
 from .model import CoupledModel
 from .patches import MAX_CORNERS, SAME_PLACE
@@ -34,17 +34,20 @@ from .sleep import SLEEP, at_rest, sleeping_dofs, wake
 
 _GEOM = mujoco.mjtGeom
 
-# A side or an edge whose slope against the plane is less than this counts as flat: its middle is
-# the point.
-_FLAT = 0.02
+# A side or an edge whose slope against the plane is less than this is flat: its middle is the
+# support point.
+_MAX_FLAT_SLOPE = 0.02
 
-_ROUNDS = 3  # of the search for the points of surface and geom that are nearest to each other
+# Rounds of the search for the points of surface and geom that are nearest to each other.
+_NEAREST_POINT_ROUNDS = 3
 
 
 def support_point(
     model: mujoco.MjModel, geom: int, direction: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Point [m], shape [3], of a geom that lies farthest in a direction: the middle of a side where a whole side does.
+    """Point [m], [3], of a geom that lies farthest in a direction.
+
+    Where a whole side or edge lies farthest, it is the middle of the side or edge.
 
     Parameters
     ----------
@@ -64,7 +67,7 @@ def support_point(
             return size[0] * direction + [0.0, 0.0, size[1] * _side(direction[2])]
         case _GEOM.mjGEOM_CYLINDER:
             across = float(np.hypot(direction[0], direction[1]))
-            rim = size[0] * direction[:2] / across if across > _FLAT else np.zeros(2)
+            rim = size[0] * direction[:2] / across if across > _MAX_FLAT_SLOPE else np.zeros(2)
             return np.append(rim, size[1] * _side(direction[2]))
         case _GEOM.mjGEOM_BOX:
             return size * [_side(along) for along in direction]
@@ -73,15 +76,13 @@ def support_point(
     count = int(model.mesh_vertnum[mesh])
     vertices = model.mesh_vert[begin : begin + count]
     heights = vertices @ direction
-    return (
-        vertices[heights > heights.max() - _FLAT * model.geom_rbound[geom]]
-        .mean(axis=0)
-        .astype(np.float64)
-    )
+    farthest = heights > heights.max() - _MAX_FLAT_SLOPE * model.geom_rbound[geom]
+    return vertices[farthest].mean(axis=0).astype(np.float64)
 
 
 def _side(along: float) -> float:
-    return 0.0 if abs(along) < _FLAT else float(np.sign(along))
+    """Sign of a direction's component along an axis; 0 where the side along the axis is flat."""
+    return 0.0 if abs(along) < _MAX_FLAT_SLOPE else float(np.sign(along))
 
 
 def within_reach(
@@ -92,11 +93,24 @@ def within_reach(
     height: Floats32,
     highest: float,
 ) -> tuple[Load, NDArray[np.float64], NDArray[np.float64]] | None:
-    """Where a geom is above a target, lower than its waves of a height, [C n n], are at their highest [m], if it is.
+    """Where the risen surface of a target reaches a geom above it; None where it does not.
 
     A geom is within reach where its lowest point is less above the undeformed surface than the
     surface has risen there. That point is found by turns: the surface point nearest to the geom's
     point, and the geom's point deepest along the normal there.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    data : mujoco.MjData
+    pair : (int, int)
+        Target and other.
+    waves : WaveSolver
+        Of the target.
+    height : float32 [C n n]
+        Of the waves [m].
+    highest : float
+        The greatest height [m].
 
     Returns
     -------
@@ -117,7 +131,7 @@ def within_reach(
     if np.linalg.norm(np.maximum(np.abs(centre - box_centre) - box_size, 0.0)) > reach:
         return None
     point = centre
-    for _ in range(_ROUNDS):
+    for _ in range(_NEAREST_POINT_ROUNDS):
         (place,), (texel,) = atlas.nearest(point)
         if np.linalg.norm(point - place) > reach:
             return None
@@ -125,12 +139,45 @@ def within_reach(
         point = centre + to_target @ support_point(model, other, -normal @ to_target)
     if (point - place) @ normal >= height[texel]:
         return None
-    where = footprint(atlas, place, float(coupled.footprint_radii[[target, other]].min()))
-    movable_area = (
-        atlas.areas.reshape(-1)[where.texels] * waves.operator.movable.reshape(-1)[where.texels]
-    )
-    load = Load(where.texels, where.weights * movable_area)
+    under = footprint(atlas, place, float(coupled.footprint_radii[[target, other]].min()))
+    areas = atlas.areas.reshape(-1)[under.texels]
+    movable_areas = areas * waves.operator.movable.reshape(-1)[under.texels]
+    load = Load(under.texels, under.weights * movable_areas)
     return load, data.geom_xpos[target] + rotation @ place, rotation @ normal
+
+
+class _Contact(NamedTuple):
+    """One of MuJoCo's contacts on a target.
+
+    Attributes
+    ----------
+    number : int
+        Among MuJoCo's contacts.
+    point : float64 [3]
+        Just outside the surface, in the target's frame [m].
+    normal : float64 [3]
+        Unit vector from the target to the other geom, in the target's frame.
+    """
+
+    number: int
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]
+
+
+class _Reached(NamedTuple):
+    """A pair whose risen surface reaches the body, though MuJoCo has no contact there.
+
+    Attributes
+    ----------
+    key : (int, int)
+        Target and other.
+    point, normal : float64 [3]
+        Of the surface, in the world [m].
+    """
+
+    key: Key
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]
 
 
 class _Place(NamedTuple):
@@ -143,11 +190,11 @@ class _Place(NamedTuple):
     points : float64 [k, 3]
         In the target's frame [m].
     tolerance : float
-        How far they may move before it is another place [m].
+        How far the points may move before it is another place [m].
     load : Load
         A unit force on the texels, each once.
     moving : float64 [t]
-        The part of it that moves them.
+        The part of the load that moves the texels.
     """
 
     atlas: Atlas
@@ -157,8 +204,85 @@ class _Place(NamedTuple):
     moving: NDArray[np.float64]
 
     def mean(self, field: NDArray) -> float:
-        """Mean of a field [C, n, n]: force times mean velocity is the power that the surface gets."""
+        """Mean of a field [C, n, n]; force times mean velocity is the power on the surface."""
         return float(self.moving @ field.reshape(-1)[self.load.texels].astype(np.float64))
+
+    def serves(self, atlas: Atlas, points: NDArray[np.float64]) -> bool:
+        """Whether contact points [k, 3] on an atlas [m] are still at this place."""
+        if self.atlas is not atlas or self.points.shape != points.shape:
+            return False
+        return bool(np.abs(self.points - points).max() < self.tolerance)
+
+
+class _Trials(NamedTuple):
+    """Copies of a target's waves to try steps on.
+
+    Attributes
+    ----------
+    waves : WaveSolver
+        The solver that was copied.
+    pushed : WaveSolver
+        Takes the coming step under the forces of the last one.
+    resting : WaveSolver
+        Takes a step from rest under unit forces.
+    """
+
+    waves: WaveSolver
+    pushed: WaveSolver
+    resting: WaveSolver
+
+    def suit(self, waves: WaveSolver) -> bool:
+        """Whether these are copies of waves as they are now: what moves gets another operator."""
+        if self.waves is not waves or self.pushed.operator is not waves.operator:
+            return False
+        return self.pushed.conserve_volume == waves.conserve_volume
+
+
+class _SurfaceStep(NamedTuple):
+    """How a target's surface moves in the coming step under the forces of the last one.
+
+    Attributes
+    ----------
+    height_before, height_now, height_after : float32 [C, n, n]
+        At the beginning of the last step, now, and at the end of the coming step [m].
+    velocity_now, velocity_after : float32 [C, n, n]
+        [m/s].
+    """
+
+    height_before: NDArray[np.float32]
+    height_now: NDArray[np.float32]
+    height_after: NDArray[np.float32]
+    velocity_now: NDArray[np.float32]
+    velocity_after: NDArray[np.float32]
+
+
+class _Mobility(NamedTuple):
+    """Velocity inwards that unit forces give the surface under a place, divided by the time step.
+
+    Attributes
+    ----------
+    at_end : float
+        From the velocity at the end of the step [1/kg].
+    mean : float
+        From the mean velocity over the step [1/kg]; not negative.
+    """
+
+    at_end: float
+    mean: float
+
+
+class _KnownMobilities(NamedTuple):
+    """Mobilities of a target's pairs, which hold while the places are the same objects."""
+
+    places: tuple[_Place, ...]
+    by_pair: dict[Key, _Mobility]
+
+    def hold(self, places: Mapping[Key, _Place]) -> bool:
+        """Whether they were measured at these places."""
+        if len(self.places) != len(places):
+            return False
+        pairs = zip(self.places, places.values(), strict=True)
+        return all(known is place for known, place in pairs)
 
 
 def require_suited_options(model: mujoco.MjModel) -> None:
@@ -166,16 +290,15 @@ def require_suited_options(model: mujoco.MjModel) -> None:
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise SceneError(
             'two_way cannot work with the integrator "RK4", which takes four contact forces in '
-            "each step, of which "
-            'MuJoCo keeps the last alone; take integrator="implicitfast" (or "Euler", "implicit"), '
-            "or two_way=False"
+            "each step, of which MuJoCo keeps the last alone; take "
+            'integrator="implicitfast" (or "Euler", "implicit"), or two_way=False'
         )
 
 
 class TwoWay:
     """Contacts with surfaces that give way.
 
-    What pairs pay in and get back, see `ContactProblem`, is counted here.
+    It also counts the energy that pairs pay in and get back; see `ContactProblem`.
 
     Parameters
     ----------
@@ -188,9 +311,9 @@ class TwoWay:
         self._coupled = coupled
         self._waves = waves
         model = coupled.model
-        # geoms that may come within reach of each target, and the targets that each geom collides
-        # for
+        # geoms that may come within reach of each target
         self._reachable: dict[int, list[int]] = {}
+        # the targets that each geom collides for
         self._targets_of: dict[int, list[int]] = {}
         solid = np.isin(model.geom_type, list(TARGET_TYPES)) & ~np.isin(model.geom_type, ENDLESS)
         moving = (model.body_weldid[model.geom_bodyid] > 0) & solid
@@ -200,25 +323,28 @@ class TwoWay:
                 self._targets_of.setdefault(geom, []).append(target)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[list(self._targets_of)] = True
-        # the waves of each target, and two solvers to try things on
-        self._trials: dict[int, tuple[WaveSolver, ...]] = {}
+        self._trials: dict[int, _Trials] = {}
         self.clear()
 
     def clear(self) -> None:
         """Forget all contacts."""
         self._velocity_change = VelocityChange(self._coupled.model)
         self._places: dict[Key, _Place] = {}
-        self._mobilities: dict[int, tuple[tuple[_Place, ...], dict[Key, tuple[float, float]]]] = {}
+        self._known_mobilities: dict[int, _KnownMobilities] = {}
+        # force of each pair in the last step [N]
         self._forces: dict[Key, float] = {}
+        # energy that each pair has paid in [J], by `Pair.purse`
         self._paid: dict[Key, float] = {}
-        self._before: dict[int, NDArray[np.float32]] = {}
+        # heights at the beginning of the last step [m], by target
+        self._heights_before: dict[int, NDArray[np.float32]] = {}
         self._just_begun = True
-        self._work: list[tuple[Pair, float, float]] = []
+        # what the forces of the latest step do, to be accounted for by `settle`
+        self._works: list[Work] = []
 
     def solve(
         self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, pending: bool
     ) -> dict[int, Load]:
-        """Find the forces of the latest physics step anew, correct the bodies' motion, and return the targets' loads.
+        """Find the contact forces anew, correct the bodies' motion; return the targets' loads.
 
         Parameters
         ----------
@@ -235,151 +361,174 @@ class TwoWay:
         require_suited_options(self._coupled.model)
         dt = self._coupled.model.opt.timestep
         contacts = self._touching(solved)
-        known = self._places
-        self._places = {}
-        for key, touched in contacts.items():
-            self._places[key] = self._place(key, touched, known.get(key))
-        asleep = [key for key in known if key not in self._places and key in self._forces]
-        asleep = [key for key in asleep if self._coupled.are_still(solved, key)]
-        self._places |= {key: known[key] for key in asleep}
+        asleep = self._follow_places(contacts, solved)
         reached = self._reached(solved)
         self._wake(data)
         self._heights = {target: self._waves[target].height for target, _ in self._places}
-        pairs = self._surfaces(dt)
+        pairs = self._pairs(dt)
         forces = {key: self._forces[key] for key in asleep}
-        self._work = []
+        self._works = []
         if contacts:
-            pairs_at: dict[int, list[Pair]] = {}
-            for key, each in contacts.items():
-                for i, _, _ in each:
-                    pairs_at.setdefault(i, []).append(pairs[key])
-            problem = ContactProblem(self._coupled.model, solved, pairs_at)
-            old = solved.qacc.copy(), solved.qfrc_constraint.copy()
-            forces |= problem.solve(self._paid)
-            self._move(
-                data, self._velocity_change(solved, *old, pending=pending), dt, pending=pending
-            )
-            self._work = problem.works()
-        for key, point, normal in reached:
-            if self._coupled.are_still(solved, key):
+            forces |= self._solve_contacts(data, solved, contacts, pairs, dt, pending=pending)
+        for meeting in reached:
+            if self._coupled.are_still(solved, meeting.key):
                 continue
-            forces[key] = self._push(data, solved, pairs[key], point, normal, dt, pending=pending)
+            pair = pairs[meeting.key]
+            forces[meeting.key] = self._push(data, solved, pair, meeting, dt, pending=pending)
         self._forces = forces
         self._velocity_change.latest = data.qvel.copy()
-        self._before = self._heights
-        loads: dict[int, list[Load]] = {}
-        for key, force in forces.items():
-            load = self._places[key].load
-            loads.setdefault(key[0], []).append(
-                Load(load.texels, force * dt / elapsed * load.forces)
-            )
-        return {target: Load.together(each) for target, each in loads.items()}
+        self._heights_before = self._heights
+        return self._loads(forces, dt, elapsed)
 
     def settle(self) -> None:
         """Note what was paid, now that the waves have stepped."""
-        paid = {pair.purse: self._paid.get(pair.purse, 0.0) for pair, _, _ in self._work}
-        for pair, body, force in self._work:
-            moved = self._places[pair.key].mean(self._waves[pair.key[0]].height) - pair.height
-            paid[pair.purse] -= body - force * moved
+        paid = {work.pair.purse: self._paid.get(work.pair.purse, 0.0) for work in self._works}
+        for pair, on_bodies, force in self._works:
+            height = self._places[pair.key].mean(self._waves[pair.key[0]].height)
+            moved = height - pair.height
+            paid[pair.purse] -= on_bodies - force * moved
         self._paid = paid
+
+    def _solve_contacts(
+        self,
+        data: mujoco.MjData,
+        solved: mujoco.MjData,
+        contacts: Mapping[Key, Sequence[_Contact]],
+        pairs: Mapping[Key, Pair],
+        dt: float,
+        *,
+        pending: bool,
+    ) -> dict[Key, float]:
+        """Force of each pair that touches [N], after which `data` moves as these forces ask."""
+        pairs_at: dict[int, list[Pair]] = {}
+        for key, touching in contacts.items():
+            for contact in touching:
+                pairs_at.setdefault(contact.number, []).append(pairs[key])
+        problem = ContactProblem(self._coupled.model, solved, pairs_at)
+        old_acceleration = solved.qacc.copy()
+        old_force = solved.qfrc_constraint.copy()
+        forces = problem.solve(self._paid)
+        change = self._velocity_change(solved, old_acceleration, old_force, pending=pending)
+        self._move(data, change, dt, pending=pending)
+        self._works = problem.works()
+        return forces
+
+    def _loads(self, forces: Mapping[Key, float], dt: float, elapsed: float) -> dict[int, Load]:
+        """Load on each target over a time [s], from forces [N] that act for dt [s]."""
+        loads: dict[int, list[Load]] = {}
+        for key, force in forces.items():
+            unit = self._places[key].load
+            load = Load(unit.texels, force * dt / elapsed * unit.forces)
+            loads.setdefault(key[0], []).append(load)
+        return {target: Load.together(of_target) for target, of_target in loads.items()}
 
     # Where bodies touch
 
-    def _touching(self, data: mujoco.MjData) -> dict[Key, list[tuple[int, NDArray, NDArray]]]:
-        """MuJoCo's contacts of each pair: which, and their points and normals in the target's frame."""
-        found: dict[Key, list[tuple[int, NDArray, NDArray]]] = {}
+    def _touching(self, data: mujoco.MjData) -> dict[Key, list[_Contact]]:
+        """MuJoCo's contacts of each pair."""
+        touching: dict[Key, list[_Contact]] = {}
         if not data.ncon:
-            return found
+            return touching
         bears = data.contact.efc_address >= 0
         rows = contacts, _, geoms, others = pair_rows(
             collider_ids(self._coupled, data), bears, self._is_read
         )
         points, normals = points_outside(data, *rows, self._coupled.extents)
         ids = zip(contacts.tolist(), geoms.tolist(), others.tolist(), strict=True)
-        for (i, geom, other), at, normal in zip(ids, points, normals, strict=True):
-            choices = []
-            for target in self._targets_of[geom]:
-                rotation = data.geom_xmat[target].reshape(3, 3)
-                point = (at - data.geom_xpos[target]) @ rotation
-                outward = normal @ rotation
-                off = 0.0
-                if target != geom:
-                    (place,) = places_facing(self._waves[target].atlas, point[None], outward[None])
-                    point, off = place, float(np.linalg.norm(place - point))
-                choices.append((off, target, point, outward))
-            _, target, point, outward = min(choices, key=lambda choice: choice[0])
-            found.setdefault((target, other), []).append((i, point, outward))
-        return found
+        for (number, geom, other), point, normal in zip(ids, points, normals, strict=True):
+            target, contact = self._on_nearest_target(data, number, geom, point, normal)
+            touching.setdefault((target, other), []).append(contact)
+        return touching
 
-    def _reached(
-        self, data: mujoco.MjData
-    ) -> list[tuple[Key, NDArray[np.float64], NDArray[np.float64]]]:
-        """Pairs within reach that do not touch, and where; see `within_reach`. They get a place."""
+    def _on_nearest_target(
+        self,
+        data: mujoco.MjData,
+        number: int,
+        geom: int,
+        point: NDArray[np.float64],
+        normal: NDArray[np.float64],
+    ) -> tuple[int, _Contact]:
+        """The nearest target that a geom collides for, and a contact, given in the world, on it."""
+        choices = []
+        for target in self._targets_of[geom]:
+            rotation = data.geom_xmat[target].reshape(3, 3)
+            place = (point - data.geom_xpos[target]) @ rotation
+            outward = normal @ rotation
+            distance = 0.0
+            if target != geom:
+                atlas = self._waves[target].atlas
+                (on_surface,) = places_facing(atlas, place[None], outward[None])
+                distance = float(np.linalg.norm(on_surface - place))
+                place = on_surface
+            choices.append((distance, target, _Contact(number, place, outward)))
+        _, target, contact = min(choices, key=lambda choice: choice[0])
+        return target, contact
+
+    def _follow_places(
+        self, contacts: Mapping[Key, Sequence[_Contact]], solved: mujoco.MjData
+    ) -> list[Key]:
+        """Find the places of all contacts; return the pairs that sleep, whose places stay."""
+        known = self._places
+        self._places = {}
+        for key, touching in contacts.items():
+            self._places[key] = self._place(key, touching, known.get(key))
+        asleep = [key for key in known if key not in self._places and key in self._forces]
+        asleep = [key for key in asleep if self._coupled.are_still(solved, key)]
+        self._places |= {key: known[key] for key in asleep}
+        return asleep
+
+    def _reached(self, data: mujoco.MjData) -> list[_Reached]:
+        """Pairs within reach that do not touch, see `within_reach`. They get a place."""
         reached = []
         for target, others in self._reachable.items():
             waves = self._waves[target]
-            height = self._waves[target].height.reshape(-1)
+            height = waves.height.reshape(-1)
             highest = float(height.max())
-            for key in ((target, other) for other in others if highest > 0):
-                found = (
-                    None
-                    if key in self._places
-                    else within_reach(self._coupled, data, key, waves, height, highest)
-                )
-                if found is not None:
-                    load = found[0].merged(len(height))
-                    moving = self._moving(target, load)
-                    self._places[key] = _Place(waves.atlas, np.zeros((0, 3)), 0.0, load, moving)
-                    reached.append((key, *found[1:]))
+            if not highest > 0:
+                continue
+            for other in others:
+                key = (target, other)
+                if key in self._places:
+                    continue
+                meeting = within_reach(self._coupled, data, key, waves, height, highest)
+                if meeting is None:
+                    continue
+                load, point, normal = meeting
+                load = load.merged(len(height))
+                moving = self._moving(target, load)
+                self._places[key] = _Place(waves.atlas, np.zeros((0, 3)), 0.0, load, moving)
+                reached.append(_Reached(key, point, normal))
         return reached
 
-    def _place(
-        self, key: Key, touched: Sequence[tuple[int, NDArray, NDArray]], known: _Place | None
-    ) -> _Place:
+    def _place(self, key: Key, touching: Sequence[_Contact], known: _Place | None) -> _Place:
+        """The place of a pair's contacts: the known one while they stay there, else a new one."""
         (target, other) = key
-        atlas = self._waves[key[0]].atlas
-        points = np.array([point for _, point, _ in touched])
+        atlas = self._waves[target].atlas
+        points = np.array([contact.point for contact in touching])
         if self._coupled.convex[other] and 1 < len(points) <= MAX_CORNERS:
+            # what is convex touches between two contacts, too
             one, two = np.triu_indices(len(points), 1)
             points = np.concatenate([points, (points[one] + points[two]) / 2])
-        if (
-            known is not None
-            and known.atlas is atlas
-            and known.points.shape == points.shape
-            and np.abs(known.points - points).max() < known.tolerance
-        ):
+        if known is not None and known.serves(atlas, points):
             return known
         (nearest, texels) = atlas.nearest(points)
-        areas = atlas.areas.reshape(-1)
         radius = float(self._coupled.footprint_radii[[target, other]].min())
-        parts = [
-            footprint_at(atlas, *each, radius)
-            for each in zip(nearest, texels.tolist(), strict=True)
-        ]
-        loads = [
-            Load(each.texels, each.weights * areas[each.texels] / len(parts)) for each in parts
-        ]
+        load = _unit_load(atlas, nearest, texels, radius)
         # what touches an open surface from inside pushes it outwards
-        inside = (
-            not atlas.mesh.closed and touched[0][2] @ atlas.normals.reshape(-1, 3)[texels[0]] < 0
-        )
-        load = Load.together(loads).merged(areas.size)
-        load = Load(load.texels, -load.forces) if inside else load
-        return _Place(
-            atlas,
-            points,
-            SAME_PLACE * float(np.sqrt(areas[texels[0]])),
-            load,
-            self._moving(target, load),
-        )
+        outward = atlas.normals.reshape(-1, 3)[texels[0]]
+        if not atlas.mesh.closed and touching[0].normal @ outward < 0:
+            load = Load(load.texels, -load.forces)
+        tolerance = SAME_PLACE * float(np.sqrt(atlas.areas.reshape(-1)[texels[0]]))
+        return _Place(atlas, points, tolerance, load, self._moving(target, load))
 
     def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
+        """The part of a load's forces [N] that moves the texels, [t]."""
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
 
     # What wakes
 
     def _wake(self, data: mujoco.MjData) -> None:
-        """Wake bodies that sleep where the surface moves faster than what MuJoCo lets sleep.
+        """Wake sleeping bodies where the surface moves faster than MuJoCo lets bodies sleep.
 
         At the beginning all that sleep on a target are woken: what they press it with is not known.
         """
@@ -387,83 +536,126 @@ class TwoWay:
         if not model.opt.enableflags & SLEEP:
             return
         tolerance = float(model.opt.sleep_tolerance)
-        keys = [
-            key for key, place in self._places.items() if self._speed_under(key, place) > tolerance
-        ]
+        moving = [key for key in self._places if self._speed_under(key) > tolerance]
         if self._just_begun:
             resting = at_rest(model, data)
-            keys += [] if resting is None else list(self._touching(resting))
+            if resting is not None:
+                moving += list(self._touching(resting))
             self._just_begun = False
-        wake(model, data, (int(self._coupled.bodies[geom]) for key in keys for geom in key))
+        bodies = self._coupled.bodies
+        wake(model, data, (int(bodies[geom]) for key in moving for geom in key))
 
-    def _speed_under(self, key: Key, place: _Place) -> float:
-        """Of the surface at a place [m/s]."""
-        return abs(place.mean(self._waves[key[0]].velocity))
+    def _speed_under(self, key: Key) -> float:
+        """Speed of the surface under a pair's place [m/s]."""
+        return abs(self._places[key].mean(self._waves[key[0]].velocity))
 
     # How the surfaces move
 
-    def _surfaces(self, dt: float) -> dict[Key, Pair]:
+    def _pairs(self, dt: float) -> dict[Key, Pair]:
+        """What the contact problem has to know of the surface under each place."""
         pairs = {}
         for target in dict.fromkeys(target for target, _ in self._places):
             places = {key: place for key, place in self._places.items() if key[0] == target}
-            held = {key: self._forces.get(key, 0.0) for key in places}
-            waves = self._waves[target]
-            of, *trials = self._trials.get(target, (None,))
-            # what moves gets another operator
-            changed = of is not waves or trials[0].operator is not waves.operator
-            if changed or trials[0].conserve_volume != waves.conserve_volume:
-                trials = [copy.copy(waves), copy.copy(waves)]
-                self._trials[target] = (waves, *trials)
-                self._mobilities = {}
-            trial, rest = trials
-            trial.state = waves.state
-            loads = [
-                Load(place.load.texels, held[key] * place.load.forces)
-                for key, place in places.items()
-            ]
-            trial.step(dt, load=Load.together(loads))
-            # velocity under each place, at the end of a step and its mean, over the step, that unit
-            # forces give
-            these, mobilities = self._mobilities.get(target, ((), {}))
-            if len(these) != len(places) or any(
-                a is not b for a, b in zip(these, places.values(), strict=True)
-            ):
-                rest.reset()
-                rest.step(dt, load=Load.together([place.load for place in places.values()]))
-                height = rest.height
-                velocity = rest.velocity
-                mobilities = {
-                    key: (-place.mean(velocity) / dt, max(-place.mean(height) / dt**2, 0.0))
-                    for key, place in places.items()
-                }
-                self._mobilities[target] = tuple(places.values()), mobilities
-            now = self._heights[target]
-            before = self._before.get(target, self._heights[target])
-            after = trial.height
-            velocity = waves.velocity
-            end = trial.velocity
+            trials = self._trial_waves(target)
+            surface = self._step_trial(target, trials.pushed, places, dt)
+            mobilities = self._mobilities(target, trials.resting, places, dt)
             for key, place in places.items():
-                (mobility, mean_mobility) = mobilities[key]
-                mean = place.mean(after - now) / dt
-                start = place.mean(velocity)
-                free = place.mean(end)
-                if mobility < mean_mobility:
-                    # the surface swings back within the step, and its velocity at the end says
-                    # little
-                    start = place.mean(now - before) / dt
-                    free = mean
-                    mobility = mean_mobility
-                pairs[key] = Pair(
-                    key, place.mean(now), held[key], start, free, mobility, mean, mean_mobility
-                )
+                pairs[key] = self._pair(key, place, surface, mobilities[key], dt)
         return pairs
+
+    def _trial_waves(self, target: int) -> _Trials:
+        """Copies of a target's waves, the same ones as long as the waves allow."""
+        waves = self._waves[target]
+        trials = self._trials.get(target)
+        if trials is None or not trials.suit(waves):
+            trials = _Trials(waves, copy.copy(waves), copy.copy(waves))
+            self._trials[target] = trials
+            self._known_mobilities = {}
+        return trials
+
+    def _step_trial(
+        self, target: int, trial: WaveSolver, places: Mapping[Key, _Place], dt: float
+    ) -> _SurfaceStep:
+        """Step trial waves by dt [s] from where the target's waves are, under the last forces."""
+        waves = self._waves[target]
+        trial.state = waves.state
+        loads = []
+        for key, place in places.items():
+            force = self._forces.get(key, 0.0)
+            loads.append(Load(place.load.texels, force * place.load.forces))
+        trial.step(dt, load=Load.together(loads))
+        height_now = self._heights[target]
+        return _SurfaceStep(
+            height_before=self._heights_before.get(target, height_now),
+            height_now=height_now,
+            height_after=trial.height,
+            velocity_now=waves.velocity,
+            velocity_after=trial.velocity,
+        )
+
+    def _mobilities(
+        self, target: int, trial: WaveSolver, places: Mapping[Key, _Place], dt: float
+    ) -> dict[Key, _Mobility]:
+        """Mobility of the surface under each place, when unit forces act on all places at once.
+
+        They are measured by a step of trial waves from rest, and stay while the places do.
+        """
+        known = self._known_mobilities.get(target)
+        if known is not None and known.hold(places):
+            return known.by_pair
+        trial.reset()
+        trial.step(dt, load=Load.together([place.load for place in places.values()]))
+        height = trial.height
+        velocity = trial.velocity
+        mobilities = {}
+        for key, place in places.items():
+            at_end = -place.mean(velocity) / dt
+            mean = max(-place.mean(height) / dt**2, 0.0)
+            mobilities[key] = _Mobility(at_end, mean)
+        self._known_mobilities[target] = _KnownMobilities(tuple(places.values()), mobilities)
+        return mobilities
+
+    def _pair(
+        self, key: Key, place: _Place, surface: _SurfaceStep, mobility: _Mobility, dt: float
+    ) -> Pair:
+        """Heights and velocities of a surface in a step of dt [s], as means under a place."""
+        mean_velocity = place.mean(surface.height_after - surface.height_now) / dt
+        velocity_at_start = place.mean(surface.velocity_now)
+        velocity_at_end = place.mean(surface.velocity_after)
+        mobility_at_end = mobility.at_end
+        if mobility.at_end < mobility.mean:
+            # the surface swings back within the step, and its velocity at the end says little
+            velocity_at_start = place.mean(surface.height_now - surface.height_before) / dt
+            velocity_at_end = mean_velocity
+            mobility_at_end = mobility.mean
+        return Pair(
+            key=key,
+            height=place.mean(surface.height_now),
+            held=self._forces.get(key, 0.0),
+            start=velocity_at_start,
+            free=velocity_at_end,
+            mobility=mobility_at_end,
+            mean=mean_velocity,
+            mean_mobility=mobility.mean,
+        )
 
     # What happens to the bodies
 
     def _move(
         self, data: mujoco.MjData, change: NDArray[np.float64], dt: float, *, pending: bool
     ) -> None:
-        """Change velocities [m/s] as the step would have, and positions with them; what sleeps stays."""
+        """Change velocities, and positions as the step would have; what sleeps stays.
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+        change : float64 [nv]
+            Of the velocities.
+        dt : float
+            Time step [s].
+        pending : bool
+            Whether `data` has yet to take the step: then its positions stay.
+        """
         change = np.where(sleeping_dofs(self._coupled.model, data), 0.0, change)
         data.qvel += change
         if not pending:
@@ -471,29 +663,73 @@ class TwoWay:
             data.qacc_warmstart[:] = data.qacc
 
     def _push(
-        self, data: mujoco.MjData, solved: mujoco.MjData, pair: Pair, point: NDArray[np.float64],
-        normal: NDArray[np.float64], dt: float, *, pending: bool,
-    ) -> float:  # fmt: skip
-        """Push a body that the risen surface has reached, so that they part no slower than they meet; the force [N]."""
-        model = self._coupled.model
-        bodies = self._coupled.bodies
-        along = np.zeros(model.nv)
-        for sign, geom in zip((-1, 1), pair.key, strict=True):
-            jacobian = np.zeros((3, model.nv))
-            mujoco.mj_jac(model, solved, jacobian, None, point, int(bodies[geom]))
-            along += sign * normal @ jacobian
-        response = np.zeros((1, model.nv))
-        mujoco.mj_solveM(model, solved, response, along[None])
-        light = float(along @ response[0])
-        end = float(along @ data.qvel) + (dt * float(along @ solved.qacc) if pending else 0.0)
-        meets = pair.free + pair.mobility * dt * pair.held - end
-        if light + pair.mobility <= 0 or meets <= 0:
+        self,
+        data: mujoco.MjData,
+        solved: mujoco.MjData,
+        pair: Pair,
+        meeting: _Reached,
+        dt: float,
+        *,
+        pending: bool,
+    ) -> float:
+        """Push a body that the risen surface has reached; return the force [N].
+
+        After the push, body and surface part no slower than they met.
+        """
+        along = self._relative_jacobian(solved, meeting)
+        response = np.zeros((1, self._coupled.model.nv))
+        mujoco.mj_solveM(self._coupled.model, solved, response, along[None])
+        body_mobility = float(along @ response[0])  # [1/kg]
+        # velocities along the normal at the end of the step, without the push [m/s]
+        body_velocity = float(along @ data.qvel)
+        if pending:
+            body_velocity += dt * float(along @ solved.qacc)
+        approach = pair.free + pair.mobility * dt * pair.held - body_velocity
+        mobility = body_mobility + pair.mobility
+        if mobility <= 0 or approach <= 0:
             return 0.0
-        force = meets / (light + pair.mobility) / dt
-        start = end - dt * float(along @ solved.qacc)
-        linear = force * dt * ((start + end) / 2 - pair.mean - pair.mean_mobility * dt * pair.held)
-        square = (force * dt) ** 2 * (light / 2 + pair.mean_mobility)
+        force = approach / mobility / dt
+        velocity_at_start = body_velocity - dt * float(along @ solved.qacc)
+        mean_body_velocity = (velocity_at_start + body_velocity) / 2
+        # the work of a share of the force is linear * share + square * share^2 [J]
+        linear = force * dt * (mean_body_velocity - pair.mean - pair.mean_mobility * dt * pair.held)
+        square = (force * dt) ** 2 * (body_mobility / 2 + pair.mean_mobility)
         force *= affordable_share(linear, square, self._paid.get(pair.purse, 0.0))
         self._move(data, force * dt * response[0], dt, pending=pending)
-        self._work.append((pair, force * dt * ((start + end) / 2 + force * dt * light / 2), force))
+        on_bodies = force * dt * (mean_body_velocity + force * dt * body_mobility / 2)
+        self._works.append(Work(pair, on_bodies, force))
         return force
+
+    def _relative_jacobian(self, solved: mujoco.MjData, meeting: _Reached) -> NDArray[np.float64]:
+        """Velocity of the other body against the target's along the normal, per `qvel`, [nv]."""
+        model = self._coupled.model
+        along = np.zeros(model.nv)
+        for sign, geom in zip((-1, 1), meeting.key, strict=True):
+            jacobian = np.zeros((3, model.nv))
+            body = int(self._coupled.bodies[geom])
+            mujoco.mj_jac(model, solved, jacobian, None, meeting.point, body)
+            along += sign * meeting.normal @ jacobian
+        return along
+
+
+def _unit_load(
+    atlas: Atlas, places: NDArray[np.float64], texels: NDArray[np.int64], radius: float
+) -> Load:
+    """A unit force in equal parts on places of an atlas, with a footprint of a radius [m] each.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    places : float64 [k, 3]
+        On the surface [m].
+    texels : int64 [k]
+        The texels nearest to the places.
+    radius : float
+        [m].
+    """
+    areas = atlas.areas.reshape(-1)
+    loads = []
+    for place, texel in zip(places, texels.tolist(), strict=True):
+        under = footprint_at(atlas, place, texel, radius)
+        loads.append(Load(under.texels, under.weights * areas[under.texels] / len(places)))
+    return Load.together(loads).merged(areas.size)

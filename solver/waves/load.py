@@ -1,9 +1,10 @@
-"""Loads: forces on some texels, held over a step, what a solver holds over the coming ones, and its state."""
+"""Loads: forces on some texels over a step, forces that a solver holds, and a solver's state."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,24 @@ from numpy.typing import NDArray
 from ..backends.backend import Backend
 from ..errors import SolverError
 from ..operator.volume import VolumeBalance
+
+
+class StepLoad(Protocol):
+    """Forces that act over one step: a `Load`, or a load that changes within the step.
+
+    Only a `Load` can be added to others by `Load.together`, which would lose the changes.
+    """
+
+    def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
+        """Constant loads that act one after the other, each with its number of substeps.
+
+        Parameters
+        ----------
+        dt : float
+            The step [s].
+        substeps : int
+            Of the whole step: the numbers of all parts add up to it.
+        """
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,26 +54,23 @@ class Load:
 
     @classmethod
     def together(cls, loads: Sequence[Load]) -> Load:
-        """Several loads at once."""
+        """The sum of several loads."""
         loads = [load for load in loads if len(load.texels)]
         if not loads:
             return cls.none()
         if len(loads) == 1:
             return loads[0]
         return cls(
-            np.concatenate([each.texels for each in loads]),
-            np.concatenate([each.forces for each in loads]),
+            np.concatenate([load.texels for load in loads]),
+            np.concatenate([load.forces for load in loads]),
         )
 
     def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
-        """What acts over a step of dt [s]: numbers of its substeps, one after the other, and the load over each.
-
-        A load that changes within a step gives several.
-        """
+        """The load itself, over all substeps of a step of dt [s]; see `StepLoad`."""
         yield substeps, self
 
     def merged(self, size: int) -> Load:
-        """The same with every texel once, on an atlas of so many texels.
+        """The load with every texel once, on an atlas of `size` texels.
 
         Raises
         ------
@@ -64,20 +80,20 @@ class Load:
         texels = self.texels
         if len(texels) and not 0 <= texels.min() <= texels.max() < size:
             raise SolverError(
-                f"texels go from {texels.min()} to {texels.max()}; valid are indices from 0 to "
-                f"{size - 1}"
+                f"texels of a load must be indices from 0 to {size - 1}, got {texels.min()} to "
+                f"{texels.max()}"
             )
         if (texels[1:] > texels[:-1]).all():
             return self
         row = np.arange(len(texels))
-        place = np.empty(size, np.int64)
-        place[texels[::-1]] = row[::-1]
-        first = place[texels]  # the row in which each texel appears first
+        row_of_texel = np.empty(size, np.int64)
+        row_of_texel[texels[::-1]] = row[::-1]
+        first = row_of_texel[texels]  # the row in which each texel appears first
         once = (first == row).nonzero()[0]
-        place[texels[once]] = row[: len(once)]
-        return Load(
-            texels[once], np.bincount(place[texels], self.forces).astype(np.float64, copy=False)
-        )
+        merged_texels = texels[once]
+        row_of_texel[merged_texels] = row[: len(once)]
+        merged_forces = np.bincount(row_of_texel[texels], self.forces)
+        return Load(merged_texels, merged_forces.astype(np.float64, copy=False))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -112,26 +128,28 @@ class HeldLoad:
 
     Parameters
     ----------
+    backend : Backend
     share : float64 [C, n, n]
-        Of a force that sets a texel in motion.
+        The part of a force on a texel that sets the texel in motion.
     balance : VolumeBalance
-        Of the forces.
+        Balances the forces where volume is conserved.
 
     Attributes
     ----------
     load : Load
-        What is held; assign to change it.
+        The forces that are held; assign to change them.
     balance : VolumeBalance
-        Likewise.
+        Assign to change it.
     """
 
     def __init__(
         self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance
     ) -> None:
-        self._backend = backend
+        self.load = Load.none()
         self.balance = balance
+        self._backend = backend
         self._share = share
-        self.load = self._uploaded = Load.none()
+        self._uploaded = self.load
 
     def forces(self) -> NDArray[np.float64]:
         """Forces held at every texel [N], positive inwards, [C, n, n]."""
@@ -139,17 +157,22 @@ class HeldLoad:
         return forces.astype(np.float64, copy=False).reshape(self._share.shape)
 
     def add(self, load: Load) -> None:
-        """Hold a load beside what is held."""
+        """Hold a load beside the forces that are held already."""
         self.load = Load.together([self.load, load]).merged(self._share.size)
 
     def counterpart(
         self, texels: NDArray[np.int64], momenta: NDArray[np.float64]
     ) -> float | NDArray[np.float64]:
-        """What balances the momenta of a source on some texels, or forces, outwards, where volume is conserved."""
+        """What balances momenta, or forces, on some texels, outwards, where volume is conserved."""
         return self.balance.counterpart(texels, momenta)
 
     def upload(self, extra: Load | None) -> float | None:
-        """Hand the backend the load of the coming step, with `extra` for that step alone, unless it has it already.
+        """Hand the backend the load of the coming step, unless it has the load already.
+
+        Parameters
+        ----------
+        extra : Load, optional
+            Acts over the coming step alone, beside the forces that are held.
 
         Returns
         -------
@@ -169,7 +192,7 @@ class HeldLoad:
         total = -float(forces.sum())
         if not np.isfinite(total):
             raise SolverError(
-                f"the forces of a load add up to {total!r} N; valid are finite numbers"
+                f"the forces of a load must be finite, got forces that add up to {total!r} N"
             )
         self._backend.load(once.texels, forces, self.counterpart(once.texels, forces))
         self._uploaded = load

@@ -20,7 +20,7 @@ from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from .finite import FiniteGuard, as_field, check_kick, count_substeps, require_finite
 from .footprint import Footprint, spread
-from .load import HeldLoad, Load, WaveState
+from .load import HeldLoad, Load, StepLoad, WaveState
 from .motion import Motion
 from .sensor import Listeners, Sensor
 
@@ -147,7 +147,7 @@ class WaveSolver:
         """
         return self.operator.longest_timestep
 
-    def step(self, dt: float, substeps: int | None = None, load: Load | None = None) -> None:
+    def step(self, dt: float, substeps: int | None = None, load: StepLoad | None = None) -> None:
         """Advance by dt [s] in equal substeps, as many as `stable_timestep` asks for.
 
         Parameters
@@ -157,7 +157,8 @@ class WaveSolver:
         substeps : int, optional
             How many, instead of the fewest.
         load : Load, optional
-            Forces that act over this step alone, beside those that are held; see `Load.parts`.
+            Forces that act over this step alone, beside the forces that are held; or a load that
+            changes within the step, see `StepLoad`.
 
         Raises
         ------

@@ -54,9 +54,9 @@ def test_load_is_the_same_as_a_held_force_that_is_ended(backend: str) -> None:
     [
         (
             Load(np.array([3, 384]), np.ones(2)),
-            "texels go from 3 to 384; valid are indices from 0 to 383",
+            "must be indices from 0 to 383, got 3 to 384",
         ),
-        (Load(np.array([-1]), np.ones(1)), "texels go from -1"),
+        (Load(np.array([-1]), np.ones(1)), "got -1 to -1"),
         (Load(np.array([1]), np.array([np.nan])), "add up to nan N"),
     ],
 )
