@@ -6,8 +6,8 @@ A contact is in one of five states:
 - **Steady**: it touches without a break. Its force passes as it is, and its place is averaged.
 - **Chattering**: it opens and closes again within a few steps. Its force is averaged too.
 - **Open**: it has lost touch a moment ago, and may close again.
-- **Gone**: it has been open for longer than `_LEFT_TIME`. What the surface has yet to receive is
-  paid out, and then the contact is inactive.
+- **Gone**: it has been open for longer than `_GONE_TIME`. The surface receives the deficit, and
+  then the contact is inactive.
 
 A geom on stiff, springy contacts chatters: contact opens for a step and closes again, at the
 natural frequency of the contact's spring, and the force jumps between zero and twice the weight.
@@ -31,7 +31,7 @@ from ripple_sim.solver.kernel import Floats, kernel, shared
 # A first hit is over within this time [s].
 _ONSET_TIME = 0.1
 # A contact that is open for longer than this, and for more than a step, is gone [s].
-_LEFT_TIME = 0.005
+_GONE_TIME = 0.005
 
 # A contact chatters if it opens again within this time [s] or within this many steps.
 _CHATTER_PERIOD = 0.015
@@ -48,22 +48,24 @@ _FORCE_CHANGE = 0.05
 # A springy contact is hit where its force is so many times its mean.
 _HIT_RATIO = 4.0
 
-# The memory grows by this share of the time, up to a limit [s].
+# The memory grows by this share of the time that passes.
 _MEMORY_GROWTH = 0.4
+# The longest memory [s].
 _LONGEST_MEMORY = 2.0
-# Averaging times of the latest place and of its jitter [s].
+# Averaging time of the latest place [s].
 _PLACE_MEMORY = 0.05
+# Averaging time of the jitter of the place [s].
 _JITTER_MEMORY = 0.5
 # Time within which the memory shortens where a contact moves [s].
 _MOVE_TIME = 0.006
-# A contact moves where it is farther from its mean place than this many times its jitter.
-_JITTERS = 4.0
-# ... but not less and not more than these shares of the place radius.
-_LEAST_MOVE = 0.1
-_MOST_MOVE = 0.6
+# A contact moves where it is farther from its mean place than this many times its jitter. The
+# distance is bounded from below and from above by these shares of the place radius.
+_MOVE_OVER_JITTER = 4.0
+_MIN_MOVE_SHARE = 0.1
+_MAX_MOVE_SHARE = 0.6
 
 # Keeps a division by the mean force finite [N].
-_TINY_FORCE = np.finfo(np.float64).tiny
+_MIN_FORCE = np.finfo(np.float64).tiny
 
 # Records rather than plain rows: the fields are attributes in plain Python as well as in kernels.
 CONTACT_STATE = np.dtype(
@@ -98,7 +100,7 @@ ContactState: TypeAlias = Any
 @shared
 def is_gone(state: ContactState, dt: float) -> bool:
     """Whether a contact is gone, and not open for a moment only, at a time step [s]."""
-    return state.absent > max(_LEFT_TIME, 1.5 * dt)
+    return state.absent > max(_GONE_TIME, 1.5 * dt)
 
 
 @shared
@@ -180,7 +182,7 @@ def _begin(state: ContactState, force: float, point: Floats, place_radius: float
 
 @shared
 def _close_again(state: ContactState, dt: float) -> None:
-    """Close a contact that was open for a moment: it chatters if the last opening is not long ago."""
+    """Close a contact that was open for a moment; it chatters if it has opened before, of late."""
     opened_soon = state.unbroken < max(_CHATTER_PERIOD, _CHATTER_STEPS * dt)
     if state.age > _ONSET_TIME and opened_soon:
         state.springy = True
@@ -195,9 +197,9 @@ def _follow_force(state: ContactState, force: float, dt: float) -> None:
     if state.age < _ONSET_TIME:
         sameness = 0.0
     elif state.springy or state.unbroken < _CALM_TIME:
-        sameness = _HIT_RATIO - force / max(state.mean_force, _TINY_FORCE)
+        sameness = _HIT_RATIO - force / max(state.mean_force, _MIN_FORCE)
     else:
-        allowed = max(_FORCE_CHANGE * state.mean_force, _TINY_FORCE)
+        allowed = max(_FORCE_CHANGE * state.mean_force, _MIN_FORCE)
         sameness = 2 - abs(force - state.mean_force) / allowed
     grown = min(state.memory + _MEMORY_GROWTH * dt, _LONGEST_MEMORY)
     state.memory = grown * min(max(sameness, 0.0), 1.0)
@@ -217,9 +219,9 @@ def _follow_place(state: ContactState, point: Floats, place_radius: float, dt: f
         state.mean_place[k] += dt / (dt + mean_memory) * (point[k] - state.mean_place[k])
         lag2 += (state.place[k] - state.mean_place[k]) ** 2
     state.jitter += dt / (dt + _JITTER_MEMORY) * (np.sqrt(jump2) - state.jitter)
-    stays_within = _MOST_MOVE * place_radius
+    stays_within = _MAX_MOVE_SHARE * place_radius
     if not state.springy:
-        jitters = max(_JITTERS * state.jitter, _LEAST_MOVE * place_radius)
+        jitters = max(_MOVE_OVER_JITTER * state.jitter, _MIN_MOVE_SHARE * place_radius)
         stays_within = min(jitters, stays_within)
     if lag2 > stays_within**2:
         beyond = 1 - stays_within / np.sqrt(lag2)
@@ -228,7 +230,7 @@ def _follow_place(state: ContactState, point: Floats, place_radius: float, dt: f
 
 @kernel(no_cpython_wrapper=True)
 def _force_on_surface(state: ContactState, force: float, hit: float, dt: float) -> float:
-    """Force that the surface receives over a step [N], with the books of what it has yet to receive.
+    """Force that the surface receives over a step [N]; keeps the books of the deficit.
 
     Parameters
     ----------

@@ -25,13 +25,17 @@ from .wrap_check import WrapCheck
 
 _PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
 
-# MuJoCo's marks of contacts that pull though they do not push: all right, or within the gap.
-_FORCE = 0
-_GAP = 1
+# Values of MuJoCo's `contact.exclude` with which a contact pulls: it is included, or in the gap.
+_INCLUDED = 0
+_IN_GAP = 1
+
+# Distance of the points on which contacts are taken to act, over the depth of the overlap: half the
+# depth is on the surface.
+_OUTSIDE = 1.5
 
 # Cosine between the normals of a contact and of the surface, above which the surface faces the
 # contact.
-_FACING = 0.25
+_MIN_FACING_COSINE = 0.25
 
 
 class Contacts(NamedTuple):
@@ -85,12 +89,14 @@ def first_rows(*sorted_ids: NDArray) -> Ints:
 def pair_rows(
     colliders: NDArray[np.integer], bears: Bools, is_target: Bools
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """MuJoCo's contacts that bear on targets, sorted by target and other; where two targets touch, one for each.
+    """MuJoCo's contacts that bear on targets, sorted by target and other.
+
+    Where two targets touch, each of them gets a row.
 
     Parameters
     ----------
     colliders : int [ncon, 2]
-        Collider ids, -1 for what is none.
+        Collider ids, -1 where there is no collider.
     bears : bool [ncon]
         Whether a contact carries a force: one without a row in the constraint solver (excluded, or
         in the margin only) does not.
@@ -117,38 +123,50 @@ def pair_rows(
 
 
 def normal_rows(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> tuple[Ints, Ints]:
-    """Rows of the constraint solver that share the normal forces of some contacts, and the contact of each, [m] both.
+    """Rows of the constraint solver that share the normal forces of some contacts.
 
-    Those of a contact are the edges of its friction pyramid, or one; its normal motion is their
-    mean.
+    The rows of a contact are the edges of its friction pyramid, or one row; the normal motion of
+    the contact is the mean over its rows.
+
+    Returns
+    -------
+    rows : int64 [m]
+    contact_of_row : int64 [m]
+        The contact of each row, as an index into `contacts`.
     """
     address = data.contact.efc_address[contacts]
     dim = data.contact.dim[contacts]
     edges = np.maximum(2 * dim - 2, 1) if is_pyramidal(model) else np.ones_like(dim)
     edges = np.where(address >= 0, edges, 0)
-    ends = edges.cumsum()
-    return np.repeat(address - ends + edges, edges) + np.arange(edges.sum()), np.repeat(
-        np.arange(len(edges)), edges
-    )
+    begins = edges.cumsum() - edges
+    rows = np.repeat(address - begins, edges) + np.arange(edges.sum())
+    contact_of_row = np.repeat(np.arange(len(edges)), edges)
+    return rows, contact_of_row
 
 
 def normal_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
-    """Normal forces of some contacts [N], as `mj_contactForce` gives them; 0 without a row in the constraint solver."""
-    rows, of = normal_rows(model, data, contacts)
-    return np.bincount(of, data.efc_force[rows], len(contacts)).astype(np.float64)
+    """Normal forces of some contacts [N], [k], as `mj_contactForce` gives them.
+
+    A contact without a row in the constraint solver has none.
+    """
+    rows, contact_of_row = normal_rows(model, data, contacts)
+    return np.bincount(contact_of_row, data.efc_force[rows], len(contacts)).astype(np.float64)
 
 
 def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
-    """Forces of some contacts, which have rows in the solver, along the other two axes of their frames [N], [k, 2]."""
-    each = data.contact
+    """Forces of some contacts along the two tangents of their frames [N], [k, 2].
+
+    The contacts must have rows in the constraint solver.
+    """
     axis = np.arange(2)
-    address = each.efc_address[contacts, None]
-    friction = each.friction[contacts, :2]
-    has_axis = each.dim[contacts, None] > axis + 1
+    address = data.contact.efc_address[contacts, None]
+    friction = data.contact.friction[contacts, :2]
+    has_axis = data.contact.dim[contacts, None] > axis + 1
     if is_pyramidal(model):
         # each direction has two opposite edges of the pyramid: friction is their difference
         edge = np.where(has_axis, address + 2 * axis, 0)
-        forces = friction * (data.efc_force[edge] - data.efc_force[np.where(has_axis, edge + 1, 0)])
+        opposite_edge = np.where(has_axis, edge + 1, 0)
+        forces = friction * (data.efc_force[edge] - data.efc_force[opposite_edge])
     else:
         forces = data.efc_force[np.where(has_axis, address + 1 + axis, 0)]
     return np.where(has_axis, forces, 0.0)
@@ -162,75 +180,102 @@ def is_pyramidal(model: mujoco.MjModel) -> bool:
 def points_outside(
     data: mujoco.MjData, contacts: Ints, sides: Ints, targets: Ints, others: Ints, extents: Floats
 ) -> tuple[Floats, Floats]:
-    """Points just outside the targets' surfaces [m], and unit normals from the targets to what touches, [k, 3] each.
+    """Points just outside the targets' surfaces, and normals there, both in the world.
 
-    Both are in the world. The contacts are those of `pair_rows`; `extents` [c] are those of
-    `CoupledModel`.
+    Parameters
+    ----------
+    data : mujoco.MjData
+    contacts, sides, targets, others
+        See `pair_rows`.
+    extents : float64 [c]
+        See `CoupledModel`.
+
+    Returns
+    -------
+    points : float64 [k, 3]
+        [m].
+    normals : float64 [k, 3]
+        Unit vectors from the targets to the other colliders.
     """
-    each = data.contact
-    normals = each.frame[contacts, :3] * (1.0 - 2.0 * sides)[:, None]
+    normals = data.contact.frame[contacts, :3] * (1.0 - 2.0 * sides)[:, None]
     # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard
     # to stop
-    depths = np.minimum(np.abs(each.dist[contacts]), np.minimum(extents[targets], extents[others]))
+    overlaps = np.abs(data.contact.dist[contacts])
+    depths = np.minimum(overlaps, np.minimum(extents[targets], extents[others]))
     # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's
     # surface is dist/2 away. A little outside it the nearest surface point is on this side, even of
     # a thin part.
-    return each.pos[contacts] + 1.5 * depths[:, None] * normals, normals
+    points = data.contact.pos[contacts] + _OUTSIDE * depths[:, None] * normals
+    return points, normals
 
 
 def adhesion(model: mujoco.MjModel, data: mujoco.MjData) -> Floats | None:
-    """Pull of every contact [N], [ncon], by sticky geoms and adhesion actuators; None where nothing pulls.
+    """Pull of every contact by sticky geoms and adhesion actuators [N], [ncon]; None without any.
 
-    MuJoCo's constraint solver holds geoms apart against the pull, so that its forces contain it:
-    what a target receives is their difference. An actuator shares its force among all contacts of
-    its body, and also those within the gap.
+    MuJoCo's constraint solver holds geoms apart against the pull, so that its forces contain the
+    pull: a target receives the difference. An actuator shares its force among all contacts of its
+    body, also the contacts within the gap.
     """
-    actuators = (
-        np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_BODY).tolist()
-        if model.nu
-        else []
-    )
+    actuators: list[int] = []
+    if model.nu:
+        on_bodies = model.actuator_trntype == mujoco.mjtTrn.mjTRN_BODY
+        actuators = np.flatnonzero(on_bodies).tolist()
     if not (model.flg_adhesion or actuators):
         return None
     contacts = data.contact
     pulls = contacts.adhesion.copy()
     if actuators:
         bodies = np.where(contacts.geom >= 0, model.geom_bodyid[contacts.geom], -1)
-        bodies[(bodies < 0).any(axis=1) | ~np.isin(contacts.exclude, (_FORCE, _GAP))] = -1
+        bodies[(bodies < 0).any(axis=1) | ~np.isin(contacts.exclude, (_INCLUDED, _IN_GAP))] = -1
         for actuator in actuators:
             on_body = (bodies == model.actuator_trnid[actuator, 0]).any(axis=1)
-            pulls[on_body] += data.actuator_force[model.actuator_outadr[actuator]] / max(
-                on_body.sum(), 1
-            )
+            force = data.actuator_force[model.actuator_outadr[actuator]]
+            pulls[on_body] += force / max(on_body.sum(), 1)
     return pulls
 
 
 def collider_ids(coupled: CoupledModel, data: mujoco.MjData) -> NDArray[np.integer]:
-    """Collider ids of the two sides of every contact, [ncon, 2]; of an element of a flex, of the vertex nearest."""
+    """Collider ids of the two sides of every contact, [ncon, 2].
+
+    An element of a flex counts as its vertex that is nearest to the contact. Self-contact of a flex
+    is ignored: both ids are -1.
+    """
     model = coupled.model
     geom = data.contact.geom
     if not (model.nflex or coupled.convex_colliders or coupled.soft):
         return geom
     flex = data.contact.flex
-    found = np.where(geom >= 0, coupled.of_geom[geom], coupled.of_flex[flex])
-    contact, side = np.nonzero((geom < 0) & (found < 0))
+    colliders = np.where(geom >= 0, coupled.of_geom[geom], coupled.of_flex[flex])
+    contact, side = np.nonzero((geom < 0) & (colliders < 0))
     if len(contact):
-        flex = flex[contact, side]
-        vertex = data.contact.vert[contact, side].astype(np.int64)
-        of_element = np.flatnonzero(vertex < 0)
-        elements = data.contact.elem[contact, side][of_element]
-        first = model.flex_vertadr[flex]
-        dim = model.flex_dim[flex[of_element]]
-        # the last corner of an element stands for those that it has not
-        corner = np.minimum(np.arange(4), dim[:, None])
-        begins = model.flex_elemdataadr[flex[of_element]] + (dim + 1) * elements
-        vertices = model.flex_elem[begins[:, None] + corner]
-        places = data.flexvert_xpos[first[of_element, None] + vertices]
-        distances = np.linalg.norm(places - data.contact.pos[contact[of_element], None], axis=2)
-        vertex[of_element] = vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
-        found[contact, side] = model.ngeom + first + vertex
-    found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
-    return found
+        first_vertex = model.flex_vertadr[flex[contact, side]]
+        vertex = _flex_vertices(model, data, contact, side)
+        colliders[contact, side] = model.ngeom + first_vertex + vertex
+    colliders[colliders[:, 0] == colliders[:, 1]] = -1
+    return colliders
+
+
+def _flex_vertices(
+    model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints, sides: Ints
+) -> NDArray[np.int64]:
+    """Vertex, within its flex, that touches on each side of contacts, [k].
+
+    Where an element touches, it is the element's vertex nearest to the contact.
+    """
+    flex = data.contact.flex[contacts, sides]
+    vertex = data.contact.vert[contacts, sides].astype(np.int64)
+    of_element = np.flatnonzero(vertex < 0)
+    flex = flex[of_element]
+    element = data.contact.elem[contacts, sides][of_element]
+    dim = model.flex_dim[flex]
+    # an element has at most 4 corners: its last corner stands for missing ones
+    corner = np.minimum(np.arange(4), dim[:, None])
+    begins = model.flex_elemdataadr[flex] + (dim + 1) * element
+    vertices = model.flex_elem[begins[:, None] + corner]
+    points = data.flexvert_xpos[model.flex_vertadr[flex][:, None] + vertices]
+    distances = np.linalg.norm(points - data.contact.pos[contacts[of_element], None], axis=2)
+    vertex[of_element] = vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
+    return vertex
 
 
 def places_facing(
@@ -238,8 +283,8 @@ def places_facing(
 ) -> NDArray[np.float64]:
     """Surface points [m], [k, 3], nearest to contact points among those that face the contacts.
 
-    The other side of a thin part may be nearer. Where no part of the surface faces a contact, it is
-    the nearest point.
+    The other side of a thin part may be nearer. Where no part of the surface faces a contact, the
+    nearest point is taken.
 
     Parameters
     ----------
@@ -249,19 +294,21 @@ def places_facing(
     normals : float64 [k, 3]
         From the target to the other geom, unit vectors.
     """
-    found, texels = atlas.nearest(points)
+    places, texels = atlas.nearest(points)
     outward = atlas.normals.reshape(-1, 3)
-    away = np.flatnonzero(np.einsum("ij,ij->i", outward[texels], normals) <= _FACING)
+    cosines = np.einsum("ij,ij->i", outward[texels], normals)
+    away = np.flatnonzero(cosines <= _MIN_FACING_COSINE)
     if len(away):
         positions = atlas.positions.reshape(-1, 3)
         facing = _nearest_facing(positions, outward, points[away], normals[away])
-        found[away[facing >= 0]] = positions[facing[facing >= 0]]
-    return found
+        exists = facing >= 0
+        places[away[exists]] = positions[facing[exists]]
+    return places
 
 
 @kernel
 def _nearest_facing(positions: Floats, outward: Floats, points: Floats, normals: Floats) -> Ints:
-    """Nearest texel to each point, [k], whose normal agrees with the point's; -1 where none does."""
+    """Texel nearest to each point, [k], among texels that face the point's normal; -1 without one."""
     found = np.full(len(points), -1)
     for i in range(len(points)):
         least = np.inf
@@ -271,7 +318,7 @@ def _nearest_facing(positions: Floats, outward: Floats, points: Floats, normals:
             for k in range(3):
                 distance2 += (positions[texel, k] - points[i, k]) ** 2
                 along += outward[texel, k] * normals[i, k]
-            if distance2 < least and along > _FACING:
+            if distance2 < least and along > _MIN_FACING_COSINE:
                 least = distance2
                 found[i] = texel
     return found
@@ -292,7 +339,7 @@ class ContactReader:
         self._atlases = {
             target: atlas for target, atlas in atlases.items() if target not in coupled.soft
         }
-        # the targets of the geoms that collide for others, or through their convex parts
+        # targets of each geom that collides for another geom, or of a target with convex parts
         self._targets_of: dict[int, list[int]] = {}
         for target in self._atlases:
             for geom in coupled.collision_geoms(target):
@@ -312,26 +359,26 @@ class ContactReader:
     def read(self, data: mujoco.MjData) -> dict[int, Contacts]:
         """Contacts of each target that is touched, by geom id.
 
-        Where two targets touch, their contacts are reported for each of them. What sticks to a
-        target and pulls more than it pushes has negative forces, at all contacts of the pair.
+        Where two targets touch, their contacts are reported for each of them. A geom that sticks to
+        a target and pulls more than it pushes has negative forces, at all contacts of the pair.
         """
-        found: dict[int, Contacts] = {}
+        contacts: dict[int, Contacts] = {}
         if data.ncon:
             colliders = collider_ids(self._coupled, data)
-            found = self._geom_contacts(data, colliders) | self._flex_contacts(data, colliders)
-            if self._targets_of.keys() & found.keys():
-                self._hand_over(data, found)
-        self._check_solver(data, found)
-        self._check_wraps(found)
-        return found
+            contacts = self._geom_contacts(data, colliders) | self._flex_contacts(data, colliders)
+            if self._targets_of.keys() & contacts.keys():
+                self._hand_over(data, contacts)
+        self._check_solver(data, contacts)
+        self._check_wraps(contacts)
+        return contacts
 
     def _geom_contacts(
         self, data: mujoco.MjData, colliders: NDArray[np.integer]
     ) -> dict[int, Contacts]:
-        """The same of what collides without a flex, by its own id, in ascending order.
+        """Contacts of what collides without a flex collider, by its own id, in ascending order.
 
-        Triangles of a flex that touches push sideways in pairs: the contacts of such a pair add up
-        to the sum of their vectors, as for the flex; see `FlexContacts`.
+        Triangles of a flex that touches push sideways in pairs: the forces of such a pair are
+        scaled to add up to the length of their vector sum, as for the flex; see `FlexContacts`.
         """
         model = self._coupled.model
         pulls = adhesion(self._coupled.model, data)
@@ -345,31 +392,48 @@ class ContactReader:
         if pulls is not None:
             forces += pulls[contacts]
         pushing = forces > 0
-        contacts, sides, targets, others = (each[pushing] for each in rows)
-        forces = forces[pushing]
+        contacts, sides, targets, others = (column[pushing] for column in rows)
         points, normals = points_outside(
             data, contacts, sides, targets, others, self._coupled.extents
         )
-        found = Contacts(others, points, forces, normals)
+        touching = Contacts(others, points, forces[pushing], normals)
         if pulls is not None or self._coupled.has_flex[others].any():
-            # the forces of a pair are to add up to what it bears: without pulls, and as vectors
-            # with a flex
-            starts = first_rows(targets, others)
-            whole = np.add.reduceat(forces, starts)
-            factors = np.ones(len(starts))
-            if pulls is not None:
-                factors -= 2 * np.add.reduceat(pulls[contacts], starts) / whole
-            sums = np.linalg.norm(np.add.reduceat(forces[:, None] * normals, starts), axis=1)
-            factors *= np.where(self._coupled.has_flex[others[starts]], sums / whole, 1.0)
-            factors = np.repeat(factors, np.diff(np.append(starts, len(forces))))
-            found = found._replace(forces=factors * forces).rows(factors != 0)
+            factors = self._pair_factors(
+                targets, touching, None if pulls is None else pulls[contacts]
+            )
+            touching = touching._replace(forces=factors * touching.forces).rows(factors != 0)
             targets = targets[factors != 0]
-        return found.split(targets)
+        return touching.split(targets)
+
+    def _pair_factors(self, targets: Ints, touching: Contacts, pulls: Floats | None) -> Floats:
+        """Factors, [k], after which the forces of each pair add up to the force that it bears.
+
+        Without its pulls, and with a flex as vectors.
+
+        Parameters
+        ----------
+        targets : int64 [k]
+            Target of each contact, ascending.
+        touching : Contacts
+        pulls : float64 [k], optional
+            Of each contact [N]; its force contains the pull twice.
+        """
+        others = touching.others
+        forces = touching.forces
+        starts = first_rows(targets, others)
+        whole = np.add.reduceat(forces, starts)
+        factors = np.ones(len(starts))
+        if pulls is not None:
+            factors -= 2 * np.add.reduceat(pulls, starts) / whole
+        vector_sums = np.add.reduceat(forces[:, None] * touching.normals, starts)
+        amounts = np.linalg.norm(vector_sums, axis=1)
+        factors *= np.where(self._coupled.has_flex[others[starts]], amounts / whole, 1.0)
+        return np.repeat(factors, np.diff(np.append(starts, len(forces))))
 
     def _flex_contacts(
         self, data: mujoco.MjData, colliders: NDArray[np.integer]
     ) -> dict[int, Contacts]:
-        """The same of targets with a flex collider, by theirs."""
+        """Contacts of targets with a flex collider, by the target's id."""
         model = self._coupled.model
         flexes = self._flexes
         if flexes is None:
@@ -379,30 +443,33 @@ class ContactReader:
         )
         if not len(contacts):
             return {}
-        normal, friction = (
-            read(model, data, contacts) for read in (normal_forces, friction_forces)
-        )
-        forces = np.column_stack([normal - data.contact.adhesion[contacts], friction])
+        normal = normal_forces(model, data, contacts) - data.contact.adhesion[contacts]
+        friction = friction_forces(model, data, contacts)
+        forces = np.column_stack([normal, friction])
         kept, *loads = flexes.loads(data, *rows, first_rows(targets, others), forces)
         return Contacts(others[kept], *loads).split(targets[kept])
 
-    def _hand_over(self, data: mujoco.MjData, found: dict[int, Contacts]) -> None:
-        """Hand every contact of a collision geom to one target: where several share the geom, to the nearest."""
-        theirs = {geom: found.pop(geom) for geom in sorted(self._targets_of.keys() & found.keys())}
-        for geom, contacts in theirs.items():
-            placed = []
-            for target in self._targets_of[geom]:
-                position = data.geom_xpos[target]
-                rotation = data.geom_xmat[target].reshape(3, 3)
-                points = (contacts.points - position) @ rotation
-                normals = contacts.normals @ rotation
-                placed.append(
-                    position + places_facing(self._atlases[target], points, normals) @ rotation.T
-                )
-            nearest = np.linalg.norm(np.array(placed) - contacts.points, axis=2).argmin(axis=0)
-            for i, target in enumerate(self._targets_of[geom]):
-                if (nearest == i).any():
-                    mine = contacts._replace(points=placed[i]).rows(nearest == i)
-                    found[target] = (
-                        Contacts.together([found[target], mine]) if target in found else mine
-                    )
+    def _hand_over(self, data: mujoco.MjData, contacts: dict[int, Contacts]) -> None:
+        """Hand the contacts of each collision geom to its target, or to the nearest of several."""
+        geoms = sorted(self._targets_of.keys() & contacts.keys())
+        of_geoms = {geom: contacts.pop(geom) for geom in geoms}
+        for geom, on_geom in of_geoms.items():
+            targets = self._targets_of[geom]
+            places = [self._places_on(data, target, on_geom) for target in targets]
+            distances = np.linalg.norm(np.array(places) - on_geom.points, axis=2)
+            nearest = distances.argmin(axis=0)
+            for i, target in enumerate(targets):
+                if not (nearest == i).any():
+                    continue
+                on_target = on_geom._replace(points=places[i]).rows(nearest == i)
+                if target in contacts:
+                    on_target = Contacts.together([contacts[target], on_target])
+                contacts[target] = on_target
+
+    def _places_on(self, data: mujoco.MjData, target: int, contacts: Contacts) -> Floats:
+        """Points on a target's surface nearest to contacts that they face, in the world [m]."""
+        position = data.geom_xpos[target]
+        rotation = data.geom_xmat[target].reshape(3, 3)
+        points = (contacts.points - position) @ rotation
+        normals = contacts.normals @ rotation
+        return position + places_facing(self._atlases[target], points, normals) @ rotation.T

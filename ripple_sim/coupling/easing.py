@@ -1,9 +1,9 @@
-"""Easing: the surface of a material that the model chose bears what is far heavier than what it is to show.
+"""Easing: a surface that shows the lightest body bears far heavier ones.
 
 A robot's torso can be hit by a ball and bear the whole robot, whose impulses differ by a factor of
-a thousand. Waves are proportional to impulses, so that no density shows the one and bears the
-other. Where the user gives no density, the model chooses one that shows the lightest body, and
-`Easing` limits the forces of the others.
+a thousand. Waves are proportional to impulses, so that no density shows the ball and bears the
+robot. Where the user gives no density, the model chooses one that shows the lightest body, and
+`Easing` limits the forces of the heavier bodies.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ripple_sim.solver.texels.thickness import half_thickness
 
 from .model import CoupledModel
 
-# Where less than this share of a force is taken up, it is told.
-_TOLD = 0.25
+# A warning is given where less than this share of a force is taken up.
+_WARNED_SHARE = 0.25
 
 
 class EasingLaw(NamedTuple):
@@ -32,12 +32,12 @@ class EasingLaw(NamedTuple):
     Attributes
     ----------
     most : float
-        Force up to which the surface takes up what it is given, smoothed over time [N].
+        Greatest force that the surface takes up, smoothed over time [N].
     rate : float
-        Of the smoothing, an exponential one; that of the surface's own swing [1/s].
+        Rate of the exponential smoothing, which is that of the surface's own swing [1/s].
     thickness : float
-        Half the target's thickness where this holds [m]; where it is thinner the most is less by as
-        much.
+        Half the target's thickness for which `most` holds [m]; where the target is thinner, the
+        greatest force is smaller in proportion.
     """
 
     most: float
@@ -55,7 +55,7 @@ class EasingLaw(NamedTuple):
         speed: float,
         stiffness: float,
     ) -> EasingLaw:
-        """The law by which a surface is dented by a share of half its thickness at most, by a hit or a weight at rest.
+        """The law that lets hits and weights dent a surface by a share of half its thickness at most.
 
         A hit J that is short beside the surface's swing of rate w counts as a force J w. Arguments
         are as for `density_under`.
@@ -67,14 +67,14 @@ class EasingLaw(NamedTuple):
 class Easing:
     """Which share of each body's force a target takes up, step by step.
 
-    Each body's smoothed force stays below the law's most: all of a light hit is taken up, and of a
-    harder one as much as of one that just reaches the most.
+    Each body's smoothed force stays below the law's `most`: all of a light hit is taken up, and of
+    a harder hit as much as of a hit that just reaches `most`.
 
     Parameters
     ----------
     law : EasingLaw
     bodies : int64 [c]
-        What counts as one body: an id for each collider.
+        For each collider the id of its body, see `bodies_of`.
     atlas : Atlas
         Of the target.
 
@@ -85,11 +85,12 @@ class Easing:
     """
 
     def __init__(self, law: EasingLaw, bodies: NDArray[np.int64], atlas: Atlas) -> None:
-        self._law = law
-        self._atlas = atlas
-        self._bodies = bodies
-        self._smoothed = np.zeros(int(bodies.max(initial=0)) + 1)
         self.least_share = 1.0
+        self._law = law
+        self._bodies = bodies
+        self._atlas = atlas
+        # smoothed force of each body [N]
+        self._smoothed = np.zeros(int(bodies.max(initial=0)) + 1)
 
     @functools.cached_property
     def _thinness(self) -> Floats:
@@ -97,7 +98,19 @@ class Easing:
         return np.minimum(half_thickness(self._atlas).reshape(-1) / self._law.thickness, 1.0)
 
     def shares(self, colliders: Ints, texels: Ints, forces: Floats, elapsed: float) -> Floats:
-        """Share that is taken up of each collider's force [N] near a texel, which is held over a time [s]."""
+        """Share of each collider's force that is taken up, [k].
+
+        Parameters
+        ----------
+        colliders : int64 [k]
+            Ids of the colliders that touch.
+        texels : int64 [k]
+            Flat indices of texels near the contacts.
+        forces : float64 [k]
+            [N].
+        elapsed : float
+            How long the forces are held [s].
+        """
         bodies = self._bodies[colliders]
         total = np.bincount(bodies, np.abs(forces), len(self._smoothed))
         fading = math.exp(-self._law.rate * elapsed)
@@ -121,7 +134,7 @@ class Easing:
 
 
 def bodies_of(coupled: CoupledModel) -> NDArray[np.int64]:
-    """What counts as one body to `Easing`: the root of each collider's tree, and one for all flexes."""
+    """Body of each collider for `Easing`: the root of the collider's tree; one for all flexes."""
     model = coupled.model
     bodies = np.full(len(coupled.owners), model.nbody, dtype=np.int64)
     rigid = coupled.owners < model.ngeom
@@ -131,12 +144,11 @@ def bodies_of(coupled: CoupledModel) -> NDArray[np.int64]:
 
 def easing_warning(name: str, easing: Easing) -> str | None:
     """What to warn of where forces are eased, else None."""
-    if easing.least_share >= _TOLD:
+    if easing.least_share >= _WARNED_SHARE:
         return None
     return (
         f"geom {name!r} shows hits of the lightest body that can touch it, and takes up "
-        f"{easing.least_share:.2g} of "
-        "the force of a heavier one, which would dent it too deep (`last_impulses` has all of it). "
-        "For waves in "
-        "proportion to every impulse, give the material a density"
+        f"{easing.least_share:.2g} of the force of a heavier one, which would dent it too deep "
+        "(`last_impulses` has all of it). For waves in proportion to every impulse, give the "
+        "material a density"
     )

@@ -1,10 +1,10 @@
 """The rest filter: the surface under a geom at rest becomes still, and nothing else changes.
 
-What flickers under a geom at rest is the place where it presses: MuJoCo divides its weight among
-the contact points anew in every step. The sum of its contact forces is smooth, and passes as it is.
-The place is averaged, over a memory that grows while nothing changes and that is short where force
-or place do. A contact that chatters is the exception: its force is averaged too. `contact_state`
-follows each contact; this module spreads its force over its texels.
+Under a geom at rest, the place where it presses flickers: MuJoCo divides the geom's weight among
+the contact points anew in every step. The sum of the contact forces is smooth, and passes as it is.
+The place is averaged over a memory, which grows while nothing changes, and is short where force or
+place change. A contact that chatters is the exception: its force is averaged too. `contact_state`
+follows each contact; this module spreads the contact's force over its texels.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
 from .contact_state import CONTACT_STATE, ContactState, is_gone, miss, touch, turn
 
-# What the times of `contact_state` are for: a time step, and a contact's time constant [s].
+# The times of `contact_state` hold for this time step, MuJoCo's default [s].
 _TIME_STEP = 0.002
+# They hold for this time constant of a contact, MuJoCo's default [s].
 DEFAULT_TIME_CONSTANT = 0.02
 # Shares below this are dropped from the mean shares of a geom.
-_LEAST_SHARE = 1e-6
+_MIN_SHARE = 1e-6
 
 
 class TexelForces(NamedTuple):
@@ -90,9 +91,9 @@ class RestFilter:
     Parameters
     ----------
     geoms, texels : int
-        How many there are.
+        Number of geoms, and of texels of the target.
     time_constant : float
-        Of contacts [s].
+        Of contacts with the target [s].
     """
 
     def __init__(
@@ -132,7 +133,7 @@ class RestFilter:
         ]
 
     def prepay(self, geom: int, impulse: float) -> None:
-        """Note an impulse [N s], positive inwards, that the surface received before a geom gives it."""
+        """Note an impulse [N s], positive inwards, that the surface received before a geom's contact."""
         if not impulse:
             return
         state = self._states[geom]
@@ -146,7 +147,12 @@ class RestFilter:
         if self._all_gone and not len(present.geoms):
             return Load.none()
         size = len(self._texels) + len(present.texels)
-        shares = _Shares(np.empty(size, np.int64), np.empty(size), np.empty(size), self._slots)
+        shares = _Shares(
+            texels=np.empty(size, np.int64),
+            mean=np.empty(size),
+            latest=np.empty(size),
+            slots=self._slots,
+        )
         count, self._all_gone = _filter(
             self._states, self._texels, self._mean_shares, present, dt / self._time_scale, shares
         )
@@ -221,16 +227,21 @@ def _filter(
 
 @kernel(no_cpython_wrapper=True)
 def _fade(
-    state: ContactState, texels: Ints, mean_shares: Floats, left: float, out: _Shares, end: int
+    state: ContactState,
+    texels: Ints,
+    mean_shares: Floats,
+    sum_of_shares: float,
+    out: _Shares,
+    end: int,
 ) -> int:
-    """Enter the earlier mean shares of a geom from `end` on, scaled to the sum `left`; return the new end."""
+    """Enter the earlier mean shares of a geom, scaled to a sum, from `end` on; return the new end."""
     whole = 0.0
     for i in range(state.first, state.last):
-        if mean_shares[i] > _LEAST_SHARE:
+        if mean_shares[i] > _MIN_SHARE:
             whole += mean_shares[i]
-    scale = left / whole
+    scale = sum_of_shares / whole
     for i in range(state.first, state.last):
-        if mean_shares[i] > _LEAST_SHARE:
+        if mean_shares[i] > _MIN_SHARE:
             out.texels[end] = texels[i]
             out.mean[end] = scale * mean_shares[i]
             out.latest[end] = 0.0
@@ -243,7 +254,7 @@ def _fade(
 def _add_shares(
     present: TexelForces, first: int, last: int, force: float, weight: float, out: _Shares, end: int
 ) -> int:
-    """Add the shares of this step, with a weight in the mean, in new slots from `end` on; return the new end."""
+    """Add the shares of this step, with a weight in the mean; return the new end of the slots."""
     for i in range(first, last):
         texel = present.texels[i]
         slot = out.slots[texel]
@@ -262,7 +273,7 @@ def _add_shares(
 
 @kernel(no_cpython_wrapper=True)
 def _keep(state: ContactState, texels: Ints, mean_shares: Floats, out: _Shares, end: int) -> int:
-    """Enter the earlier mean shares of a geom that does not touch, from `end` on; return the new end."""
+    """Enter the earlier mean shares of a geom that does not touch; return the new end."""
     for i in range(state.first, state.last):
         out.texels[end] = texels[i]
         out.mean[end] = mean_shares[i]

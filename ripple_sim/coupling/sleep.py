@@ -1,4 +1,4 @@
-"""MuJoCo's sleep: what sleeps where, and what wakes it.
+"""MuJoCo's sleep: the contacts of bodies that sleep, and how to wake bodies.
 
 MuJoCo stops the bodies of an island that were slow for some steps, and leaves out their contacts.
 It does not know that a rippling surface below them may move.
@@ -17,28 +17,34 @@ from ripple_sim.solver.kernel import Bools
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
-# Velocity that wakes a sleeping tree and moves nothing [m/s or rad/s]: MuJoCo wakes what has any.
-_NUDGE = 1e-200
+# Velocity that wakes a sleeping tree and moves nothing [m/s or rad/s]: MuJoCo wakes every tree
+# that has a velocity.
+_WAKING_VELOCITY = 1e-200
 
-# Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their
-# forces are those of statics, however deep the bodies lie in each other.
-_NO_SPRING = (1e6, 1.0)
-_RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-# Geoms that are apart by this share of the smaller one's size are meant to touch.
-_NEAR = 1e-3
+# Parameters of contacts that bear as in statics, however deep the bodies lie in each other: a
+# `solref` without a spring (time constant [s] and damping ratio), and a `solimp` with an impedance
+# of nearly 1.
+_SOLREF_WITHOUT_SPRING = (1e6, 1.0)
+_SOLIMP_RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+# Geoms that are apart by less than this share of the smaller one's size are taken to touch.
+_MAX_GAP_SHARE = 1e-3
 
 
 def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData | None:
-    """Data with the contacts of all bodies as they lie, all awake and at rest; None where none of them sleeps."""
+    """Data with the contacts of all bodies where they lie, all awake and without velocity.
+
+    None where no body sleeps.
+    """
     if (data.tree_asleep < 0).all():
         return None
     still = copy.copy(model)
     still.opt.enableflags &= ~SLEEP
     for kind in ("geom", "pair", "flex"):
-        getattr(still, f"{kind}_solref")[:] = _NO_SPRING
-        getattr(still, f"{kind}_solimp")[:] = _RIGID
-    # planes, which have no end, are given a radius of 0
-    still.geom_margin += _NEAR * np.minimum(still.geom_aabb[:, 3:].min(axis=1), still.geom_rbound)
+        getattr(still, f"{kind}_solref")[:] = _SOLREF_WITHOUT_SPRING
+        getattr(still, f"{kind}_solimp")[:] = _SOLIMP_RIGID
+    # a plane, which has no end, has a bounding radius of 0
+    sizes = np.minimum(still.geom_aabb[:, 3:].min(axis=1), still.geom_rbound)
+    still.geom_margin += _MAX_GAP_SHARE * sizes
     state = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
     resting = mujoco.MjData(still)
@@ -61,4 +67,4 @@ def wake(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int]) -> N
     for body in bodies:
         tree = int(model.body_treeid[body])
         if tree >= 0 and data.tree_asleep[tree] >= 0:
-            data.qvel[model.tree_dofadr[tree]] = _NUDGE
+            data.qvel[model.tree_dofadr[tree]] = _WAKING_VELOCITY

@@ -1,4 +1,4 @@
-"""Warnings of geoms so fast that they would pass through a target or get stuck in it, before they touch."""
+"""Warnings of geoms so fast that they would pass through a target or get stuck in it."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from ripple_sim.solver.kernel import Floats, Ints
 
 from .model import SPECULATIVE, CoupledModel
 
-_SAFE = 0.85
+# Safe depth over the sum of the two geoms' smallest half-extents: geoms came through at 0.9.
+_SAFE_DEPTH = 0.85
 
+# Safe depth over a geom's smallest half-extent in a signed distance field: contacts begin to push
+# from all sides at 1.4, and do not yet at 1.2.
+_SAFE_DEPTH_IN_SDF = 1.2
 
-# Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push
-# from all sides: seen at 1.4, not yet at 1.2.
-_SAFE_IN_SDF = 1.2
-
-
-# Depth over a flex's thickness at which it begins to throw cylinders aside.
-_SAFE_IN_FLEX = 0.7
-
+# Safe depth of cylinders over a flex's thickness: beyond it the flex begins to throw them aside.
+_SAFE_DEPTH_IN_FLEX = 0.7
 
 # The check runs once in so many steps, and looks as many steps ahead.
-_EVERY = 5
+_CHECK_EVERY = 5
 
-
-# How much less time a pair must have than that of the last warning to be told of.
+# A warning comes again for a pair that has so many times less time to stop than the pair of the
+# last warning.
 _WORSE = 2.0
 
+# Keeps a division by the rate of a contact's spring finite: the least squared rate [1/s^2].
+_MIN_SQUARED_RATE = 1e-12
 
 # A pair to watch.
 PAIR = np.dtype(
@@ -50,12 +50,12 @@ class TunnellingCheck:
     by v t_stop before the contact's spring has stopped it: t_stop = tau zeta exp(-zeta) for a
     `solref` of time constant tau and damping ratio zeta (a critically damped spring at zeta = 1).
     Past the sum of the two geoms' smallest half-extents it comes out on the other side or stays
-    inside; the first that did so were seen at 0.9 of that sum. A geom that is inside an SDF geom by
+    inside; the first geoms that did so were seen at 0.9 of the sum. A geom that is inside an SDF geom by
     more than its own half-extent is pushed from all sides: the normal forces then add up to many
-    times the momentum exchanged. A warning names the pair that is worst, and comes again only where
-    another is twice as bad: a humanoid that falls has dozens of pairs, and one advice serves them
-    all. MuJoCo's speculative contacts, where the version has them and they are enabled, stop geoms
-    in time, but not at SDF geoms or flexes: then only those are checked.
+    times the momentum exchanged. A warning names the worst pair, and comes again only where another
+    pair is twice as bad: a humanoid that falls has dozens of pairs, and one advice serves them all.
+    MuJoCo's speculative contacts, where the version has them and they are enabled, stop geoms in
+    time, but not at SDF geoms or flexes: then only SDF geoms and flexes are checked.
 
     A flex collider holds geoms off by its thickness, which counts in place of the half-extent of
     its geom. Cylinders that sink in by 0.7 of the thickness begin to be thrown aside.
@@ -71,27 +71,29 @@ class TunnellingCheck:
         self._model = coupled.model
         self._names = coupled.names
         self._pairs = _watched_pairs(coupled, targets)
-        # within how long the pair of the last warning would have had to stop [s]
-        self._told = np.inf
+        # time within which the pair of the last warning would have had to stop [s]
+        self._warned_time = np.inf
         self._steps = 0
 
     def __call__(self, data: mujoco.MjData) -> None:
         """Warn of a pair that is about to meet too fast. Call it after each physics step."""
         self._steps += 1
-        if not len(self._pairs) or (self._steps - 1) % _EVERY:
+        if not len(self._pairs) or (self._steps - 1) % _CHECK_EVERY:
             return
-        rows, speeds = too_fast(self._pairs, self._model, data, _EVERY)
+        rows, speeds = too_fast(self._pairs, self._model, data, _CHECK_EVERY)
         times = self._pairs["limit"][rows] / speeds
-        if not times.min(initial=np.inf) < self._told / _WORSE:
+        if not times.min(initial=np.inf) < self._warned_time / _WORSE:
             return
         worst = int(times.argmin())
-        self._told = float(times[worst])
-        speed = float(speeds[worst])
-        model = self._model
-        names = self._names
+        self._warned_time = float(times[worst])
+        self._warn(self._pairs[rows[worst]], float(speeds[worst]))
+
+    def _warn(self, pair: np.void, speed: float) -> None:
+        """Warn of a pair, `PAIR`, that meets at a speed [m/s]."""
+        target, other, limit, _, stopping_time = pair.item()
         timestep = self._model.opt.timestep
-        target, other, limit, _, stopping_time = self._pairs[rows[worst]].item()
-        body = model.body(int(model.geom_bodyid[other])).name or names[other]
+        names = self._names
+        body = self._model.body(int(self._model.geom_bodyid[other])).name or names[other]
         needed = limit / speed - stopping_time
         # MuJoCo keeps a contact's time constant at two time steps or more
         shortest = limit / speed / (1 + 2 / np.e)
@@ -103,16 +105,25 @@ class TunnellingCheck:
             advice = f'use a solref of "{np.e * (limit / speed - timestep):.2g} 1" or less for both'
         warn_caller(
             f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through "
-            f"it, get stuck or "
-            f"give a wrong impulse: with a time step of {timestep:.2g} s it sinks in by "
-            f"{speed * (timestep + stopping_time):.2g} m, of which {limit:.2g} m are safe; {advice}"
+            f"it, get stuck or give a wrong impulse: with a time step of {timestep:.2g} s it sinks "
+            f"in by {speed * (timestep + stopping_time):.2g} m, of which {limit:.2g} m are safe; "
+            f"{advice}"
         )
 
 
 def too_fast(
     pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, steps: int
 ) -> tuple[Ints, Floats]:
-    """Rows of the pairs, `PAIR`, that may touch within some steps and sink in beyond their limits, and speeds [m/s]."""
+    """Rows of the pairs that may touch soon and sink in beyond their limits, and their speeds [m/s].
+
+    Parameters
+    ----------
+    pairs : PAIR [p]
+    model : mujoco.MjModel
+    data : mujoco.MjData
+    steps : int
+        Within which the pairs may touch.
+    """
     body = model.geom_bodyid
     target = pairs["target"]
     other = pairs["other"]
@@ -126,45 +137,72 @@ def too_fast(
     speeds = np.linalg.norm(relative, axis=1)
     near = distances < pairs["range"] + (1 + steps) * speeds * timestep
     approaching = np.einsum("ij,ij->i", away, relative) < 0
-    rows = np.flatnonzero(
-        near & approaching & (speeds * (timestep + pairs["stopping_time"]) > pairs["limit"])
-    )
+    too_deep = speeds * (timestep + pairs["stopping_time"]) > pairs["limit"]
+    rows = np.flatnonzero(near & approaching & too_deep)
     return rows, speeds[rows]
 
 
 def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
     """Pairs of a geom that collides for a target and another geom, which may tunnel, `PAIR` [p]."""
     model = coupled.model
+    target, other = _pairs_at_risk(coupled, targets)
+    pairs = np.zeros(len(target), PAIR)
+    pairs["target"] = target
+    pairs["other"] = other
+    pairs["limit"] = _safe_depths(coupled, target, other)
+    pairs["range"] = model.geom_rbound[target] + model.geom_rbound[other]
+    pairs["stopping_time"] = _stopping_times(coupled, target, other)
+    return pairs
+
+
+def _pairs_at_risk(coupled: CoupledModel, targets: list[int]) -> tuple[Ints, Ints]:
+    """Geom ids of pairs, [p] each, that MuJoCo's speculative contacts do not stop in time."""
+    model = coupled.model
+    at_risk = np.ones(model.ngeom, dtype=bool)
+    if model.opt.enableflags & SPECULATIVE:
+        at_risk = _is_sdf(model) | coupled.has_flex[: model.ngeom]
+    is_thin = np.isfinite(coupled.collider_extents)
+    # the geoms that collide for the targets, each once
+    colliders: dict[int, None] = {}
+    for target in targets:
+        colliders.update(dict.fromkeys(coupled.collision_geoms(target)))
+    pairs = []
+    for collider in colliders:
+        for other in np.flatnonzero(coupled.can_collide(collider)).tolist():
+            if is_thin[other] and (at_risk[collider] or at_risk[other]):
+                pairs.append((collider, other))
+    ids = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
+    return ids[0], ids[1]
+
+
+def _is_sdf(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Whether each geom is a signed distance field, [ngeom]."""
+    return np.asarray(model.geom_type == mujoco.mjtGeom.mjGEOM_SDF)
+
+
+def _safe_depths(coupled: CoupledModel, target: Ints, other: Ints) -> Floats:
+    """Depth up to which a contact of each pair of geoms is safe [m], [p]."""
+    model = coupled.model
     extents = coupled.collider_extents
-    flex = coupled.has_flex[: coupled.model.ngeom]
-    sdf, cylinder = (
-        model.geom_type == kind
-        for kind in (mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_CYLINDER)
-    )
-    unchecked = (
-        sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
-    )
-    pairs = [
-        (target, other)
-        for target in dict.fromkeys(
-            geom for each in targets for geom in coupled.collision_geoms(each)
-        )
-        for other in np.flatnonzero(coupled.can_collide(target)).tolist()
-        if np.isfinite(extents[other]) and (unchecked[target] or unchecked[other])
-    ]
-    target, other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
-    limit = _SAFE * (extents[target] + extents[other])
+    sdf = _is_sdf(model)
+    flex = coupled.has_flex[: model.ngeom]
+    cylinder = model.geom_type == mujoco.mjtGeom.mjGEOM_CYLINDER
+    limit = _SAFE_DEPTH * (extents[target] + extents[other])
     for geom, around in ((target, other), (other, target)):
-        safe = np.where(sdf[around], _SAFE_IN_SDF * extents[geom], np.inf)
-        safe = np.where(flex[around] & cylinder[geom], _SAFE_IN_FLEX * extents[around], safe)
+        in_sdf = np.where(sdf[around], _SAFE_DEPTH_IN_SDF * extents[geom], np.inf)
+        is_thrown_aside = flex[around] & cylinder[geom]
+        safe = np.where(is_thrown_aside, _SAFE_DEPTH_IN_FLEX * extents[around], in_sdf)
         limit = np.minimum(limit, safe)
-    reach = model.geom_rbound[target] + model.geom_rbound[other]
+    return limit
+
+
+def _stopping_times(coupled: CoupledModel, target: Ints, other: Ints) -> Floats:
+    """Depth over speed after the first contact of each pair of geoms [s], [p]."""
     solref = (coupled.solref[target] + coupled.solref[other]) / 2
-    # negative pairs are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio =
+    # negative numbers are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio =
     # damping / (2 omega)
     direct = solref[:, 0] <= 0
-    omega = np.sqrt(np.where(direct, np.maximum(-solref[:, 0], 1e-12), 1.0))
-    constant = np.maximum(solref[:, 0], 2 * model.opt.timestep)
+    omega = np.sqrt(np.where(direct, np.maximum(-solref[:, 0], _MIN_SQUARED_RATE), 1.0))
+    constant = np.maximum(solref[:, 0], 2 * coupled.model.opt.timestep)
     ratio = np.where(direct, -solref[:, 1] / (2 * omega), solref[:, 1])
-    stopping_times = np.where(direct, 1 / omega, constant * ratio) * np.exp(-np.clip(ratio, 0, 1))
-    return np.array(list(zip(target, other, limit, reach, stopping_times, strict=True)), PAIR)
+    return np.where(direct, 1 / omega, constant * ratio) * np.exp(-np.clip(ratio, 0, 1))

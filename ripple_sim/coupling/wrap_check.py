@@ -12,24 +12,25 @@ from ripple_sim.solver.kernel import Floats
 
 from .model import CoupledModel
 
-# The amounts of forces on a flex over their sum as vectors, that is told of, after so many steps of
-# touch.
-_WRAPPED = 1.1
-_TOUCHED = 50
+# A flex is wrapped round something where the amounts of the forces on it are more than this many
+# times their sum as vectors.
+_MAX_AMOUNT_OVER_SUM = 1.1
+# Steps of touch after which it is judged.
+_MIN_STEPS = 50
 
 
 class WrapCheck:
     """Warns of flexes that wrap round something. Called with the `Contacts` of each step by target.
 
-    Round a ball the forces on a cloth's slopes point against one another: the surface is pressed by
-    their amounts, as by a string round a pole, and the ball is moved by their sum.
+    Round a ball the forces on a cloth's slopes point against one another: the amounts of the forces
+    press the surface, as a string round a pole does, and the sum of the forces moves the ball.
     """
 
     def __init__(self, coupled: CoupledModel) -> None:
         self._names = coupled.names
         self._owners = coupled.owners
         self._flexes = {target for target, surface in coupled.soft.items() if surface.flex >= 0}
-        # by target and what touches it: steps, amounts and sums as vectors [N]
+        # by target and what touches it: steps, and sums of amounts and of vector sums [N]
         self._sums: dict[tuple[int, int], Floats] = {}
 
     def __call__(self, contacts: Mapping[int, Any]) -> None:
@@ -41,18 +42,20 @@ class WrapCheck:
                 mine = owners == owner
                 amount = forces[mine].sum()
                 together = np.linalg.norm(forces[mine] @ normals[mine])
-                found = self._sums.setdefault((target, owner), np.zeros(3))
-                found += np.array([1.0, amount, together])
-                steps, whole, moving = found
-                if steps >= _TOUCHED and whole > _WRAPPED * moving:
+                sums = self._sums.setdefault((target, owner), np.zeros(3))
+                sums += np.array([1.0, amount, together])
+                steps, pressing, moving = sums
+                if steps >= _MIN_STEPS and pressing > _MAX_AMOUNT_OVER_SUM * moving:
                     self._flexes.discard(target)
-                    flex, other = (
-                        repr(self._names[each]) for each in (self._owners[target], owner)
-                    )
-                    warn_caller(
-                        f"flex {flex} wraps round {other}: its impulses are {whole / moving:.2f} "
-                        f"times what that "
-                        "loses, for forces on its slopes press it, but cancel as vectors; "
-                        "mj_contactForce has these"
-                    )
+                    self._warn(target, owner, pressing / moving)
                     break
+
+    def _warn(self, target: int, owner: int, ratio: float) -> None:
+        """Warn of a flex whose impulses are so many times the impulse of what it wraps round."""
+        flex = self._names[self._owners[target]]
+        other = self._names[owner]
+        warn_caller(
+            f"flex {flex!r} wraps round {other!r}: its impulses are {ratio:.2f} times the impulse "
+            f"that {other!r} loses, because the forces on the slopes of the flex press it, but "
+            "cancel as vectors; mj_contactForce gives the vectors"
+        )

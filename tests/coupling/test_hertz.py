@@ -173,7 +173,7 @@ def test_gpu_and_processor_agree_and_a_reset_ends_the_pulse():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"pulse": "soft"}, "pulse is 'soft' for geom 'target'; valid are 'contact', 'hertz'"),
+        ({"pulse": "soft"}, "pulse of geom 'target' must be one of 'contact', 'hertz', got 'soft'"),
         ({"modulus": None}, r"modulus is None Pa .* valid is a finite number greater than 0: E\*"),
         ({"modulus": {"target": -1.0}}, "modulus is -1.0 Pa"),
         ({"two_way": True}, "take two_way=False, or pulse='contact'"),
