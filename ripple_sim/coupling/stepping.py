@@ -110,30 +110,38 @@ class StepClock:
         timestep = float(model.opt.timestep)
         before = self._time
         timestep_before = self._timestep
-        has_gone_back = before is not None and time < before
-        was_reset_by_user = True
-        if can_be_marked(model):
-            mark = read_mark(data)
-            was_reset_by_user = mark is None
-            # a mark is made where there is none, and one that others made is taken over
-            if mark is None:
-                mark = make_mark(data)
-            reset = has_gone_back or self._mark not in (None, mark)
-            self._mark = mark
-        else:
-            # the automatic reset leaves its warning behind, and any other one wipes it out
-            diverged = divergence(data) is not None
-            reset = has_gone_back or (before is not None and diverged != self._diverged)
-            self._diverged = diverged
+        has_mark = can_be_marked(model) and read_mark(data) is not None
+        reset = self._sees_reset(model, data, before)
         goes_on = before is not None and not reset and time > before
-        in_turn = self._is_back_at(data) and not was_reset_by_user and not goes_on
+        in_turn = self._is_back_at(data) and has_mark and not goes_on
         self._time = time
         self._timestep = timestep
         if before is None or reset:
             return Passed(timestep if time else 0.0, reset=reset, in_turn=in_turn)
         if in_turn:
             return Passed(0.0, in_turn=True)
-        elapsed = time - before
+        return self._passed(time - before, timestep, timestep_before)
+
+    def _sees_reset(self, model: mujoco.MjModel, data: mujoco.MjData, before: float | None) -> bool:
+        """Whether the simulation began anew since the last look, at the time `before` [s]."""
+        has_gone_back = before is not None and float(data.time) < before
+        if can_be_marked(model):
+            # a mark is made where there is none, and one that others made is taken over
+            mark = read_mark(data)
+            if mark is None:
+                mark = make_mark(data)
+            has_new_mark = self._mark not in (None, mark)
+            self._mark = mark
+            return has_gone_back or has_new_mark
+        # the automatic reset leaves its warning behind, and any other one wipes it out
+        diverged = divergence(data) is not None
+        has_other_warning = before is not None and diverged != self._diverged
+        self._diverged = diverged
+        return has_gone_back or has_other_warning
+
+    @staticmethod
+    def _passed(elapsed: float, timestep: float, timestep_before: float) -> Passed:
+        """The steps in an elapsed time [s], of the present time step or of the one before [s]."""
         # a step that equals the last one to the last bit saves the solver new coefficients
         if abs(elapsed - timestep) < _ROUND_OFF * timestep:
             return Passed(timestep)

@@ -105,44 +105,18 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
     Nothing can touch it, it collides off its surface, or MuJoCo tells no forces of its contacts.
     """
     model = coupled.model
-    name = coupled.names[geom]
-    size = float(np.ptp(atlas.mesh.V, axis=0).max())
     solids = coupled.collision_geoms(geom)
+    collides = model.geom_contype[geom] or model.geom_conaffinity[geom]
     if coupled.out_of_touch(geom):
         yield _touch_warning(coupled, geom)
     elif geom in coupled.convex_colliders or any(solid != geom for solid in solids):
-        colliders: list[int] = []
-        for solid in solids:
-            colliders += coupled.convex_colliders.get(solid, [solid])
-        gap = collision_gap(coupled, geom, atlas, colliders)
-        if gap > COARSE_TOLERANCE * size:
-            names = ", ".join(repr(coupled.names[collider]) for collider in colliders)
-            yield (
-                f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its "
-                "size) off the surface that ripples: contacts load it where it is nearest to them; "
-                f"name other geoms in Target(contacts=...) or call make_collidable(spec, {name!r})"
-            )
+        yield from _collider_warning(coupled, geom, atlas)
     elif coupled.has_flex[geom]:
         yield from _flex_warning(coupled, geom)
-    elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and (
-        model.geom_contype[geom] or model.geom_conaffinity[geom]
-    ):
-        gap = hull_gap(atlas)
-        if gap > GAP_TOLERANCE * size:
-            yield (
-                f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} "
-                'of its size) off the surface that ripples; give it type="sdf" in the MJCF, or '
-                f"call make_collidable(spec, {name!r})"
-            )
+    elif model.geom_type[geom] == _GEOM.mjGEOM_MESH and collides:
+        yield from _hull_warning(coupled, geom, atlas)
     elif model.geom_type[geom] == _GEOM.mjGEOM_SDF:
-        hills = np.flatnonzero(coupled.can_collide(geom) & (model.geom_type == _GEOM.mjGEOM_HFIELD))
-        if len(hills):
-            names = ", ".join(repr(coupled.names[other]) for other in hills)
-            yield (
-                f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): "
-                f'call make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity '
-                "so that they do not meet"
-            )
+        yield from _sdf_warning(coupled, geom)
     # not in MuJoCo's older versions
     passive = getattr(model, "flex_passive", np.zeros(model.nflex))
     for flex in coupled.soft_flexes(geom).tolist():
@@ -150,8 +124,58 @@ def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterat
             yield (
                 f"MuJoCo tells no forces of the passive contacts of flex "
                 f"{coupled.names[model.ngeom + flex]!r}, under "
-                f'which geom {name!r} will not ripple; set passive="false" in the flex\'s <contact>'
+                f"which geom {coupled.names[geom]!r} will not ripple; set "
+                'passive="false" in the flex\'s <contact>'
             )
+
+
+def _collider_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
+    """Warning of a target for which other geoms collide, off its surface."""
+    name = coupled.names[geom]
+    size = _size(atlas)
+    colliders: list[int] = []
+    for solid in coupled.collision_geoms(geom):
+        colliders += coupled.convex_colliders.get(solid, [solid])
+    gap = collision_gap(coupled, geom, atlas, colliders)
+    if gap > COARSE_TOLERANCE * size:
+        names = ", ".join(repr(coupled.names[collider]) for collider in colliders)
+        yield (
+            f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) "
+            "off the surface that ripples: contacts load it where it is nearest to them; name "
+            f"other geoms in Target(contacts=...) or call make_collidable(spec, {name!r})"
+        )
+
+
+def _hull_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
+    """Warning of a mesh geom whose convex hull is off its surface."""
+    name = coupled.names[geom]
+    size = _size(atlas)
+    gap = hull_gap(atlas)
+    if gap > GAP_TOLERANCE * size:
+        yield (
+            f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} "
+            'of its size) off the surface that ripples; give it type="sdf" in the MJCF, or '
+            f"call make_collidable(spec, {name!r})"
+        )
+
+
+def _sdf_warning(coupled: CoupledModel, geom: int) -> Iterator[str]:
+    """Warning of height fields that an SDF geom does not meet."""
+    name = coupled.names[geom]
+    is_field = coupled.model.geom_type == _GEOM.mjGEOM_HFIELD
+    fields = np.flatnonzero(coupled.can_collide(geom) & is_field)
+    if len(fields):
+        names = ", ".join(repr(coupled.names[field]) for field in fields)
+        yield (
+            f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): "
+            f'call make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity '
+            "so that they do not meet"
+        )
+
+
+def _size(atlas: Atlas) -> float:
+    """Longest extent of a target along the axes of its frame [m]."""
+    return float(np.ptp(atlas.mesh.V, axis=0).max())
 
 
 def _touch_warning(coupled: CoupledModel, geom: int) -> str:

@@ -252,28 +252,34 @@ def randomize(spec: mujoco.MjSpec, entry: RandomEntry) -> dict[str, np.ndarray]:
     shifts = {}
     names = free if entry.bodies is None else entry.bodies
     for name in names:
-        body = free[name]
-        shifts[name] = rng.uniform(-entry.position, entry.position, 3)
-        body.pos = body.pos + shifts[name]
-        turn = rng.standard_normal(4)
-        if entry.orientation:
-            body.quat = turn / np.linalg.norm(turn)
-            body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-        size, mass = np.exp(rng.uniform(*np.log([entry.size, entry.mass]).T))
-        kind = rng.choice(entry.shapes) if entry.shapes else None
-        for geom in body.geoms:
-            if geom.meshname:
-                continue
-            if kind is not None:
-                radius = float(np.max(geom.size))
-                geom.type, proportions = BODY_SHAPES[kind]
-                geom.size = radius * np.array(proportions)
-            geom.size = geom.size * float(size)
-            if np.isfinite(geom.mass):
-                geom.mass = geom.mass * float(mass)
-            else:
-                geom.density = geom.density * float(mass)
+        shifts[name] = _vary(free[name], entry, rng)
     return shifts
+
+
+def _vary(body: mujoco.MjsBody, entry: RandomEntry, rng: np.random.Generator) -> np.ndarray:
+    """Vary one body; return its shift [m]. Each body takes as many random numbers."""
+    shift = rng.uniform(-entry.position, entry.position, 3)
+    body.pos = body.pos + shift
+    turn = rng.standard_normal(4)
+    if entry.orientation:
+        body.quat = turn / np.linalg.norm(turn)
+        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    # evenly over their logarithms
+    size, mass = np.exp(rng.uniform(*np.log([entry.size, entry.mass]).T))
+    shape = rng.choice(entry.shapes) if entry.shapes else None
+    for geom in body.geoms:
+        if geom.meshname:
+            continue
+        if shape is not None:
+            radius = float(np.max(geom.size))
+            geom.type, proportions = BODY_SHAPES[shape]
+            geom.size = radius * np.array(proportions)
+        geom.size = geom.size * float(size)
+        if np.isfinite(geom.mass):
+            geom.mass = geom.mass * float(mass)
+        else:
+            geom.density = geom.density * float(mass)
+    return shift
 
 
 def _is_free(body: mujoco.MjsBody) -> bool:

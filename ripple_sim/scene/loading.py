@@ -168,6 +168,11 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
         body.check()
     if entry.height is not None:
         entry.height.check()
+    _check_layer_and_maps(entry)
+
+
+def _check_layer_and_maps(entry: RippleEntry) -> None:
+    """Refuse limits, images and discs of a target that cannot be."""
     least, greatest = entry.thickness_limits
     if not 0 <= least <= greatest:
         raise SceneError(

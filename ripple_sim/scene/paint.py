@@ -197,24 +197,10 @@ def paint_target(
     mesh's vertices. Raises `SceneError` if an image that is asked for cannot be read, or the mesh
     has no texture coordinates.
     """
-    pixels = None
-    corner_uv = mesh.corner_uv
-    if texture is not None:
-        if corner_uv is None:
-            raise SceneError(
-                f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no "
-                "texture coordinates: choose a mesh that has them (a wrap has none)"
-            )
-        pixels = load_image(texture)
-    elif corner_uv is not None:
-        pixels = mesh_image(mesh_path)
-    if pixels is None or corner_uv is None:
-        coloured = vertex_colors(mesh_path)
-        if coloured is None:
-            return
-        points, colors = coloured
-        _, nearest = cKDTree(points).query(mesh.V)
-        pixels, corner_uv = _baked(mesh.F, colors[nearest])
+    painting = _painting(mesh, mesh_path, texture)
+    if painting is None:
+        return
+    pixels, corner_uv = painting
     asset = spec.mesh("target")
     # MuJoCo counts v from the image's upper edge
     asset.usertexcoord = (corner_uv * [1.0, -1.0] + [0.0, 1.0]).ravel()
@@ -230,3 +216,27 @@ def paint_target(
     image.data = pixels.tobytes()
     spec.add_material(name="target").textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "target"
     spec.geom("target").material = "target"
+
+
+def _painting(
+    mesh: Mesh, mesh_path: str | Path, texture: str | Path | None
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]] | None:
+    """The image for a mesh and texture coordinates of its corners, [m, 3, 2]; None if uncoloured."""
+    pixels = None
+    if texture is not None:
+        if mesh.corner_uv is None:
+            raise SceneError(
+                f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no "
+                "texture coordinates: choose a mesh that has them (a wrap has none)"
+            )
+        pixels = load_image(texture)
+    elif mesh.corner_uv is not None:
+        pixels = mesh_image(mesh_path)
+    if pixels is not None and mesh.corner_uv is not None:
+        return pixels, mesh.corner_uv
+    coloured = vertex_colors(mesh_path)
+    if coloured is None:
+        return None
+    points, colors = coloured
+    _, nearest = cKDTree(points).query(mesh.V)
+    return _baked(mesh.F, colors[nearest])
