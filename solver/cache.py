@@ -165,6 +165,8 @@ class ResultCache(Generic[Result]):
         self._count = count
         self._small = small
         self._results: OrderedDict[str, Result] = OrderedDict()
+        # Python may end without freeing modules; nanobind then reports results as leaks on stderr
+        atexit.register(self._results.clear)
 
     def get(self, key: str, make: Callable[[], Result]) -> Result:
         """The result of a key; `make` computes it if it is not in the cache."""

@@ -1,6 +1,8 @@
 """The cache: kept under its limit, what was used longest ago first, nobody else's files touched."""
 
 import os
+import subprocess
+import sys
 import weakref
 from pathlib import Path
 
@@ -177,3 +179,17 @@ def test_what_is_made_from_an_object_is_made_once_and_kept_while_the_object_live
     del first
     assert made[0]() is None
     assert made[1]() is make(second)
+
+
+def test_results_in_memory_are_freed_before_python_ends():
+    program = (
+        "import threading, time\n"
+        "from ripple_sim.solver.cache import ResultCache\n"
+        "class Result:\n"
+        "    def __del__(self): print('freed', flush=True)\n"
+        "cache = ResultCache(1, lambda result: True)\n"
+        "cache.get('key', Result)\n"
+        "threading.Thread(target=lambda kept: time.sleep(60), args=(cache,), daemon=True).start()\n"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (result.stdout, result.stderr) == ("freed\n", "")
