@@ -2,8 +2,8 @@
 #include "glsl/frame.glsl"
 
 layout(binding = FLOOR_MAP_UNIT) uniform sampler2D floor_visibility;  // r: ambient visibility; g: 1 where shadows may fall
-// r: ambient visibility; g: share of the lights that arrives. In 8 bits, which software drivers filter in half the time;
-// on the floor itself their steps would be seen.
+// The floor as solids see it. r: ambient visibility; g: share of the lights that arrives. It has 8 bits, which software
+// drivers filter in half the time; on the floor itself the steps would be visible.
 layout(binding = FLOOR_SEEN_UNIT) uniform sampler2D floor_seen;
 layout(binding = FLOOR_BOUNCE_UNIT) uniform sampler2D floor_bounce;  // light that objects throw on the floor, over pi
 

@@ -1,4 +1,4 @@
-// What all shaders know about the frame; contract.py says what each member means.
+// Uniforms of the frame for all shaders; contract.py describes the members.
 struct Light { LIGHT_MEMBERS };
 
 struct Shadow { SHADOW_MEMBERS };

@@ -16,7 +16,7 @@ vec3 octahedral_decode(vec2 code)
     return normalize(vec3(p.x - (p.x < 0.0 ? -under : under), p.y - (p.y < 0.0 ? -under : under), z));
 }
 
-// Two values of 8 bits, 0 to 1, in a channel of 16.
+// Two values of 8 bits, 0 to 1, in a channel of 16 bits.
 float pack_unorm8(float high, float low)
 {
     return dot(floor(255.0 * clamp(vec2(high, low), 0.0, 1.0) + 0.5), vec2(256.0, 1.0)) / UNORM16;
@@ -28,7 +28,7 @@ vec2 unpack_unorm8(float channel)
     return vec2(high, bits - 256.0 * high) / 255.0;
 }
 
-// Number of an object, in the table of objects, and whether its inner side is seen.
+// Number of an object in the table of objects, and whether its inner side is visible.
 const int INNER_SIDE = 32768;
 
 float pack_object(float number, bool inner)
@@ -46,10 +46,10 @@ bool unpack_inner(float channel)
     return int(channel * UNORM16 + 0.5) >= INNER_SIDE;
 }
 
-// What the G-buffer holds of a surface. `g_normal`: the normal without ripples, of the side which is seen; the packed object;
-// ambient visibility with half the thickness. `g_color`: the place in the height map, 0 to 1 on its page; red with green;
-// blue with ink. `color` is the square root of the albedo; `baked` holds ambient visibility and half the thickness; `ink` is
-// the opacity of lines on top.
+// Texels of the G-buffer for a surface. `g_normal` contains the normal of the visible side, without ripples; the packed
+// object; ambient visibility with half the thickness. `g_color` contains the place on the page of the height map, 0 to 1; red
+// with green; blue with ink. `color` is the square root of the albedo; `baked` contains ambient visibility and half the
+// thickness; `ink` is the opacity of lines on top.
 void encode_surface(vec3 normal, vec2 place, vec3 color, float object, vec2 baked, float ink, out vec4 g_normal, out vec4 g_color)
 {
     g_normal = vec4(octahedral_encode(normal), object, pack_unorm8(baked.x, baked.y));

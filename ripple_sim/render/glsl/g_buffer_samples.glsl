@@ -1,4 +1,4 @@
-// The G-buffer, sample by sample. With LAYER a single, transparent object is looked for in it.
+// The samples of the G-buffer. With LAYER only those of a single, transparent object count.
 #include "glsl/g_buffer.glsl"
 #include "glsl/view.glsl"
 
@@ -23,7 +23,7 @@ bool block_inside(ivec2 pixel)
 uniform int layer;  // number of the object
 #endif
 
-// Samples of a pixel, as bits, that show solids, in front of the floor; with LAYER those of the object.
+// Bits of the samples of a pixel that show solids in front of the floor; with LAYER, that show the object.
 int visible_samples(ivec2 pixel)
 {
     float limit = min(floor_depth(), 0.99999994);

@@ -1,5 +1,5 @@
-// The height maps of all targets: gradient (xyz) and height (w), a page of charts each. Between texels they are quadratic
-// B-splines over 3 x 3 texels: surfaces whose normals have no kinks. A halo of one texel is enough, and where three charts
+// The height maps of all targets: gradient (xyz) and height (w), a page of charts for each target. Between texels they are
+// quadratic B-splines over 3 x 3 texels, so that normals have no kinks. A halo of one texel is enough, and where three charts
 // meet all three give the same value.
 layout(binding = HEIGHT_MAPS_UNIT) uniform sampler2DArray height_maps;
 
@@ -10,8 +10,8 @@ mat3x2 spline_weights(vec2 t)
     return mat3x2(0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t));
 }
 
-// The same of four bilinear taps, which take half of the texel in the middle each.
-// Corners of the rectangle of taps [texels], and what counts of the higher ones along each axis.
+// Four bilinear taps that give the value of the spline; each takes half of the texel in the middle. `low` and `high` are
+// corners of the rectangle of taps [texels], `share` is the weight of the higher taps along each axis.
 struct SplineTaps { vec2 low, high, share; };
 
 // Taps for a place on a page of charts [texels].
@@ -35,16 +35,16 @@ vec4 spline_at(sampler2DArray pages, vec3 place)
                taps.share.y);
 }
 
-// What a pixel sees of a height map: where it spans more than a texel, ripples are averaged over it.
-const vec2 WIDE = vec2(1.0, 2.0);  // pixels of so many texels begin to be, and are, averaged over
+// Widths of a pixel [texels] from which ripples begin to be averaged over the pixel, and are averaged completely.
+const vec2 WIDE = vec2(1.0, 2.0);
 
-// Gradient and height at a place on the page [texels], and in a layer. `across` and `up` lead to the pixels beside
-// [texels], `chart` is the corner of the chart with its halo, and its side; without one there is nothing. `variance` is that
-// of the gradient in the pixel, as far as texels show it.
+// Mean gradient and height of a pixel, at a place on the page [texels] and in a layer. `across` and `up` lead to the
+// neighbouring pixels [texels]. `chart` is the corner of the chart with its halo, and its side; a side of 0 means no height
+// map. `variance` is the variance of the gradient in the pixel, as far as texels show it.
 vec4 seen_at(vec3 place, vec2 across, vec2 up, vec3 chart, out float variance)
 {
     float wide = smoothstep(WIDE.x, WIDE.y, max(length(across), length(up)));
-    // four taps of the spline's, which move apart to the quarters of the pixel: with each into the quarter on its side
+    // the four taps of the spline move apart to the quarters of the pixel, each into the quarter on its side
     bool turned = abs(across.x) < abs(across.y);
     vec2 side = turned ? up : across, top = turned ? across : up;
     side *= side.x < 0.0 ? -0.25 : 0.25;

@@ -1,6 +1,6 @@
-// What every pixel needs of the frame's uniforms, to be included before anything else. Software drivers read a uniform for
-// every pixel anew, which took a tenth of a frame: there most come to the fragment stage as flat varyings. A GPU has room
-// for few varyings.
+// The uniforms of the frame that every pixel needs; to be included before anything else. Software drivers read a uniform
+// again for every pixel, which took a tenth of a frame. With HOLD_UNIFORMS most uniforms reach the fragment stage as flat
+// varyings instead. A GPU has room for few varyings.
 #include "glsl/frame.glsl"
 
 #if HOLD_UNIFORMS
@@ -69,7 +69,7 @@ void hold_uniforms()
 #define counts held_counts
 #endif
 
-// Lights and shadows by numbers that are known when a shader is compiled: others are read from the block.
+// Lights and shadows by number. The numbers must be known when a shader is compiled; otherwise the block is read.
 Light light_at(int i)
 {
     Light light = lights[i];

@@ -1,8 +1,8 @@
-// Light: that of the lights where nothing is in the way, and the surroundings: a skybox or a backdrop, and soft boxes that
-// only reflections and ambient light see.
+// Light of the lights, without shadows, and of the surroundings: a skybox or a backdrop, and soft boxes that only
+// reflections and ambient light see.
 #include "glsl/frame.glsl"
 
-// Radiance that arrives of a light, and the direction towards it.
+// Radiance that arrives from a light, and the direction towards the light.
 vec3 incident(Light light, vec3 position, out vec3 towards)
 {
 #if !NEAR_LIGHTS
@@ -40,7 +40,7 @@ vec3 sky_at(vec3 direction, float roughness)
 #endif
 }
 
-// Share of a soft box that a lobe about the direction, of the given blur, meets.
+// Share of a lobe about a direction, with a blur, that meets a soft box.
 float soft_box(vec3 direction, vec4 normal, vec4 tangent, float blur)
 {
     float along = dot(direction, normal.xyz);
@@ -50,17 +50,17 @@ float soft_box(vec3 direction, vec4 normal, vec4 tangent, float blur)
     return along > 0.0 ? inside.x * inside.y : 0.0;
 }
 
-const vec2 LOBE = vec2(0.04, 0.9);  // half width of a mirror's lobe, and more of it by roughness
+const vec2 LOBE = vec2(0.04, 0.9);  // half width of a mirror's lobe, and its growth with roughness
 
-// Roughness whose lobe is that of the given one, spread by normals of a variance in the pixel: reflections turn twice as
-// far, and a smooth step's own variance is a fifth of the square of its half width.
+// Roughness of a lobe that is widened by the variance of normals in the pixel. Reflections turn twice as far as normals, and
+// the variance of a smooth step is a fifth of the square of its half width.
 float roughened(float roughness, float variance)
 {
     float width = LOBE.x + LOBE.y * roughness;
     return (sqrt(width * width + 10.0 * variance) - LOBE.x) / LOBE.y;
 }
 
-// Radiance that a lobe about the direction, of the given roughness, collects; `bounce` comes from below.
+// Radiance that a lobe about a direction, of a roughness, collects; `bounce` is the radiance from below.
 vec3 environment(vec3 direction, float roughness, vec3 bounce)
 {
     float width = LOBE.x + LOBE.y * roughness;
@@ -78,8 +78,8 @@ vec3 diffuse_box(int i, vec3 normal)
     return sky.w * soft_box_radiance[i].rgb * size * wrapped * wrapped;
 }
 
-// Ambient light on a diffuse surface, over pi. The first soft box stands where the key light does: `key` is the share of
-// that which arrives.
+// Ambient light on a diffuse surface, over pi. The first soft box is at the key light's place: `key` is the share of its
+// light that arrives.
 vec3 ambient(vec3 normal, vec3 bounce, vec3 key)
 {
     vec3 radiance = mix(bounce, sky.rgb, 0.5 + 0.5 * normal.z) + key * diffuse_box(0, normal);

@@ -1,5 +1,5 @@
-// The table of objects; contract.py says what each member of a row means. It is a texture, as software drivers read what
-// storage buffers hold number by number.
+// The table of objects; contract.py describes the members of a row. It is a texture, since software drivers read storage
+// buffers number by number.
 struct Object { OBJECT_MEMBERS };
 
 layout(binding = OBJECTS_UNIT) uniform sampler2D object_table;  // OBJECT_COLUMNS rows beside each other, a vector a texel

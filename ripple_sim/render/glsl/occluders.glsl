@@ -1,8 +1,8 @@
 // Nearby geoms, approximated by capsules.
 layout(std140, binding = OCCLUDERS_BINDING) uniform Occluders { vec4 occluders[2 * MAX_OCCLUDERS]; };  // end a, radius; end b
 
-// Ambient visibility about a normal: the share of the hemisphere that other geoms leave free. The bits of `near` are
-// those of the occluders that count.
+// Ambient visibility about a normal: the share of the hemisphere that other geoms leave free. The bits of `near` select the
+// occluders that count.
 float occluder_visibility(vec3 position, vec3 normal, int near)
 {
     float open = 1.0;

@@ -1,6 +1,6 @@
-// Points and pixels that samples are taken at: blocks of 2 x 2 pixels that share their work, points of a disc.
+// Places of samples: blocks of 2 x 2 pixels that share their work, and points of a disc.
 
-// Mean over a block of 2 x 2 pixels, or over the part of it that lies to the given sides.
+// Mean over a block of 2 x 2 pixels, or over the part of the block to some sides of the pixel.
 float block_mean(float value, bvec2 sides)
 {
     vec2 side = 1.0 - 2.0 * vec2(ivec2(gl_FragCoord.xy) & 1);
@@ -15,13 +15,13 @@ vec3 block_mean(vec3 value, bvec2 sides)
 
 const float TWO_PI = 6.2831853;
 
-// Points at growing radii that follow one another under turns by the golden angle spread evenly (Vogel's spiral).
+// Points of a spiral spread evenly if each is turned by the golden angle from the one before (Vogel's spiral).
 const float GOLDEN_ANGLE = 2.3999632;
 const mat2 GOLDEN_TURN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
 const mat2 FOURTH_TURN = mat2(-0.98471349, -0.17418195, 0.17418195, -0.98471349);  // by four times that
 
-// Number, and a half, of this pixel's first point of a spiral, of whose points the pixels of a block of 2 x 2 take turns:
-// every block has the same, so that there is neither noise nor hatching.
+// Number of this pixel's first point of a spiral, plus a half. The pixels of a block of 2 x 2 take the points in turn. Every
+// block has the same points, so that there is neither noise nor hatching.
 float first_point()
 {
     ivec2 corner = ivec2(gl_FragCoord.xy) & 1;
@@ -33,14 +33,14 @@ vec2 spiral_direction(float point)
     return vec2(cos(GOLDEN_ANGLE * point), sin(GOLDEN_ANGLE * point));
 }
 
-// Means over parts of a disc, in place of points of it: one in the middle and the rest on a circle about it, each over so
-// much. They show the edge of what covers half of the disc within 0.018 of its share, and what is small evenly; as many on
-// a spiral, which do not balance about the middle, miss the edge by 0.06.
+// Means over parts of a disc, in place of points of the disc: one in the middle and the others on a circle about it. A
+// blocker that covers half of the disc is found with an error of at most 0.018, and small blockers count evenly. As many
+// means on a spiral, which do not balance about the middle, have an error of 0.06.
 const int MEANS = 8;
 const float CIRCLE_RADIUS = 0.8, MEAN_WIDTH = 0.5;  // in radii of the disc
 const mat2 CIRCLE_TURN = mat2(0.62348980, 0.78183148, -0.78183148, 0.62348980);  // by a seventh
 
-// How far from the middle of the disc one of the means is.
+// Distance of a mean from the middle of the disc, in radii of the disc.
 float mean_radius(int number)
 {
     return number == 0 ? 0.0 : CIRCLE_RADIUS;

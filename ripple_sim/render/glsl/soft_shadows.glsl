@@ -1,5 +1,5 @@
-// The shadow maps of the lights, and soft shadows in them: percentage-closer soft shadows (PCSS), and with TRANSMISSION those
-// of what is transparent, in colour. SHADOWS lights may cast shadows; their maps lie side by side.
+// The shadow maps of the lights, and soft shadows: percentage-closer soft shadows (PCSS), and with TRANSMISSION the coloured
+// shadows of transparent objects. SHADOWS lights may cast shadows; their maps lie side by side.
 #include "glsl/held_uniforms.glsl"
 #include "glsl/sampling.glsl"
 
@@ -16,7 +16,7 @@ vec2 in_maps(int light, vec2 point)
     return point;
 }
 
-// Radius of the penumbra, in the map, of a blocker on what lies behind it; both by their distance from the light [m].
+// Radius of the penumbra, in the map, of a blocker on a surface behind it; both by their distance from the light [m].
 float penumbra_of(int light, float blocker, float behind)
 {
     vec4 penumbra = shadow_at(light).penumbra, width = shadow_at(light).width;
@@ -24,7 +24,7 @@ float penumbra_of(int light, float blocker, float behind)
     return min((behind - blocker) * blur / (width.x + width.y * behind), penumbra.z);
 }
 
-// Radius, in the map, of what may shade a point at a distance from the light [m]: a penumbra of the nearest blocker.
+// Radius, in the map, in which blockers may shade a point at a distance from the light [m]: the penumbra of the nearest.
 float widest_penumbra(int light, float to_light)
 {
     return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
@@ -52,7 +52,7 @@ struct Receiver {
     bool casts;             // whether the surface casts shadows itself
 };
 
-// The normal is that of the surface without ripples, `facing` its cosine to the light; `bias` as for `light_visibility`.
+// `normal` is without ripples, `facing` its cosine to the light; `bias` is as for `light_visibility`.
 Receiver receiver(int light, vec3 position, vec3 normal, float facing, float bias)
 {
     Shadow shadow = shadow_at(light);
@@ -79,13 +79,13 @@ Receiver receiver(int light, vec3 position, vec3 normal, float facing, float bia
     return at;
 }
 
-// Level of `blockers` whose texels are so wide a share of the map, or the finest.
+// Level of `blockers` whose texels have a width, as a share of the map, or the finest level.
 float blockers_level(float footprint)
 {
     return log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
 }
 
-// Mean of what covers a map about a point, over so much of the map: see blockers.glsl.
+// Mean of the blockers about a point of a map, over a share of the map: see blockers.glsl.
 vec3 blockers_mean(int light, vec2 point, float footprint)
 {
     return textureLod(blockers, in_maps(light, point), blockers_level(footprint)).rgb;
@@ -93,15 +93,15 @@ vec3 blockers_mean(int light, vec2 point, float footprint)
 
 layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
 
-// The pixels of a block of 2 x 2 share their search for blockers, of whose points each takes a fourth; with OWN_POINTS they
-// do not. Each filters for itself: steps of two pixels would be seen.
+// The pixels of a block of 2 x 2 share their search for blockers: each takes a fourth of the points. With OWN_POINTS they do
+// not. Each pixel filters for itself: steps of two pixels would be visible.
 #if OWN_POINTS
 const int SHARED = 1, SEARCH_TAPS = 8;
 const mat2 TURN = GOLDEN_TURN;
-const float UNSEEN = 0.004;  // share of a light that nobody misses
-const float NARROW = 3.0;  // radius of a penumbra, in those of `scatter`, from which what is between may be interpolated
+const float UNSEEN = 0.004;  // share of a light that is not noticed
+const float NARROW = 3.0;  // radius of a penumbra, over the radius of `scatter`, from which values between may be interpolated
 
-bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that
+bool in_narrow = false;  // whether a point is in a penumbra that is too narrow to be interpolated
 #else
 const int SHARED = 4, SEARCH_TAPS = 3;
 const mat2 TURN = FOURTH_TURN;
@@ -110,7 +110,7 @@ const int FILTER_TAPS = 16;
 
 const vec2 BY_MEANS = vec2(0.4, 0.8);  // texels of `blockers` between those: from where on they are means
 
-// What covers a map about a point and lies before a surface: a share of the map, and its distance from the light [m].
+// Blockers about a point of a map, before a surface: their share of the map, and their distance from the light [m].
 struct Blockers { float share, distance; };
 
 // Of a point beside the receiver, over a footprint, by the point's place in the order of all. What covers the map is in part
@@ -132,7 +132,7 @@ Blockers blockers_beside(int light, Receiver at, vec2 offset, float footprint, f
 // of a branch. They are tested at the end, since such drivers execute a loop's body once more than a test before it lets
 // pass. Each exposure has other points, which `counts.z` turns.
 
-// How much blocks the light within a radius in the map, and that times its mean distance from the light [m].
+// Share of blockers within a radius in the map, and the share times their mean distance from the light [m].
 vec2 find_blockers(int light, Receiver at, float radius)
 {
     float first = SHARED > 1 ? first_point() : 0.5;
@@ -222,21 +222,21 @@ layout(binding = TRANSMISSION_UNIT) uniform sampler2D transmission_maps;
 
 const float CLOSEST = 3.0;  // distance at which things begin to shade one another, in texels [m]
 
-// Mean of what is taken about a point of a light's map, as far as a radius, both in the map.
+// Mean light that is taken about a point of a light's map, within a radius, both in the map.
 vec4 taken_about(int light, vec2 point, float radius)
 {
     float level = log2(max(2.0 * radius * float(textureSize(transmission_maps, 0).y), 1.0));
     return textureLod(transmission_maps, in_maps(light, point), level);
 }
 
-// Mean share of the light that is taken, and that times its distance from the light [m].
+// Mean share of the light that is taken, and the share times its distance from the light [m].
 vec2 transparent_blocker(vec4 taken)
 {
     return vec2(dot(taken.rgb, vec3(1.0 / 3.0)), taken.a);
 }
 #endif
 
-// Share of a light that passes all that is transparent on its way to a point; the rest as for `light_visibility`.
+// Share of a light that passes the transparent objects on its way to a point; arguments as for `light_visibility`.
 vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
 {
     vec3 taken = vec3(0.0);
@@ -269,7 +269,7 @@ vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
     return 1.0 - taken;
 }
 
-// Share of a light that arrives, through what is transparent and past all else; see `light_visibility`.
+// Share of a light that arrives through transparent objects and past opaque ones; see `light_visibility`.
 vec3 light_arriving(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
     return light_visibility(light, position, normal, bias, scatter, block) *

@@ -1,5 +1,5 @@
-// The texture on an object. MAPPING is one of the kinds in contract.py; what flat textures are wrapped round has half
-// size 1.
+// The texture on an object. MAPPING is one of the kinds in contract.py. A shape that a flat texture is wrapped round has half
+// sizes of 1.
 #if MAPPING == CUBE_IMAGE
 layout(binding = CUBE_IMAGE_UNIT) uniform samplerCube cube_image;
 #else
@@ -49,7 +49,7 @@ vec3 textured(vec3 albedo, vec3 mapped, vec4 tiling)
 #elif MAPPING == CUBE_IMAGE
     albedo *= texture(cube_image, mapped).rgb;
 #elif MAPPING > CUBE_IMAGE
-    // coordinates jump from one edge of the texture to the other: their own differences would blur it there
+    // coordinates jump from one edge of the texture to the other: differences of the coordinates would blur the seam
     mat3x2 slope;
     vec2 place = wrapped(mapped, slope) * tiling.xy + tiling.zw;
     albedo *= textureGrad(image, place, tiling.xy * (slope * dFdx(mapped)), tiling.xy * (slope * dFdy(mapped))).rgb;

@@ -1,4 +1,4 @@
-// Square tiles of the frame, each two triangles of the vertices 4 i to 4 i + 3. Only those of one kind are drawn.
+// Square tiles of the frame: tile i is two triangles of the vertices 4 i to 4 i + 3. Only tiles of one kind are drawn.
 layout(binding = TILE_KINDS_UNIT) uniform usampler2D tile_kinds;  // a texel a tile
 
 uniform vec2 extent;  // of a tile, where the frame extends from -1 to 1
@@ -10,13 +10,13 @@ ivec2 tile()
     return ivec2(number % columns, number / columns);
 }
 
-// Where a vertex is in the frame, from -1 to 1.
+// Position of a vertex in the frame, from -1 to 1.
 vec2 tile_corner()
 {
     return extent * vec2(tile() + ivec2(gl_VertexID & 1, gl_VertexID >> 1 & 1)) - 1.0;
 }
 
-// There, at a depth from 0 to 1; tiles of other kinds lie outside.
+// Clip coordinates of a vertex at a depth from 0 to 1; tiles of other kinds lie outside the frame.
 vec4 on_tile(float depth)
 {
     vec4 outside = vec4(vec3(2.0), 1.0);

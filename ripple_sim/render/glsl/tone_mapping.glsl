@@ -1,4 +1,4 @@
-// From linear radiance to the frame's colours; with LINEAR these are the radiance itself.
+// From linear radiance to the frame's colours; with LINEAR the colours are the radiance.
 #include "glsl/sampling.glsl"
 
 // Linear colour, 0 to 1, to sRGB.
@@ -12,12 +12,12 @@ vec3 encoded(vec3 color)
 #endif
 }
 
-// Linear radiance to sRGB: values below the shoulder keep hue and contrast, brighter ones roll off towards white;
+// Linear radiance to sRGB: values below the shoulder keep hue and contrast, brighter values roll off towards white;
 // `tone_mapped` in tone_mapping.py is the same.
 vec3 tone_mapped(vec3 radiance)
 {
 #if LINEAR
-    return clamp(radiance, 0.0, 65504.0);  // what half floats hold
+    return clamp(radiance, 0.0, 65504.0);  // greatest half float
 #else
     float peak = max(radiance.r, max(radiance.g, radiance.b));
     float excess = max(peak - SHOULDER, 0.0);
@@ -28,7 +28,7 @@ vec3 tone_mapped(vec3 radiance)
 #endif
 }
 
-// By interleaved gradient noise, which is evenly spread over any few neighbouring pixels.
+// Dither with interleaved gradient noise, which is spread evenly over any few neighbouring pixels.
 vec3 dithered(vec3 color)
 {
     float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));

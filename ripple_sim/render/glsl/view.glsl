@@ -1,25 +1,25 @@
-// Rays from the eye through the frame, and where they meet the plane of the floor. What varies linearly over the frame is
-// computed at the corners of what is drawn: one triangle over the whole framebuffer; with TILES 1 squares of the frame, as
-// instances; with TILES 2 those of a kind.
+// Rays from the eye through the frame, and where they meet the plane of the floor. Values that vary linearly over the frame
+// are computed at the vertices: of one triangle over the whole framebuffer; with TILES 1 of square tiles of the frame, as
+// instances; with TILES 2 of the tiles of one kind.
 #include "glsl/held_uniforms.glsl"
 
 VARYING vec2 screen;          // position in the frame, from -1 to 1
-VARYING vec3 start;           // of the ray: the eye, unless rays are parallel
-VARYING vec3 eye_local;       // the same along the floor's axes from its origin, and up; below it where there is no floor
+VARYING vec3 start;           // start of the ray: the eye, unless rays are parallel
+VARYING vec3 eye_local;       // `start` along the floor's axes, from its origin; below the floor where there is no floor
 VARYING vec3 way;             // along the ray, one metre along the camera's axis
-VARYING vec3 way_local;       // the same along the floor's axes, and down to it
+VARYING vec3 way_local;       // `way` along the floor's axes, with z downwards
 flat VARYING vec4 limits;     // half sizes of the floor, near and far plane [m]
 flat VARYING float parallel;  // 1 where rays are parallel
 flat VARYING float nearest;   // how far away the floor begins to show [m]
 flat VARYING vec3 focus_local;
 flat VARYING vec3 around;   // ambient light on the open floor, without the soft box of the key light
-flat VARYING vec3 key_box;  // and that
-flat VARYING vec3 floor_lit, floor_surround;  // radiance of the open floor by the lights, and by what is around
+flat VARYING vec3 key_box;  // the soft box of the key light
+flat VARYING vec3 floor_lit, floor_surround;  // radiance of the open floor: from the lights, and from the surroundings
 
 #stage vertex
 #include "glsl/lights.glsl"
 
-uniform float level;  // depth of what is drawn
+uniform float level;  // depth of the vertices
 #if TILES == 2
 #include "glsl/tiles.glsl"
 #elif TILES

@@ -1,6 +1,6 @@
 #version 410
-// The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW those pixels.
-// Each pixel stands for a block of BLOCK x BLOCK of the frame's.
+// The floor and the sky behind it. Without SHADOW, no shadows are drawn, and pixels where one may fall are marked by their
+// depth; with SHADOW, the marked pixels are drawn. Each pixel stands for a block of BLOCK x BLOCK pixels of the frame.
 #define OWN_POINTS (BLOCK > 1)
 #include "glsl/view.glsl"
 
@@ -24,11 +24,11 @@ layout(binding = MIRROR_UNIT) uniform sampler2D mirror;  // the scene as the flo
 uniform float reflectance;
 #endif
 
-const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
-const float RIM = 0.5;         // blocks on either side of the floor's edges that are not smooth
-const float HIGHEST_LEVEL = 4.0;  // of the floor map
-const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
-const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
+const float STEEPEST = 0.03;  // greatest change from one block to the next where the background is smooth
+const float RIM = 0.5;         // width of the rough strip on either side of the floor's edges [blocks]
+const float HIGHEST_LEVEL = 4.0;  // highest level of the floor map
+const float BOUNCE_LEVEL = 2.3;   // level at which the few points of the map's search are no longer visible
+const float LARGEST = 0.04;       // greatest block [half widths of the floor map]: larger blocks would miss shadows
 
 const float LOWEST = SKYBOX > 0 ? 0.0 : -1.0;  // a skybox continues below the horizon, which the floor hides
 
@@ -36,7 +36,7 @@ const float LOWEST = SKYBOX > 0 ? 0.0 : -1.0;  // a skybox continues below the h
 layout(binding = HORIZON_UNIT) uniform sampler2D horizon_colors;  // of the skybox, by the azimuth
 #endif
 
-// What the floor fades into: details of a skybox would be drawn out downwards.
+// Colour that the floor fades into. Details of a skybox would be drawn out downwards.
 vec3 horizon_at(vec3 direction)
 {
 #if HORIZON
@@ -61,12 +61,13 @@ bool may_be_shaded(vec2 place, vec2 near)
 #endif
 
 #if !BACKDROP
-// Haze as in MuJoCo: a cone about the eye, where the skybox is, from the floor up to the height of the eye. Its foot is
-// nearer by the ring's width, a share of that distance. It is densest at some height, and clear at its foot and its top.
+// Haze as in MuJoCo: a cone about the eye, at the distance of the skybox, from the floor up to the height of the eye. The
+// cone's foot is nearer by the ring's width, a share of that distance. Haze is densest at some height, and clear at the foot
+// and the top.
 vec3 hazed(vec3 shown)
 {
     float slope = way_local.z / max(length(way_local.xy), 1e-9), height = eye_local.z / haze_cone.z;
-    float below = slope / max(height + haze_cone.x * slope, 1e-9);  // the eye, in heights of it, where the ray meets the ring
+    float below = slope / max(height + haze_cone.x * slope, 1e-9);  // how far below the eye the ray meets the cone, as a share of the eye's height
     float up = 1.0 - below, dense = haze_cone.y;
     float share = min(up / dense, below / (1.0 - dense));
     return mix(shown, fogged(haze.rgb, haze_cone.z), haze.w * (eye_local.z > 0.0 ? clamp(share, 0.0, 1.0) : 0.0));
@@ -92,10 +93,10 @@ void main()
 #endif
     vec3 world = start + at * way;
     vec2 place = floor_map_position(plane);
-    // the blocks of 2 x 2 that share their light are texels of the next level
+    // blocks of 2 x 2 texels that share their light are texels of the next level
     float level = 1.0;
 #if BLOCK > 1
-    // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
+    // in higher levels, texels at the map's edge, which stand for everything beyond it, are as dark as texels far inside
     level = clamp(textureQueryLod(floor_visibility, place).y + 1.0, level, HIGHEST_LEVEL);
 #endif
     vec2 near = textureLod(floor_visibility, place, level).rg;
@@ -105,10 +106,10 @@ void main()
         shadow[i] = vec3(1.0);
     float blur = 0.0;
 #if SHADOW
-    // the search for what shades is shared where all four pixels of a block see the floor
+    // the search for blockers is shared where all four pixels of a block show the floor
     bvec2 block = bvec2(BLOCK == 1 && block_mean(met ? 0.0 : 1.0, bvec2(true)) == 0.0);
 #if BLOCK > 1
-    // narrow penumbras are widened, so that none falls between blocks, and left to pixels
+    // narrow penumbras are widened, so that none falls between blocks, and are shaded pixel by pixel
     blur = 0.5 * length(fwidth(plane));
 #endif
     bool partly = false;
@@ -119,7 +120,7 @@ void main()
 #endif
     }
 #else
-    // all four pixels of a block, so that they can share their search for what shades them
+    // all four pixels of a block, so that they can share their search for blockers
     bool shaded = met && may_be_shaded(place, near);
     gl_FragDepth = block_mean(shaded ? 1.0 : 0.0, bvec2(true)) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
@@ -161,7 +162,7 @@ void main()
     shown += reflectance * textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb;
 #endif
     vec3 far = encoded(sky_at(direction, 0.0));
-    far = mix(far, fogged(far, haze_cone.z), shown_far.z);  // black has none
+    far = mix(far, fogged(far, haze_cone.z), shown_far.z);  // without a skybox the background is black and has no fog
     shown = hazed(mix(fogged(shown, at), far, fade));
 #endif
 #if BLOCK > 1

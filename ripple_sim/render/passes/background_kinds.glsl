@@ -1,5 +1,5 @@
 #version 410
-// How each tile of the frame is filled from the coarse background: see `CoarseBackground`.
+// Chooses how each tile of the frame is filled from the coarse background: see `CoarseBackground`.
 layout(binding = COARSE_BACKGROUND_UNIT) uniform sampler2D coarse;
 
 #stage vertex
@@ -9,12 +9,12 @@ void main()
 }
 
 #stage fragment
-const float LARGEST = 0.4 / 255.0;  // largest error of a colour that is interpolated from a tile's corners
-const int SIDE = TILE / 2;        // of a tile, in squares of 2 x 2 blocks
+const float LARGEST = 0.4 / 255.0;  // greatest error of a colour that is interpolated from a tile's corners
+const int SIDE = TILE / 2;        // edge of a tile, in squares of 2 x 2 blocks
 
 out uint kind;
 
-// Mean of a square; it begins at a place that is given in squares from the tile's lower left corner.
+// Mean of a square of blocks; `at` is its corner, in squares from the tile's lower left corner.
 vec4 square(ivec2 tile, vec2 at)
 {
     return textureLod(coarse, (vec2(tile * TILE) + 2.0 * at) / vec2(textureSize(coarse, 0)), 0.0);
@@ -27,7 +27,7 @@ void main()
     vec3 upper = square(tile, vec2(0, SIDE)).rgb, last = square(tile, vec2(SIDE)).rgb;
     vec3 off = abs(lower + last - right - upper);  // the tile is two triangles
     float least = 1.0, most = 0.0;
-    // a ring about the tile as well, from which pixels at its edges are interpolated
+    // with a ring of squares about the tile, from which pixels at its edges are interpolated
     for (int y = -1; y <= SIDE; ++y)
         for (int x = -1; x <= SIDE; ++x) {
             vec2 at = vec2(x, y) + 0.5, share = at / float(SIDE);

@@ -1,14 +1,14 @@
 #version 410
-// Fills the frame from the background at a fraction of its resolution, tile by tile; see `CoarseBackground`. With PLAIN
-// pixels are interpolated from the corners of their tile, otherwise from the coarse background; with ROUGH those where that
-// is not smooth are marked as a depth.
+// Fills the frame from the coarse background, tile by tile; see `CoarseBackground`. With PLAIN pixels are interpolated from
+// the corners of their tile, otherwise from the coarse background. With ROUGH pixels where the coarse background is not smooth
+// are marked by their depth.
 layout(binding = COARSE_BACKGROUND_UNIT) uniform sampler2D coarse;  // a: 1 for floor, 0 for sky, between them where rough
 
 #stage vertex
 #include "glsl/tiles.glsl"
 
 uniform float level;
-uniform vec2 blocks;  // of the background in a frame
+uniform vec2 blocks;  // blocks of the coarse background in a frame
 
 out vec2 in_coarse;  // texture coordinates in the coarse background
 out vec3 color;
@@ -23,7 +23,7 @@ void main()
 #stage fragment
 #include "glsl/tone_mapping.glsl"
 
-const float UNSURE = 0.002;  // weight of a block that is not smooth from which a pixel is left out
+const float UNSURE = 0.002;  // weight of rough blocks from which a pixel is not interpolated
 
 in vec2 in_coarse;
 in vec3 color;
@@ -38,7 +38,7 @@ void main()
 #endif
     fragment = vec4(dithered(shown.rgb), 1.0);
 #if ROUGH
-    // all four pixels of a block, so that they can share their search for what shades them
+    // all four pixels of a block, so that they can share their search for blockers
     gl_FragDepth = block_mean(min(shown.a, 1.0 - shown.a), bvec2(true)) > UNSURE ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
 }

@@ -1,6 +1,6 @@
 #version 410
-// What may block a light: how much of the shadow map is covered, and that times the distance from the light [m] and times
-// its square. Mipmaps of it are means over as much as the search for blockers steps over.
+// Blockers of a light: the covered share of the shadow map, and the share times the distance from the light [m], and times
+// the square of the distance. The search for blockers takes the mipmap whose texels are as wide as its steps.
 #include "glsl/frame.glsl"
 
 VARYING vec2 screen;  // from -1 to 1
@@ -21,7 +21,7 @@ void main()
 {
     vec2 place = 0.5 * screen + 0.5;
     int light = int(place.x * float(SHADOWS));
-    // all of its 4 x 4 texels: with fewer, edges of shadows are ragged where penumbras are narrow
+    // all 4 x 4 texels of the shadow map: with fewer, edges of shadows are ragged where penumbras are narrow
     vec4 depths[4] = vec4[](
         textureGatherOffset(shadow_maps, place, ivec2(-1, -1)), textureGatherOffset(shadow_maps, place, ivec2(1, -1)),
         textureGatherOffset(shadow_maps, place, ivec2(-1, 1)), textureGatherOffset(shadow_maps, place, ivec2(1, 1)));

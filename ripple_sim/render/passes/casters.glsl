@@ -1,6 +1,6 @@
 #version 410
-// Objects as a light or the floor sees them: MAP says what of them (see contract.py, soft_shadows.glsl). With MOVED
-// vertices are those of a target, displaced.
+// Objects as a light or the floor sees them; MAP is the kind of the map (see contract.py, soft_shadows.glsl). With MOVED
+// the vertices are displaced vertices of a target.
 #include "glsl/frame.glsl"
 
 VARYING vec3 albedo;
@@ -42,11 +42,11 @@ void main()
 #stage fragment
 #if MAP == TRANSMISSION_MAP
 uniform int light;
-uniform vec3 transmission;  // share of the light that passes, where it meets a refracting surface head on
+uniform vec3 transmission;  // share of the light that passes a refracting surface which it meets head on
 
 #if MOVED
-const float FOCUS = 3.0;       // of light that meets it head on, on the floor by its foot
-const float BRIGHTEST = 0.95;  // mean of the colours; less than 1, so that the map holds the distance as well
+const float FOCUS = 3.0;       // brightness of the light that meets the object head on, on the floor by its foot
+const float BRIGHTEST = 0.95;  // greatest mean of the colours; less than 1, so that the map contains the distance as well
 #endif
 
 out vec4 fragment;
@@ -64,7 +64,7 @@ void main()
     passes *= FOCUS * pow(cosine, 10.0);
     passes *= min(BRIGHTEST / max(dot(passes, vec3(1.0 / 3.0)), 1e-6), 1.0);
 #else
-    passes *= 1.0 - aside * aside;  // which is reflected
+    passes *= 1.0 - aside * aside;  // the rest is reflected
 #endif
 #endif
     vec3 taken = 1.0 - passes;

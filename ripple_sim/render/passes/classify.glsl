@@ -1,6 +1,6 @@
 #version 410
-// Classifies pixels by what they show, as a depth, so that each of the next passes runs over its own pixels only: whether
-// all or some of the samples show solids; with LAYER, whether any shows the object.
+// Classifies pixels by their contents, as a depth, so that each of the next passes runs over its own pixels only: pixels with
+// solids in all or in some of the samples; with LAYER, pixels with the object in any sample.
 #include "glsl/view.glsl"
 
 #stage fragment

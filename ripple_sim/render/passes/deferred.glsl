@@ -15,23 +15,23 @@
 #include "glsl/soft_shadows.glsl"
 #include "glsl/tone_mapping.glsl"
 
-layout(binding = BEHIND_UNIT) uniform sampler2D frame_behind;  // without the transparent object
+layout(binding = BEHIND_UNIT) uniform sampler2D frame_behind;  // the frame without the transparent object
 
 out vec4 fragment;
 
-const float FULL_LIGHT = 0.70;  // sRGB value from which a heatmap's colour is shown as it is
+const float FULL_LIGHT = 0.70;  // sRGB value of a lit surface from which a heatmap's colour is unchanged
 const float DARKEST = 0.45;
 const float NEUTRAL = 0.62;     // albedo under a heatmap
-const float SCATTER = 0.2;      // how far light gets under a translucent surface, in sizes of the object
+const float SCATTER = 0.2;      // depth that light reaches under a translucent surface, in sizes of the object
 const float CREASE = 0.35;      // difference of the unit normals of two pixels: a radius of three pixels
-const float PIXEL_VARIANCE = 1.0 / 24.0;  // of normals in a pixel, over the squares of their steps to the pixels beside
+const float PIXEL_VARIANCE = 1.0 / 24.0;  // variance of normals in a pixel, over the squares of their steps to the neighbouring pixels
 const float MOST_VARIANCE = 0.1;
 const vec3 INK = vec3(0.09, 0.11, 0.16);
 
-const float SOFTENED = 0.6;  // most of the ripples' shading that light under the surface takes away
-const float COAT_ROUGHNESS = 0.25;  // of a lamp's highlight: lamps are not points
+const float SOFTENED = 0.6;  // greatest share of the ripples' shading that light under the surface takes away
+const float COAT_ROUGHNESS = 0.25;  // roughness of a lamp's highlight in the coat: lamps are not points
 
-// Radiance of the floor about a point of it, as far as the radius [m].
+// Mean radiance of the floor about a point, within a radius [m].
 vec3 floor_radiance(vec3 position, float radius)
 {
     vec3 local = position - floor_origin.xyz;
@@ -74,7 +74,7 @@ struct SurfaceSample {
 };
 
 #if LAYER
-// What lies behind the point where a ray, refracted as in water, leaves the object; blurred where that is turbid.
+// Colour behind the point where a ray, refracted as in water, leaves the object; blurred where the object is turbid.
 vec3 seen_through(vec3 position, vec3 normal, float thickness, float size, float turbidity)
 {
     vec3 bent = refract(normalize(position - start), normal, 0.75);
@@ -85,8 +85,8 @@ vec3 seen_through(vec3 position, vec3 normal, float thickness, float size, float
 }
 #endif
 
-// Radiance of a surface; `spread` is the variance of its normals in the pixel, `block` says which neighbours in the block
-// of 2 x 2 share their shadows with it.
+// Radiance of a surface; `spread` is the variance of its normals in the pixel, `block` tells which neighbours in the block
+// of 2 x 2 share their shadows with the pixel.
 vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, float spread, bvec2 block)
 {
     float roughness = object.base.x, metallic = object.base.y, sheen = object.base.z, coat = object.base.w;
@@ -106,7 +106,7 @@ vec3 shaded(Object object, SurfaceSample surface, vec3 albedo, vec3 position, fl
     // a wall sees the floor before it, about as far away as it is high
     vec3 bounce = floor_radiance(position + 1.2 * height * normal, height);
     float rough = roughened(roughness, spread);
-    // what is reflected of the floor: where the coat is a mirror, the base is not, and sees much of it
+    // reflection of the floor: where the coat is a mirror, the base is not, and sees much of the floor
     vec3 met = position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2);
     vec3 mirrored = floor_radiance(met, 0.3 * height), blurred_floor = floor_radiance(met, (0.3 + 2.0 * rough) * height);
     vec3 f0 = mix(vec3(0.04), albedo, metallic);

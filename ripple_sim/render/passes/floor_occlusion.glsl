@@ -1,6 +1,6 @@
 #version 410
-// What light reaches a point of the floor. Its ambient visibility comes from the height of what hangs above it: the form
-// factor of horizontal patches at height h and horizontal distance d is h^2 / (pi (h^2 + d^2)^2) per unit area.
+// The light that reaches a point of the floor. Ambient visibility follows from the heights of the objects above the floor: the
+// form factor of horizontal patches at height h and horizontal distance d is h^2 / (pi (h^2 + d^2)^2) per unit area.
 #include "glsl/view.glsl"
 
 #stage fragment
@@ -17,13 +17,13 @@ layout(location = 2) out vec4 seen;
 
 const int TAPS = 14;
 const int SHADOW_TAPS = 16;
-const float SIDE = 0.25;   // of a light on what faces neither to it nor away from it
-const float UNDER = 0.5;   // of the floor's light on what hangs above it
+const float SIDE = 0.25;   // share of a light on a side that faces neither to it nor away from it
+const float UNDER = 0.5;   // share of the floor's light on objects above it
 
-// What shades a texel of the floor: whether anything shades any of it, and the share of the light that passes that.
+// Shadow on a texel of the floor: whether anything shades a part of the texel, and the share of the light that passes.
 struct Shade { bool any; float passes; };
 
-// The texel is `texel` wide [m].
+// Shadow of a light on a texel of the floor; `texel` is its width [m].
 Shade shade_of(int light, vec3 world, float texel)
 {
     Shadow shadow = shadow_at(light);
@@ -45,7 +45,7 @@ Shade shade_of(int light, vec3 world, float texel)
     int taps = inside && about.x > 0.0 ? SHADOW_TAPS : 0;
 #endif
     for (int i = 0; i < taps; ++i) {
-        // denser in the middle: what is close casts narrow shadows
+        // denser in the middle: close objects cast narrow shadows
         float offset = reach * (float(i) + 0.25 * first) / float(SHADOW_TAPS);
         direction = FOURTH_TURN * direction;
         float depth = textureLod(shadow_maps, in_maps(light, p.xy + offset * direction), 0.0).r;
@@ -57,7 +57,7 @@ Shade shade_of(int light, vec3 world, float texel)
         widest = blocker.x > 0.0 ? max(widest, penumbra_of(light, blocker.y / blocker.x, to_light)) : widest;
 #endif
     }
-    // something closer may lie between two points
+    // a closer object may lie between two points
     return Shade(closest < widest + margin + 0.2 * reach, passes);
 }
 
@@ -66,7 +66,7 @@ void main()
     vec2 uv = 0.5 * screen + 0.5;
     float texel = extent.x / float(textureSize(ceiling, 0).x);
     float covered = 0.0;
-    // of what covers: its colours, and their moments along the axes of the floor
+    // colours of the covering objects, and the moments of the colours along the axes of the floor
     vec3 colors = vec3(0.0), across = vec3(0.0), along = vec3(0.0);
     float first = first_point();
     vec2 direction = spiral_direction(first);
@@ -99,7 +99,7 @@ void main()
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 towards;
         vec3 radiance = incident(light_at(i), world, towards), light = radiance * max(dot(floor_normal.xyz, towards), 0.0);
-        // the sides that a point of the floor sees look towards it
+        // sides of objects that a point of the floor sees face the point
         vec2 sidewards = vec2(dot(floor_u.xyz, towards), dot(floor_v.xyz, towards));
         bounce += radiance * max(SIDE * colors - across * sidewards.x - along * sidewards.y, 0.0);
         unshaded += light;

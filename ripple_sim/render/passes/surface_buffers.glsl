@@ -1,5 +1,5 @@
 #version 410
-// What is seen at the middle of each pixel, without light: of solids, transparent or not, and of the floor.
+// The surface at the middle of each pixel, without light: of a solid, transparent or not, or of the floor.
 #include "glsl/view.glsl"
 
 #stage fragment
