@@ -249,13 +249,13 @@ def _focus_distance(model: mujoco.MjModel, data: mujoco.MjData, camera: int) -> 
     target = int(model.cam_targetbodyid[camera])
     carrier = int(model.cam_bodyid[camera])
     # `body_weldid` is 0 for bodies that are fixed to the world
-    is_carried = bool(model.body_weldid[carrier])
+    is_movable = bool(model.body_weldid[carrier])
     min_distance = MIN_FOCUS_DISTANCE
     if mode == _TARGET_BODY and target >= 0:
         focus = data.xpos[target]
     elif mode == _TARGET_CENTRE_OF_MASS and target >= 0:
         focus = data.subtree_com[target]
-    elif is_carried:
+    elif is_movable:
         focus = data.subtree_com[model.body_rootid[carrier]]
         min_distance = _MIN_FOCUS_DISTANCE_ON_BODY
     else:

@@ -67,7 +67,8 @@ bool may_be_shaded(vec2 place, vec2 near)
 vec3 hazed(vec3 shown)
 {
     float slope = way_local.z / max(length(way_local.xy), 1e-9), height = eye_local.z / haze_cone.z;
-    float below = slope / max(height + haze_cone.x * slope, 1e-9);  // how far below the eye the ray meets the cone, as a share of the eye's height
+    // how far below the eye the ray meets the cone, as a share of the eye's height
+    float below = slope / max(height + haze_cone.x * slope, 1e-9);
     float up = 1.0 - below, dense = haze_cone.y;
     float share = min(up / dense, below / (1.0 - dense));
     return mix(shown, fogged(haze.rgb, haze_cone.z), haze.w * (eye_local.z > 0.0 ? clamp(share, 0.0, 1.0) : 0.0));
