@@ -495,8 +495,8 @@ class Ripples:
             if isinstance(load, Load):  # always: hits on what is soft have no pulses
                 loads[target] = filtered(load)
         for geom, waves in self._waves.items():
-            load = loads[geom] if shared is None else shared.get(geom)
-            waves.step(elapsed, load=load)
+            step_load = loads[geom] if shared is None else shared.get(geom)
+            waves.step(elapsed, load=step_load)
         if self._two_way is not None:
             self._two_way.settle()
 
