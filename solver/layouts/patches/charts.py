@@ -8,6 +8,7 @@ cell, 1 and 3 in the middles of the cell's sides before and behind that corner.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,8 +20,17 @@ from .cells import BorderedCells
 from .disks import Border, along, flattened
 from .surface import Flat, TriangleSurface, central_vertices, cut_ray, halved_chords
 
+# The vertices along a line on a surface.
 Path = Ints
-Halves = list[tuple[Path, Path]]  # of each arc of a part's border
+
+# The two halves of each arc of a part's border.
+Halves = list[tuple[Path, Path]]
+
+# The four sides of a chart, counter-clockwise, from corner 0 to corner 1 and so on.
+Sides = tuple[Path, Path, Path, Path]
+
+# The charts round each of some corners.
+Fans = list[list[int]]
 
 # column and row of a chart's corners, counter-clockwise
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -32,33 +42,44 @@ def corner_charts(cells: BorderedCells) -> tuple[TriangleSurface, Ints, list[Sid
     Returns the finer surface, the chart of each triangle, and the sides of all charts.
     """
     surface = cells.surface
-    # arcs of a single edge get a vertex in its middle, at which they are cut in half, and all cells
-    # inner vertices
-    single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
+    # an arc of a single edge gets a vertex in its middle, where it can be cut in half
+    single_edges = []
+    for cell_arcs in cells.arcs:
+        single_edges += [arc for arc in cell_arcs if len(arc) == 2]
+    single = np.array(single_edges).reshape(-1, 2)
     key = [len(surface.V), 1]
     chosen = np.isin(surface.edges.ends @ key, np.sort(single, axis=1) @ key)
     finer, middles, origin, _ = surface.subdivided(np.where(chosen, 0.5, np.nan))
-    middle = dict(
-        zip(map(tuple, surface.edges.ends[chosen].tolist()), middles[chosen].tolist(), strict=True)
-    )
-    arcs = [
-        [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each]
-        for each in cells.arcs
-    ]
+    chosen_ends = map(tuple, surface.edges.ends[chosen].tolist())
+    middle_of_edge = dict(zip(chosen_ends, middles[chosen].tolist(), strict=True))
+    arcs: list[list[Path]] = []
+    for cell_arcs in cells.arcs:
+        arcs.append([])
+        for arc in cell_arcs:
+            if len(arc) == 2:
+                arc = np.insert(arc, 1, middle_of_edge[min(arc), max(arc)])
+            arcs[-1].append(arc)
     cell = cells.cell[origin]
+    # no edge joins two points of a border, so that every cell has an inner vertex
     split, origin = halved_chords(finer, cell, on_paths(finer, arcs))
-    surface, sides = cut_polygons(
-        split, cell[origin], [[halves_of(split.V, arc) for arc in each] for each in arcs]
-    )
+    halves: list[Halves] = []
+    for cell_arcs in arcs:
+        halves.append([halves_of(split.V, arc) for arc in cell_arcs])
+    surface, sides = cut_polygons(split, cell[origin], halves)
     return surface, charts_of(surface, sides), sides
 
 
 def halves_of(V: Floats, arc: Path) -> tuple[Path, Path]:
-    """Cut an arc in two at the vertex nearest to its middle; the same from either side."""
+    """Cut an arc in two at the vertex nearest to its middle.
+
+    The arc is cut at the same vertex if it is given the other way round.
+    """
     flipped = arc[0] > arc[-1] or (arc[0] == arc[-1] and arc[1] > arc[-2])
     way = arc[::-1] if flipped else arc
-    at = 1 + int(np.abs(along(V, [way])[1:-1] - 0.5).argmin())
-    return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
+    middle = 1 + int(np.abs(along(V, [way])[1:-1] - 0.5).argmin())
+    first = way[: middle + 1]
+    second = way[middle:]
+    return (second[::-1], first[::-1]) if flipped else (first, second)
 
 
 def cut_polygons(
@@ -66,11 +87,10 @@ def cut_polygons(
 ) -> tuple[TriangleSurface, list[Sides]]:
     """Lay out the first parts as regular polygons and cut them from their middles into charts.
 
-    Returns the finer surface and the sides of the charts.
-
-    Parts beyond those that have a border are left alone.
+    Only the parts that have `halves` are cut. Returns the finer surface and the sides of the
+    charts.
     """
-    on_border = on_paths(surface, [arc for each in halves for arc in each])
+    on_border = on_paths(surface, list(itertools.chain.from_iterable(halves)))
     chosen = part < len(halves)
     places = np.full((len(part), 3, 2), np.nan)
     some = TriangleSurface(
@@ -84,10 +104,10 @@ def cut_polygons(
     for i in range(max(map(len, halves))):
         start = np.full(count, -1)
         end = np.full(count, -1)
-        for number, each in enumerate(halves):
-            if len(each) > i:
+        for number, arcs in enumerate(halves):
+            if len(arcs) > i:
                 start[number] = centre[number]
-                end[number] = each[i][0][-1]
+                end[number] = arcs[i][0][-1]  # the middle of the arc
         border = np.pad(on_border, (0, len(flat.surface.V) - len(on_border)))
         flat, lines = cut_ray(flat, start, end, border)
         for path, line in zip(paths, lines, strict=False):
@@ -119,28 +139,24 @@ def _polygon_border(surface: TriangleSurface, halves: list[Halves]) -> Border:
     return np.repeat(cells, lengths), np.concatenate(paths), np.stack([z.real, z.imag], axis=1)
 
 
-Sides = tuple[Path, Path, Path, Path]
-Fans = list[list[int]]  # charts round a corner
-
-
 def charts_of(surface: TriangleSurface, sides: list[Sides]) -> Ints:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
-    size = len(surface.V)
-    walls = np.concatenate(
-        [np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each]
-    )
-    wall = np.isin(surface.edges.ends @ [size, 1], np.sort(walls, axis=1) @ [size, 1])
-    part = labels(surface.edges.sides[~wall] // 3, len(surface.F))
+    vertex_count = len(surface.V)
+    paths = itertools.chain.from_iterable(sides)
+    walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
+    key = [vertex_count, 1]
+    is_wall = np.isin(surface.edges.ends @ key, np.sort(walls, axis=1) @ key)
+    part = labels(surface.edges.sides[~is_wall] // 3, len(surface.F))
     number = int(part.max()) + 1
     if number != len(sides):
         raise AtlasError(
             f"{len(sides)} charts came out as {number}: triangles of the surface are too thin"
         )
     # the triangle on the inner side of the first edge of a chart's second side
-    key = (surface.F * size + np.roll(surface.F, -1, axis=1)).ravel()
-    order = np.argsort(key)
-    wanted = np.array([each[1][0] * size + each[1][1] for each in sides])
-    owner = order[np.searchsorted(key, wanted, sorter=order)] // 3
+    side_keys = (surface.F * vertex_count + np.roll(surface.F, -1, axis=1)).ravel()
+    order = np.argsort(side_keys)
+    wanted = np.array([second[0] * vertex_count + second[1] for _, second, _, _ in sides])
+    owner = order[np.searchsorted(side_keys, wanted, sorter=order)] // 3
     chart = np.full(number, -1)
     chart[part[owner]] = np.arange(len(sides))
     return chart[part]
@@ -148,7 +164,7 @@ def charts_of(surface: TriangleSurface, sides: list[Sides]) -> Ints:
 
 def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
     """Charts as squares."""
-    paths = [path for each in sides for path in each]
+    paths = list(itertools.chain.from_iterable(sides))
     lengths = [len(path) for path in paths]
     side = np.repeat(np.arange(len(paths)), lengths)
     a = CORNERS[side % 4]
@@ -159,23 +175,26 @@ def square_border(surface: TriangleSurface, sides: list[Sides]) -> Border:
 def on_paths(surface: TriangleSurface, sides: Sequence[Sequence[Path]]) -> Bools:
     """Vertices that lie on a path, such as a side of a chart, [n]."""
     on_path = np.zeros(len(surface.V), bool)
-    on_path[np.concatenate([path for each in sides for path in each])] = True
+    on_path[np.concatenate(list(itertools.chain.from_iterable(sides)))] = True
     return on_path
 
 
 def glued_sides(sides: list[Sides]) -> Ints:
-    """Charts that share a side have its first edge the other way round."""
+    """Chart and side beyond each side of each chart [C, 4, 2]; -1 at a rim.
+
+    Two charts have their common side in opposite directions: it ends with the edge with which the
+    other chart's side begins.
+    """
     table = np.full((len(sides), 4, 2), -1)
-    seen = {
-        (int(path[0]), int(path[1])): (chart, s)
-        for chart, each in enumerate(sides)
-        for s, path in enumerate(each)
-    }
-    for chart, each in enumerate(sides):
-        for s, path in enumerate(each):
-            other = seen.get((int(path[-1]), int(path[-2])))
-            if other is not None:
-                table[chart, s] = other
+    by_first_edge: dict[tuple[int, int], tuple[int, int]] = {}
+    for chart, chart_sides in enumerate(sides):
+        for side, path in enumerate(chart_sides):
+            by_first_edge[int(path[0]), int(path[1])] = chart, side
+    for chart, chart_sides in enumerate(sides):
+        for side, path in enumerate(chart_sides):
+            beyond = by_first_edge.get((int(path[-1]), int(path[-2])))
+            if beyond is not None:
+                table[chart, side] = beyond
     return table
 
 

@@ -313,7 +313,7 @@ def joined(surface: TriangleSurface, chart: Ints, sides: list[Sides]) -> list[Si
 
 
 def _curvatures(surface: TriangleSurface, cell: Ints) -> Floats:
-    """Curvature of each cell, and of the rim in it [right angles]; `cell` [m] is each triangle's."""
+    """Curvature of each cell and its rim [right angles]; `cell` [m] is each triangle's."""
     total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
     missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
     share = (missing / total)[surface.F] * surface.angles

@@ -3,18 +3,18 @@
 The mesh is collapsed to a tetrahedron, which is put on the sphere. The vertices come back level by
 level.
 
-In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the
+The method is in the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). New here are the
 carried area (`level`), and a triple-product barrier with Newton steps on every level (`energy`,
 `newton`).
 
 Each vertex comes back inside the kernel of its star, so that no triangle ever folds. Next to the
-vertex v it was merged with, the kernel is the wedge between the great circles through v and the two
-neighbours they share, left and right. The bisector of that wedge always leads into it.
+vertex v with which it was merged, the kernel is the wedge between the great circles through v and
+the two neighbours that they share, left and right. The bisector of the wedge always leads into it.
 
-Each level is relaxed: by sweeps over single vertices first, then by Newton steps of all at once. A
-sweep moves one vertex after the other by a Newton step in its tangent plane. A step never folds a
-triangle, since a fold has infinite energy. Sweeps get out of states where the global Newton method
-sticks (a long cigar), and remove what is rough; what is smooth is the work of `newton`.
+Each level is relaxed: by sweeps over single vertices first, then by Newton steps of all vertices at
+once. A sweep moves one vertex after the other by a Newton step in its tangent plane. No step folds
+a triangle, since a fold has infinite energy. Sweeps leave states in which the global Newton method
+sticks (a long cigar), and remove rough errors; smooth errors are the work of `newton`.
 """
 
 from __future__ import annotations
@@ -68,64 +68,93 @@ from .level import (
     update_triangle,
 )
 
-# Long edges cost as much as short ones: the operator's error comes from long texels, at the roots
-# of limbs, and its time step from narrow ones. With the wall 99.9 % of most surfaces have texels
-# less than twice too wide.
+# Energy density of the sphere map. Long edges cost as much as short ones: the operator's error comes
+# from long texels, at the roots of limbs, and its time step from narrow ones. With the wall `small`
+# 99.9 % of most surfaces have texels less than twice too wide.
 SPHERE = Density(power=4, even=1.0, long=1.0, small=0.55**16)
 
-# stop when a sweep lowers the energy by less than this share
-MOST_SWEEPS = 5
-TIRED_SWEEP = 0.1
-# stop when two steps in a row do
-MOST_NEWTON_STEPS = 20
-TIRED_NEWTON = 5e-3
-# vertices of a level that is content with less
-LARGE = 8000
-TIRED_LARGE = 1.5e-2
+# Sweeps before the Newton steps of a level, at most.
+MAX_SWEEPS = 5
+
+# Share of the energy that a sweep must save for another sweep to follow.
+MIN_SWEEP_GAIN = 0.1
+
+# Newton steps of a level, at most.
+MAX_NEWTON_STEPS = 20
+
+# Relaxation ends when two Newton steps in a row save less than this share of the energy.
+MIN_NEWTON_GAIN = 5e-3
+
+# Vertices from which on a level counts as large.
+LARGE_LEVEL = 8000
+
+# As `MIN_NEWTON_GAIN`, on a large level.
+MIN_NEWTON_GAIN_LARGE = 1.5e-2
+
+# Least and most steps of conjugate gradients in a Newton step.
 CG_RANGE = 10, 60
-EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck: start over from the sweeps
-MOST_ROUNDS = 4
-LONGEST_STEP = 0.7  # of a vertex [rad]
-HORIZON = 1.2  # Newton steps beyond which no fold is looked for
 
+# Energy of a level that is stuck: it starts over from the sweeps.
+EXPLODED_ENERGY = 1e5 * 4 * np.pi
+
+# Times that a level starts over, at most.
+MAX_ROUNDS = 4
+
+# Way of a vertex in one Newton step, at most [rad].
+MAX_VERTEX_STEP = 0.7
+
+# Time up to which folds are searched for, in Newton steps.
+FOLD_HORIZON = 1.2
+
+# Corners of the tetrahedron with which the map begins: unit vectors.
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
-GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
 
-# vertices of a level: equal equilateral references until, real shapes from
+# Vertices of the normalised mesh are rounded to multiples of 1 / GRID.
+GRID = 2.0**32
+
+# Levels of up to this number of vertices have equal equilateral references.
 EQUAL_UNTIL = 12
+
+# Levels of at least this number of vertices have the real shapes as references.
 REAL_FROM = 100
 
-# shape quality below which a reference is pulled towards equilateral
+# Shape quality (1 is equilateral) below which a reference is pulled towards equilateral, on coarse
+# and on fine levels.
 COARSE_SLIVER = 0.5
 FINE_SLIVER = 0.15
 
-# from one level to the next, below and above CAREFUL_UNTIL vertices
+# Vertices of a level over vertices of the level before, below and above CAREFUL_UNTIL vertices.
 SLOW_GROWTH = 1.25
 FAST_GROWTH = 2.0
+
+# Levels of fewer vertices than this grow slowly.
 CAREFUL_UNTIL = 30
 
-# in the real triangles, each tried when the one before gave no certified map
+# Trust in the real triangles, 0 to 1. A value is tried if the one before gave no certified map.
 TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)
-CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
+
+# Neighbours of a new vertex with more triangles than this are left to the sweeps.
+CROWDED_DEGREE = 64
 
 
 def relax_level(level: Level, S: Floats, reference: Reference) -> None:
     """Lower the energy of a level in place."""
     shapes = star_shapes(level.star, reference)
-    least_gain = TIRED_NEWTON if len(S) < LARGE else TIRED_LARGE
+    least_gain = MIN_NEWTON_GAIN if len(S) < LARGE_LEVEL else MIN_NEWTON_GAIN_LARGE
     energy = functools.partial(total_energy, level.tail, S, reference)
-    for _ in range(MOST_ROUNDS):
-        for i in range(MOST_SWEEPS):
-            if sweep(level, S, shapes, reference.density, i % 2 == 0) < TIRED_SWEEP * energy():
+    for _ in range(MAX_ROUNDS):
+        for i in range(MAX_SWEEPS):
+            fall = sweep(level, S, shapes, reference.density, i % 2 == 0)
+            if fall < MIN_SWEEP_GAIN * energy():
                 break
         descend_by_newton(
             lambda cg_steps: newton_step(level, S, reference, cg_steps),
             lambda backwards: sweep(level, S, shapes, reference.density, backwards),
             energy,
-            (least_gain, 2, MOST_NEWTON_STEPS),
+            (least_gain, 2, MAX_NEWTON_STEPS),
             CG_RANGE,
         )
-        if energy() < EXPLODED:
+        if energy() < EXPLODED_ENERGY:
             return
 
 
@@ -182,7 +211,7 @@ def newton_step(
         return 0.0, 0.0
     velocity = step[:, :1] * x + step[:, 1:] * y
     longest = float(np.sqrt(np.max(np.sum(step * step, axis=1))))
-    bound = min(0.9 * _time_of_first_fold(level.tail, S, velocity), LONGEST_STEP / longest)
+    bound = min(0.9 * _time_of_first_fold(level.tail, S, velocity), MAX_VERTEX_STEP / longest)
 
     def moved(t: float) -> Floats:
         ahead = S + t * velocity
@@ -269,11 +298,14 @@ def _time_of_first_fold(tail: Ints32, S: Floats, velocity: Floats) -> float:
         c3 = dot(dp, n2)
         c1 = dot(dp, n0) + dot(p, n1)
         c2 = dot(dp, n1) + dot(p, n2)
-        if abs(c1) * HORIZON + abs(c2) * HORIZON**2 + abs(c3) * HORIZON**3 < 0.9 * c0:
+        if (
+            abs(c1) * FOLD_HORIZON + abs(c2) * FOLD_HORIZON**2 + abs(c3) * FOLD_HORIZON**3
+            < 0.9 * c0
+        ):
             continue
         low = high = 0.0
         for s in range(1, 25):
-            high = HORIZON * s / 24
+            high = FOLD_HORIZON * s / 24
             if c0 + high * (c1 + high * (c2 + high * c3)) <= 0.0:
                 for _ in range(12):
                     middle = 0.5 * (low + high)
@@ -351,20 +383,8 @@ def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
     SphereMapError
         No such map was found.
     """
-    # centred, scaled to an area of 4 pi, and rounded, so that place and size of the mesh do not
-    # change the map: without rounding, the last bits would decide between the many equivalent ways
-    # out of a symmetric coarse level
-    V = V - np.mean(V, axis=0, dtype=np.float64)
-    V = np.rint(V * np.sqrt(4 * np.pi / np.sum(triangle_areas(V, F))) * GRID) / GRID
-    # along a Morton curve neighbours in space come close together in memory
-    cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(
-        np.int64
-    )
-    code = np.zeros(len(V), dtype=np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    order = np.argsort(code, kind="stable")
+    V = _normalised(V, F)
+    order = _morton_order(V)
     number = np.empty(len(V), dtype=np.int64)
     number[order] = np.arange(len(V))
     triangles = number[F]
@@ -378,13 +398,34 @@ def progressive_sphere_map(V: Floats, F: NDArray[np.integer]) -> Floats:
             return turned if certify(F, turned).valid else S
     raise SphereMapError(
         f"no fold-free sphere map was found: {certificate.flipped} of {len(F)} triangles are "
-        f"folded, the solid angle "
-        f"is {certificate.solid_angle:.6g} instead of 4 pi; simplify or remesh the mesh, and "
-        f"remove its slivers"
+        f"folded, the solid angle is {certificate.solid_angle:.6g} instead of 4 pi; simplify or "
+        f"remesh the mesh, and remove its slivers"
     )
 
 
+def _normalised(V: Floats, F: NDArray[np.integer]) -> Floats:
+    """Vertices centred, scaled to an area of 4 pi, and rounded.
+
+    So place and size of the mesh do not change the map. Without rounding the last bits would decide
+    between the many equivalent ways out of a symmetric coarse level.
+    """
+    V = V - np.mean(V, axis=0, dtype=np.float64)
+    return np.rint(V * np.sqrt(4 * np.pi / np.sum(triangle_areas(V, F))) * GRID) / GRID
+
+
+def _morton_order(V: Floats) -> NDArray[np.int64]:
+    """Order of the vertices along a Morton curve: neighbours in space are close in memory."""
+    size = max(float(np.ptp(V, axis=0).max()), 1e-300)
+    cells = ((V - V.min(axis=0)) / size * 1023.999).astype(np.int64)
+    code = np.zeros(len(V), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
 def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
+    """Sphere map by levels of detail; `trust` in the real triangles is 0 to 1."""
     n = len(V)
     # every vertex gets some room, even if its triangles have no area
     carried = np.full(n, 1e-3 * 4 * np.pi / n)
@@ -394,26 +435,25 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     removed = table.tail[log]
     kept = table.tail[table.twin[log]]
     carry(removed, kept, carried)
-    # how many vertices the first level has that shows a vertex or a triangle
+    # the number of vertices of the first level that shows each vertex or triangle
     vertex_since = np.full(n, 4)
     triangle_since = np.full(len(F), 4)
     arrival = n - np.arange(len(log))
-    vertex_since[removed] = triangle_since[log // 3] = triangle_since[table.twin[log] // 3] = (
-        arrival
-    )
+    vertex_since[removed] = arrival
+    triangle_since[log // 3] = arrival
+    triangle_since[table.twin[log] // 3] = arrival
     vertices = np.flatnonzero(vertex_since == 4)
     triangles = np.flatnonzero(triangle_since == 4)
 
     S = np.zeros((n, 3))
-    # the four that are left, in the order in which no triangle is inside out
+    # the four last vertices, in the order in which no triangle is inside out
     h = table.leaving[vertices[0]]
     S[table.tail[[h, following(h), preceding(h), preceding(table.twin[h])]]] = TETRAHEDRON
     reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)), SPHERE)
     load = np.ones(n)
     for size in _level_sizes(n):
-        shape_trust = trust * min(
-            max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0
-        )
+        realism = np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL)
+        shape_trust = trust * min(max(realism, 0.0), 1.0)
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
         surface = RealSurface(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
         update_level(vertices, triangles, table, surface, reference)
@@ -523,8 +563,8 @@ def insert_vertices(
     ring = np.empty((len(S) + 1, 3))
     shapes = np.empty((len(S), 4))
     terms = np.empty((len(S), TERMS))
-    other_ring = np.empty((CROWDED + 1, 3))
-    other_shapes = np.empty((CROWDED, 4))
+    other_ring = np.empty((CROWDED_DEGREE + 1, 3))
+    other_shapes = np.empty((CROWDED_DEGREE, 4))
     for h in log[::-1]:
         u = tail[h]
         v = tail[table.twin[h]]
@@ -544,7 +584,7 @@ def insert_vertices(
         for i in range(degree):
             w = tail[following(neighbours[i])]
             other_degree = gather_star(table, w, others)
-            if other_degree <= CROWDED:
+            if other_degree <= CROWDED_DEGREE:
                 _gather(others, other_degree, tail, S, reference, other_ring, other_shapes)
                 relax_vertex(w, S, other_ring, other_shapes, other_degree, density, terms)
             ring[i, 0], ring[i, 1], ring[i, 2] = row(S, w)
