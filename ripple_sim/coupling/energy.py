@@ -1,10 +1,10 @@
-"""The energy of bodies and waves together, and the contact problem, solved again so that this energy does not rise.
+"""The energy of bodies and waves, and a contact problem whose forces do not let it rise.
 
-Surfaces give way in the problem: each row of MuJoCo's constraint solver gets the gap, the velocity
-and the mobility of the surfaces that it presses on. A pair pays in what its contacts take from the
-motion of body and surface, and gets back no more than that. Forces that would take more are
-lessened (a passivity observer and controller: Hannaford and Ryu, 2002). What new forces change in
-velocities is told as MuJoCo's own scheme has it.
+Surfaces give way in the contact problem: each row of MuJoCo's constraint solver gets the gap, the
+velocity and the mobility of the surfaces that it presses on. A pair pays in the energy that its
+contacts take from the motion of body and surface, and gets back no more than it has paid in. Forces
+that would take more are lessened (a passivity observer and controller: Hannaford and Ryu, 2002).
+`VelocityChange` says how new forces change the velocities, by MuJoCo's own integrators.
 """
 
 from __future__ import annotations
@@ -26,26 +26,32 @@ _INTEGRATORS = mujoco.mjtIntegrator
 # Rounds in which the velocity at the beginning of a step is found from that at its end.
 _START_ROUNDS = 3
 
-# MuJoCo keeps impedances this far from 0 and 1, and takes narrower ranges for none.
-_LEAST_IMPEDANCE = 1e-4
-_NARROW = 1e-15
+# MuJoCo keeps impedances this far from 0 and 1: `mjMINIMP`.
+_MIN_IMPEDANCE = 1e-4
+# MuJoCo takes a `solimp` with a width below this for one of constant impedance [m]: `mjMINVAL`.
+_MIN_WIDTH = 1e-15
 
-# Rounds in which contacts that share a footprint find their forces, and the share of a force that
-# may be left.
-_ROUNDS = 8
-_LEFT = 1e-4
+# Rounds in which contacts that share a footprint find their forces.
+_SHARING_ROUNDS = 8
+# The rounds end where the velocities that the forces give differ by less than this share.
+_SHARING_TOLERANCE = 1e-4
 
-# Rounds in which pairs that cannot afford their forces get a share of them, after the first a
-# little less than they can afford, and in the last one the least.
-_ATTEMPTS = 6
-_LESS = 0.95
-_LEAST_SHARE = 1e-9
+# Attempts in which pairs that cannot afford their forces get a share of them.
+_AFFORDING_ATTEMPTS = 6
+# From the second attempt on they get this part of the share that they can afford.
+_CAUTION = 0.95
+# The least share of a force, which all get in the last two attempts.
+_MIN_SHARE = 1e-9
 
-# A difference of work that round-off makes, as a share of it.
-_ROUND_OFF = 1e-6
+# A difference of works that is smaller than this share of the work is round-off.
+_WORK_ROUND_OFF = 1e-6
 
-# Acceleration that the rows of an open contact aim at: any is greater, so that they do not push.
-_OPEN = -1e10
+# Acceleration that the rows of an open contact aim at [m/s^2]: any real one is greater, so that the
+# rows do not push.
+_OPEN_ACCELERATION = -1e10
+
+# Target, and the collider that touches it, by their ids.
+Key = tuple[int, int]
 
 
 class Energy(NamedTuple):
@@ -69,12 +75,18 @@ class Energy(NamedTuple):
 
 
 def body_energy(data: mujoco.MjData, scratch: mujoco.MjData) -> float:
-    """Kinetic and potential energy of MuJoCo's bodies [J], at one time; `scratch` is data of the same model.
+    """Kinetic and potential energy of MuJoCo's bodies at one time [J].
 
     MuJoCo's semi-implicit steps leave velocities half a step behind positions. The potential is
     taken half a step back: under uniform gravity the sum is then constant to round-off, while that
     of `mujoco.mj_energyPos` and `mj_energyVel` differs on the way up from that on the way down.
     With the integrator RK4 both are of the same time already.
+
+    Parameters
+    ----------
+    data : mujoco.MjData
+    scratch : mujoco.MjData
+        Of the same model; overwritten.
     """
     model = scratch.model
 
@@ -95,18 +107,22 @@ def body_energy(data: mujoco.MjData, scratch: mujoco.MjData) -> float:
 
 
 class VelocityChange:
-    """What other contact forces would have changed in the velocities after a step.
+    """The change of the velocities after a step if other contact forces had acted.
 
-    MuJoCo's integrators are implicit in joint damping, and some in the gyroscopic terms of what
-    spins: velocities then change by another mass matrix than accelerations tell, and forces that
-    are taken back would leave a rest behind.
+    MuJoCo's integrators are implicit in joint damping, and some also in the gyroscopic terms of
+    spinning bodies: velocities then change by another mass matrix than accelerations, and forces
+    that are taken back would leave a rest behind.
+
+    Attributes
+    ----------
+    latest : float64 [nv], optional
+        The velocities with which the next step begins, unless somebody changes them.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
+        self.latest: Floats | None = None
         self._model = model
         self._scratch: mujoco.MjData | None = None
-        # the velocities with which the next step begins, unless somebody changes them
-        self.latest: Floats | None = None
 
     def __call__(
         self, data: mujoco.MjData, qacc: Floats, force: Floats, *, pending: bool
@@ -142,13 +158,12 @@ class VelocityChange:
             integrate(self._model, scratch)
             return scratch.qvel.copy()
 
-        start = (
-            data.qvel
-            if pending
-            else self.latest
-            if self.latest is not None
-            else data.qvel - dt * qacc
-        )
+        if pending:
+            start = data.qvel
+        elif self.latest is not None:
+            start = self.latest
+        else:
+            start = data.qvel - dt * qacc
         old = end(start, qacc, force)
         for _ in range(0 if pending else _START_ROUNDS):
             if np.array_equal(old, data.qvel):
@@ -158,12 +173,8 @@ class VelocityChange:
         return end(start, data.qacc, data.qfrc_constraint) - old
 
 
-# Of a target, and of what touches it.
-Key = tuple[int, int]
-
-
 class Pair(NamedTuple):
-    """A target and what touches it: what the contact problem has to know of the surface there.
+    """How a target's surface moves under a collider that touches it, for the contact problem.
 
     Attributes
     ----------
@@ -173,11 +184,16 @@ class Pair(NamedTuple):
         Of the surface [m].
     held : float
         Force of the last step [N].
-    start, free, mobility : float
-        Velocity of the surface at the beginning of the step, and at its end under the force of the
-        last step [m/s]; and what a unit force adds to it, over the step [1/kg].
-    mean, mean_mobility : float
-        The last two for the mean velocity over the step.
+    start : float
+        Velocity of the surface at the beginning of the step [m/s].
+    free : float
+        Velocity at the end of the step under the force of the last step [m/s].
+    mobility : float
+        Change of the velocity at the end by a unit force, over the step [1/kg].
+    mean : float
+        Mean velocity over the step under the force of the last step [m/s].
+    mean_mobility : float
+        Change of the mean velocity by a unit force, over the step [1/kg].
     """
 
     key: Key
@@ -191,7 +207,7 @@ class Pair(NamedTuple):
 
     @property
     def purse(self) -> Key:
-        """Who pays: the same for the two pairs of two targets that touch each other."""
+        """The pair's account; two targets that touch each other, which are two pairs, share one."""
         return min(self.key), max(self.key)
 
 
@@ -212,8 +228,29 @@ class Work(NamedTuple):
     force: float
 
 
+class _Rows(NamedTuple):
+    """The rows of the constraint solver for one of MuJoCo's contacts.
+
+    Attributes
+    ----------
+    contact : int
+        Among MuJoCo's contacts.
+    normal : slice
+        The rows that carry the normal force.
+    all : slice
+        Also the rows of friction.
+    pairs : sequence of Pair
+        One for each target that the contact presses.
+    """
+
+    contact: int
+    normal: slice
+    all: slice
+    pairs: Sequence[Pair]
+
+
 class DualDiagonal:
-    """The diagonal of A + R, the matrix of MuJoCo's dual problem, with A the inverse mass that each row feels.
+    """The diagonal of A + R, the matrix of MuJoCo's dual problem; A is the rows' inverse mass.
 
     The solver PGS and the noslip iterations read R from there and not from `efc_R`. Newton and CG
     make no such matrix.
@@ -235,13 +272,15 @@ class DualDiagonal:
 
 
 class ContactProblem:
-    """MuJoCo's rows with gaps and velocities counted from surfaces that move as under the last force.
+    """MuJoCo's contact problem with gaps and velocities counted from the moving surfaces.
+
+    The surfaces move as under the forces of the last step.
 
     Parameters
     ----------
     model : mujoco.MjModel
     data : mujoco.MjData
-        With the contacts of the step; gets the forces that are found.
+        With the contacts of the step; gets the new forces.
     pairs_at : mapping
         MuJoCo's index of each contact to the pairs that it belongs to.
     """
@@ -252,96 +291,120 @@ class ContactProblem:
         self._model = model
         self._data = data
         self._dt = model.opt.timestep
-        contact = data.contact
         pulls = adhesion(model, data)
         self._pulls = np.zeros(data.ncon) if pulls is None else pulls
-        self._pairs = {pair.key: pair for mine in pairs_at.values() for pair in mine}
-        rows_of = dict.fromkeys(self._pairs, 0)
-        # of each contact: which of MuJoCo's, its rows that carry the normal force, all its rows, a
-        # pair for each target
-        self._contacts: list[tuple[int, slice, slice, Sequence[Pair]]] = []
-        for i, mine in pairs_at.items():
-            first = int(contact.efc_address[i])
-            dim = int(contact.dim[i])
-            count = 2 * (dim - 1) if is_pyramidal(model) and dim > 1 else 1
-            rows = slice(first, first + count)
-            self._contacts.append((i, rows, rows if count > 1 else slice(first, first + dim), mine))
-            for pair in mine:
-                rows_of[pair.key] += count
-        # as they are without mobility, and what each row would add if all rows of its pairs bore
-        # alike [1/kg]
+        self._pairs = {pair.key: pair for pairs in pairs_at.values() for pair in pairs}
+        self._contacts = [self._rows(i, pairs) for i, pairs in pairs_at.items()]
+        # the rows' regularization [1/kg] and reference acceleration [m/s^2], on surfaces without
+        # mobility
         self._R = data.efc_R.copy()
         self._aref = data.efc_aref.copy()
+        # mobility of each row [1/kg] if all rows of its pairs bear the same force
         self._mobility = np.zeros(data.nefc)
         self._dual = DualDiagonal(model, data)
         # acceleration without contacts [m/s^2]
         self._smooth = self._along(data.qacc_smooth)
-        for i, rows, whole, mine in self._contacts:
-            first = rows.start
-            gap = data.efc_pos[first] - data.efc_margin[first] - sum(pair.height for pair in mine)
-            stiffness, damping = data.efc_KBIP[first, :2]
-            part = impedance(contact.solimp[i], gap)
-            self._R[whole] *= data.efc_diagA[first] * (1 - part) / part / self._R[first]
-            self._mobility[rows] = sum(pair.mobility * rows_of[pair.key] for pair in mine)
-            if gap >= 0:
-                self._aref[rows] = _OPEN
-                continue
-            free = sum(
-                (pair.free - pair.start) / self._dt + pair.mobility * pair.held for pair in mine
-            )
-            slip = data.efc_vel[rows] - sum(pair.start for pair in mine)
-            self._aref[rows] = free - damping * slip - stiffness * part * gap
+        row_count = dict.fromkeys(self._pairs, 0)
+        for rows in self._contacts:
+            for pair in rows.pairs:
+                row_count[pair.key] += rows.normal.stop - rows.normal.start
+        for rows in self._contacts:
+            mobility = sum(pair.mobility * row_count[pair.key] for pair in rows.pairs)
+            self._mobility[rows.normal] = mobility
+            self._count_from_surface(rows)
+
+    def _rows(self, i: int, pairs: Sequence[Pair]) -> _Rows:
+        """The rows of one of MuJoCo's contacts, which presses the targets of some pairs."""
+        first = int(self._data.contact.efc_address[i])
+        dim = int(self._data.contact.dim[i])
+        if is_pyramidal(self._model) and dim > 1:
+            edges = slice(first, first + 2 * (dim - 1))
+            return _Rows(i, edges, edges, pairs)
+        return _Rows(i, slice(first, first + 1), slice(first, first + dim), pairs)
+
+    def _count_from_surface(self, rows: _Rows) -> None:
+        """Set R and the reference acceleration of a contact, with gap and velocity of the surface.
+
+        MuJoCo's spring and damper act on the gap above the displaced surface, and on the velocity
+        against it.
+        """
+        data = self._data
+        pairs = rows.pairs
+        first = rows.normal.start
+        gap = data.efc_pos[first] - data.efc_margin[first] - sum(pair.height for pair in pairs)
+        stiffness, damping = data.efc_KBIP[first, :2]
+        part = impedance(data.contact.solimp[rows.contact], gap)
+        self._R[rows.all] *= data.efc_diagA[first] * (1 - part) / part / self._R[first]
+        if gap >= 0:
+            self._aref[rows.normal] = _OPEN_ACCELERATION
+            return
+        # acceleration of the surface without a force [m/s^2]
+        free = sum(
+            (pair.free - pair.start) / self._dt + pair.mobility * pair.held for pair in pairs
+        )
+        slip = data.efc_vel[rows.normal] - sum(pair.start for pair in pairs)
+        self._aref[rows.normal] = free - damping * slip - stiffness * part * gap
 
     def solve(self, paid: Mapping[Key, float]) -> dict[Key, float]:
-        """Force on each target in a pair [N], such as every pair can afford with what it has paid in [J]."""
+        """Force on each target in a pair [N], which every pair can afford.
+
+        Parameters
+        ----------
+        paid : mapping
+            Energy that pairs have paid in [J], by `Pair.purse`.
+        """
         data = self._data
-        soft = np.zeros(data.nefc)
+        # what is added to R so that rows bear less [1/kg]
+        softness = np.zeros(data.nefc)
         force = np.zeros(data.nefc)
-        for attempt in range(_ATTEMPTS):
-            self._set_compliance(self._R + self._mobility + soft)
+        for attempt in range(_AFFORDING_ATTEMPTS):
+            self._set_compliance(self._R + self._mobility + softness)
             force = self._shared(force)
             shares = self._affordable(force, paid)
             if not shares:
                 break
             gained = self._along(data.qacc) - self._smooth
             total = self._total(force)
-            for _, rows, _, mine in self._contacts:
-                share = shares.get(mine[0].purse)
+            for rows in self._contacts:
+                share = shares.get(rows.pairs[0].purse)
                 if share is None:
                     continue
-                # with this much added to R, and all else as it is, a row bears that share of its
+                share = max(share * (_CAUTION if attempt else 1), _MIN_SHARE)
+                if attempt >= _AFFORDING_ATTEMPTS - 2:
+                    share = _MIN_SHARE
+                normal = rows.normal
+                yields = sum(pair.mobility * total[pair.key] for pair in rows.pairs)
+                divisor = np.where(force[normal] > 0, force[normal], np.inf)
+                mobility = np.maximum(gained[normal] + yields, 0) / divisor
+                # with this much added to R, and all else as it is, a row bears the share of its
                 # force
-                share = max(share * (_LESS if attempt else 1), _LEAST_SHARE)
-                share = share if attempt < _ATTEMPTS - 2 else _LEAST_SHARE
                 less = (1 - share) / share
-                yields = sum(pair.mobility * total[pair.key] for pair in mine)
-                lost = np.maximum(gained[rows] + yields, 0) / np.where(
-                    force[rows] > 0, force[rows], np.inf
-                )
-                soft[rows] += less * (self._R[rows] + soft[rows] + lost)
+                softness[normal] += less * (self._R[normal] + softness[normal] + mobility)
         return self._total(force)
 
     def works(self) -> list[Work]:
         """What the force of each pair does, with the forces that were found."""
         force = self._data.efc_force
         work = defaultdict[Key, float](float)
-        means = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
-        for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
-            along = normal * self._dt * float(means[rows].mean())
-            aside = self._dt * float(force[whole] @ means[whole]) - along
-            work[mine[0].key] += along + max(aside, 0.0)
+        mean_velocity = self._data.efc_vel + self._dt / 2 * self._along(self._data.qacc)
+        for rows, normal in zip(self._contacts, self._normal(force), strict=True):
+            along = normal * self._dt * float(mean_velocity[rows.normal].mean())
+            aside = self._dt * float(force[rows.all] @ mean_velocity[rows.all]) - along
+            work[rows.pairs[0].key] += along + max(aside, 0.0)
         total = self._total(force)
         return [Work(pair, work[key], total[key]) for key, pair in self._pairs.items()]
 
     def _normal(self, force: Floats) -> list[float]:
-        """Normal force of each contact on its bodies, without what adhesion takes of it [N]."""
-        return [float(force[rows].sum() - self._pulls[i]) for i, rows, _, _ in self._contacts]
+        """Normal force of each contact on its bodies, less the pull of adhesion [N]."""
+        return [
+            float(force[rows.normal].sum() - self._pulls[rows.contact]) for rows in self._contacts
+        ]
 
     def _total(self, force: Floats) -> dict[Key, float]:
         """Force on each target in a pair [N]."""
         total = defaultdict[Key, float](float)
-        for (*_, mine), normal in zip(self._contacts, self._normal(force), strict=True):
-            for pair in mine:
+        for rows, normal in zip(self._contacts, self._normal(force), strict=True):
+            for pair in rows.pairs:
                 total[pair.key] += normal
         return total
 
@@ -352,57 +415,72 @@ class ContactProblem:
         return product
 
     def _set_compliance(self, R: Floats) -> None:
+        """Give the solver other regularizations R of all rows [1/kg]."""
         data = self._data
         contact = self._data.contact
         data.efc_R[:] = R
         data.efc_D[:] = 1 / R
         if data.nisland:
-            # the solver takes `aref` from all rows, but these from the rows of islands
-            data.iefc_R[:], data.iefc_D[:] = (
-                data.efc_R[data.map_iefc2efc],
-                data.efc_D[data.map_iefc2efc],
-            )
+            # the solver takes `aref` from all rows, but R and D from the rows of islands
+            data.iefc_R[:] = data.efc_R[data.map_iefc2efc]
+            data.iefc_D[:] = data.efc_D[data.map_iefc2efc]
         self._dual.set_compliance(data, R)
-        for i, rows, whole, _ in self._contacts:
-            if rows != whole:
+        for i, normal, all_rows, _ in self._contacts:
+            if normal != all_rows:
                 # an elliptic cone: friction stays what it is
-                contact.mu[i] = contact.friction[i, 0] * np.sqrt(R[rows.start + 1] / R[rows.start])
+                ratio = R[normal.start + 1] / R[normal.start]
+                contact.mu[i] = contact.friction[i, 0] * np.sqrt(ratio)
 
     def _shared(self, force: Floats) -> Floats:
-        """Forces of all rows, found from a guess by turns.
+        """Forces of all rows [N], found from a guess by turns.
 
-        The rows of a pair move the surface together: each by the sum of their forces F, while
-        MuJoCo's R is one number a row. With n rows R has n times the mobility m, and the
-        difference, m F - n m f, is that of the last round.
+        The rows of a pair move the surface together: each by the sum F of their forces, while
+        MuJoCo's R is one number a row. With n rows R has n times the mobility m, and the reference
+        acceleration has the difference, m F - n m f, with the forces of the last round.
         """
         data = self._data
-        for _ in range(_ROUNDS):
+        for _ in range(_SHARING_ROUNDS):
             total = self._total(force)
             aref = self._aref + self._mobility * force
-            for _, rows, _, mine in self._contacts:
-                aref[rows] -= sum(pair.mobility * total[pair.key] for pair in mine)
+            for rows in self._contacts:
+                aref[rows.normal] -= sum(pair.mobility * total[pair.key] for pair in rows.pairs)
             data.efc_aref[:] = aref
             mujoco.mj_fwdConstraint(self._model, data)
             last = force
             force = data.efc_force.copy()
-            found = self._total(force)
-            least = 0.0
-            left = 0.0
-            for _, rows, _, mine in self._contacts:
-                moved = self._mobility[rows] * (force[rows] - last[rows])
-                for pair in mine:
-                    change = found[pair.key] - total[pair.key]
-                    left = max(left, float(np.abs(moved - pair.mobility * change).max()))
-                    least = max(least, pair.mobility * abs(found[pair.key]))
-            if left <= _LEFT * least:
+            if self._agree(force, last, total):
                 break
         return force
 
-    def _affordable(self, force: Floats, paid: Mapping[Key, float]) -> dict[Key, float]:
-        """Shares of their forces that pairs can afford, of those that cannot afford all.
+    def _agree(self, force: Floats, last: Floats, last_total: Mapping[Key, float]) -> bool:
+        """Whether rows move the surfaces as the sums of their forces do, after a round.
 
-        The work of a share s of a force is linear s + square s^2: at first against what moves apart
-        without it, and then against what it has set in motion itself.
+        Parameters
+        ----------
+        force, last : float64 [nefc]
+            Forces of all rows after the round, and before it [N].
+        last_total : mapping
+            Force on each target in a pair before the round [N].
+        """
+        total = self._total(force)
+        # accelerations [m/s^2]
+        greatest = 0.0
+        greatest_difference = 0.0
+        for rows in self._contacts:
+            normal = rows.normal
+            by_rows = self._mobility[normal] * (force[normal] - last[normal])
+            for pair in rows.pairs:
+                by_pair = pair.mobility * (total[pair.key] - last_total[pair.key])
+                difference = float(np.abs(by_rows - by_pair).max())
+                greatest_difference = max(greatest_difference, difference)
+                greatest = max(greatest, pair.mobility * abs(total[pair.key]))
+        return greatest_difference <= _SHARING_TOLERANCE * greatest
+
+    def _affordable(self, force: Floats, paid: Mapping[Key, float]) -> dict[Key, float]:
+        """Shares of their forces that pairs can afford, by purse; without pairs that can afford all.
+
+        The work of a share s of a force is linear s + square s^2: the first part against the
+        motion without the force, the second against the motion that the force itself makes.
         """
         data = self._data
         dt = self._dt
@@ -410,44 +488,54 @@ class ContactProblem:
         linear = defaultdict[Key, float](float)
         square = defaultdict[Key, float](float)
         for pair in self._pairs.values():
-            given = total[pair.key]
+            on_pair = total[pair.key]
             added = pair.mean_mobility * dt
-            linear[pair.purse] += -given * dt * (pair.mean + added * pair.held)
-            square[pair.purse] += given * dt * added * given
+            linear[pair.purse] += -on_pair * dt * (pair.mean + added * pair.held)
+            square[pair.purse] += on_pair * dt * added * on_pair
+        # mean velocity of the bodies without the forces, and by the forces [m/s]
         motions = (
             data.efc_vel + dt / 2 * self._smooth,
             dt / 2 * (self._along(data.qacc) - self._smooth),
         )
-        for (_, rows, whole, mine), normal in zip(self._contacts, self._normal(force), strict=True):
-            works = np.array([normal * dt * float(motion[rows].mean()) for motion in motions])
-            aside = (
-                np.array([dt * float(force[whole] @ motion[whole]) for motion in motions]) - works
+        for rows, normal in zip(self._contacts, self._normal(force), strict=True):
+            row_forces = force[rows.all]
+            along = np.array(
+                [normal * dt * float(velocity[rows.normal].mean()) for velocity in motions]
             )
+            whole = np.array([dt * float(row_forces @ velocity[rows.all]) for velocity in motions])
+            aside = whole - along
+            works = along
             if aside.sum() > 0:
-                works += aside  # friction that drives must be paid for too
-            linear[mine[0].purse] += float(works[0])
-            square[mine[0].purse] += float(works[1])
-        shares = {
-            each: affordable_share(linear[each], square[each], paid.get(each, 0.0))
-            for each in linear
-        }
-        return {purse: share for purse, share in shares.items() if share < 1}
+                works = along + aside  # friction that drives must be paid for too
+            purse = rows.pairs[0].purse
+            linear[purse] += float(works[0])
+            square[purse] += float(works[1])
+        shares = {}
+        for purse in linear:
+            share = affordable_share(linear[purse], square[purse], paid.get(purse, 0.0))
+            if share < 1:
+                shares[purse] = share
+        return shares
 
 
 def affordable_share(linear: float, square: float, paid: float) -> float:
     """The greatest share s up to 1 whose work, linear s + square s^2, is paid for [J]."""
-    if square <= 0 or linear + square <= paid + _ROUND_OFF * abs(linear):
+    if square <= 0 or linear + square <= paid + _WORK_ROUND_OFF * abs(linear):
         return 1.0
-    return max(float(np.sqrt(max(linear**2 + 4 * square * paid, 0.0)) - linear) / (2 * square), 0.0)
+    root = np.sqrt(max(linear**2 + 4 * square * paid, 0.0))
+    return max(float(root - linear) / (2 * square), 0.0)
 
 
 def impedance(solimp: Iterable[float], gap: float) -> float:
-    """MuJoCo's impedance d of a contact, from its `solimp` [5] and gap [m]; see "solver parameters" in its manual."""
-    begin, end, width, middle, power = (float(each) for each in solimp)
+    """MuJoCo's impedance d of a contact, from its `solimp` [5] and its gap [m].
+
+    See "Solver parameters" in MuJoCo's manual.
+    """
+    begin, end, width, middle, power = (float(value) for value in solimp)
     begin, end, middle = (
-        min(max(each, _LEAST_IMPEDANCE), 1 - _LEAST_IMPEDANCE) for each in (begin, end, middle)
+        min(max(value, _MIN_IMPEDANCE), 1 - _MIN_IMPEDANCE) for value in (begin, end, middle)
     )
-    if begin == end or width <= _NARROW:
+    if begin == end or width <= _MIN_WIDTH:
         return (begin + end) / 2
     along = min(abs(gap) / width, 1.0)
     power = max(power, 1.0)

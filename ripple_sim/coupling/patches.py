@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,17 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.waves.footprint import weigh_each
 
-# Up to so many contacts of a pair, what is convex presses between them too.
+# A patch has at most so many corners; a convex geom presses between them too.
 MAX_CORNERS = 8
-# Points on the rim of a patch stand for half a cell, those at its corners for a quarter: their
-# centres lie farther in.
+# Distance from the middle of a patch to the cell of a point, over the distance to the point. Points
+# on the rim of a patch stand for half a cell, and points at its corners for a quarter: the centres
+# of these cells lie farther in.
 _INSET = 0.75
+# Points of a patch that is filled are joined where they are nearer than this share of its size.
+_JOINED_SHARE = 1 / 8
+# Between two corners the surface may lie farther off than at the corners, by the footprint radius
+# over this, and still be touched.
+_TOUCH_DIVISOR = 10
 # Footprint radius over the patch's size at which the footprints of the points of a square or a line
 # just overlap.
 _OVERLAP = 0.3
@@ -53,7 +60,7 @@ def load_points(
     radii : float64 [p]
         Footprint radius of a single contact with each geom [m].
     convex : bool [p]
-        Whether the geom that touches is.
+        Whether the geom that touches is convex.
     closest : callable
         Surface points [m], [q, 3], nearest to points [q, 3].
 
@@ -88,14 +95,14 @@ def load_points(
     away = np.sqrt(np.einsum("ij,ij->i", off, off))
     # the forces at the corners are shared among these and the midpoints
     total = np.bincount(patches, forces)
-    (limit, size) = np.zeros((2, len(radii)))
+    limit = np.zeros(len(radii))
     np.maximum.at(limit, patches, away[: len(points)])
-    middles = (
-        np.column_stack([np.bincount(patches, forces * each) for each in points.T]) / total[:, None]
-    )
+    moments = [np.bincount(patches, forces * coordinate) for coordinate in points.T]
+    middles = np.column_stack(moments) / total[:, None]
+    size = np.zeros(len(radii))
     np.maximum.at(size, of_pair, np.sqrt(((points[first] - points[second]) ** 2).sum(axis=1)))
     # where there is no touch between two corners, they keep their shares
-    touch = away[len(points) :] <= (limit + radii / 10)[of_pair]
+    touch = away[len(points) :] <= (limit + radii / _TOUCH_DIVISOR)[of_pair]
     filled = np.zeros(len(radii), np.bool_)
     filled[of_pair] = True
     filled[of_pair[~touch]] = False
@@ -105,27 +112,23 @@ def load_points(
     np.add.at(shares, pairs[~touch].ravel(), np.repeat(share[~touch], 2))
     # what carries a force: of each patch its corners, then the midpoints
     kept = shares.nonzero()[0]
-    of = np.concatenate([patches, of_pair])
-    kept = kept[of[kept].argsort(kind="stable")]
-    of = of[kept]
+    patch_of = np.concatenate([patches, of_pair])
+    kept = kept[patch_of[kept].argsort(kind="stable")]
+    patch_of = patch_of[kept]
     # the points of a patch that is filled stand for the cells of a lattice, and are joined where
     # they are near
-    inset = np.where(filled, _INSET, 1.0)[of, None]
-    near = np.where(filled, size / 8, 0.0)
-    lattice = inset * probes[kept] + (1 - inset) * middles[of]
-    patches, points, forces = _joined(of, lattice, shares[kept], near, len(kept))
-    return (
-        patches,
-        points,
-        forces,
-        np.where(filled, np.maximum(radii, _OVERLAP * size), radii)[patches],
-    )
+    inset = np.where(filled, _INSET, 1.0)[patch_of, None]
+    near = np.where(filled, size * _JOINED_SHARE, 0.0)
+    lattice = inset * probes[kept] + (1 - inset) * middles[patch_of]
+    patches, points, forces = _joined(patch_of, lattice, shares[kept], near, len(kept))
+    patch_radii = np.where(filled, np.maximum(radii, _OVERLAP * size), radii)
+    return patches, points, forces, patch_radii[patches]
 
 
 def corners(
     patches: Ints, points: Floats, forces: Floats, radii: Floats
 ) -> tuple[Ints, Floats, Floats]:
-    """Join contacts within a radius [m] of the strongest of their patch: patches, force-weighted points, summed forces.
+    """Join contacts within a radius of the strongest contact of their patch.
 
     Contacts farther apart (the two ends of a capsule) stay apart, up to eight corners; then the
     rest joins the nearest. The forces of the corners add up to those of the patch.
@@ -139,7 +142,16 @@ def corners(
     forces : float64 [k]
         All of one sign within a patch [N].
     radii : float64 [p]
-        Of each patch.
+        Of each patch [m].
+
+    Returns
+    -------
+    patches : int64 [n]
+        The patch of each corner, ascending.
+    points : float64 [n, 3]
+        Force-weighted [m].
+    forces : float64 [n]
+        Summed [N].
     """
     strongest_first = np.lexsort((-np.abs(forces), patches))
     return _joined(patches, points[strongest_first], forces[strongest_first], radii, MAX_CORNERS)
@@ -148,56 +160,107 @@ def corners(
 def _joined(
     patches: Ints, points: Floats, forces: Floats, near: Floats, most: int
 ) -> tuple[Ints, Floats, Floats]:
-    """Points of each patch joined with the first one near them that is a seed: force-weighted, with summed forces.
+    """Join the points of each patch with the first seed near them; see `corners` for the result.
 
-    A point is a seed unless one of its patch that is a seed of its own comes before. `near` are the
-    distances of the patches [m]. After so many seeds of a patch the rest joins the nearest of them.
+    A point is a seed unless a seed of its patch is near and comes before it.
+
+    Parameters
+    ----------
+    patches, points, forces
+        See `corners`.
+    near : float64 [p]
+        Distance within which the points of a patch are joined [m].
+    most : int
+        Of the seeds of a patch; further points join the nearest seed.
     """
-    # made here: kernels that allocate take longer to compile
-    of = np.empty_like(patches)
-    at = np.empty_like(points)
-    totals = np.empty_like(forces)
-    found = _join(patches, points, forces, near, most, np.empty_like(patches), of, at, totals)
-    return of[:found], at[:found], totals[:found]
+    # allocated here: kernels that allocate take longer to compile
+    seeds = _Seeds(
+        rows=np.empty_like(patches),
+        patches=np.empty_like(patches),
+        points=np.empty_like(points),
+        forces=np.empty_like(forces),
+    )
+    count = _join(patches, points, forces, near, most, seeds)
+    return seeds.patches[:count], seeds.points[:count], seeds.forces[:count]
+
+
+class _Seeds(NamedTuple):
+    """Points with which others are joined, patch by patch.
+
+    Attributes
+    ----------
+    rows : int64 [k]
+        Among all points.
+    patches : int64 [k]
+    points : float64 [k, 3]
+        Force-weighted means of the seed and the points joined with it [m].
+    forces : float64 [k]
+        Their sums [N].
+    """
+
+    rows: Ints
+    patches: Ints
+    points: Floats
+    forces: Floats
 
 
 @kernel
 def _join(
-    patches: Ints, points: Floats, forces: Floats, near: Floats, most: int,
-    seeds: Ints, of: Ints, at: Floats, totals: Floats,
-) -> int:  # fmt: skip
-    """Fill in the seeds, their patches, points and forces; how many there are."""
-    found = 0
+    patches: Ints, points: Floats, forces: Floats, near: Floats, most: int, seeds: _Seeds
+) -> int:
+    """Fill in the seeds; return their number."""
+    count = 0
     begin = 0
     for i in range(len(patches)):
-        if found > 0 and of[found - 1] != patches[i]:
-            begin = found
+        if count > 0 and seeds.patches[count - 1] != patches[i]:
+            begin = count
         joins = -1
         nearest = -1
         least = np.inf
-        for row in range(begin, found):
+        for row in range(begin, count):
             distance2 = 0.0
             for k in range(3):
-                distance2 += (points[i, k] - points[seeds[row], k]) ** 2
+                distance2 += (points[i, k] - points[seeds.rows[row], k]) ** 2
             if distance2 < least:
                 nearest = row
                 least = distance2
             if joins < 0 and distance2 <= near[patches[i]] ** 2:
                 joins = row
-        if joins < 0 and found - begin == most:
+        if joins < 0 and count - begin == most:
             joins = nearest
         if joins < 0:
-            seeds[found] = i
-            of[found] = patches[i]
-            totals[found] = forces[i]
+            seeds.rows[count] = i
+            seeds.patches[count] = patches[i]
+            seeds.forces[count] = forces[i]
             for k in range(3):
-                at[found, k] = points[i, k]
-            found += 1
+                seeds.points[count, k] = points[i, k]
+            count += 1
         else:
-            totals[joins] += forces[i]
+            seeds.forces[joins] += forces[i]
+            weight = forces[i] / seeds.forces[joins]
             for k in range(3):
-                at[joins, k] += forces[i] / totals[joins] * (points[i, k] - at[joins, k])
-    return found
+                seeds.points[joins, k] += weight * (points[i, k] - seeds.points[joins, k])
+    return count
+
+
+class _Made(NamedTuple):
+    """Footprints that exist, as they were asked for.
+
+    Attributes
+    ----------
+    geoms : int64 [m]
+    points : float64 [m, 3]
+        Load points in the target's frame [m].
+    radii : float64 [m]
+        [m].
+    tolerances : float64 [m]
+        How far point and radius may move before another footprint is made [m].
+    """
+
+    geoms: Ints
+    points: Floats
+    radii: Floats
+    tolerances: Floats
 
 
 class Footprints:
@@ -214,15 +277,13 @@ class Footprints:
     def __init__(self, atlas: Atlas, movable: NDArray[np.bool_]) -> None:
         self._movable = movable
         self._place_on(atlas)
-        # geoms, points, radii as they were asked for, and how far these two may move before one is
-        # made anew [m]
-        self._made: tuple[NDArray, ...] = (
-            np.zeros(0, np.int64),
-            np.zeros((0, 3)),
-            np.zeros(0),
-            np.zeros(0),
+        self._made = _Made(
+            geoms=np.zeros(0, np.int64),
+            points=np.zeros((0, 3)),
+            radii=np.zeros(0),
+            tolerances=np.zeros(0),
         )
-        # of each, as `under` gives them
+        # texels and shares of each, as `under` gives them
         self._under: list[tuple[Ints, Floats]] = []
 
     def follow(self, atlas: Atlas) -> None:
@@ -230,8 +291,8 @@ class Footprints:
         first = [texels[0] for texels, _ in self._under]
         before = self._grid.positions
         self._place_on(atlas)
-        geoms, points, *sizes = self._made
-        self._made = geoms, points + self._grid.positions[first] - before[first], *sizes
+        points = self._made.points + self._grid.positions[first] - before[first]
+        self._made = self._made._replace(points=points)
 
     def _place_on(self, atlas: Atlas) -> None:
         self._atlas = atlas
@@ -241,7 +302,9 @@ class Footprints:
     def under(
         self, geoms: Ints, points: Floats, radii: Floats, active: Bools
     ) -> list[tuple[Ints, Floats]]:
-        """Texels under load points, and their shares of a unit force there: 1 in all, or less where some are fixed.
+        """Texels under each load point, and their shares of a unit force there.
+
+        The shares add up to 1, or to less where texels are fixed.
 
         Parameters
         ----------
@@ -257,7 +320,7 @@ class Footprints:
         """
         rows = np.full(len(geoms) + len(self._under), -1)
         touching = np.zeros(len(active), np.bool_)
-        rows = rows[: _serving(geoms, points, radii, *self._made, active, touching, rows)]
+        rows = rows[: _serving(geoms, points, radii, self._made, active, touching, rows)]
         new = (rows < 0).nonzero()[0]
         rows[new] = len(self._under) + np.arange(len(new))
         under = self._under
@@ -271,26 +334,36 @@ class Footprints:
             under = [*under, *((texels[first:last], shares[first:last]) for first, last in ends)]
             tolerances = SAME_PLACE * np.sqrt(grid.areas[centres])
         self._under = [under[row] for row in rows.tolist()]
-        added = geoms[new], points[new], radii[new], tolerances
-        self._made = tuple(
-            np.concatenate(each)[rows] for each in zip(self._made, added, strict=True)
+        made = self._made
+        self._made = _Made(
+            geoms=np.concatenate([made.geoms, geoms[new]])[rows],
+            points=np.concatenate([made.points, points[new]])[rows],
+            radii=np.concatenate([made.radii, radii[new]])[rows],
+            tolerances=np.concatenate([made.tolerances, tolerances])[rows],
         )
         return self._under[: len(geoms)]
 
 
 @kernel
 def _serving(
-    geoms: Ints, points: Floats, radii: Floats, made: Ints, at: Floats, sizes: Floats, near: Floats, active: Bools,
-    touching: Bools, rows: Ints,
-) -> int:  # fmt: skip
-    """Fill in the first footprint that serves each load point, and then those that are only kept; how many there are.
+    geoms: Ints,
+    points: Floats,
+    radii: Floats,
+    made: _Made,
+    active: Bools,
+    touching: Bools,
+    rows: Ints,
+) -> int:
+    """Fill in the first footprint that serves each load point, then the footprints that are kept.
+
+    Returns the number of load points and kept footprints.
 
     Parameters
     ----------
     geoms, points, radii
         Of the load points.
-    made, at, sizes, near
-        Geoms, points, radii and tolerances of the footprints.
+    made : _Made
+        The footprints.
     active
         Geoms whose footprints are kept.
     touching : bool [c]
@@ -301,15 +374,18 @@ def _serving(
     count = len(geoms)
     for i in range(len(geoms)):
         touching[geoms[i]] = True
-        for row in range(len(made)):
-            if made[row] == geoms[i] and rows[i] < 0:
+        for row in range(len(made.geoms)):
+            if made.geoms[row] == geoms[i] and rows[i] < 0:
                 distance2 = 0.0
                 for k in range(3):
-                    distance2 += (at[row, k] - points[i, k]) ** 2
-                if np.sqrt(distance2) <= near[row] and abs(sizes[row] - radii[i]) <= near[row]:
+                    distance2 += (made.points[row, k] - points[i, k]) ** 2
+                tolerance = made.tolerances[row]
+                same_radius = abs(made.radii[row] - radii[i]) <= tolerance
+                if np.sqrt(distance2) <= tolerance and same_radius:
                     rows[i] = row
-    for row in range(len(made)):
-        if active[made[row]] and not touching[made[row]]:
+    for row in range(len(made.geoms)):
+        geom = made.geoms[row]
+        if active[geom] and not touching[geom]:
             rows[count] = row
             count += 1
     return count

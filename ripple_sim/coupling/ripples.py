@@ -491,9 +491,9 @@ class Ripples:
         for geom, easing in self._eased.items():
             self._warn_once(f"eased {geom}", easing_warning(target_name(self.model, geom), easing))
         for target, filtered in self._high_pass.items():
-            load = loads[target]
-            if isinstance(load, Load):  # always: hits on what is soft have no pulses
-                loads[target] = filtered(load)
+            unfiltered = loads[target]
+            if isinstance(unfiltered, Load):  # always: hits on flexes and skins have no pulses
+                loads[target] = filtered(unfiltered)
         for geom, waves in self._waves.items():
             step_load = loads[geom] if shared is None else shared.get(geom)
             waves.step(elapsed, load=step_load)
