@@ -16,11 +16,13 @@ from .operator.assembly import build_operator as build_operator
 from .operator.material import Material as Material
 from .operator.modes import Modes as Modes, modes as modes
 from .operator.regions import absorbing_damping as absorbing_damping, hold as hold
-from .texels.atlas import Atlas as Atlas, texel_atlas as texel_atlas
+from .texels.atlas import Atlas as Atlas
+from .texels.gluing import glue as glue
 from .texels.maps import texture_map as texture_map, vertex_map as vertex_map
+from .texels.texel_atlas import texel_atlas as texel_atlas
 from .texels.texel_mesh import TexelMesh as TexelMesh
 from .texels.thickness import thickness_map as thickness_map
-from .texels.topology import TexelTopology as TexelTopology, glue as glue
+from .texels.topology import TexelTopology as TexelTopology
 from .waves.footprint import Footprint as Footprint
 from .waves.height_map import HeightMap as HeightMap
 from .waves.load import Load as Load

@@ -114,7 +114,7 @@ class AtlasCommand:
         """Check paths and options before anything that takes time."""
         from ripple_sim.solver import AtlasError
         from ripple_sim.solver.mesh.files import check_mesh_file
-        from ripple_sim.solver.texels.atlas import check_atlas_place
+        from ripple_sim.solver.texels.atlas_file import check_atlas_place
 
         check_mesh_file(self.mesh)
         for path in filter(None, (self.output, self.plot)):

@@ -22,7 +22,7 @@ from ripple_sim.solver.cache import cache_path, make_room, mark_used
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.solver.mesh.queries import ClosestPoints, RayScene
 from ripple_sim.solver.mesh.topology import corner_angles
-from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
+from ripple_sim.solver.texels.atlas_file import read_arrays, write_arrays
 
 from .geoms import to_body
 from .model import SPECULATIVE, part_name

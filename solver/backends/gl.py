@@ -18,8 +18,8 @@ from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator
 from ..texels import cells
 from ..texels.moving import MovedStencil, interpolate
+from ..texels.quad_pass import LEAST_RATIO
 from ..texels.stencil import IrregularLinks, Stencil, crossing_links, missing_links
-from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .field_backend import FieldBackend
 from .gl_fields import (

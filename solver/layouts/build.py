@@ -17,10 +17,11 @@ from ..errors import PATH, AtlasError, MeshError, SphereMapError, checked, insta
 from ..kernel import log
 from ..mesh.clean import counted
 from ..mesh.mesh import Mesh, check_genus_zero
-from ..texels.atlas import ADVICE, FORMAT, Atlas, read_atlas_file
+from ..texels.atlas import Atlas
+from ..texels.atlas_file import ADVICE, FORMAT, read_atlas_file
 from ..texels.chart_map import ChartMap, LinearChartMap
+from ..texels.gluing import glue
 from ..texels.texel_mesh import TexelMesh
-from ..texels.topology import glue
 from .choice import LONGEST_TEXEL, texel_length
 from .cube.atlas import CubeChartMap, SphereAtlas, atlas_from_sphere_map
 from .cube.convention import check_memory, check_resolution

@@ -237,11 +237,17 @@ class Material:
         square = modulus / density
         kinematic = viscosity / density
         if short:
-            stiff, fast, mass = _SHORT_STIFF, _SHORT_FAST, _SHORT_MASS
-            shortest, longest = 0.0, _SHORT_LONGEST
+            stiff = _SHORT_STIFF
+            fast = _SHORT_FAST
+            mass = _SHORT_MASS
+            shortest = 0.0
+            longest = _SHORT_LONGEST
         else:
-            stiff, fast, mass = STIFF, FAST, MASS
-            shortest, longest = SHORTEST, LONGEST
+            stiff = STIFF
+            fast = FAST
+            mass = MASS
+            shortest = SHORTEST
+            longest = LONGEST
         return cls(
             speed=(fast * square) ** 0.5,
             stiffness=stiff * square / depth**2,

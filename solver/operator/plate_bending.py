@@ -215,7 +215,7 @@ def plate_bending(
 
 
 def shared_cells(texels: TexelMesh) -> csr_array:
-    """Number of cells that two texels share, [T, T]; the diagonal has the cells of a texel, plus 1."""
+    """Number of cells that two texels share, [T, T]; on the diagonal those of a texel, plus 1."""
     topology = texels.topology
     count = texels.topology.texel_count
     halo = np.where(topology.rim, -1, topology.halo)

@@ -106,7 +106,7 @@ VolumeRate: TypeAlias = tuple[Ints, Ints, Floats32, Floats32]
 def volume_rate(
     operator: WaveOperator, dt: float, conserve: bool | None = None
 ) -> VolumeRate | None:
-    """Weights of heights and velocities in the pressure that keeps the volume over a substep dt [s].
+    """The pressure that keeps the volume over a substep dt [s], by heights and velocities.
 
     None where nothing changes the volume, or no part keeps it. A part does not keep it where a
     clamp holds some of it, or its stiffness varies: clamps and springs take up momentum themselves.

@@ -1,4 +1,4 @@
-"""The texel mesh: charts of texels, how they are connected, and what is computed on them; the atlas on a surface."""
+"""The texel mesh, charts of texels on a surface, and the atlas, which adds the mesh below."""
 
 import lazy_loader
 

@@ -1,14 +1,14 @@
-from .atlas import (
+from .atlas import Atlas as Atlas, check_points as check_points
+from .atlas_file import (
     ADVICE as ADVICE,
     FORMAT as FORMAT,
-    Atlas as Atlas,
     check_atlas_place as check_atlas_place,
-    check_points as check_points,
     read_arrays as read_arrays,
     read_atlas_file as read_atlas_file,
     write_arrays as write_arrays,
     write_atlas_file as write_atlas_file,
 )
+from .barycentrics import barycentrics_at as barycentrics_at, barycentrics_in as barycentrics_in
 from .cells import (
     EVEN as EVEN,
     LEAST_AREA as LEAST_AREA,
@@ -23,10 +23,6 @@ from .chart_map import (
     ChartMap as ChartMap,
     LinearChartMap as LinearChartMap,
     Parts as Parts,
-    PartsMesh as PartsMesh,
-    barycentrics_at as barycentrics_at,
-    barycentrics_in as barycentrics_in,
-    parts_mesh as parts_mesh,
     texture_coordinates as texture_coordinates,
     uncut as uncut,
 )
@@ -40,6 +36,7 @@ from .distance import (
     march as march,
     seeded as seeded,
 )
+from .gluing import glue as glue
 from .halo import (
     fill_halo as fill_halo,
     sampling_matrix as sampling_matrix,
@@ -52,6 +49,8 @@ from .moving import (
     SurfaceRide as SurfaceRide,
     interpolate as interpolate,
 )
+from .parts_mesh import PartsMesh as PartsMesh, parts_mesh as parts_mesh
+from .quad_pass import LEAST_RATIO as LEAST_RATIO
 from .stencil import (
     LINK_ENDS as LINK_ENDS,
     NO_LINKS as NO_LINKS,
@@ -64,7 +63,7 @@ from .stencil import (
     missing_links as missing_links,
     stiffness_matrix as stiffness_matrix,
 )
-from .stiffness import LEAST_RATIO as LEAST_RATIO, TexelCells as TexelCells
+from .stiffness import TexelCells as TexelCells
 from .stretch import QUANTILES as QUANTILES, stretch_summary as stretch_summary
 from .texel_mesh import (
     TexelGrid as TexelGrid,
@@ -81,4 +80,4 @@ from .thickness import (
     medial_radius as medial_radius,
     thickness_map as thickness_map,
 )
-from .topology import TexelTopology as TexelTopology, glue as glue
+from .topology import TexelTopology as TexelTopology

@@ -1,24 +1,25 @@
-"""The cells of a texel mesh: finite elements of a quad, a triangle, a strip, a polygon; and where all but quads lie.
+"""The cells of a texel mesh: finite elements, and where the special cells lie.
 
-A quad takes its gradient from its two diagonals (one-point integration), and a little stiffness
-against the one pattern that this does not see, the hourglass + - + - (Flanagan and Belytschko
-1981). That pattern is a second derivative: its stiffness is free, as long as linear functions have
-none of it. In a quad that is no parallelogram they have: where the map onto the charts has kinks,
-eigenvalues then converge with order 1 to 1.6 instead of 2, so that it is taken away.
+A quad takes its gradient from its two diagonals (one-point integration), and has a little stiffness
+against the one pattern that the gradient does not see, the hourglass + - + - (Flanagan and
+Belytschko 1981). This pattern is a second derivative: its stiffness may be chosen, as long as
+linear functions have none of the pattern. In a quad that is no parallelogram they have some. Where
+the map onto the charts has kinks, eigenvalues then converge with order 1 to 1.6 instead of 2, so
+that the share of linear functions is taken out of the hourglass.
 
 The stiffness decides whether short waves lag behind or run ahead, and follows from the quad's
 shape. Linear triangles give it far too much in a sheared quad: there waves ran ahead, by 3 % in the
 median over the elephant at N = 96.
 
-Vectors are three coordinates, of one point or of many. What is `shared` is for NumPy in double
-precision, where a surface is at rest, and for a kernel in single precision, where it moves;
-`quads.glsl` is its twin on the GPU. Lengths are in units of about a cell's own.
+Vectors are three coordinates, of one point or of many. `shared` functions run in NumPy in double
+precision, where a surface is at rest, and in a kernel in single precision, where it moves;
+`quads.glsl` is their twin on the GPU. Lengths are in units of about the length of a cell.
 
-The few cells that are no plain quads are strips at rims, triangles and polygons in corners. Where
-they lie and what they add to is worked out once; their weights then follow from wherever their
-corners are. Between the last texels and a rim lies a strip of half a texel: where the rim is free,
-heights in it change along the rim only, and its area goes to the texels. Nothing is known of a
-strip where the rim has no positions.
+The few special cells, which are no plain quads, are strips at rims, and triangles and polygons in
+corners. Their places, and the links and texels to which they add, are worked out once; their
+weights then follow from wherever their corners are. Between the last texels and a rim lies a strip
+of half a texel. Where the rim is free, heights in the strip change along the rim only, and its area
+goes to the texels. There is no strip where the rim has no positions.
 """
 
 from __future__ import annotations
@@ -38,8 +39,14 @@ from .topology import TRIANGLE, TexelTopology
 
 Numbers: TypeAlias = Any  # a float, or an array of them
 
-# In single precision, which holds these exactly, they do not make single numbers double.
-_ZERO, _QUARTER, _HALF, _ONE, _TWO, _THREE, _FOUR = map(np.float32, (0, 0.25, 0.5, 1, 2, 3, 4))
+# Numbers in single precision, which holds them exactly: they do not make single numbers double.
+_ZERO = np.float32(0)
+_QUARTER = np.float32(0.25)
+_HALF = np.float32(0.5)
+_ONE = np.float32(1)
+_TWO = np.float32(2)
+_THREE = np.float32(3)
+_FOUR = np.float32(4)
 
 # One over the stiffness of a square against the hourglass, which is 0.4. At 1 waves lag along its
 # sides as much as they lead along its diagonals, 1/2 makes the 5-point stencil, 1/3 an isotropic
@@ -50,36 +57,41 @@ PER_HOURGLASS = np.float32(2.5)
 # own time step.
 SHARE = np.float32(0.75)
 
-# A quad whose diagonals have their middles further apart than the root of one over this, in units
-# of the diagonals, counts as uneven. In an even one what linear functions have of the hourglass is
-# of second order, and makes up for some of the waves' lag: on the sphere N = 64 is a third more
-# exact with it.
+# A quad counts as uneven where the middles of its diagonals are further apart than the root of one
+# over this, in units of the diagonals. In an even quad the hourglass share of linear functions is of
+# second order, and makes up for some of the lag of waves: on the sphere N = 64 is a third more exact
+# with it.
 EVEN = np.float32(1000)
 
-# A cell folded to a line would ask for an infinitely short time step: least area, in units of a
-# square's as large.
+# Least area of a cell, in units of the area of a square of its size: a cell that is folded to a line
+# would need an infinitely short time step.
 LEAST_AREA = np.float32(0.02)
 
 # Detours fade out in quads where |p|^2 |q|^2 - (p.q)^2 is below this share of |p|^2 |q|^2, with
 # diagonals p and q.
 FADED = np.float32(0.02)
 
-_TINY = 1e-12  # area of a cell in one point
+# Area of a cell in one point.
+_TINY = 1e-12
 TINY = np.float32(_TINY)
 PER_TINY = np.float32(1 / _TINY)
 
 # A polygon flatter than this, in units of its size, counts as flat: many combinations of its
-# corners then make the node in its middle. Its square is well above round-off.
-_FLAT = 1e-5
+# corners then make the node in its middle. The square of this is well above round-off.
+_FLAT_POLYGON = 1e-5
 
-# The four corners of a cell at (r, c), and its links in the order of `quad`: link, and the place
-# where it is stored.
+# Row and column of the four corners of a cell at (r, c), from there.
 CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
+
+# Links of a cell at (r, c), in the order of `quad`: number of the link, and row and column of the
+# place where it is stored, from (r, c).
 LINKS = ((0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 0, 1), (2, 0, 0), (3, 0, 0))
 
-# Two corners of each strip on the surface, joined by the first four of the links, and the two
-# beyond the rim opposite.
+# Corners of the four kinds of strips: two on the surface, which the first four links join kind by
+# kind, and opposite the two beyond the rim.
 _STRIPS = ((0, 1, 2, 3), (2, 3, 0, 1), (0, 2, 1, 3), (1, 3, 0, 2))
+
+# No places.
 _NOTHING = np.zeros(0, np.int64)
 
 
@@ -92,15 +104,16 @@ def cross_length(a: Vector, b: Vector) -> Numbers:
 
 @shared
 def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...]:
-    """Weights of a quad's links: south, north, west and east side, diagonal sw-ne, diagonal se-nw; its area.
+    """Weights of the six links of a quad, and its area.
 
-    Its corners se, nw and ne are at e, n and p from sw; `detours` are those of the links in this
-    order. With diagonals p, q and u_p, u_q the differences along them, area |gradient|^2 is (|q|^2
-    u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared
-    differences along west and east, less that along south and north. The hourglass, less what the
-    linear function of that gradient has of it, is (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne,
-    where a p + b q is how far the quad is from a parallelogram, and next to none in an even one. A
-    quad in one point has neither.
+    The links are the south, north, west and east side, the diagonal sw-ne and the diagonal se-nw.
+    The corners se, nw and ne are at e, n and p from sw; `detours` are in the order of the links.
+    With diagonals p, q and u_p, u_q the differences along them, area |gradient|^2 is (|q|^2 u_p^2 -
+    2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared differences along
+    west and east, less that along south and north. The hourglass, less what the linear function of
+    that gradient has of it, is (1 + a, -1 + b, -1 - b, 1 - a) at sw, se, nw, ne, where a p + b q is
+    how far the quad is from a parallelogram, and next to none in an even one. A quad in one point
+    has neither.
     """
     q = subtract(n, e)
     north = subtract(p, n)
@@ -119,7 +132,7 @@ def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...
     to_pp = detours[4] * pp
     to_qq = detours[5] * qq
     to_pq = _HALF * (to_west + to_east - to_south - to_north)
-    # no more than leaves a quad: in one p.q is less than |p| |q|
+    # detours fade out where they would leave no quad: in a quad p.q is less than |p| |q|
     most = (pp + to_pp) * (qq + to_qq)
     both = pq + to_pq
     fit = np.minimum(
@@ -159,7 +172,7 @@ def quad(e: Vector, n: Vector, p: Vector, detours: Vector) -> tuple[Numbers, ...
 
 @shared
 def hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
-    """Hourglass stiffness of a quad of given area whose diagonals p and q have the products pp, qq and pq.
+    """Hourglass stiffness of a quad, from its area and the products of its diagonals p and q.
 
     In a parallelogram with the squared sides a >= b, the product d of its sides and the area J, a
     wave of wave number k has omega^2 = k^2 - k^4 (a + b) / 16 + k^4 H (J^2 + 3 d^2) / 8 J in the
@@ -190,7 +203,10 @@ def quad_area(e: Vector, n: Vector, p: Vector) -> Numbers:
 
 @shared
 def triangle(a: Vector, b: Vector, c: Vector) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-    """Cotangent weights of the links bc, ca, ab, and the area of a triangle (Pinkall and Polthier 1993)."""
+    """Cotangent weights of the links bc, ca, ab of a triangle, and its area.
+
+    See Pinkall and Polthier 1993.
+    """
     ab = subtract(b, a)
     ac = subtract(c, a)
     bc = subtract(c, b)
@@ -202,12 +218,13 @@ def triangle(a: Vector, b: Vector, c: Vector) -> tuple[Numbers, Numbers, Numbers
 
 @kernel
 def polygons(corners: Floats) -> tuple[Floats, Floats]:
-    """Link weights [k (k - 1) / 2, m] and shares of the area [k, m] of m polygons in space [3, k, m].
+    """Link weights and shares of the area of m polygons in space [3, k, m].
 
-    Links are those of corners 0-1, 0-2 and so on, 1-2 and so on.
+    Weights [k (k - 1) / 2, m] are of the links of corners 0-1, 0-2 and so on, 1-2 and so on; shares
+    are [k, m].
 
-    A virtual node in the middle cuts each into triangles; it is an affine combination of the
-    corners, so that linear functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and
+    A virtual node in the middle cuts each polygon into triangles. It is an affine combination of
+    the corners, so that linear functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and
     Botsch 2020).
     """
     _, count, number = corners.shape
@@ -251,9 +268,10 @@ def polygons(corners: Floats) -> tuple[Floats, Floats]:
 
 @kernel(no_cpython_wrapper=True)
 def _virtual_node(corners: Floats) -> Floats:
-    """Weights [k], of sum 1, of the point whose triangles with the sides of a polygon [3, k] have least squared areas.
+    """Weights [k], of sum 1, at the corners of a polygon [3, k] that make its virtual node.
 
-    Of all weights that make it the most even ones.
+    The triangles of this point with the sides of the polygon have the least sum of squared areas.
+    Of all weights that make it these are the most even ones.
     """
     count = corners.shape[1]
     # |x - c| x side, squared: x' A x - 2 b' x, with A = sum of |s|^2 1 - s s'
@@ -300,8 +318,11 @@ def _mean(corners: Floats, weights: Floats) -> tuple[float, float, float]:
 
 @kernel(no_cpython_wrapper=True)
 def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
-    """Solution of a symmetric positive semidefinite system [3, 3]; next to 0 where this leaves it open."""
-    ridge = _FLAT**2 * (matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) + 1e-300
+    """Solution of a symmetric positive semidefinite system [3, 3].
+
+    It is next to 0 in directions that the system leaves open.
+    """
+    ridge = _FLAT_POLYGON**2 * (matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) + 1e-300
     first = matrix[0, 0] + ridge
     a = matrix[0, 1] / first
     b = matrix[0, 2] / first
@@ -316,13 +337,14 @@ def _solved(matrix: Floats, right: Vector) -> tuple[float, float, float]:
 
 
 def conductance(coefficients: Sequence[Floats], softening: Sequence[Floats]) -> Floats:
-    """Harmonic mean of the coefficients at the corners of cells, as of media in series: 0 where one of them is 0.
+    """Harmonic mean of the coefficients at the corners of cells, as of media in series.
 
-    It is softened by the least of the factors at the corners.
+    0 where a coefficient is 0. The mean is softened by the least of the factors at the corners.
     """
     with np.errstate(divide="ignore"):
-        resistance = sum(1 / each for each in coefficients)
-    return len(coefficients) / resistance * functools.reduce(np.minimum, softening)
+        resistance = sum(1 / coefficient for coefficient in coefficients)
+    least_factor = functools.reduce(np.minimum, softening)
+    return len(coefficients) / resistance * least_factor
 
 
 def at_corners(field: NDArray) -> list[NDArray]:
@@ -341,17 +363,19 @@ class SpecialCells:
     corners : int64 [j, k]
         Flat places of their corners in a field with halo.
     law : callable
-        Geometric weights of their links [l, k], shares of their areas [s, k], and these [k], from
-        corners [3, j, k].
+        From corners [3, j, k] to geometric weights of the links [l, k], shares of the areas [s, k],
+        and the areas [k].
     links : (int64 [m], int64 [m])
-        Of the weights [l, k], flat, those that are added, and the flat places among a stencil's
-        weights.
+        Flat indices, among the weights [l, k], of weights that are added, and the flat places among
+        a stencil's weights to which they are added.
     shares : (int64 [m], int64 [m])
-        Of the shares [s, k], flat, those that are added, and flat texels.
+        Flat indices, among the shares [s, k], of shares that are added, and the flat texels to
+        which they are added.
     irregular : (int64 [m], int64 [m, 2])
-        Of the weights, flat, those of links beyond the nine points, and the texels at both ends.
+        Flat indices, among the weights, of links beyond the nine points, and the texels at both
+        ends.
     on_all_copies : bool
-        Whether what they add to a link that crosses a glued side is listed for each of its copies.
+        Whether `links` lists every copy of a link that crosses a glued side.
     """
 
     corners: Ints
@@ -362,10 +386,10 @@ class SpecialCells:
     on_all_copies: bool = False
 
     def weigh(self, places: Floats, scale: float) -> tuple[Floats, Floats, Floats]:
-        """Weights of their links [l, k], shares of their areas [s, k] and the areas [k], both [m^2].
+        """Weights of the links [l, k], shares of the areas [s, k] and the areas [k], both [m^2].
 
-        `places` [3, p] are those of a field with halo [m], and `scale` is one over about a cell's
-        length [1/m].
+        `places` [3, p] are the positions of a field with halo [m], and `scale` is one over about
+        the length of a cell [1/m].
         """
         links, shares, areas = self.law(scale * places[:, self.corners])
         return links, shares / scale**2, areas / scale**2
@@ -374,11 +398,11 @@ class SpecialCells:
 def special_cells(topology: TexelTopology, halo_positions: Floats) -> list[SpecialCells]:
     """All cells of a texel mesh but the quads between four texels."""
     kinds = (*_rim_cells(topology, halo_positions), _triangles(topology), *_polygons(topology))
-    return [each for each in kinds if each.corners.size]
+    return [cells for cells in kinds if cells.corners.size]
 
 
 def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[SpecialCells]:
-    """Strips between the last texels and a rim: whole quads where it is fixed."""
+    """Strips between the last texels and a rim; at a fixed rim they are whole quads."""
     n = topology.shape[1]
     rim = topology.rim
     exists = np.logical_and.reduce(at_corners(topology.halo >= 0))
@@ -392,7 +416,7 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
     corners = corners[:, finite]
     at_rim = rim.reshape(-1)[corners]
     shown = topology.halo.reshape(-1)[corners]
-    # a corner beyond the rim has its share go to the texel beside it
+    # the share of a corner beyond the rim goes to the texel beside it
     belongs = np.broadcast_to(np.arange(4)[:, None], corners.shape).copy()
     for i in range(4):
         for j in range(4):
@@ -411,15 +435,17 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
 
 
 def _triangles(topology: TexelTopology) -> SpecialCells:
-    """The cells in corners of three charts; each chart adds what its own texel there, the first corner, has of it."""
+    """The triangles in corners of three charts.
+
+    Each of the charts adds the share of its own texel there, the first corner.
+    """
     n = topology.shape[1]
     width = topology.halo.shape[1]
     corner, chart = np.nonzero(topology.valence.T == TRIANGLE)
     r, c = np.array([[0, 0, n, n], [0, n, n, 0]])[:, corner]
-    # of the chart's own texel, and beyond it
-    (row, next_row), (column, next_column) = (
-        np.where(each == 0, [[1], [0]], [each, each + 1]) for each in (r, c)
-    )
+    # in a chart with halo: row and column of the chart's own texel, and those beyond it
+    row, next_row = np.where(r == 0, [[1], [0]], [r, r + 1])
+    column, next_column = np.where(c == 0, [[1], [0]], [c, c + 1])
     corners = (chart * width + np.stack([row, row, next_row])) * width + np.stack(
         [column, next_column, column]
     )
@@ -430,9 +456,13 @@ def _triangles(topology: TexelTopology) -> SpecialCells:
 
 
 def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
-    """Polygons by their number of corners: their sides belong to the nine points, their diagonals do not."""
-    for count in sorted({len(each) for each in topology.polygons}):
-        texels = np.stack([each for each in topology.polygons if len(each) == count], axis=1)
+    """Polygons by their number of corners.
+
+    Their sides are links of the nine points, their diagonals are not.
+    """
+    for count in sorted({len(polygon) for polygon in topology.polygons}):
+        alike = [polygon for polygon in topology.polygons if len(polygon) == count]
+        texels = np.stack(alike, axis=1)
         first, second = np.triu_indices(count, 1)
         pairs = np.stack([texels[first], texels[second]], axis=-1).reshape(-1, 2)
         link, places = crossing_links(topology).between(pairs)
@@ -445,15 +475,21 @@ def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
 
 
 def _link_places(topology: TexelTopology, cells: Ints, links: Sequence[tuple]) -> tuple[Ints, Ints]:
-    """Which links [l, k] of cells [3, k] are stored, and where in a stencil's weights; both flat."""
+    """Links [l, k] of cells [3, k] that are stored, and their places in a stencil's weights.
+
+    Both are flat.
+    """
     n = topology.shape[1]
-    (chart, r, c) = cells
-    found = [(link, r + down, c + right) for link, down, right in links]
-    stored = np.stack([(row <= n) & (column <= n) for _, row, column in found])
-    places = np.stack(
-        [((4 * chart + link) * (n + 1) + row) * (n + 1) + column for link, row, column in found]
-    )
-    return np.flatnonzero(stored), places[stored]
+    chart, r, c = cells
+    stored = []
+    places = []
+    for link, down, right in links:
+        row = r + down
+        column = c + right
+        stored.append((row <= n) & (column <= n))
+        places.append(((4 * chart + link) * (n + 1) + row) * (n + 1) + column)
+    is_stored = np.stack(stored)
+    return np.flatnonzero(is_stored), np.stack(places)[is_stored]
 
 
 def _whole_quads(x: Floats) -> tuple[Floats, Floats, Floats]:
@@ -469,11 +505,11 @@ def _areas(x: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _strips(x: Floats) -> tuple[Floats, Floats, Floats]:
-    """The link of the first two corners, texels at a free rim; the rim's points beside them are the others.
+    """The link of the first two corners, which are texels at a free rim.
 
-    Heights have no slope across a free rim (the natural condition). Their gradient in the strip is
-    the difference of the two texels over their distance along the rim, at whatever angle the grid
-    lines meet that.
+    The other two corners are the points of the rim beside them. Heights have no slope across a free
+    rim (the natural condition). Their gradient in the strip is the difference of the two texels
+    over their distance along the rim, at whatever angle the grid lines meet the rim.
     """
     link = x[:, 1] - x[:, 0]
     rim = x[:, 3] - x[:, 2]

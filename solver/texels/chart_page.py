@@ -1,4 +1,4 @@
-"""A page: all charts with their halos in one rectangle, so that one texture holds any number of them."""
+"""A page: all charts with their halos in one rectangle, so that one texture holds them all."""
 
 from __future__ import annotations
 
@@ -48,12 +48,18 @@ class ChartPage:
     def locate(
         self, places: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Chart, row and column of places [k, 2] on the page, each [k]; 0.0 is the centre of the first texel."""
+        """Chart, row and column of places [k, 2] on the page, each [k].
+
+        Row and column 0.0 are at the centre of the first texel.
+        """
         block = np.floor(places / self.block).astype(np.int64)
         column, row = (places - block * self.block - 1.5).T
         return block[:, 1] * self.columns + block[:, 0], row, column
 
     def places(self, chart: NDArray[np.int64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Places on the page [k, 2], in texels from its corner, of places [k, 2] in charts [k], 0 to 1."""
+        """Places on the page [k, 2], in texels from its corner.
+
+        `uv` [k, 2] are places in the charts [k], 0 to 1.
+        """
         row, column = np.divmod(chart, self.columns)
         return np.stack([column, row], axis=1) * self.block + 1.0 + self.resolution * uv

@@ -15,21 +15,29 @@ from ..mesh.mesh import Mesh
 from ..mesh.vectors import combine, cross, dot, row, subtract, unit
 from .topology import TexelTopology
 
-_MOST = 256  # edges that a way crosses
-# passes over a way's points, and how far one moves along its edge where it counts as tight
-_PULLS = 32
+# Edges that a way crosses, at most.
+_MOST_EDGES = 256
+
+# Passes over the points of a way that pull it tight, at most.
+_MOST_PULLS = 32
+
+# A way is tight where no point moves by more than this share of its edge.
 _TIGHT = 1e-4
-# Excess of squares: less is round-off, and a way twice as long as straight leads round other things
-# than folds.
-_LEAST = 1e-9
-_GREATEST = 3.0
-_ON_SIDE = 1e-9  # barycentric coordinates below it count as 0
+
+# Least excess of the square of a way over that of the straight line: less is round-off.
+_LEAST_EXCESS = 1e-9
+
+# Greatest excess: a way twice as long as straight leads round other things than folds.
+_MOST_EXCESS = 3.0
+
+# Barycentric coordinates below this count as 0: the point lies on a side.
+_ON_SIDE = 1e-9
 
 
 def link_detours(
     mesh: Mesh, topology: TexelTopology, triangles: Ints, barycentrics: Floats
 ) -> Floats32:
-    """By what share the square of the way over the facets exceeds that of the straight line, for each link.
+    """Detour of each link: squared way over the facets over the squared straight line, less 1.
 
     Parameters
     ----------
@@ -65,15 +73,16 @@ def _measure(
 ) -> None:
     """Fill in the detours between texels at places [C, n + 2, n + 2], -1 for none."""
     charts, width, _ = there.shape
-    edges = np.empty((_MOST, 2), np.int64)
-    points = np.empty((_MOST, 3))
+    edges = np.empty((_MOST_EDGES, 2), np.int64)
+    points = np.empty((_MOST_EDGES, 3))
     for link, (dr, dc, shift) in enumerate(((0, 1, 0), (1, 0, 0), (1, 1, 0), (1, -1, 1))):
         for chart in range(charts):
             for r in range(width - dr):
                 for c in range(width - 1 if link != 1 else width):
-                    a = there[chart, r, c + shift]
-                    b = there[chart, r + dr, c + shift + dc]
-                    a, b = min(a, b), max(a, b)  # from the same end for all copies
+                    first = there[chart, r, c + shift]
+                    second = there[chart, r + dr, c + shift + dc]
+                    a = min(first, second)  # from the same end for all copies
+                    b = max(first, second)
                     if a < 0 or a == b or triangles[a] == triangles[b]:
                         continue
                     p = _point(V, F, triangles[a], weights, a)
@@ -87,7 +96,8 @@ def _measure(
                     if count > 0:
                         length = _pulled(V, edges, points, count, p, q)
                         excess = length * length / square - 1.0
-                        out[link, chart, r, c] = excess if _LEAST < excess < _GREATEST else 0.0
+                        if _LEAST_EXCESS < excess < _MOST_EXCESS:
+                            out[link, chart, r, c] = excess
 
 
 @kernel(no_cpython_wrapper=True)
@@ -125,9 +135,10 @@ def _cut(
     edges: Ints,
     points: Floats,
 ) -> int:
-    """Edges, with the points on them, that the plane cuts from start to end, each a texel, its triangle and its point.
+    """Fill in the edges that the plane cuts from start to end, and the points on them.
 
-    Returns how many there are, 0 where the end is in the same triangle, or is not found.
+    The start and the end are each a texel, its triangle and its point. Returns the number of edges:
+    0 where the end is in the same triangle, or is not found.
     """
     (a, here, p) = start
     (b, target, q) = end
@@ -136,7 +147,7 @@ def _cut(
     way = subtract(q, p)
     normal = cross(way, combine(1.0, _normal(V, F, here), 1.0, _normal(V, F, target)))
     entered = -1
-    for count in range(_MOST):
+    for count in range(_MOST_EDGES):
         best = -np.inf
         leaving = -1
         for k in range(3):
@@ -176,12 +187,12 @@ def _normal(V: Floats, F: Ints, triangle: int) -> tuple[float, float, float]:
 
 @kernel(no_cpython_wrapper=True)
 def _pulled(V: Floats, edges: Ints, points: Floats, count: int, p: tuple, q: tuple) -> float:
-    """Length of the way from p to q through points on edges, once each has moved along its edge to where it is short.
+    """Length of the way from p to q through points on edges, once it is pulled tight.
 
-    Laid flat, the two triangles at an edge hold a straight line between the points before and
-    after.
+    Each point moves along its edge to where the way is shortest. Laid flat, the two triangles at an
+    edge hold a straight line between the points before and after.
     """
-    for _ in range(_PULLS):
+    for _ in range(_MOST_PULLS):
         moved = 0.0
         for i in range(count):
             a = row(V, edges[i, 0])

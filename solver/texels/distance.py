@@ -13,26 +13,28 @@ from numpy.typing import NDArray
 from ..kernel import Bools, Floats, Ints, kernel
 from .texel_mesh import TexelMesh
 
-# Rows and columns in a halo table of the eight neighbours of a texel, in order round it
+# Rows and columns in a halo table of the eight neighbours of a texel, in order round it.
 _ROWS = np.array([1, 2, 2, 2, 1, 0, 0, 0])
 _COLUMNS = np.array([2, 2, 1, 0, 0, 0, 1, 2])
 
-# From one of them to those that share a triangle with it and the texel: the latter two only where
-# it is straight ahead
+# Steps round a texel from one neighbour to those that share a triangle with both: the last two only
+# if the neighbour lies straight ahead rather than across a corner.
 _TURNS = np.array([-1, 1, -2, 2])
 
 
 class Scratch(NamedTuple):
-    """What marching over T texels writes; `clean` leaves it as it was, so that it costs no more on a larger grid.
+    """Arrays that marching over T texels writes.
+
+    `clean` resets the texels that were touched, so that a march costs no more on a larger grid.
 
     Attributes
     ----------
     distance : float64 [T]
         Infinite where a texel has not been reached.
     touched, order : int64 [T]
-        Texels that have been reached, and those whose distance is known, nearest first.
+        Texels that have been reached, and texels whose distance is known, nearest first.
     known : bool [T]
-        Whether a texel's distance is.
+        Whether the distance of a texel is known.
     """
 
     distance: Floats
@@ -42,9 +44,9 @@ class Scratch(NamedTuple):
 
 
 def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Distance of every texel of a region to the texels outside of it [m], [C, n, n]; 0 outside, at most 8 % too long.
+    """Distance of every texel of a region to the texels outside of it [m], [C, n, n].
 
-    Infinite where there is no outside.
+    At most 8 % too long; 0 outside, and infinite where there is no outside.
     """
     grid = texels.grid
     scratch = distance_scratch(region.size)
@@ -58,7 +60,7 @@ def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.
 
 
 def distance_scratch(size: int) -> Scratch:
-    """Scratch that its users clean up. One for each thread."""
+    """Scratch arrays for a number of texels, one for each thread; whoever uses them cleans them."""
     return _distance_scratch(size, threading.get_ident())
 
 
@@ -70,10 +72,10 @@ def _distance_scratch(size: int, thread: int) -> Scratch:
 
 @kernel(no_cpython_wrapper=True)
 def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -> float:
-    """Distance at neighbour k of those round texel t, by way of that and of those beside it that are known.
+    """Distance at the k-th neighbour round texel t, by way of t and a third texel that is known.
 
-    That of a point source, unfolded into the plane of a triangle, where the straight way crosses
-    the edge between the two that are known (Novotni and Klein 2002).
+    It is the distance of a point source, unfolded into the plane of a triangle, if the straight way
+    crosses the edge between the two known texels (Novotni and Klein 2002).
     """
     s = around[k]
     dp = distance[t]
@@ -110,10 +112,11 @@ def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int) -
 def march(
     halo: Ints, positions: Floats, seeds: int, limit: float, scratch: Scratch
 ) -> tuple[int, int]:
-    """Fast marching with point-source updates over the triangles of both triangulations of every quad.
+    """Fast marching over the triangles of both triangulations of every quad.
 
-    The first of those `touched` are the seeds, whose distances are known; see `seeded`. Returns how
-    many texels have been touched, and of how many within the limit the distance is now known.
+    Updates are those of point sources. The first of the `touched` texels are the seeds, whose
+    distances are known; see `seeded`. Returns the number of texels that have been touched, and the
+    number of texels within the limit whose distance is now known.
     """
     distance = scratch.distance
     touched = scratch.touched
@@ -123,8 +126,8 @@ def march(
     around = np.empty(8, np.int64)
     count = seeds
     known = 0
-    # texels that wait, the nearest first; those that came nearer wait more than once, and of two as
-    # near as each other the one of the lower index comes first
+    # texels that wait, the nearest first, and of two at one distance the one of the lower index; a
+    # texel that came nearer waits more than once
     front = [(distance[t], t) for t in touched[:seeds]]
     heapify(front)
     while len(front) > 0 and front[0][0] <= limit:
@@ -157,7 +160,10 @@ def march(
 def seeded(
     halo: Ints, positions: Floats, center: int, point: Floats, distance: Floats, touched: Ints
 ) -> int:
-    """Touch the nine texels round the one nearest to a point, at their straight distances from it; return how many."""
+    """Touch the nine texels round the one nearest to a point, at their straight distances.
+
+    Returns how many there are.
+    """
     n = halo.shape[1] - 2
     chart = center // (n * n)
     row = center // n % n
@@ -176,7 +182,7 @@ def seeded(
 
 @kernel
 def clean(scratch: Scratch, count: int) -> None:
-    """Leave a scratch as if so many texels had not been touched."""
+    """Reset the texels that were touched, `count` of them."""
     for i in range(count):
         scratch.distance[scratch.touched[i]] = np.inf
         scratch.known[scratch.touched[i]] = False

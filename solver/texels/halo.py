@@ -13,9 +13,9 @@ from .topology import TexelTopology
 def fill_halo(topology: TexelTopology, field: NDArray) -> None:
     """Fill in the halo of a field [C, n + 2, n + 2, ...] from its texels.
 
-    Where no texel lies, in corners of other than four charts, comes the mean of the three next to
-    it: bilinear interpolation is then continuous where three charts meet. Beyond a rim the last
-    texels are repeated.
+    Places without a texel, in corners of other than four charts, get the mean of the three texels
+    next to them: bilinear interpolation is then continuous where three charts meet. Beyond a rim
+    the last texels are repeated.
     """
     _, ghosts, sources = topology.addresses
     flat = field.reshape(topology.halo.size, *field.shape[3:])
@@ -24,9 +24,8 @@ def fill_halo(topology: TexelTopology, field: NDArray) -> None:
     for r, r_in in ((0, 1), (last, last - 1)):
         for c, c_in in ((0, 1), (last, last - 1)):
             missing = topology.halo[:, r, c] < 0
-            mean = (
-                field[:, r_in, c_in] + field[:, r_in, c] + field[:, r, c_in]
-            ) / field.dtype.type(3)
+            total = field[:, r_in, c_in] + field[:, r_in, c] + field[:, r, c_in]
+            mean = total / field.dtype.type(3)
             field[missing, r, c] = mean[missing]
 
 
@@ -38,10 +37,10 @@ def with_filled_halo(topology: TexelTopology, field: Floats32) -> Floats32:
 
 
 def sampling_matrix(topology: TexelTopology, chart: Ints, row: Floats, column: Floats) -> csr_array:
-    """Matrix that takes a flattened field [C n^2] to its values at chart points, each [k]; see `Atlas.locate`.
+    """Matrix that takes a flattened field [C n^2] to its values at chart points.
 
-    In a corner where other than four charts meet the weight of the texel that is missing is shared
-    out.
+    Chart, row and column are each [k]; see `Atlas.locate`. In a corner where other than four charts
+    meet, the other texels share the weight of the missing one.
     """
     r = np.floor(row).astype(np.int64)
     c = np.floor(column).astype(np.int64)

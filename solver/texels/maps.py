@@ -1,4 +1,4 @@
-"""Maps: an image in the object's own texture coordinates, or an attribute of its vertices, sampled at the texels."""
+"""Maps: an image in the object's texture coordinates, or values of its vertices, at the texels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from ..errors import SolverError
 from ..images import read_image
 from .atlas import Atlas
 
+# Places of the channels in an image.
 _CHANNELS = {"red": 0, "green": 1, "blue": 2, "alpha": 3}
+
+# Names of channels that a map can be made of.
 CHANNELS = ("luminance", *_CHANNELS)
 
 
@@ -88,16 +91,17 @@ def texture_map(
     row = np.floor(y).astype(np.int64)
     s = x - column
     t = y - row
-    upper, lower = (
-        (1 - s) * values[each % height, column % width]
-        + s * values[each % height, (column + 1) % width]
-        for each in (row, row + 1)
-    )
+    left = column % width
+    right = (column + 1) % width
+    upper_row = row % height
+    lower_row = (row + 1) % height
+    upper = (1 - s) * values[upper_row, left] + s * values[upper_row, right]
+    lower = (1 - s) * values[lower_row, left] + s * values[lower_row, right]
     return low + (high - low) * ((1 - t) * upper + t * lower)
 
 
 def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values at the corners of the triangles [triangle_count, 3, ...], at the texels [C, n, n, ...]."""
+    """Values at the texels [C, n, n, ...], from corners of triangles [triangle_count, 3, ...]."""
     return np.einsum("fijk,fijk...->fij...", atlas.barycentrics, corners[atlas.triangles])
 
 

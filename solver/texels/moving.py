@@ -1,4 +1,4 @@
-"""Texels whose surface moves: where they are on the triangles of a mesh, and their stencils, made when asked for."""
+"""Texels on a surface that moves: their places on triangles, and stencils that are made late."""
 
 from __future__ import annotations
 
@@ -9,17 +9,22 @@ from numpy.typing import NDArray
 
 from ..kernel import Floats, Ints32, kernel
 from .atlas import Atlas
-from .chart_map import barycentrics_in
+from .barycentrics import barycentrics_in
 from .stencil import NO_LINKS, IrregularLinks, Stencil
 from .stiffness import CellCoefficient, TexelCells
 
-# Rest positions further off their triangles than this, in units of the surface's size, keep that
-# distance.
-_OFF = 1e-9
+# Distance of a rest position from its triangle, in units of the size of the surface, from which on
+# the place keeps this distance; less is round-off.
+_OFF_TRIANGLE = 1e-9
+
+# Least length and area by which vectors are divided.
+_LEAST_DIVISOR = 1e-300
 
 
 class SurfaceRide:
-    """All places of an atlas, with halo, on vertices that move: each keeps its triangle and its place in it.
+    """All places of an atlas, with halo, on vertices that move.
+
+    Each place keeps its triangle, and where it lies in it.
 
     Parameters
     ----------
@@ -33,7 +38,8 @@ class SurfaceRide:
     weights : float64 [k, 3]
         Barycentric coordinates; NaN where there is nothing.
     on_triangles : bool
-        Whether all lie in their triangles: none is off, and none shows a texel where it is not.
+        Whether all places lie in their triangles: none is off its triangle, and none is the image
+        of a texel elsewhere.
     """
 
     def __init__(self, atlas: Atlas) -> None:
@@ -49,27 +55,26 @@ class SurfaceRide:
         nothing = ~np.isfinite(places[:, 0])
         corners = F[atlas.triangles.reshape(-1)[halo]]
         weights = atlas.barycentrics.reshape(-1, 3)[halo]
-        if (at := rim & ~nothing).any():
-            triangle, closest = atlas.closest_points(np.ascontiguousarray(places[at]))
-            corners[at] = F[triangle]
-            weights[at] = barycentrics_in(V[F[triangle]], closest)
+        on_rim = rim & ~nothing
+        if on_rim.any():
+            triangle, closest = atlas.closest_points(np.ascontiguousarray(places[on_rim]))
+            corners[on_rim] = F[triangle]
+            weights[on_rim] = barycentrics_in(V[F[triangle]], closest)
         weights[nothing] = np.nan
         # images of a periodic surface keep their way to the texels that they show
-        shift = np.where(
-            (rim | nothing)[:, None], 0.0, places - atlas.positions.reshape(-1, 3)[halo]
-        )
+        shown = atlas.positions.reshape(-1, 3)[halo]
+        shift = np.where((rim | nothing)[:, None], 0.0, places - shown)
         self._images = np.flatnonzero(shift.any(axis=1))
         self._shift = shift[self._images].T
         self.corners = corners.astype(np.int32)
         self.weights = weights
+        # ways from the triangles to the places: along the first side of the triangle, across it, and
+        # along its normal, in units of the root of twice its area
         self._offsets = np.zeros((0, 3))
-        # along the triangle's first side, across it, and along its normal, in units of the root of
-        # twice its area
         off = np.nan_to_num(places - shift - np.einsum("ij,ijk->ik", weights, V[corners]))
-        if np.abs(off).max(initial=0.0) > _OFF * np.ptp(V, axis=0).max():
-            self._offsets = np.linalg.solve(
-                np.swapaxes(_frames(V, self.corners), 1, 2), off[..., None]
-            )[..., 0]
+        if np.abs(off).max(initial=0.0) > _OFF_TRIANGLE * np.ptp(V, axis=0).max():
+            frames = np.swapaxes(_frames(V, self.corners), 1, 2)
+            self._offsets = np.linalg.solve(frames, off[..., None])[..., 0]
         self.on_triangles = not (len(self._offsets) or len(self._images))
 
     def around(self, V: Floats) -> Floats:
@@ -83,7 +88,7 @@ class SurfaceRide:
         return points.reshape(3, *self._shape)
 
     def positions(self, V: Floats) -> tuple[Floats, Floats | None]:
-        """Positions of the texels [C, n, n, 3] and what lies beyond them; see `TexelMesh`."""
+        """Positions of the texels [C, n, n, 3] [m], and `beyond` of `TexelMesh`."""
         around = np.ascontiguousarray(np.moveaxis(self.around(V), 0, -1))
         return around[:, 1:-1, 1:-1].copy(), around if self._has_beyond else None
 
@@ -109,21 +114,24 @@ class MovedPlaces:
 
 
 class MovedStencil(Stencil):
-    """A stencil of cells and where they are.
+    """A stencil whose weights are worked out from cells and their places when they are first read.
 
-    A GPU makes its own of it, so that nobody may ever ask for the weights.
+    A GPU works out weights of its own, and then these may never be read.
 
     Parameters
     ----------
+    cells : TexelCells
+    coefficient : CellCoefficient
+    places : MovedPlaces
     multiple : (MovedStencil, float), optional
-        One of which this is a multiple, and by how much.
+        A stencil of which this one is a multiple, and the factor.
     added : IrregularLinks, optional
-        Links that stay as they are wherever the places are; no part of a multiple.
+        Links that stay as they are wherever the places are; they are no part of a multiple.
 
     Attributes
     ----------
     known_fastest : float or None
-        What `fastest` gives, where a GPU has found it.
+        Result of `fastest`, where a GPU has worked it out.
     """
 
     def __init__(
@@ -143,48 +151,53 @@ class MovedStencil(Stencil):
         self.known_fastest: float | None = None
 
     @functools.cached_property
-    def _made(self) -> tuple[Stencil, Floats]:
+    def _stencil_and_areas(self) -> tuple[Stencil, Floats]:
+        """The stencil of the cells, without added links, and the areas [m^2], [C, n, n]."""
         if self._multiple is None:
             return self.cells.moved(self.places.around, self.coefficient)
-        (stencil, areas) = self._multiple[0]._made
-        factor = self._multiple[1]
+        original, factor = self._multiple
+        stencil, areas = original._stencil_and_areas
         links = stencil.irregular._replace(weights=factor * stencil.irregular.weights)
         return Stencil(self.topology, factor * stencil.weights, links), areas
 
     @functools.cached_property
     def weights(self) -> Floats:  # type: ignore[override]
         """Weights of the nine-point stencil, [C, 4, n + 1, n + 1]."""
-        return self._made[0].weights
+        return self._stencil_and_areas[0].weights
 
     @functools.cached_property
     def irregular(self) -> IrregularLinks:  # type: ignore[override]
         """The links beyond the nine points."""
-        return self.with_added(self._made[0].irregular)
+        return self.with_added(self._stencil_and_areas[0].irregular)
 
     def with_added(self, links: IrregularLinks) -> IrregularLinks:
-        """Irregular links of the cells, and those that stay."""
+        """Irregular links of the cells, and the added links."""
         return IrregularLinks.joined(links, self._added)
 
     @property
     def areas(self) -> Floats:
         """Area of the texel mesh that belongs to each texel [m^2], [C, n, n]."""
-        return self._made[1]
+        return self._stencil_and_areas[1]
 
     def fastest(self, mass: Floats) -> float:
-        """Bound of the largest eigenvalue as for any stencil, or the one that is known."""
+        """Gershgorin's bound of the largest eigenvalue; `known_fastest` where it is known."""
         return super().fastest(mass) if self.known_fastest is None else self.known_fastest
 
 
 def _frames(V: Floats, corners: NDArray[np.integer]) -> Floats:
-    """First side, direction across it, and normal of triangles, as rows as long as the root of twice the area."""
+    """First side, direction across it, and normal of triangles, as rows [k, 3, 3].
+
+    Each row is as long as the root of twice the area.
+    """
     x = V[corners]
     along = x[:, 1] - x[:, 0]
     across = x[:, 2] - x[:, 0]
     normal = np.cross(along, across)
     double = np.linalg.norm(normal, axis=1)[:, None]
-    normal /= np.maximum(double, 1e-300)
-    along /= np.maximum(np.linalg.norm(along, axis=1)[:, None], 1e-300)
-    return np.sqrt(double)[..., None] * np.stack([along, np.cross(normal, along), normal], axis=1)
+    normal /= np.maximum(double, _LEAST_DIVISOR)
+    along /= np.maximum(np.linalg.norm(along, axis=1)[:, None], _LEAST_DIVISOR)
+    units = np.stack([along, np.cross(normal, along), normal], axis=1)
+    return np.sqrt(double)[..., None] * units
 
 
 @kernel
@@ -204,7 +217,10 @@ def interpolate(values: Floats, corners: Ints32, weights: Floats, out: Floats) -
 
 @kernel
 def _interpolate_units(values: Floats, corners: Ints32, weights: Floats, out: Floats) -> None:
-    """Unit vectors between those of vertices [n, 3], at the texels among places with halo, into [C, n, n, 3]."""
+    """Unit vectors between the vectors of vertices [n, 3], at the texels, into [C, n, n, 3].
+
+    Corners and weights are those of all places with halo.
+    """
     charts, n = out.shape[:2]
     for chart in range(charts):
         for r in range(n):

@@ -1,4 +1,6 @@
-"""The symmetric nine-point stencil of a texel mesh, and the links beyond it round irregular vertices.
+"""The symmetric nine-point stencil of a texel mesh, and irregular links beyond the nine points.
+
+Irregular links lie round irregular vertices.
 
 A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of place (r, c) of a chart with
 halo to the east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and
@@ -129,7 +131,7 @@ def link_exists(topology: TexelTopology, link: int) -> Bools:
 
 @functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
 def rim_ties(topology: TexelTopology) -> tuple[Ints, Ints]:
-    """Texels that links tie to a fixed rim, and the places of these links among a stencil's weights.
+    """Texels that links tie to a fixed rim, and the places of these links among the weights.
 
     Both are flat, [k].
     """

@@ -1,4 +1,4 @@
-"""The texel mesh: charts of texels on a surface, whose centres are the vertices on which waves are solved.
+"""The texel mesh: charts of texels on a surface; waves are solved at the centres of the texels.
 
 The texel mesh cuts corners where the surface is creased, and spans twists that the surface does not
 have: its area is up to 2 % too small or too large at N = 96. The map onto the charts is exact: the
@@ -230,7 +230,7 @@ class TexelMesh:
 
     @property
     def bare_rim(self) -> NDArray[np.bool_]:
-        """Texels in whose centres the surface ends, [C, n, n]: a rim beside them has no positions."""
+        """Texels in whose centres the surface ends, [C, n, n]: their rim has no positions."""
         bare = self.topology.rim & ~np.isfinite(self.halo_positions[..., 0])
         bare[:, [0, 0, -1, -1], [0, -1, 0, -1]] = False  # no texel lies beside a corner
         count = np.bincount(self.topology.halo[bare], minlength=self.topology.texel_count)

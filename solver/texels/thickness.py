@@ -22,28 +22,38 @@ from ..mesh.volume import Volume
 from .atlas import Atlas
 from .texel_mesh import smoothed
 
-# Details closer to a texel than this share of the surface's size do not count: the edges of a box,
-# for instance.
+# Lengths are shares of the longest extent of the surface.
+
+# Points closer to a texel than this are details that do not count: the edges of a box, for instance.
 _DETAIL = 0.04
 
-# No radius is less than this share of the size: a ball that touches two points a detail apart has
-# half its diameter.
+# Least radius of a medial ball: a ball that touches two points a detail apart has half the detail as
+# its radius.
 LEAST = _DETAIL / 2
+
+# Greatest radius of a medial ball.
 _MOST_RADIUS = 0.55
 
-_POINTS = 8_000  # among which the balls are sought
-_ROUNDS = 12  # by then every ball has stopped to shrink
+# Points among which medial balls are sought, at most about so many.
+_POINTS = 8_000
+
+# Rounds of shrinking, by which every ball has stopped to shrink.
+_MOST_ROUNDS = 12
+
+# Share of its radius by which a ball must shrink to go on.
 _TOLERANCE = 1e-3
 
-# Over the longest extent: a ray starts so far below the surface, no radius is less than the second
-# or more than the third.
-_START = 1e-3
-_LEAST = 0.01
-_MOST = 0.55
+# Depth below the surface at which a ray to the other side starts.
+_RAY_START = 1e-3
 
-# Over the longest extent: what lies so little above the surface is taken for touching it, and no
-# layer is thinner.
+# Least and greatest half thickness.
+_LEAST_HALF = 0.01
+_MOST_HALF = 0.55
+
+# Least thickness of a layer. A body that lies so little above the surface counts as touching it.
 _LEAST_THICKNESS = 1e-4
+
+# A valid body, or several, inside an object.
 _BODIES = Valid(
     lambda value: all(
         isinstance(each, Mesh | Volume)
@@ -55,40 +65,42 @@ _BODIES = Valid(
 
 @kept_with
 def medial_radius(atlas: Atlas) -> NDArray[np.float32]:
-    """Radius of the largest ball that touches the surface at a texel and holds no other part of it [m], [C, n, n].
+    """Radius of the largest ball that touches a texel and holds no other part of the surface [m].
 
-    The lesser one of the balls inside and outside. A point that is moved along its normal by less
-    than that is still closer to where it came from than to any other place, so that no two of them
-    meet. Found by shrinking balls (Ma, Bae and Choi 2012, "3D medial axis point approximation using
-    nearest neighbors and the normal field"), at `LEAST` to 0.55 of the surface's longest extent.
+    [C, n, n]; the lesser one of the balls inside and outside. A point that moves along its normal
+    by less than this radius is still closer to its start than to any other place, so that no two
+    points meet. Radii are found by shrinking balls (Ma, Bae and Choi 2012, "3D medial axis point
+    approximation using nearest neighbors and the normal field"), from `LEAST` to 0.55 of the
+    longest extent of the surface.
     """
     size = float(np.ptp(atlas.mesh.V, axis=0).max())
     stride = int(np.ceil(np.sqrt(atlas.areas.size / _POINTS)))
-    points, normals = (
-        field[:, ::stride, ::stride].reshape(-1, 3) for field in (atlas.positions, atlas.normals)
-    )
+    points = atlas.positions[:, ::stride, ::stride].reshape(-1, 3)
+    normals = atlas.normals[:, ::stride, ::stride].reshape(-1, 3)
     tree = cKDTree(points)
-    inside, outside = (_shrunk(tree, points, side * normals, size) for side in (-1.0, 1.0))
+    inside = _shrunk(tree, points, -1.0 * normals, size)
+    outside = _shrunk(tree, points, 1.0 * normals, size)
     _, nearest = tree.query(atlas.positions.reshape(-1, 3))
     curvature = 1 / np.minimum(inside, outside)[nearest].reshape(atlas.areas.shape)
     return (1 / smoothed(atlas.texels.topology, curvature)).astype(np.float32)
 
 
 def _shrunk(tree: cKDTree, points: Floats, normals: Floats, size: float) -> Floats:
-    """Radii of the balls on the side of the normals, [k]: each shrinks until no point lies in it."""
+    """Radii of the balls on the side of the normals, [k].
+
+    Each ball shrinks until no point lies in it.
+    """
     radius = np.full(len(points), _MOST_RADIUS * size)
     active = np.arange(len(points))
-    for _ in range(_ROUNDS):
+    for _ in range(_MOST_ROUNDS):
         center = points[active] + normals[active] * radius[active, None]
         distance, nearest = tree.query(center)
         away = points[nearest] - points[active]
         squared = (away**2).sum(axis=1)
         depth = (away * normals[active]).sum(axis=1)
-        within = (
-            (distance < (1 - _TOLERANCE) * radius[active])
-            & (squared > (_DETAIL * size) ** 2)
-            & (depth > 0)
-        )
+        is_inside = distance < (1 - _TOLERANCE) * radius[active]
+        is_detail = squared <= (_DETAIL * size) ** 2
+        within = is_inside & ~is_detail & (depth > 0)
         active = active[within]
         if not len(active):
             break
@@ -98,11 +110,12 @@ def _shrunk(tree: cKDTree, points: Floats, normals: Floats, size: float) -> Floa
 
 
 def half_thickness(atlas: Atlas) -> NDArray[np.float64]:
-    """Half the way from each texel to the other side of the object [m], [C, n, n]: the radius of a ball, of a tube.
+    """Half the way from each texel to the other side of the object [m], [C, n, n].
 
-    Along the inward normal (Shapira, Shamir and Cohen-Or 2008, "Consistent mesh partitioning and
-    skeletonisation using the shape diameter function", with one ray a texel instead of a cone), and
-    smoothed. Without another side it is about half of the longest extent.
+    It is the radius of a ball or a tube. The way is along the inward normal (Shapira, Shamir and
+    Cohen-Or 2008, "Consistent mesh partitioning and skeletonisation using the shape diameter
+    function", with one ray a texel instead of a cone), and smoothed. Without another side it is
+    about half of the longest extent.
     """
     radius = half_thickness_at(
         atlas.mesh, atlas.positions.reshape(-1, 3), atlas.normals.reshape(-1, 3)
@@ -111,18 +124,23 @@ def half_thickness(atlas: Atlas) -> NDArray[np.float64]:
 
 
 def half_thickness_at(mesh: Mesh, points: Floats, normals: Floats) -> Floats:
-    """Half the way from points of the surface [m], [k, 3], to the other side [m], [k]; normals [k, 3] are outward."""
+    """Half the way from points of the surface [k, 3] [m] to the other side [m], [k].
+
+    Normals [k, 3] are outward.
+    """
     V = mesh.V
     F = mesh.F
     middle = V.mean(axis=0)
     size = float(np.ptp(V, axis=0).max())
-    distance = RayScene(((V - middle) / size)[F]).distances(
-        (points - middle) / size - _START * normals, -normals
-    )
-    return size * np.clip((distance.astype(np.float64) + _START) / 2, _LEAST, _MOST)
+    scene = RayScene(((V - middle) / size)[F])
+    starts = (points - middle) / size - _RAY_START * normals
+    distance = scene.distances(starts, -normals)
+    half = (distance.astype(np.float64) + _RAY_START) / 2
+    return size * np.clip(half, _LEAST_HALF, _MOST_HALF)
 
 
 def _are_limits(value: Any) -> bool:
+    """Whether a value is a least and a greatest thickness."""
     try:
         least, greatest = value
         return bool(0 <= least <= greatest)
@@ -141,7 +159,9 @@ def thickness_map(
     inside: Mesh | Volume | Sequence[Mesh | Volume],
     limits: tuple[float, float] = (0.0, np.inf),
 ) -> NDArray[np.float64]:
-    """Way from each texel along the inward normal to what lies inside [m], [C, n, n], smoothed over a few texels.
+    """Way from each texel along the inward normal to the body inside [m], [C, n, n].
+
+    Smoothed over a few texels.
 
     Parameters
     ----------
@@ -150,19 +170,19 @@ def thickness_map(
     inside : Mesh, Volume, or several
         In the frame of the atlas.
     limits : (float, float)
-        Least and greatest thickness [m]: beyond them it counts as these.
+        Least and greatest thickness [m]; a thickness beyond them counts as the limit.
 
     Warns
     -----
     RippleWarning
-        Where rays miss what lies inside and there is no greatest limit: they get the greatest
-        thickness of the others. Where it comes out through the surface and there is no least limit:
-        the layer is as thin there as it can be.
+        Where rays miss the body inside and there is no greatest limit: their texels get the
+        greatest thickness of the others. Where the body comes out through the surface and there is
+        no least limit: the layer is as thin there as it can be.
 
     Raises
     ------
     AtlasError
-        If no ray meets what lies inside, or an argument is invalid.
+        If no ray meets the body inside, or an argument is invalid.
     MeshError
         For an invalid volume.
     """
@@ -177,14 +197,13 @@ def thickness_map(
     if not met.any():
         raise AtlasError(
             "what lies inside is met by no ray from the surface inwards; valid is a body within "
-            "it, in the same frame "
-            f"and in metres: the surface goes from {points.min(axis=0).round(4)} to "
-            f"{points.max(axis=0).round(4)}"
+            "it, in the same frame and in metres: the surface goes from "
+            f"{points.min(axis=0).round(4)} to {points.max(axis=0).round(4)}"
         )
     if out.any() and limits[0] == 0:
         message = (
             f"what lies inside comes out of the surface at {out.mean():.1%} of the texels: "
-            f"no layer is left"
+            "no layer is left"
         )
         warn_caller(message)
     way = np.clip(way, max(limits[0], _LEAST_THICKNESS * size), limits[1])
@@ -200,15 +219,18 @@ def thickness_map(
 
 
 def _cast(corners: Floats, points: Floats, ways: Floats, size: float) -> tuple[Floats, Bools]:
-    """Distance from points along unit ways to triangles [m, 3, 3], infinite without; and where they begin inside.
+    """Distance [m] from points along unit ways to triangles [m, 3, 3], and which begin inside.
 
-    Embree finds the triangle in float32; the distance is that to its plane in float64.
+    Infinite where a ray meets no triangle. Embree finds the triangle in float32; the distance to
+    its plane is in float64.
     """
     middle = points.mean(axis=0)
     starts = points - _LEAST_THICKNESS * size * ways
     triangle, near, _, _ = RayScene((corners - middle) / size).cast((starts - middle) / size, ways)
     met = np.flatnonzero(triangle >= 0)
-    a, b, c = (corners[triangle[met], k] for k in range(3))
+    a = corners[triangle[met], 0]
+    b = corners[triangle[met], 1]
+    c = corners[triangle[met], 2]
     normal = np.cross(b - a, c - a)
     along = (normal * ways[met]).sum(axis=1)
     distance = np.full(len(points), np.inf)
@@ -216,6 +238,6 @@ def _cast(corners: Floats, points: Floats, ways: Floats, size: float) -> tuple[F
     with np.errstate(divide="ignore", invalid="ignore"):
         exact = ((a - points[met]) * normal).sum(axis=1) / along
     distance[met] = np.where(np.isfinite(exact), np.maximum(exact, 0.0), near[met] * size)
-    out[met] = along > 0  # the first that is met is the far side
+    out[met] = along > 0  # the ray meets the far side first
     distance[out] = 0.0
     return distance, out

@@ -11,7 +11,7 @@ from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
 from ripple_sim.solver.mesh.queries import ClosestPoints
 from ripple_sim.solver.mesh.vectors import cross, dot, row, subtract
-from ripple_sim.solver.texels.chart_map import barycentrics_in
+from ripple_sim.solver.texels.barycentrics import barycentrics_in
 
 from .tessellation import coarse_mesh
 

@@ -24,7 +24,8 @@ from ripple_sim.render.visuals.texture_mapping import TextureMapping
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.cache import ResultCache, content_key
 from ripple_sim.solver.mesh.topology import Edges, edges_of
-from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
+from ripple_sim.solver.texels.chart_map import ChartMap
+from ripple_sim.solver.texels.parts_mesh import PartsMesh, parts_mesh
 
 from .surface import Charts, Surface, shared_places, split_at_charts
 from .tessellation import (

@@ -22,10 +22,12 @@ from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...mesh.queries import RayScene
 from ...mesh.vectors import cross, dot
-from ...texels.atlas import Atlas, check_points, triangles_of
-from ...texels.chart_map import Parts, barycentrics_at, uncut
+from ...texels.atlas import Atlas, check_points
+from ...texels.barycentrics import barycentrics_at
+from ...texels.chart_map import Parts, uncut
 from ...texels.detours import link_detours
 from ...texels.stretch import stretch_summary
+from ...texels.texel_atlas import triangles_of
 from ...texels.texel_mesh import TexelMesh
 from ..sphere_map import certify, stretch
 from .convention import (

@@ -25,8 +25,10 @@ from ...kernel import Floats, Ints, log
 from ...memory import require_memory
 from ...mesh.mesh import Mesh
 from ...mesh.vectors import cross, dot
-from ...texels.chart_map import Parts, texel_areas
-from ...texels.topology import TexelTopology, glue
+from ...texels.chart_map import Parts
+from ...texels.gluing import glue
+from ...texels.texel_areas import texel_areas
+from ...texels.topology import TexelTopology
 
 CHART_NORMALS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 CHART_U = np.array([[0, 1, 0], [0, -1, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]])

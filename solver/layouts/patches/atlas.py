@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.atlas import Atlas
-from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, texel_areas, uncut
+from ...texels.barycentrics import barycentrics_at, barycentrics_in
+from ...texels.chart_map import Parts, uncut
 from ...texels.detours import link_detours
+from ...texels.gluing import glue
 from ...texels.stretch import stretch_summary
+from ...texels.texel_areas import texel_areas
 from ...texels.texel_mesh import TexelMesh
-from ...texels.topology import TexelTopology, glue
+from ...texels.topology import TexelTopology
 from ..energy import COLUMN, FIXED
 from .disks import signed_areas
 from .layout import PatchMap, patch_map

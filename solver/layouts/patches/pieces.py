@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...kernel import Bools, Floats, Ints, kernel
-from ...texels.chart_map import MOST_CORNERS, clip
+from ...texels.texel_areas import MOST_CORNERS, clip
 from .layout import PatchMap
 from .seamless import SeamlessMap, follow, places_on_charts, turned
 
