@@ -275,12 +275,8 @@ def load_stored(path: Path) -> StoredPlan:
         found = msgspec.json.decode(path.read_bytes(), type=StoredPlan)
         check_plan(found.plan)
         return found
-    except (
-        OSError,
-        RecursionError,
-        ValueError,
-        SceneError,
-    ) as error:  # strings that are not UTF-8 are a ValueError
+    # strings that are not UTF-8 are a ValueError
+    except (OSError, RecursionError, ValueError, SceneError) as error:
         raise BatchError(
             f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is"
         ) from error

@@ -134,7 +134,8 @@ class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=Tru
             raise SceneError(
                 f"plan: {key} has length {self.length}; valid is 1 or more, of numbers"
             )
-        if problem := self._problem():
+        problem = self._problem()
+        if problem:
             raise SceneError(
                 f"plan: {key} is drawn from {kind} = {shown(getattr(self, kind))}; {problem}"
             )

@@ -24,7 +24,8 @@ _RIM_NAMES = f"{{{','.join(RIMS)}}}"
 
 def parse_size(word: str) -> tuple[int, int]:
     """Read width and height [pixels] from a word such as "1280x720"."""
-    if (match := re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)) is None:
+    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)
+    if match is None:
         raise ValueError(
             f"{shown(word)} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720"
         )
@@ -34,11 +35,15 @@ def parse_size(word: str) -> tuple[int, int]:
 def _reader(
     read: Callable[[str], Any], right: Callable[[Any], bool], valid: str
 ) -> Callable[[str], Any]:
-    """What reads a word to a value that is right; its message says what is valid."""
+    """Make a parser: it reads a word, and checks that the value is right.
+
+    Its message says that the word must be `valid`.
+    """
 
     def parse(word: str) -> Any:
         with contextlib.suppress(ValueError):
-            if right(value := read(word)):
+            value = read(word)
+            if right(value):
                 return value
         raise ValueError(f"{shown(word)} is not valid; it must be {valid}")
 

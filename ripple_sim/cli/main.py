@@ -125,13 +125,9 @@ def _run(command: Any) -> int:
         )
         return _fail(error, FAILED if failed else BAD_INPUT)
     except MemoryError as error:
-        return _fail(
-            (
-                f"not enough memory{f': {error}' if str(error) else ''}; ask for a lower "
-                "resolution or size"
-            ),
-            FAILED,
-        )
+        reason = f": {error}" if str(error) else ""
+        text = f"not enough memory{reason}; ask for a lower resolution or size"
+        return _fail(text, FAILED)
     except KeyboardInterrupt as ending:
         return _fail("interrupted", INTERRUPTED, ending)
     except SystemExit as ending:

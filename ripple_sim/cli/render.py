@@ -127,7 +127,8 @@ class _Rate(ProgressColumn):
     def render(self, task: Task) -> Text:
         from ripple_sim.solver.compile_clock import compile_times, compiling
 
-        if (module := compiling()) is None:
+        module = compiling()
+        if module is None:
             return Text(
                 f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed"
             )

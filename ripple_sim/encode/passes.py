@@ -126,7 +126,8 @@ def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: boo
     Raises `VideoError` if there is no such pass or format, OpenEXR is missing, or the folder holds
     the passes of another video or anything that was not made here.
     """
-    if unknown := [name for name in passes if name not in PASSES]:
+    unknown = [name for name in passes if name not in PASSES]
+    if unknown:
         raise VideoError(f"there is no pass {unknown[0]!r}; valid are {', '.join(PASSES)}")
     if form not in PASS_FORMATS:
         raise VideoError(

@@ -47,7 +47,7 @@ def read_object(path: Path) -> dict[str, Any]:
         OSError,
         ValueError,
         RecursionError,
-    ):  # the last one of brackets in brackets without end
+    ):  # RecursionError: brackets in brackets without end
         return {}
     return found if isinstance(found, dict) else {}
 

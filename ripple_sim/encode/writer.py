@@ -71,7 +71,8 @@ class FrameWriter:
         self._pending = 0  # frames of the segment
         # what made encoding fail; frames after that are dropped
         self._error: Exception | None = None
-        self._abandoned = self._finished = False  # whether the video is given up, or in its place
+        self._abandoned = False  # whether the video is given up
+        self._finished = False  # whether the video is in its place
         self._queue: queue.Queue[NDArray | None] = queue.Queue(QUEUE_FRAMES)
         self._thread = threading.Thread(target=self._run, name="video encoder", daemon=True)
         self._thread.start()

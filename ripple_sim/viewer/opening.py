@@ -218,14 +218,16 @@ def display_problem() -> str | None:
     """Why no window can be opened, or None. Wayland desktops serve X11 too, and set DISPLAY."""
     if not sys.platform.startswith("linux"):
         return None
-    if not (name := os.environ.get("DISPLAY")):
+    name = os.environ.get("DISPLAY")
+    if not name:
         return "the environment variable DISPLAY is not set"
     try:
         x11 = ctypes.CDLL("libX11.so.6")
     except OSError:
         return "the library libX11.so.6 is missing (on Debian and Ubuntu: apt-get install libx11-6)"
     x11.XOpenDisplay.restype = ctypes.c_void_p
-    if not (display := x11.XOpenDisplay(None)):
+    display = x11.XOpenDisplay(None)
+    if not display:
         return f"there is no X server at DISPLAY={name}"
     x11.XCloseDisplay(ctypes.c_void_p(display))
     return None

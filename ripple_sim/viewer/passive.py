@@ -86,7 +86,8 @@ def launch_passive(
             "Ripples(model, ...)"
         )
     data = own_data(model, data)
-    if problem := display_problem():
+    problem = display_problem()
+    if problem:
         raise DisplayError(
             f"no window can be opened: {problem}; RippleRenderer renders frames without one"
         )

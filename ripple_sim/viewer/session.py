@@ -203,7 +203,8 @@ class Session:
 
         Returns the point in the surface's frame [m], or None if the ray meets no surface.
         """
-        if (hit := self.pick(origin, direction)) is None:
+        hit = self.pick(origin, direction)
+        if hit is None:
             return None
         name, point, _ = hit
         self.simulation.ripples[name].add_impulse(point, self.poke_impulse, self._poke_radius)

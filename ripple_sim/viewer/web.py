@@ -72,9 +72,11 @@ def is_local(host: str) -> bool:
 
 def address(host: str, port: int, secret: str) -> str:
     """What to open in a browser."""
-    name = (
-        socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
-    )
+    name = host
+    if host in ("0.0.0.0", "::"):
+        name = socket.gethostname()
+    elif ":" in host:  # IPv6
+        name = f"[{host}]"
     return f"http://{name}:{port}/?secret={secret}"
 
 
@@ -245,7 +247,8 @@ class _Page:
         self._window = window
         window.hide_texts()
         # numbers of the latest frames sent, and acknowledged by the browser
-        self._sent = self._received = 0
+        self._sent = 0
+        self._received = 0
         self._heard = 0.0
         server.state.update(
             {"status": "", "sent": 0, "trame__title": f"{window.plotter.title} - ripple-sim"}

@@ -115,8 +115,8 @@ class Window:
         iren.clear_key_event_callbacks()
         # keys are ours: the style's own ones end the program, draw wire frames and the like
         iren.style.AddObserver("CharEvent", lambda *_: None)
-        # weakly, for PyVista keeps each plotter until it is closed: so the plotter of a dropped
-        # window is closed
+        # A weak reference: PyVista keeps each plotter until it is closed, and the plotter of a deleted
+        # window must be closed.
         me = weakref.proxy(self)
         iren.add_observer(
             "KeyPressEvent", lambda *_: me.key(me.plotter.iren.interactor.GetKeySym())
@@ -396,7 +396,8 @@ def check_display() -> None:
 
     Raises `DisplayError` with what is missing and the alternatives.
     """
-    if problem := display_problem():
+    problem = display_problem()
+    if problem:
         raise DisplayError(
             f"no window can be opened: {problem}; add --web to use a browser instead, or render a "
             "video with `ripple-sim render` or `ripple-sim drop`"
