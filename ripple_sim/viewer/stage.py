@@ -59,7 +59,7 @@ _MAX_SHADOW_HEIGHT = 6.0
 _SHADOW_WIDTH = 1.15
 
 # Height of a shadow's disc above the floor, in radii of the geom's bounding ball.
-_SHADOW_LIFT = 0.01
+_SHADOW_BIAS = 0.01
 
 # rings and sides of a shadow's disc
 _SHADOW_RINGS = 8
@@ -242,7 +242,7 @@ class Shadows:
             actor.prop.opacity = dark
             wide = _SHADOW_WIDTH * radius * (1 + 0.1 * max(0.0, above) / radius)
             _place(
-                actor, np.array([x, y, ground + _SHADOW_LIFT * radius]), np.diag([wide, wide, 1.0])
+                actor, np.array([x, y, ground + _SHADOW_BIAS * radius]), np.diag([wide, wide, 1.0])
             )
 
 

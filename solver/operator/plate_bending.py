@@ -460,9 +460,9 @@ def _evened(rows: Rows, laplacian: csr_array, stiff: Floats, areas: Floats) -> F
     slowing = bound / np.maximum(rate, bound)
     entry = pull.tocoo()
     owner = rows.owners[entry.row]
-    is_owned = owner >= 0
+    has_owner = owner >= 0
     factors = np.ones(len(areas))
-    np.minimum.at(factors, owner[is_owned], slowing[entry.col[is_owned]])
+    np.minimum.at(factors, owner[has_owner], slowing[entry.col[has_owner]])
     return factors
 
 

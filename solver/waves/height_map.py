@@ -110,9 +110,9 @@ class DisplacementLimit:
         """
         size = np.abs(height)
         if not self.may_bend(float(size.max())):
-            nowhere = np.zeros(height.shape, np.bool_)
+            none_bent = np.zeros(height.shape, np.bool_)
             nothing = np.empty(0, np.float32)
-            return nowhere, nothing, nothing
+            return none_bent, nothing, nothing
         radii = size / self.radius
         high = radii > FREE
         argument = (np.minimum(radii[high], _MAX_RADII) - FREE) / (MOST - FREE)
