@@ -308,7 +308,7 @@ def places_facing(
 
 @kernel
 def _nearest_facing(positions: Floats, outward: Floats, points: Floats, normals: Floats) -> Ints:
-    """Texel nearest to each point, [k], among texels that face the point's normal; -1 without one."""
+    """Nearest texel to each point that faces the point's normal, [k]; -1 without one."""
     found = np.full(len(points), -1)
     for i in range(len(points)):
         least = np.inf

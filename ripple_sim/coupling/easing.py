@@ -55,7 +55,7 @@ class EasingLaw(NamedTuple):
         speed: float,
         stiffness: float,
     ) -> EasingLaw:
-        """The law that lets hits and weights dent a surface by a share of half its thickness at most.
+        """The law that limits dents to a share of half the surface's thickness.
 
         A hit J that is short beside the surface's swing of rate w counts as a force J w. Arguments
         are as for `density_under`.

@@ -477,7 +477,7 @@ class ContactProblem:
         return greatest_difference <= _SHARING_TOLERANCE * greatest
 
     def _affordable(self, force: Floats, paid: Mapping[Key, float]) -> dict[Key, float]:
-        """Shares of their forces that pairs can afford, by purse; without pairs that can afford all.
+        """Shares of their forces that pairs can afford, by purse, where they cannot afford all.
 
         The work of a share s of a force is linear s + square s^2: the first part against the
         motion without the force, the second against the motion that the force itself makes.

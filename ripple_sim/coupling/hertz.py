@@ -140,7 +140,7 @@ class PulsedLoad(NamedTuple):
     pulses: tuple[Pulse, ...]
 
     def parts(self, dt: float, substeps: int) -> Iterator[tuple[int, Load]]:
-        """Each part is a substep, or the 32nd of the shortest pulse; then the constant load alone."""
+        """Substeps, or 32nds of the shortest pulse; at last the constant load alone."""
         substep = dt / substeps
         shortest = min(pulse.duration for pulse in self.pulses)
         remaining = max(pulse.duration - pulse.age for pulse in self.pulses)
@@ -356,7 +356,7 @@ class Hits:
         return float(impulses.sum())
 
     def over(self, load: Load, elapsed: float) -> StepLoad:
-        """Add the pulses of the coming time [s] to a load; the pulses are then older by this time."""
+        """Add the pulses of the coming time [s] to a load, and let them age by it."""
         if not self._pulses:
             return load
         pulses = tuple(self._pulses)

@@ -356,7 +356,7 @@ class TargetLoad:
         return self.given(elapsed, on_texels), touches
 
     def given(self, elapsed: float, present: TexelForces = NO_FORCES) -> StepLoad:
-        """Load over a time [s] with the pulses of hits, while these forces act, or no geom touches."""
+        """Load over a time [s] in which these forces act, with the pulses of hits."""
         if self._easing is not None and present is NO_FORCES:
             self._easing.pause(elapsed)
         load = self._filter(present, elapsed)

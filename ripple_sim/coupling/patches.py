@@ -97,8 +97,8 @@ def load_points(
     total = np.bincount(patches, forces)
     limit = np.zeros(len(radii))
     np.maximum.at(limit, patches, away[: len(points)])
-    moments = [np.bincount(patches, forces * coordinate) for coordinate in points.T]
-    middles = np.column_stack(moments) / total[:, None]
+    weighted_sums = [np.bincount(patches, forces * coordinate) for coordinate in points.T]
+    middles = np.column_stack(weighted_sums) / total[:, None]
     size = np.zeros(len(radii))
     np.maximum.at(size, of_pair, np.sqrt(((points[first] - points[second]) ** 2).sum(axis=1)))
     # where there is no touch between two corners, they keep their shares

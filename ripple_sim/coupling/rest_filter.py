@@ -133,7 +133,7 @@ class RestFilter:
         ]
 
     def prepay(self, geom: int, impulse: float) -> None:
-        """Note an impulse [N s], positive inwards, that the surface received before a geom's contact."""
+        """Note an impulse [N s], positive inwards, that came before the contact of a geom."""
         if not impulse:
             return
         state = self._states[geom]
@@ -234,7 +234,7 @@ def _fade(
     out: _Shares,
     end: int,
 ) -> int:
-    """Enter the earlier mean shares of a geom, scaled to a sum, from `end` on; return the new end."""
+    """Enter a geom's earlier mean shares from `end` on, scaled to a sum; return the new end."""
     whole = 0.0
     for i in range(state.first, state.last):
         if mean_shares[i] > _MIN_SHARE:

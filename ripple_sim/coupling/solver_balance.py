@@ -98,7 +98,7 @@ class SolverBalance:
                 self._judge(target)
 
     def _missing(self, data: mujoco.MjData) -> tuple[Floats, Floats]:
-        """Missing force [N] of each tree that is free, and missing share of each other tree's force.
+        """Missing force [N] of each free tree, and missing share of the other trees' forces.
 
         Both [ntree + 1], and infinite where the tree is not of that kind.
         """

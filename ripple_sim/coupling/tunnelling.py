@@ -114,7 +114,7 @@ class TunnellingCheck:
 def too_fast(
     pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, steps: int
 ) -> tuple[Ints, Floats]:
-    """Rows of the pairs that may touch soon and sink in beyond their limits, and their speeds [m/s].
+    """Rows of the pairs that may soon sink in beyond their limits, and their speeds [m/s].
 
     Parameters
     ----------

@@ -221,7 +221,7 @@ def paint_target(
 def _painting(
     mesh: Mesh, mesh_path: str | Path, texture: str | Path | None
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]] | None:
-    """The image for a mesh and texture coordinates of its corners, [m, 3, 2]; None if uncoloured."""
+    """Image and corners' texture coordinates of a mesh, [m, 3, 2]; None if it is uncoloured."""
     pixels = None
     if texture is not None:
         if mesh.corner_uv is None:

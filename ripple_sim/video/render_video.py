@@ -258,7 +258,7 @@ class Film:
         self._last_seen = seen
 
     def fetch(self) -> NDArray | None:
-        """Wait for the earliest shot submitted; return a frame after its last exposure, else None."""
+        """Wait for the earliest shot; return a frame after its last exposure, else None."""
         start = work_clock()
         shot = self._submitted.popleft()
         if shot.exposure == 0:

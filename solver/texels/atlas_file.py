@@ -1,4 +1,4 @@
-"""The file of an atlas: one verified format, an uncompressed NumPy archive, for users and the cache."""
+"""The file of an atlas, for users and the cache: an uncompressed NumPy archive, verified."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The atlas of a surface that comes as grids of points: its mesh is made of the texels themselves."""
+"""The atlas of a surface that comes as grids of points, which are its texels."""
 
 from __future__ import annotations
 
