@@ -16,7 +16,7 @@ import pytest
 from ripple_sim.cli import main as cli, signals
 from ripple_sim.encode import open_writer
 from ripple_sim.solver import load_atlas
-from ripple_sim.solver.texels import atlas
+from ripple_sim.solver.texels import atlas_file
 
 BOTH = [signal.SIGINT, signal.SIGTERM]
 ALL = [*BOTH, signal.SIGHUP]
@@ -211,7 +211,7 @@ def test_a_full_disk_is_no_bad_input(tmp_path, monkeypatch, capsys, tetrahedron)
         file.write(b"half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(atlas, "write_arrays", full)
+    monkeypatch.setattr(atlas_file, "write_arrays", full)
     assert (
         cli.main(["atlas", str(tetrahedron), "--resolution", "4", "-o", str(tmp_path / "a.npz")])
         == 1

@@ -205,7 +205,10 @@ def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
     ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")
     with Exporter(soft_model, ripples, tmp_path / "run.html", size=SIZE, looks=looks) as exporter:
         exporter.write(data)
-    renderer = RippleRenderer(soft_model, ripples, width=SIZE[0], height=SIZE[1], looks=looks)
+    width, height = SIZE
+    renderer = RippleRenderer(
+        soft_model, ripples, width=width, height=height, looks=looks, lighting="studio"
+    )
     with opened(browser, tmp_path / "run.html") as tab:
         tab.evaluate(
             "ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })"

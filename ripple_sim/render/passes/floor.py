@@ -17,7 +17,7 @@ from ripple_sim.render.visuals.objects import Assets
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import Visual, finish_of, geom_visual, visible_geoms
 
-# Least half size of a finite floor [radii of a ball about all other geoms].
+# Least half size of a finite floor [horizontal radii of all other geoms together].
 _MIN_HALF_SIZE = 4.0
 
 # Least vertical part of the floor's unit normal: walls are no floors.
@@ -71,9 +71,13 @@ def find_floor(model: Any, targets: Collection[int]) -> int | None:
 
 
 def _size_of_geoms(model: Any, data: Any, geoms: NDArray[np.int64]) -> float:
-    """Radius of a ball about some geoms [m]; without geoms that of flexes and skins."""
+    """Horizontal radius of some geoms together [m]; without geoms that of flexes and skins.
+
+    Heights do not count: bodies may wait far above the floor until they fall.
+    """
     if len(geoms):
-        balls = np.column_stack([data.geom_xpos[geoms], model.geom_rbound[geoms]])
+        places = data.geom_xpos[geoms] * [1.0, 1.0, 0.0]
+        balls = np.column_stack([places, model.geom_rbound[geoms]])
         _, radius = enclosing(balls)
         return radius
     return model.stat.extent / 2 if model.nflex or model.nskin else 0.0

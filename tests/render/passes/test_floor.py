@@ -31,6 +31,14 @@ def test_the_floor_is_the_highest_of_the_planes_that_face_up_most() -> None:
         assert find_floor(model, []) == floor
 
 
+def test_a_plane_stays_the_floor_under_bodies_that_wait_far_above_it() -> None:
+    waiting = '<body pos="0 0 120"><freejoint/><geom size=".06"/></body>'
+    plane = '<geom type="plane" size="12 12 .1"/>'
+    ball = '<geom size=".5" pos="0 0 .5"/>'
+    scene = f"<mujoco><worldbody>{plane}{ball}{waiting}</worldbody></mujoco>"
+    assert find_floor(mujoco.MjModel.from_xml_string(scene), []) == 0
+
+
 def test_a_small_plane_is_no_floor() -> None:
     """Nor a wall; an infinite plane is one before a large one, and an opaque one before water over it."""
     ground = '<geom type="plane" size="0 0 1"/>'

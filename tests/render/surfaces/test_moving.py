@@ -118,7 +118,7 @@ def test_a_frame_shows_a_dent_darker_than_with_the_light_at_rest(monkeypatch):
     )
     ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=8)
     ripples["target"].move(0.2 * dented(ripples["target"].rest.mesh.V / 0.2)[0])
-    renderer = RippleRenderer(model, ripples, width=64, height=48)
+    renderer = RippleRenderer(model, ripples, width=64, height=48, lighting="studio")
     camera = Camera(lookat=(0.0, 0.0, 0.0), distance=0.5, azimuth=90.0, elevation=-60.0)
     dark = renderer.render(data, camera).astype(float)
     monkeypatch.setattr(MovingOcclusion, "__call__", lambda self, V: self._baked.astype(np.float32))
