@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render import Camera, FixedCamera
 from ripple_sim.render.pose import Pose
-from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.scene.camera_entry import PATH_FIELDS, CameraEntry
 
 _MIN_FOCAL_DISTANCE = 0.02  # in distances of the camera from what it looks at: the near plane
 
@@ -25,8 +27,10 @@ def viewpoint(
     A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise
     MuJoCo's free camera, aimed at the model's middle where the scene says nothing else. With
     `orbit` either circles by that many degrees a second; with `track` the free camera moves along
-    with a body's centre of mass, and the named one turns towards it.
+    with a body's centre of mass, and the named one turns towards it. The keys of a path move the
+    free camera.
     """
+    entry = on_path(entry, time)
     tracked = None if entry.track is None else data.subtree_com[model.body(entry.track).id]
     if entry.name is not None:
         fixed = Camera.from_mjcf(model, data, entry.name)
@@ -48,6 +52,36 @@ def viewpoint(
         elevation=entry.elevation,
         fovy=entry.fovy,
     )
+
+
+def on_path(entry: CameraEntry, time: float) -> CameraEntry:
+    """The camera with the values that its keys give at a time [s].
+
+    Between keys a value follows the monotone cubic of Fritsch and Carlson ("Monotone piecewise
+    cubic interpolation", SIAM Journal on Numerical Analysis 17, 1980): it passes through every key
+    and overshoots none. It starts and ends at rest.
+    """
+    values: dict[str, Any] = {}
+    for name in PATH_FIELDS:
+        keys = [key for key in entry.key if getattr(key, name) is not None]
+        if keys:
+            times = np.array([key.time for key in keys])
+            value = _on_curve(times, np.array([getattr(key, name) for key in keys], float), time)
+            values[name] = tuple(value.tolist()) if value.ndim else float(value)
+    return msgspec.structs.replace(entry, **values)
+
+
+def _on_curve(
+    times: NDArray[np.float64], values: NDArray[np.float64], time: float
+) -> NDArray[np.float64]:
+    """A smooth curve through values [k] or [k, 3] at times [k], constant before and after."""
+    from scipy.interpolate import PchipInterpolator  # most cameras do without, and it loads slowly
+
+    # with equal values beyond both ends the curve is level there
+    all_times = np.array([times[0] - 1.0, *times, times[-1] + 1.0])
+    all_values = np.array([values[0], *values, values[-1]])
+    curve = PchipInterpolator(all_times, all_values)
+    return np.asarray(curve(np.clip(time, times[0], times[-1])))
 
 
 def focal_distance(

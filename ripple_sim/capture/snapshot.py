@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.render.height_map_textures import AnyHeightMap, MovedHeightMap
 from ripple_sim.render.pose import Pose
-from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.scene.camera_entry import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap
 from ripple_sim.solver.backends.gl_fields import DeviceField

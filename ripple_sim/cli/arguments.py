@@ -137,6 +137,7 @@ FrameRate = Annotated[
 Duration = Annotated[
     float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")
 ]
+CameraName = Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")]
 Resolution = Annotated[
     int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")
 ]

@@ -64,16 +64,7 @@ class _SceneCommand(SceneOptions):
     resolution: arguments.Resolution = SceneOptions.resolution
     layout: arguments.SceneLayout = SceneOptions.layout
     rim: arguments.Rim = SceneOptions.rim
-    camera: Annotated[
-        str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")
-    ] = None
-    """Name of a camera in the MJCF."""
-
-    def seen(self, scene: Scene) -> Scene:
-        """The scene, seen through the camera that the user named."""
-        from ripple_sim.scene.scene import through_camera
-
-        return scene if self.camera is None else through_camera(scene, self.camera)
+    camera: arguments.CameraName = SceneOptions.camera
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -110,7 +101,6 @@ class ExportCommand(_SceneCommand, ExportOptions):
         scene = find_scene(self.scene, seed=self.seed)
         for note in scene.notes:
             print(f"{Path(self.scene).name}: {note}", file=sys.stderr)
-        scene = self.seen(scene)
         with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
             summary = export_scene(scene, self.output, options, progress=progress)
         size = summary.output.stat().st_size if summary.output.is_file() else 0
@@ -203,8 +193,7 @@ class _VideoCommand(_SceneCommand, VideoOptions):
     compare: arguments.Baseline = VideoOptions.compare
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
     """Output file: .mp4, .webm, .gif or .webp, or a name without an ending for a folder of frames."""
-    device: arguments.Device = None
-    """Number of the EGL device to render on. By default the device in MUJOCO_EGL_DEVICE_ID, if it is set."""
+    device: arguments.Device = VideoOptions.device
     renderer: Literal["gl", "cycles"] = "gl"
     """gl is the OpenGL renderer. cycles is Blender's path tracer (needs bpy), at seconds to minutes a frame."""
     samples: arguments.Count = 64
@@ -234,15 +223,12 @@ class _VideoCommand(_SceneCommand, VideoOptions):
 
         check_options(self.options(), self.output)  # before anything that takes time
 
-        from ripple_sim.solver.gl import select_device, shared_context
         from ripple_sim.video.render_video import render_video
-        from ripple_sim.video.settings import frame_count, settled
+        from ripple_sim.video.settings import chosen_context, frame_count, settled
 
-        if self.device is not None:
-            select_device(self.device)
-        scene = self.seen(self.load())
+        scene = self.load()
         options = settled(self.options(), scene, self.output)
-        title = f"renderer {shared_context().renderer}, waves {options.backend}"
+        title = f"renderer {chosen_context(options).renderer}, waves {options.backend}"
         with frame_progress(title, frame_count(options)) as progress:
             summary = render_video(scene, self.output, options, progress=progress)
         resumed = (
@@ -271,7 +257,7 @@ class _VideoCommand(_SceneCommand, VideoOptions):
 
         from ripple_sim.video.settings import frame_count, settled
 
-        scene = self.seen(self.load())
+        scene = self.load()
         frames = frame_count(settled(self.options(), scene, self.output))
         with frame_progress(f"renderer Cycles, {self.samples} samples", frames) as progress:
             summary = render_cycles(

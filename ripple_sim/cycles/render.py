@@ -45,7 +45,7 @@ from ripple_sim.render.visuals.lights import (
 )
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
-from ripple_sim.scene.scene import Scene, with_exposure
+from ripple_sim.scene.scene import Scene, through_camera, with_exposure
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import warn_caller
 from ripple_sim.video.options import VideoOptions
@@ -250,6 +250,7 @@ def render_cycles(
     output = Path(output)
     python = check_cycles(options, output, samples)
     options = settled(dataclasses.replace(options, overlay=()), scene, output)
+    scene = through_camera(scene, options.camera)
     scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
     frames = frame_count(options)
     start = time.perf_counter()

@@ -19,8 +19,8 @@ from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.encode.part import Settings
 from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.render.visuals.visual import find_look, paint_of
-from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.scene_file import CameraEntry, check_camera
+from ripple_sim.scene.camera_entry import CameraEntry, check_camera
+from ripple_sim.scene.scene import Scene, through_camera
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
 from ripple_sim.video.settings import frame_count, origin
@@ -320,6 +320,7 @@ def export_scene(
     adopt_warnings()
     check_options(options)
     check_export(Path(output), options.overwrite, chunked=options.chunk is not None)
+    scene = through_camera(scene, options.camera)
     frames = frame_count(options, scene)
     simulation = Simulation.of(scene, options, on_step=on_step)
     if options.signals and not scene.sensors:

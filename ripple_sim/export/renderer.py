@@ -27,7 +27,7 @@ from ripple_sim.render.mujoco_cameras import (
 )
 from ripple_sim.render.visuals.lights import in_studio
 from ripple_sim.render.visuals.surroundings import followed_flags
-from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.scene.camera_entry import CameraEntry
 from ripple_sim.solver.errors import GLError, checked, instance, warn_caller, whole
 from ripple_sim.solver.gl import GLContext, shared_context
 

@@ -14,7 +14,7 @@ from ripple_sim.capture.scene_camera import viewpoint
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.encode.part import Settings
 from ripple_sim.render.pose import Pose
-from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.scene.camera_entry import CameraEntry
 from ripple_sim.solver.waves.sensor import Sensor
 
 from .moving_mesh import MovingMesh

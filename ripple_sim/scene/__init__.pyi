@@ -4,6 +4,12 @@ from .bodies import (
     drop_model as drop_model,
     randomize as randomize,
 )
+from .camera_entry import (
+    MAX_EXPOSURES as MAX_EXPOSURES,
+    CameraEntry as CameraEntry,
+    CameraKey as CameraKey,
+    check_camera as check_camera,
+)
 from .drop import (
     UP_AXES as UP_AXES,
     drop_scene as drop_scene,
@@ -51,13 +57,10 @@ from .scene import (
     with_exposure as with_exposure,
 )
 from .scene_file import (
-    MAX_EXPOSURES as MAX_EXPOSURES,
-    CameraEntry as CameraEntry,
     RippleEntry as RippleEntry,
     SceneFile as SceneFile,
     StillEntry as StillEntry,
     apply_maps as apply_maps,
-    check_camera as check_camera,
     parse_scene as parse_scene,
     uniform_material as uniform_material,
 )

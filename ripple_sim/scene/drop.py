@@ -21,12 +21,13 @@ from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.queries import RayScene
 
 from .bodies import BODY_SHAPES, TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
+from .camera_entry import CameraEntry
 from .events import Events
 from .loading import Edit, load_scene, refusal_of
 from .material_entry import COEFFICIENTS, MaterialEntry
 from .paint import paint_target
 from .scene import Scene
-from .scene_file import CameraEntry, RippleEntry
+from .scene_file import RippleEntry
 from .source import scene_path, shipped_scenes
 
 # Axes of a file that may point up.

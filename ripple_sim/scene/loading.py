@@ -33,11 +33,12 @@ from ripple_sim.solver.images import open_image
 from ripple_sim.solver.layouts.build import LAYOUTS
 
 from .bodies import RandomEntry, randomize
+from .camera_entry import check_camera
 from .events import DropEntry, Events, Script, ThrowEntry
 from .material_entry import PresetEntry, given_fields
 from .overlays import parse_request
 from .scene import Scene, check_duration
-from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
+from .scene_file import RippleEntry, SceneFile, parse_scene
 from .source import read_toml, scene_path
 from .target_maps import check_rim
 

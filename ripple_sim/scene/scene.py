@@ -10,8 +10,9 @@ import mujoco
 
 from ripple_sim.errors import SceneError
 
+from .camera_entry import CameraEntry, check_camera
 from .events import Events
-from .scene_file import CameraEntry, RippleEntry, SensorEntry, check_camera, converted
+from .scene_file import RippleEntry, SensorEntry, converted
 
 # Duration of a run, less than a day [s].
 MAX_DURATION = 86_400
@@ -75,11 +76,13 @@ class Scene:
         return {entry.geom: entry.contacts for entry in self.targets if entry.contacts is not None}
 
 
-def through_camera(scene: Scene, name: str) -> Scene:
-    """The scene seen through a camera of its model.
+def through_camera(scene: Scene, name: str | None) -> Scene:
+    """The scene seen through a camera of its model; None leaves it as it is.
 
     Raises `SceneError` if the model has no such camera.
     """
+    if name is None:
+        return scene
     camera = CameraEntry(name=name)
     check_camera(scene.model, camera)
     return dataclasses.replace(scene, camera=camera)

@@ -1,7 +1,7 @@
 """The TOML file of a scene: its tables, read strictly.
 
 `apply_maps` gives a target of `[[ripple]]` the maps of its material, the layer over what is inside,
-and parts without waves. `check_camera` compares `[camera]` with the model.
+and parts without waves.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import mujoco
 import numpy as np
 
 from ripple_sim.coupling.ripples import Ripples
@@ -24,12 +23,10 @@ from ripple_sim.solver import Material, texture_map, thickness_map
 from ripple_sim.solver.errors import shown
 
 from .bodies import RandomEntry
+from .camera_entry import CameraEntry
 from .events import ChangeEntry, ControlEntry, DropEntry, PlaceEntry, PokeEntry, ThrowEntry, Vector
 from .material_entry import MaterialEntry
 from .target_maps import HeightEntry, InsideEntry, moved
-
-# Most images of which a frame is the mean.
-MAX_EXPOSURES = 1024
 
 # Largest number in a file, in metres, seconds, newtons or degrees: no sensible scene has larger
 # ones, and their squares do not overflow.
@@ -39,87 +36,6 @@ Entry = typing.TypeVar("Entry")
 
 # sRGB, 0 to 1.
 Color = tuple[float, float, float]
-
-
-class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """`[camera]`: where the video is seen from."""
-
-    name: str | None = None
-    """A camera of the MJCF; by default MuJoCo's free camera."""
-    track: str | None = None
-    """A body to follow: the free camera moves along with its centre of mass, from which `lookat` then counts; a named
-    camera turns towards it."""
-    lookat: Vector | None = None
-    """Point that the free camera looks at [m]; by default the model's middle."""
-    distance: float | None = None
-    """From there [m]; by default by the model's extent."""
-    azimuth: float = 90.0
-    """As in MuJoCo's viewer [degrees]."""
-    elevation: float = -20.0
-    """Likewise; negative looks down."""
-    fovy: float = 45.0
-    """Vertical field of view [degrees]."""
-    orbit: float = 0.0
-    """Degrees per second by which the camera circles."""
-    shutter: float = 0.0
-    """Shutter angle [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that
-    time."""
-    aperture: float = 0.0
-    """Diameter of the lens [m]; 0: all is sharp. An f-number would need a focal length, which MuJoCo's cameras do not
-    have."""
-    focus: float | str | Vector | None = None
-    """What stays sharp: a distance along the camera's axis [m], the name of a body or a geom, or a point in the world
-    [m]; by default the point that the camera looks at."""
-    exposures: int = 32
-    """Images of which a frame is the mean where `shutter` or `aperture` is not 0; at most 1024."""
-
-
-def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Raise `SceneError` if the model lacks what a camera names, or an optic is impossible."""
-    body = mujoco.mjtObj.mjOBJ_BODY
-    geom = mujoco.mjtObj.mjOBJ_GEOM
-    if entry.name is not None and not _exists(model, mujoco.mjtObj.mjOBJ_CAMERA, entry.name):
-        cameras = _names(model, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam)
-        raise SceneError(f"the model has no camera {entry.name!r}; its cameras are {cameras}")
-    if entry.track is not None and not _exists(model, body, entry.track):
-        raise SceneError(
-            f"the model has no body {entry.track!r} for the camera to track; its bodies are "
-            f"{_names(model, body, model.nbody)}"
-        )
-    if isinstance(entry.focus, str) and not (
-        _exists(model, body, entry.focus) or _exists(model, geom, entry.focus)
-    ):
-        raise SceneError(
-            f"the model has nothing {entry.focus!r} for the camera to focus on; its bodies are "
-            f"{_names(model, body, model.nbody)}; its geoms are {_names(model, geom, model.ngeom)}"
-        )
-    _check_optics(entry)
-
-
-def _check_optics(entry: CameraEntry) -> None:
-    """Refuse numbers out of range."""
-    if not 0 <= entry.shutter <= 360:
-        _refuse("shutter angle", entry.shutter, "0 to 360 degrees")
-    if not 0 <= entry.aperture < np.inf:
-        _refuse("aperture", entry.aperture, "0 m or more")
-    if isinstance(entry.focus, float) and not 0 < entry.focus < np.inf:
-        _refuse("focus", entry.focus, "more than 0 m")
-    if not 1 <= entry.exposures <= MAX_EXPOSURES:
-        _refuse("number of exposures", entry.exposures, f"1 to {MAX_EXPOSURES}")
-
-
-def _refuse(name: str, value: object, valid: str) -> typing.NoReturn:
-    raise SceneError(f"the camera's {name} is {value!r}; valid is {valid}")
-
-
-def _exists(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
-    return bool(mujoco.mj_name2id(model, kind, name) >= 0)
-
-
-def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> str:
-    """Names of all bodies, geoms or cameras of a model, for a message."""
-    names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
-    return ", ".join(filter(None, names)) or "none"
 
 
 class StillEntry(msgspec.Struct, forbid_unknown_fields=True):

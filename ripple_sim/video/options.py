@@ -37,6 +37,8 @@ class SceneOptions:
     """Frames per second."""
     duration: float | None = None
     """Seconds of the scene."""
+    camera: str | None = None
+    """Name of a camera in the MJCF."""
     slow_motion: float = 1.0
     """Seconds of the output per second of the scene: 4 is four times slower."""
     resolution: int | None = None
@@ -100,6 +102,8 @@ class VideoOptions(SceneOptions):
     """Also run the scene with this wave operator and show both side by side."""
     resume: bool = False
     """Continue an interrupted render of the same scene with the same options."""
+    device: int | None = None
+    """Number of the EGL device to render on. By default the device in MUJOCO_EGL_DEVICE_ID, if it is set."""
 
     def __post_init__(self) -> None:
         check_fields(
@@ -109,6 +113,7 @@ class VideoOptions(SceneOptions):
             shutter=Valid(lambda angle: 0 <= angle <= 360, "0 to 360 degrees"),
             aperture=Valid(lambda metres: is_finite(metres) and metres >= 0, "0 m or more"),
             exposures=whole(1),
+            device=whole(0),
             **IN_ANY_CASE,
         )
 

@@ -36,15 +36,22 @@ from ripple_sim.overlay.painter import Painter
 from ripple_sim.overlay.placed_marks import PlacedMark, Projection, draw_marks, place_marks
 from ripple_sim.render import Surface
 from ripple_sim.scene.overlays import parse_request
-from ripple_sim.scene.scene import Scene, with_exposure
+from ripple_sim.scene.scene import Scene, through_camera, with_exposure
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.compile_clock import compile_times, work_clock
 from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance, user_line, work_for
-from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.gl import GLContext
 from ripple_sim.sound import Microphone, gain
 
 from .options import VideoOptions
-from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
+from .settings import (
+    EXPOSURE,
+    check_options,
+    chosen_context,
+    frame_count,
+    render_settings,
+    settled,
+)
 
 _END: Any = object()  # marks the end of an iterator
 
@@ -428,9 +435,10 @@ def render_video(
     output = Path(output)
     options = settled(options, scene, output)
     check_options(options, output)
+    scene = through_camera(scene, options.camera)
     scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
     frames = frame_count(options)
-    gl = shared_context()
+    gl = chosen_context(options)
     with open_video(output, options, render_settings(scene, options, frames, gl)) as writer:
         resumed_at = writer.frames
         operators = compared_operators(options.compare)

@@ -28,7 +28,7 @@ from ripple_sim.overlay.operators import compared_operators
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import Scene, check_duration
 from ripple_sim.solver.backends.choice import auto_backend
-from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.gl import GLContext, select_device, shared_context
 
 from .options import Backend, SceneOptions, VideoOptions
 
@@ -118,6 +118,13 @@ def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
         overlay=tuple(scene.overlay if options.overlay is None else options.overlay),
         backend=backend,
     )
+
+
+def chosen_context(options: VideoOptions) -> GLContext:
+    """The OpenGL context of the device that the options name."""
+    if options.device is not None:
+        select_device(options.device)
+    return shared_context()
 
 
 def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> Settings:

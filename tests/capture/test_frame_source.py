@@ -13,7 +13,7 @@ from PIL import Image
 from ripple_sim import Simulation, VideoOptions, render_video
 from ripple_sim.capture import FilmExposure, FrameSource, focal_distance, snapshots, viewpoint
 from ripple_sim.render import Camera, perspective, view_matrix
-from ripple_sim.scene import CameraEntry, Scene, check_camera, with_exposure
+from ripple_sim.scene import CameraEntry, CameraKey, Scene, check_camera, with_exposure
 
 FOCAL_PIXELS = HEIGHT / 2 / np.tan(np.radians(FOVY) / 2)
 
@@ -220,6 +220,45 @@ def test_an_orbiting_camera_goes_round_what_it_looks_at(world):
         np.testing.assert_allclose(after, [-before[1], before[0], before[2]], atol=1e-12)
         np.testing.assert_allclose(full.position, start.position, atol=1e-12)
         np.testing.assert_allclose(full.rotation, start.rotation, atol=1e-12)
+
+
+def test_a_camera_path_passes_through_its_keys_smoothly_and_overshoots_none(world):
+    entry = CameraEntry(
+        lookat=(0.0, 0.0, 1.0),
+        elevation=-30.0,
+        fovy=40.0,
+        key=[
+            CameraKey(time=1.0, distance=4.0, azimuth=350.0),
+            CameraKey(time=2.0, azimuth=370.0, lookat=(1.0, 0.0, 0.0)),
+            CameraKey(time=4.0, distance=2.0, azimuth=360.0, lookat=(0.0, 2.0, 0.0)),
+        ],
+    )
+    check_camera(world[0], entry)
+    times = np.arange(0.0, 5.0, 0.01)
+    cameras = [viewpoint(*world, entry, time) for time in times]
+    at = {time: viewpoint(*world, entry, time) for time in (1.0, 2.0, 4.0)}
+    assert [camera.azimuth for camera in at.values()] == [350.0, 370.0, 360.0]
+    assert (at[1.0].distance, at[4.0].distance) == (4.0, 2.0)
+    assert (at[2.0].lookat, at[4.0].lookat) == ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+    # what no key gives is the camera's, and a value moves between the keys that give it
+    assert {(camera.elevation, camera.fovy) for camera in cameras} == {(-30.0, 40.0)}
+    assert viewpoint(*world, entry, 2.5).distance == pytest.approx(3.0)
+    azimuths = np.array([camera.azimuth for camera in cameras])
+    assert azimuths.min() == 350.0
+    assert azimuths.max() == 370.0
+    # at rest before and after, and no jump of the velocity [degrees/s]: the acceleration is bounded
+    velocities = np.diff(azimuths) / 0.01
+    assert not velocities[times[:-1] < 0.995].any()
+    assert not velocities[times[1:] > 4.005].any()
+    assert np.abs(np.diff(velocities)).max() < 0.05 * np.abs(velocities).max()
+
+
+def test_a_camera_path_rides_on_a_tracked_body(world):
+    keys = [CameraKey(time=0.0, lookat=(0.0, 0.0, 0.5)), CameraKey(time=1.0, distance=3.0)]
+    entry = CameraEntry(track="cart", key=keys)
+    pose = viewpoint(*world, entry, 0.5).pose()
+    np.testing.assert_allclose(pose.focus, [0.5, 0.25, 2.0 + 0.5])
+    assert pose.distance == pytest.approx(3.0)
 
 
 def test_a_tracking_camera_moves_along_with_the_centre_of_mass(world):

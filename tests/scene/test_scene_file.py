@@ -10,7 +10,7 @@ from scene_files import write_scene
 
 from ripple_sim import Simulation, scene
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.scene import CameraEntry, Events, RippleEntry, Scene, StillEntry
+from ripple_sim.scene import CameraEntry, CameraKey, Events, RippleEntry, Scene, StillEntry
 from ripple_sim.solver import RippleError
 
 LEAST = {"model": "scene.xml", "ripple": [{"geom": "egg"}]}
@@ -87,6 +87,7 @@ def test_images_are_found_beside_the_scene_file_and_given_paths_stay() -> None:
 
 MODEL = mujoco.MjModel.from_xml_string(
     """<mujoco><worldbody><camera name="eye" pos="0 -3 1"/><camera pos="0 -3 1"/><camera name="side" pos="3 0 1"/>
+    <camera name="follower" pos="3 1 1" mode="targetbody" target="stone"/>
     <geom name="egg" size="0.1"/><body name="stone" pos="0 0 1"><geom name="pebble" size="0.05"/></body>
     </worldbody></mujoco>"""
 )
@@ -103,6 +104,9 @@ MODEL = mujoco.MjModel.from_xml_string(
         {"focus": (0.0, 0.0, 0.0)},
         {"focus": 1e-9},
         {"focus": "stone"},
+        {"name": "eye", "orbit": 5.0, "track": "stone"},
+        {"name": "follower", "orbit": 5.0},
+        {"orbit": 5.0, "key": [CameraKey(time=0.0, distance=1.0), CameraKey(time=1.0, fovy=9.0)]},
     ],
 )
 def test_valid_cameras_are_accepted(entry: dict) -> None:
@@ -112,8 +116,8 @@ def test_valid_cameras_are_accepted(entry: dict) -> None:
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        ({"name": "ear"}, "no camera 'ear'; its cameras are eye, side$"),
-        ({"name": ""}, "no camera ''; its cameras are eye, side$"),
+        ({"name": "ear"}, "no camera 'ear'; its cameras are eye, side, follower$"),
+        ({"name": ""}, "no camera ''; its cameras are eye, side, follower$"),
         (
             {"track": "pebble"},
             "no body 'pebble' for the camera to track; its bodies are world, stone$",
@@ -129,6 +133,25 @@ def test_valid_cameras_are_accepted(entry: dict) -> None:
         ({"shutter": np.nan}, "shutter angle is nan"),
         ({"aperture": -0.01}, "aperture is -0.01; valid is 0 m or more"),
         ({"aperture": np.inf}, "aperture is inf"),
+        (
+            {"name": "eye", "orbit": 5.0},
+            "'eye' of the model turns to no body, so orbit = 5 has no point to circle; add track",
+        ),
+        (
+            {"name": "eye", "key": [CameraKey(time=0.0, distance=1.0)]},
+            "moves the free camera, and the camera 'eye' of the model has a pose of its own",
+        ),
+        (
+            {"orbit": 5.0, "key": [CameraKey(time=0.0, azimuth=1.0)]},
+            "orbit = 5 and the azimuths of .* both turn the camera",
+        ),
+        (
+            {"key": [CameraKey(time=1.0, distance=1.0), CameraKey(time=1.0, distance=2.0)]},
+            "at 1 s follows one at 1 s; the times of keys must increase",
+        ),
+        ({"key": [CameraKey(time=0.5)]}, "at 0.5 s gives nothing but its time; give .*lookat"),
+        ({"key": [CameraKey(time=0.0, distance=0.0)]}, "distance is 0.0; valid is more than 0 m"),
+        ({"key": [CameraKey(time=0.0, fovy=180.0)]}, "fovy is 180.0; valid is between 0 and 180"),
         ({"exposures": 0}, "number of exposures is 0; valid is 1 to 1024"),
         ({"exposures": scene.MAX_EXPOSURES + 1}, "number of exposures is 1025"),
     ],
@@ -315,6 +338,20 @@ def test_through_camera_changes_the_camera_alone_and_not_the_scene_itself() -> N
     assert dataclasses.replace(after, camera=before.camera).__dict__ == before.__dict__
     with pytest.raises(SceneError, match="no camera 'ear'; its cameras are eye, side"):
         scene.through_camera(before, "ear")
+    assert scene.through_camera(before, None) is before
+
+
+def test_a_scene_file_gives_the_path_of_the_camera(tmp_path: Path) -> None:
+    keys = "[[camera.key]]\ntime = 0.0\nazimuth = 10\n[[camera.key]]\ntime = 1.5\nfovy = 30\n"
+    free = TOML.replace('name = "eye"', "elevation = -30.0") + keys
+    loaded = scene.load_scene(write_scene(tmp_path, MJCF, free))
+    assert loaded.camera.key == [
+        CameraKey(time=0.0, azimuth=10.0),
+        CameraKey(time=1.5, fovy=30.0),
+    ]
+    wrong = free.replace("azimuth", "azimut")
+    with pytest.raises(SceneError, match=r"'azimut' in \[camera.key\]; valid are time, lookat"):
+        scene.load_scene(write_scene(tmp_path, MJCF, wrong))
 
 
 def test_exposure_replaces_given_values_and_leaves_the_others() -> None:
@@ -324,6 +361,8 @@ def test_exposure_replaces_given_values_and_leaves_the_others() -> None:
         azimuth=12.0, shutter=180.0, aperture=0.1, focus="stone", exposures=8
     )
     assert scene.with_exposure(before).camera == before.camera
+    moving = filmed(key=[CameraKey(time=0.0, distance=1.0)])
+    assert scene.with_exposure(moving, shutter=180).camera.key == moving.camera.key
     assert scene.with_exposure(before, aperture=0.0).camera.aperture == 0.0, "0 is a value"
 
 

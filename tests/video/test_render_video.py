@@ -17,9 +17,9 @@ from PIL import Image
 from programs import ended
 from unfinished_videos import MJCF, contents, egg_scene, interrupting_at
 
-from ripple_sim import ExportOptions, Simulation, render_video
+from ripple_sim import ExportOptions, Simulation, export_scene, render_video
 from ripple_sim.encode import FRAMES_IN_CLIP
-from ripple_sim.errors import ExportError, VideoError
+from ripple_sim.errors import ExportError, SceneError, VideoError
 from ripple_sim.scene import MaterialEntry, Scene, load_scene
 from ripple_sim.solver.gl import GLContext
 from ripple_sim.video import VideoOptions, prefetched
@@ -306,6 +306,7 @@ def test_passes_of_another_video_are_not_replaced(scene: Scene, tmp_path: Path) 
         ({"resolution": "x"}, "resolution is 'x'; valid is int or None"),
         ({"frame_format": b"z"}, "frame format is b'z'; valid is 'png' or 'exr'"),
         ({"resume": np.zeros(2)}, "resume is array([0., 0.]); valid is bool"),
+        ({"device": -1}, "device is -1; valid is a whole number, 0 or greater"),
     ],
 )
 def test_options_are_checked_where_they_are_made(given: dict[str, Any], message: str) -> None:
@@ -314,6 +315,16 @@ def test_options_are_checked_where_they_are_made(given: dict[str, Any], message:
     if set(given) & {"size", "fps", "duration", "slow_motion", "resolution"}:
         with pytest.raises(ExportError, match=f"^{re.escape(message)}"):
             ExportOptions(**given)
+
+
+def test_a_camera_that_the_model_lacks_is_refused_before_anything_is_written(
+    scene: Scene, tmp_path: Path
+) -> None:
+    with pytest.raises(SceneError, match="no camera 'ear'"):
+        render_video(scene, tmp_path / "clip.mp4", VideoOptions(camera="ear"))
+    with pytest.raises(SceneError, match="no camera 'ear'"):
+        export_scene(scene, tmp_path / "clip.html", ExportOptions(camera="ear"))
+    assert not list(tmp_path.glob("clip*"))
 
 
 @pytest.mark.parametrize("name", ["progress", "on_step", "on_frame"])
