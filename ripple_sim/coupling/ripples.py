@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Load, Material, SolverError, WaveSolver
+from ripple_sim.solver import Load, Material, SolverError
 from ripple_sim.solver.errors import checked, warn_caller, whole
+from ripple_sim.solver.mesh.points import check_points
 from ripple_sim.solver.operator.plate_rim import Rim
-from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
 
 from .amplitude_check import AmplitudeCheck
@@ -44,6 +44,7 @@ from .stepping import (
 )
 from .target import Target, contacts_of, named_targets
 from .target_warnings import collision_warnings
+from .target_waves import Surface, TargetWaves, Whereabouts
 from .tunnelling import TunnellingCheck
 from .two_way import TwoWay, require_suited_options
 
@@ -149,7 +150,10 @@ class Ripples:
         options = {"backend": backend, "operator": operator}
         # what pushes back, and pulses of hits, need all of a force
         can_ease = not two_way and all(target.pulse == "contact" for target in targets.values())
-        self._surfaces, self._easings = rippling_surfaces(self.model, targets, options, can_ease)
+        self._whereabouts = Whereabouts(self.model)
+        self._surfaces, self._easings = rippling_surfaces(
+            self.model, targets, options, self._whereabouts, can_ease
+        )
         # by geom id; shared with all who load or read the waves, and see new ones as soon as they
         # are in here
         self._waves = {surface.geom: surface.waves for surface in self._surfaces.values()}
@@ -194,7 +198,7 @@ class Ripples:
                 'integrator="implicitfast", or a short time step'
             )
 
-    def __getitem__(self, name: GeomKey) -> WaveSolver:
+    def __getitem__(self, name: GeomKey) -> TargetWaves:
         """Waves of a geom, by name or id."""
         return self._surface(name).waves
 
@@ -438,6 +442,36 @@ class Ripples:
         soft = self._soft.get(surface.geom)
         return surface.waves.vertices if soft is None else soft.vertices(data)
 
+    def surface(self, name: GeomKey, data: mujoco.MjData | None = None) -> Surface:
+        """The surface of a target in the world, displaced by its waves.
+
+        The triangles are those of the target's mesh, the same at all times. Each vertex is moved
+        along its normal by the height there, in full: frames show less of heights that are too
+        large for the object, see `DisplacementLimit`. Waves that are shorter than the edges of the
+        mesh are not to be seen in it; a .ply or .glb file of `Exporter` has triangles as fine as
+        the texels.
+
+        Parameters
+        ----------
+        name : str or int
+            Geom.
+        data : mujoco.MjData, optional
+            By default that of the latest `step`, as it is now; see `TargetWaves.to_world`.
+
+        Returns
+        -------
+        Surface
+            `V, F, normals = ripples.surface(name)`: vertices [m] float64 [n, 3], triangles int64
+            [m, 3], and unit normals float64 [n, 3].
+
+        Raises
+        ------
+        SceneError
+            For an unknown geom, or if `data` belongs to another model.
+        """
+        state = self._whereabouts.data(data)
+        return self._surface(name).waves.surface(state, self.vertices(name, state))
+
     def reset(self) -> None:
         """Flatten all surfaces, and let time begin anew."""
         self._clock.restart()
@@ -448,6 +482,7 @@ class Ripples:
         self._check_amplitude.ignore(self._surface(name).geom)
 
     def _follow(self, data: mujoco.MjData) -> None:
+        self._whereabouts.follow(data)
         passed = self._clock.look(self.model, data)
         # whether MuJoCo's automatic reset is disabled, and its state is broken since the last one
         broken = bool(self.model.opt.disableflags & NO_RESET) and divergence(data) is not None

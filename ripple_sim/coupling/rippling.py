@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver import Material
 from ripple_sim.solver.operator.regions import hold
 
 from .easing import EasingLaw
@@ -21,6 +21,7 @@ from .soft import is_soft, target_pose
 from .suited import suited_targets
 from .target import Target
 from .target_mesh import target_atlas
+from .target_waves import TargetWaves, Whereabouts
 from .watched import WatchedShape
 
 
@@ -35,7 +36,7 @@ class RipplingSurface:
     material : Material
     options : mapping
         Keyword arguments of `WaveSolver`.
-    waves : WaveSolver
+    waves : TargetWaves
     held : float64 [C, n, n], optional
         Shares of the texels that are held still, 0 to 1.
     layout : str
@@ -47,7 +48,7 @@ class RipplingSurface:
     geom: int
     material: Material
     options: Mapping[str, Any]
-    waves: WaveSolver
+    waves: TargetWaves
     held: NDArray[np.float64] | None = None
     layout: str = "auto"
     shape: WatchedShape | None = None
@@ -71,7 +72,7 @@ class RipplingSurface:
                     "to the old one: make new Ripples for the model as it is now"
                 )
         atlas = target_atlas(model, self.geom, old.rest.resolution, self.layout)
-        new = WaveSolver(atlas, self.material, **self.options)
+        new = old.on(atlas, self.material, **self.options)
         new.listeners.find_points = old.listeners.find_points
         return dataclasses.replace(self, waves=new, shape=WatchedShape(model, self.geom))
 
@@ -85,7 +86,7 @@ class RipplingSurface:
         material = changed.material
         if changed.held is not None:
             material = hold(old.rest, material, changed.held)
-        new = WaveSolver(old.rest, material, **changed.options)
+        new = old.on(old.rest, material, **changed.options)
         if old.vertices is not None:
             new.move(old.vertices)
         new.state = old.state
@@ -128,7 +129,11 @@ def site_on(model: mujoco.MjModel, geom: int, name: str) -> NDArray[np.float64]:
 
 
 def rippling_surfaces(
-    model: mujoco.MjModel, targets: Mapping[str, Target], options: Mapping[str, Any], can_ease: bool
+    model: mujoco.MjModel,
+    targets: Mapping[str, Target],
+    options: Mapping[str, Any],
+    whereabouts: Whereabouts,
+    can_ease: bool,
 ) -> tuple[dict[str, RipplingSurface], dict[int, EasingLaw]]:
     """The surfaces of targets, by name, and the laws by which forces on them are eased, by geom id.
 
@@ -139,6 +144,7 @@ def rippling_surfaces(
         By name; see `named_targets`.
     options : mapping
         Keyword arguments of `WaveSolver` that are common to all.
+    whereabouts : Whereabouts
     can_ease : bool
         Whether a target whose density is chosen may take up less than all of a heavy body's forces,
         see `Easing`.
@@ -153,7 +159,7 @@ def rippling_surfaces(
         own_options = {**options, "rim": target.rim, "conserve_volume": target.conserve_volume}
         material = suited.materials[name]
         atlas = target_atlas(model, geom, suited.resolutions[name], layout)
-        waves = WaveSolver(atlas, material, **own_options)
+        waves = TargetWaves(whereabouts, geom, atlas, material, **own_options)
         waves.listeners.find_points = functools.partial(site_on, model, geom)
         shape = WatchedShape(model, geom)
         surfaces[name] = RipplingSurface(

@@ -6,9 +6,10 @@ import igl
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..kernel import Floats, Floats32, Ints
+from .points import check_points
 
 # Distances beyond this are misses, in lengths of a ray's direction: Embree's distance of a miss is
 # 1e37.
@@ -30,13 +31,34 @@ class ClosestPoints:
         self._tree = igl.AABB()
         self._tree.init(self._V, self._F)
 
-    def __call__(self, points: Floats) -> tuple[Ints, Floats]:
-        """Triangle nearest to each point [k, 3], [k], and the nearest point on it, [k, 3]."""
+    def __call__(self, points: ArrayLike) -> tuple[Ints, Floats]:
+        """Find the triangle nearest to each point, and the nearest point on it.
+
+        Parameters
+        ----------
+        points : [k, 3] or [3]
+            [m].
+
+        Returns
+        -------
+        triangles : int64 [k]
+        closest : float64 [k, 3]
+            [m].
+
+        Raises
+        ------
+        AtlasError
+            If the points are not finite, or not of shape [k, 3] or [3].
+        """
+        return self.nearest(check_points(points))
+
+    def nearest(self, points: Floats) -> tuple[Ints, Floats]:
+        """Like `__call__`, for points [k, 3] that need no check."""
         return self._tree.squared_distance(self._V, self._F, points)[1:]
 
-    def distances(self, points: Floats) -> Floats:
-        """Distance from each point [k, 3] to the triangles, [k]."""
-        return np.sqrt(self._tree.squared_distance(self._V, self._F, points)[0])
+    def distances(self, points: ArrayLike) -> Floats:
+        """Distance from each point [k, 3] to the triangles [m], [k]."""
+        return np.sqrt(self._tree.squared_distance(self._V, self._F, check_points(points))[0])
 
 
 class RayScene:

@@ -10,17 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import PATH, AtlasError, checked, shown
+from ..errors import PATH, AtlasError, checked
 from ..mesh.mesh import Mesh
+from ..mesh.points import check_points
 from ..mesh.queries import ClosestPoints
 from .atlas_file import check_atlas_place, write_atlas_file
 from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
 from .halo import sampling_matrix
 from .texel_mesh import TexelMesh, texel_quality
-
-# Greatest coordinate of a point [m]: squares of a greater one overflow on the way to the nearest
-# surface point.
-_FARTHEST = 1e100
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -109,7 +106,7 @@ class Atlas:
         AtlasError
             If the points are not finite or not of shape [k, 3] or [3].
         """
-        triangle, closest = self.closest_points(check_points(points))
+        triangle, closest = self.closest_points(points)
         return closest, self.chart_map.coordinates(self.mesh, triangle, closest)
 
     def locate(
@@ -133,12 +130,12 @@ class Atlas:
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Like `nearest`, for points [k, 3] that need no check."""
-        triangle, closest = self.closest_points(points)
+        triangle, closest = self.closest_points.nearest(points)
         return closest, self.chart_map.texels_at(self.mesh, self.resolution, triangle, closest)
 
     def closest_places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Closest surface points [m], [k, 3], without texels; for points that need no check."""
-        return self.closest_points(points)[1]
+        return self.closest_points.nearest(points)[1]
 
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
         """Flat indices (chart N + row) N + column of the texels nearest in the atlas, [k]."""
@@ -228,23 +225,5 @@ class Atlas:
 
     @functools.cached_property
     def closest_points(self) -> ClosestPoints:
-        """Finds the nearest points of the mesh."""
+        """Find the nearest points of the mesh: `atlas.closest_points(points)`, see `ClosestPoints`."""
         return ClosestPoints(self.mesh.V, self.mesh.F)
-
-
-def check_points(points: ArrayLike) -> NDArray[np.float64]:
-    """Points as float64 [k, 3], or `AtlasError`."""
-    try:
-        array = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise AtlasError(
-            f"points are {shown(points)}; valid are numbers of shape [3] or [k, 3], in metres"
-        ) from error
-    if array.ndim == 0 or array.shape[-1] != 3 or array.ndim > 2:
-        raise AtlasError(f"points have shape {array.shape}; valid is [3] or [k, 3], in metres")
-    if not (np.abs(array) < _FARTHEST).all():
-        raise AtlasError(
-            f"points hold NaN or numbers beyond {_FARTHEST:g}; valid are finite coordinates in "
-            "metres"
-        )
-    return np.ascontiguousarray(array.reshape(-1, 3))

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError, is_finite, shown
 from ..kernel import Floats, Ints, kernel
-from ..texels.atlas import Atlas, check_points
+from ..mesh.points import check_points
+from ..texels.atlas import Atlas
 from ..texels.distance import Scratch, clean, distance_scratch, distance_to, march, seeded
 from ..texels.texel_mesh import TexelGrid
 from .finite import require_finite

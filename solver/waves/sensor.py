@@ -19,7 +19,7 @@ from ..backends.kernels import Probes
 from ..errors import POSITIVE, SolverError, shown
 from ..operator.material import Material, frequency
 from ..operator.wave_operator import WaveOperator
-from ..texels.atlas import Atlas, check_points
+from ..texels.atlas import Atlas
 from ..texels.topology import TexelTopology
 
 UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "height": "m", "strain": "1"}
@@ -169,7 +169,7 @@ class Sensor:
                 f"'strain', that of the "
                 "sheet that is bent, and none for the others"
             )
-        self.points, centers = atlas.nearest(check_points(points))
+        self.points, centers = atlas.nearest(points)
         self.kind = kind
         self.rate = float(rate)
         laplacian = -thickness / 4 if thickness is not None else None

@@ -113,7 +113,8 @@ def test_balls_give_their_momentum_where_they_hit_the_visible_surface(
     off = []
     model = run.model
     data = run.data
-    atlas = run.ripples["target"].atlas
+    waves = run.ripples["target"]
+    atlas = waves.atlas
     ball = data.joint(model.body("ball").jntadr[0])
     target = data.geom("target")
     # not on the waist, where a ball touches two pieces at once: their impulses have no one
@@ -127,7 +128,7 @@ def test_balls_give_their_momentum_where_they_hit_the_visible_surface(
         given = 0.0
         lost = 0.0
         texel = rng.choice(lobes)
-        aim = target.xpos + rotation @ atlas.positions.reshape(-1, 3)[texel]
+        aim = waves.to_world(atlas.positions.reshape(-1, 3)[texel], data)
         way = rotation @ atlas.normals.reshape(-1, 3)[texel] + 0.3 * rng.standard_normal(3)
         way /= np.linalg.norm(way)
         ball.qpos[:3] = aim + 0.5 * way
@@ -136,10 +137,8 @@ def test_balls_give_their_momentum_where_they_hit_the_visible_surface(
             before = ball.qvel[:3].copy()
             for hit in run.step():
                 given += hit.impulse
-                local, there = (
-                    (at - target.xpos) @ rotation for at in (data.geom("ball").xpos, hit.point)
-                )
-                off.append(np.linalg.norm(there - atlas.project(local)[0][0]))
+                nearest, _ = atlas.project(waves.from_world(data.geom("ball").xpos))
+                off.append(np.linalg.norm(waves.from_world(hit.point) - nearest))
             lost += 0.2 * np.linalg.norm(ball.qvel[:3] - before)
         assert lost > 0.3
         assert given == pytest.approx(lost, rel=0.01)

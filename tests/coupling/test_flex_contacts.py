@@ -87,16 +87,15 @@ def test_impulses_lie_where_the_balls_are_nearest_to_the_true_surface() -> None:
     run = Run(spec, "target", resolution=48)
     off = []
     data = run.data
-    atlas = run.ripples["target"].atlas
+    waves = run.ripples["target"]
+    atlas = waves.atlas
+    texel = np.sqrt(atlas.areas.mean())
     data.qvel.reshape(-1, 6)[:, :3] = -directions
     while data.time < 0.6:
         for hit in run.step():
-            position = data.geom("target").xpos
-            rotation = data.geom("target").xmat.reshape(3, 3)
-            nearest, _ = atlas.project((data.geom(hit.other).xpos - position) @ rotation)
-            off.append(np.linalg.norm((hit.point - position) @ rotation - nearest))
+            nearest, _ = atlas.project(waves.from_world(data.geom(hit.other).xpos))
+            off.append(np.linalg.norm(waves.from_world(hit.point) - nearest))
     assert len(run.pairs) == len(directions)
-    texel = np.sqrt(atlas.areas.mean())
     assert np.median(off) < 0.3 * texel
     assert np.quantile(off, 0.99) < texel
 

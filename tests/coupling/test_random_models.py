@@ -76,10 +76,10 @@ class Hit:
 
     def _look_at_place(self, data: mujoco.MjData, impulse: Impulse, kind: str) -> None:
         """How far from the true surface an impulse lies, over its size, and whether it faces what it pushes away."""
-        atlas = self.ripples[impulse.geom].atlas
-        geom = data.geom(impulse.geom)
-        rotation = geom.xmat.reshape(3, 3)
-        local = (impulse.point - geom.xpos) @ rotation
+        waves = self.ripples[impulse.geom]
+        atlas = waves.atlas
+        rotation = data.geom(impulse.geom).xmat.reshape(3, 3)
+        local = waves.from_world(impulse.point, data)
         off = np.linalg.norm(atlas.project(local)[0][0] - local)
         self.off = max(self.off, off / np.ptp(atlas.mesh.V, axis=0).max())
         pair = impulse.geom, impulse.other

@@ -14,16 +14,14 @@ from ripple_sim import Material, Ripples
 
 
 def impulses(model: mujoco.MjModel, geom: str, seconds: float, **options):
-    """Run; return the ripples, and every impulse with the data's pose of the target at that moment."""
+    """Run; return the ripples, and every impulse with the middle of the ball at that moment."""
     run = Run(
         model, geom, material=Material(speed=0.5, density=50.0), conserve_volume=True, **options
     )
     record = []
     while run.data.time < seconds:
         hits = run.step()
-        placed = run.data.geom(geom)
-        pose = placed.xpos.copy(), placed.xmat.reshape(3, 3).copy()
-        record += [(hit, pose, run.data.body("ball").xpos.copy()) for hit in hits]
+        record += [(hit, run.data.body("ball").xpos.copy()) for hit in hits]
     return run.ripples, record
 
 
@@ -43,7 +41,7 @@ def test_ball_on_a_concave_mesh_hits_the_surface_under_it(transform: str, placin
     data = forwarded(probe)
     ripples = Ripples(probe, {"target": Material()}, resolution=64, backend="cpu")
     mesh = ripples["target"].atlas.mesh
-    world = mesh.V @ data.geom("target").xmat.reshape(3, 3).T + data.geom("target").xpos
+    world = ripples["target"].to_world(mesh.V, data)
     # a place on the saddle between shoulder and hip: inside the convex hull
     middle = world.mean(axis=0)
     near = world[np.linalg.norm(world[:, :2] - middle[:2], axis=1) < 0.03]
@@ -51,14 +49,15 @@ def test_ball_on_a_concave_mesh_hits_the_surface_under_it(transform: str, placin
     model = model_of(geom + BALL.format(f"{top[0]} {top[1]} {top[2] + 0.15}"), asset)
     ripples, record = impulses(model, "target", 0.4, resolution=64)
     assert record
-    for impulse, (position, rotation), ball in record[:3]:
-        local = (impulse.point - position) @ rotation
+    waves = ripples["target"]  # the target stands still
+    atlas = waves.atlas
+    for impulse, ball in record[:3]:
+        local = waves.from_world(impulse.point)
         # on the true surface ...
-        closest, _ = ripples["target"].atlas.project(local)
+        closest, _ = atlas.project(local)
         assert np.linalg.norm(closest[0] - local) < 1e-9
         # ... where it is nearest to the ball's middle, which is where a ball touches
-        touching, _ = ripples["target"].atlas.project((ball - position) @ rotation)
-        atlas = ripples["target"].atlas
+        touching, _ = atlas.project(waves.from_world(ball))
         texel = impulse.texel
         assert np.linalg.norm(atlas.positions[texel] - touching[0]) < np.sqrt(atlas.areas[texel])
         assert np.linalg.norm(impulse.point - ball) == pytest.approx(0.05, abs=0.012)
@@ -92,10 +91,7 @@ def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> 
             for impulse in run.step():
                 hits += 1
                 forces = np.maximum(contact_forces(model, data)[:, 0], 0.0)
-                world = (
-                    atlas.mesh.V @ data.geom("target").xmat.reshape(3, 3).T
-                    + data.geom("target").xpos
-                )
+                world = run.ripples["target"].to_world(atlas.mesh.V)
                 weighted = forces @ data.contact.pos / forces.sum()
                 _, _, nearest = igl.point_mesh_squared_distance(weighted[None], world, atlas.mesh.F)
                 texel = np.sqrt(atlas.areas[impulse.texel])

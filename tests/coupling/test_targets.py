@@ -38,7 +38,6 @@ def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None
     run = Run(model, "target", resolution=16, conserve_volume=True)
     mujoco.mj_forward(model, data := run.data)
     ripples = run.ripples
-    geom = data.geom("target")
     end = model.site("end").pos
     if place == "poke":
         with pytest.warns(
@@ -53,7 +52,7 @@ def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None
         ripples.make_rigid("target", end, 0.1)
         chosen = ~ripples["target"].operator.movable
     atlas = ripples["target"].atlas
-    world = atlas.positions[chosen] @ geom.xmat.reshape(3, 3).T + geom.xpos
+    world = ripples["target"].to_world(atlas.positions[chosen], data)
     assert 2 < len(world) < 60
     assert np.linalg.norm(world - data.site("end").xpos, axis=1).max() < 0.12
 
@@ -139,8 +138,7 @@ def test_a_sensor_on_a_site_goes_on_when_the_material_changes() -> None:
     data = forwarded(model)
     ripples = Run(model, "target", resolution=16, conserve_volume=True).ripples
     sensor = ripples["target"].sensor("end", "velocity", 1000.0)
-    geom = data.geom("target")
-    world = sensor.points @ geom.xmat.reshape(3, 3).T + geom.xpos
+    world = ripples["target"].to_world(sensor.points, data)
     assert np.linalg.norm(world - data.site("end").xpos) < 0.02
     ripples.poke("target", [1, 0, -0.3], 0.01, 0.1)
     ripples["target"].step(1.0)

@@ -20,9 +20,10 @@ from scipy.sparse import csr_array
 from ...errors import POSITIVE, AtlasError, checked
 from ...kernel import Floats, Ints, kernel
 from ...mesh.mesh import Mesh
+from ...mesh.points import check_points
 from ...mesh.queries import RayScene
 from ...mesh.vectors import cross, dot
-from ...texels.atlas import Atlas, check_points
+from ...texels.atlas import Atlas
 from ...texels.barycentrics import barycentrics_at
 from ...texels.chart_map import Parts, uncut
 from ...texels.detours import link_detours
